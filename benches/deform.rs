@@ -6,7 +6,8 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ventriform::deform::{DeformParameters, fit};
+use ventriform::deform::DeformParameters;
+use ventriform::fit::fit;
 use ventriform::grid::voxelise::voxelise;
 use ventriform::locate;
 use ventriform::model::{Organ, Template};
@@ -63,7 +64,7 @@ fn benchmarks(criterion: &mut Criterion) {
     });
     let fitted = fit(&volume, &template, &settings, &monitor).expect("the phantom has a heart");
     group.bench_function("voxelise 128³", |b| {
-        b.iter(|| voxelise(black_box(&fitted.mesh), volume.shape, &volume.frame));
+        b.iter(|| voxelise(black_box(&fitted.model.mesh), volume.shape, &volume.frame));
     });
     group.finish();
 }

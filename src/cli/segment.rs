@@ -135,7 +135,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     for warning in made.warnings() {
         note!("warning: {warning}");
     }
-    for flag in &made.segmentation.fit.flags {
+    for flag in &made.segmentation.fit.judgement.flags {
         note!("warning: {flag}");
     }
     Ok(())
@@ -168,12 +168,12 @@ fn reader(path: &Path) -> Result<NamedReader> {
 fn headline(s: &Segmentation) -> String {
     let mut line = format!(
         "{} after {} steps, confidence {:.2}; wall {:.1} ml",
-        s.fit.reason.as_str(),
-        s.fit.iterations,
-        s.fit.confidence,
-        s.fit.wall_ml
+        s.fit.model.reason.as_str(),
+        s.fit.model.iterations,
+        s.fit.judgement.confidence,
+        s.fit.model.wall_ml
     );
-    if let Some(wall) = &s.fit.wall {
+    if let Some(wall) = &s.fit.model.wall {
         line += &format!(", cavity {:.1} ml", wall.cavity_ml);
     }
     if let Some(a) = &s.agreement {

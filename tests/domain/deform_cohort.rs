@@ -66,7 +66,10 @@ fn no_patient_of_the_cohort_is_lost() {
         .unwrap();
         let agreement = made.agreement.unwrap();
         assert!(agreement.jaccard > 0.7, "{case}: {agreement:?}");
-        assert_eq!(made.fit.self_intersections + made.fit.turned_triangles, 0);
+        assert_eq!(
+            made.fit.model.self_intersections + made.fit.model.turned_triangles,
+            0
+        );
     }
 }
 
@@ -119,5 +122,5 @@ fn a_clinical_scan_is_segmented_where_its_expert_drew_alike_in_every_container()
     assert!(converted.voxels == scan.voxels);
     let again = segmented(&converted);
     assert_eq!(again.mask, made.mask);
-    assert_eq!(again.fit.mesh.vertices, made.fit.mesh.vertices);
+    assert_eq!(again.fit.model.mesh.vertices, made.fit.model.mesh.vertices);
 }

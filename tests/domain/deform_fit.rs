@@ -7,12 +7,14 @@ use nalgebra::Rotation3;
 use ventriform::deform::dynamics::{self, Motion, StopReason};
 use ventriform::deform::elastic::{Elastic, Stiffness};
 use ventriform::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
-use ventriform::deform::{DeformError, DeformParameters, Fit, Flag, WallEdge, fit};
+use ventriform::deform::{DeformError, DeformParameters, WallEdge};
+use ventriform::fit::{Fit, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::agreement::compare;
 use ventriform::grid::field::Field;
 use ventriform::grid::voxelise::voxelise;
+use ventriform::judge::Flag;
 use ventriform::locate::{Hints, LocateError};
 use ventriform::mesh::{TriMesh, shapes};
 use ventriform::model::struts::struts;
@@ -107,14 +109,14 @@ fn a_sphere_grows_onto_a_sphere_and_a_shifted_one_comes_back() {
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-        assert_eq!(fit.reason, StopReason::Converged);
+        assert_eq!(fit.model.reason, StopReason::Converged);
         // A polyhedron that follows the sphere in the mean has corners outside and faces
         // inside: compare the radius of equal volume.
-        let found = (3.0 * fit.mesh.volume() / (4.0 * std::f64::consts::PI)).cbrt();
+        let found = (3.0 * fit.model.mesh.volume() / (4.0 * std::f64::consts::PI)).cbrt();
         // Blur of 2 mm moves the steepest slope of a ball inward by sigma²/R.
         let edge = radius - 4.0 / radius;
         assert!((found - edge).abs() < 0.1 * SPACING, "{found} for {edge}");
-        let middle: Vec3 = fit.mesh.vertices.iter().sum::<Vec3>() / 162.0;
+        let middle: Vec3 = fit.model.mesh.vertices.iter().sum::<Vec3>() / 162.0;
         assert!((middle - centre).norm() < 0.1 * SPACING, "{middle}");
     }
 }
@@ -178,11 +180,18 @@ fn a_ventricle_is_found_and_fitted_beside_a_hotter_organ() {
     ));
     let parameters = DeformParameters::default();
     let first = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-    assert!(jaccard(&first.mesh, &truth, &volume) > 0.75);
-    assert!(first.confidence > 0.5, "{}", first.confidence);
-    assert_eq!(first.self_intersections + first.turned_triangles, 0);
+    assert!(jaccard(&first.model.mesh, &truth, &volume) > 0.75);
+    assert!(
+        first.judgement.confidence > 0.5,
+        "{}",
+        first.judgement.confidence
+    );
+    assert_eq!(
+        first.model.self_intersections + first.model.turned_triangles,
+        0
+    );
     let again = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-    assert_eq!(first.mesh, again.mesh);
+    assert_eq!(first.model.mesh, again.model.mesh);
 }
 
 #[test]
@@ -211,9 +220,9 @@ fn a_defect_without_any_uptake_does_not_draw_the_surface_inward() {
     let parameters = DeformParameters::default();
     let volumes = [&healthy, &defect].map(|v| {
         let fit = fit(v, &template, &parameters, &Monitor::silent()).unwrap();
-        let agreement = jaccard(&fit.mesh, &truth, v);
+        let agreement = jaccard(&fit.model.mesh, &truth, v);
         assert!(agreement > 0.7, "{agreement}");
-        fit.wall_ml
+        fit.model.wall_ml
     });
     assert!((volumes[1] / volumes[0] - 1.0).abs() < 0.1, "{volumes:?}");
 }
@@ -237,7 +246,7 @@ fn a_turned_and_moved_patient_gives_the_same_volume() {
             &Monitor::silent(),
         )
         .unwrap();
-        volumes.push(fit.wall_ml);
+        volumes.push(fit.model.wall_ml);
     }
     let mean = volumes.iter().sum::<f64>() / 4.0;
     let sd = (volumes.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 4.0).sqrt();
@@ -258,8 +267,8 @@ fn the_anatomical_edge_subtracts_what_blur_adds() {
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-        assert_eq!(fit.self_intersections + fit.turned_triangles, 0);
-        jaccard(&fit.mesh, &truth, &volume)
+        assert_eq!(fit.model.self_intersections + fit.model.turned_triangles, 0);
+        jaccard(&fit.model.mesh, &truth, &volume)
     });
     assert!(agreement[1] > agreement[0] + 0.02, "{agreement:?}");
 }
@@ -310,7 +319,7 @@ fn both_sides_of_a_clear_wall_lie_at_its_apparent_edge() {
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &monitor).unwrap();
-        beyond(&fit.mesh, &apparent, &centre, &axis())
+        beyond(&fit.model.mesh, &apparent, &centre, &axis())
     });
     for (a, b) in half_maximum.iter().zip(&gradient) {
         let all = format!("{half_maximum:?} {gradient:?}");
@@ -333,7 +342,10 @@ fn a_margin_moves_both_sides_and_the_rim_outwards() {
             margin,
             ..DeformParameters::default()
         };
-        let mesh = fit(&volume, &template, &parameters, &monitor).unwrap().mesh;
+        let mesh = fit(&volume, &template, &parameters, &monitor)
+            .unwrap()
+            .model
+            .mesh;
         let [inner, outer] = beyond(&mesh, &truth, &centre, &axis());
         let basal = mesh.vertices.iter().map(|p| -(p - centre).dot(&axis()));
         [inner, outer, basal.fold(f64::MIN, f64::max)]
@@ -386,10 +398,10 @@ fn merit_falls_with_misfit_strain_and_doubts_and_rises_with_what_is_seen() {
         change(&mut fit);
         fit.merit()
     };
-    let usual = merit(&|fit| fit.strain = 0.0);
+    let usual = merit(&|fit| fit.model.strain = 0.0);
     let falls = |change: &dyn Fn(&mut Fit), by: f64| {
         let changed = merit(&|fit| {
-            fit.strain = 0.0;
+            fit.model.strain = 0.0;
             change(fit);
         });
         assert!(
@@ -397,11 +409,15 @@ fn merit_falls_with_misfit_strain_and_doubts_and_rises_with_what_is_seen() {
             "{usual} {changed} {by}"
         );
     };
-    falls(&|fit| fit.active -= 0.1, 0.1);
-    falls(&|fit| fit.residual += 1.0, 0.05);
-    falls(&|fit| fit.strain = 0.04, 0.1);
+    falls(&|fit| fit.model.active -= 0.1, 0.1);
+    falls(&|fit| fit.model.residual += 1.0, 0.05);
+    falls(&|fit| fit.model.strain = 0.04, 0.1);
     falls(
-        &|fit| fit.flags.push(Flag::UncertainPlace { confidence: 0.1 }),
+        &|fit| {
+            fit.judgement
+                .flags
+                .push(Flag::UncertainPlace { confidence: 0.1 })
+        },
         0.02,
     );
 }
@@ -412,16 +428,16 @@ fn merit_falls_with_the_change_of_length_where_the_apex_does_not_show() {
     let volume = scan(&cup(Vec3::new(5.0, -8.0, 3.0), axis(), 1.05), 56, |_| 1.0);
     let parameters = DeformParameters::default();
     let mut found = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-    let long_axis = found.localisation.as_ref().unwrap().cup.axis;
+    let long_axis = found.model.localisation.as_ref().unwrap().cup.axis;
     let mut merit = |by: f64, offset: f64, dark: bool| {
-        let place = found.localisation.as_mut().unwrap();
+        let place = found.model.localisation.as_mut().unwrap();
         place.dark_apex = dark.then_some(0.2);
         // The whole scene moves along the axis, which changes no length.
         place.cup.centre += long_axis * offset;
-        for p in &mut found.mesh.vertices {
+        for p in &mut found.model.mesh.vertices {
             *p += long_axis * offset;
         }
-        found.displacements.fill(long_axis * by);
+        found.model.displacements.fill(long_axis * by);
         found.merit()
     };
     let usual = merit(0.0, 0.0, false);
@@ -487,7 +503,7 @@ fn a_volume_without_a_heart_is_an_error() {
     for (name, volume) in &others {
         match fit_to(volume) {
             Err(DeformError::Localise(LocateError::NoHeart { .. })) => {}
-            other => panic!("{name}: {:?}", other.map(|f| f.localisation)),
+            other => panic!("{name}: {:?}", other.map(|f| f.model.localisation)),
         }
     }
 }

@@ -8,7 +8,8 @@ use std::path::Path;
 
 use nalgebra::{Rotation3, Unit};
 use rayon::prelude::*;
-use ventriform::deform::{DeformParameters, fit};
+use ventriform::deform::DeformParameters;
+use ventriform::fit::fit;
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
@@ -82,10 +83,10 @@ fn moved(volume: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) ->
 fn measure(volume: &Volume, template: &Template) -> Vec<f64> {
     let parameters = DeformParameters::default();
     let fit = fit(volume, template, &parameters, &Monitor::silent()).unwrap();
-    let wall = fit.wall.unwrap();
+    let wall = fit.model.wall.unwrap();
     let map = polar::map(volume, &wall, &wall, &PolarParameters::default());
     let segments = map.segments.iter().map(|s| s.mean_percent.unwrap());
-    [fit.wall_ml, wall.cavity_ml]
+    [fit.model.wall_ml, wall.cavity_ml]
         .into_iter()
         .chain(segments)
         .collect()
@@ -186,7 +187,7 @@ fn so_do_tilted_scans_with_several_defects() {
         let volume = scan.volume;
         let parameters = DeformParameters::default();
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-        let centre = fit.cup.unwrap().centre;
+        let centre = fit.model.cup.unwrap().centre;
         let runs =
             tilts().map(|turn| measure(&moved(&volume, &centre, &turn, &Vec3::zeros()), &template));
         let (variation, measure) = worst_variation(&runs);

@@ -3,7 +3,8 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::{DeformParameters, WallEdge, fit};
+use ventriform::deform::{DeformParameters, WallEdge};
+use ventriform::fit::fit;
 use ventriform::grid::agreement::compare;
 use ventriform::grid::voxelise::{Mask, voxelise};
 use ventriform::mesh::shapes;
@@ -89,26 +90,30 @@ fn no_varied_patient_is_lost() {
             ..DeformParameters::default()
         };
         let fit = fit(&volume, &template, &parameters, &Monitor::silent()).unwrap();
-        let found = fit.localisation.as_ref().unwrap().cup;
+        let found = fit.model.localisation.as_ref().unwrap().cup;
         let off = (found.centre - (pose.apex + pose.base) / 2.0).norm();
         let angle = found.axis.angle(&pose.axis).to_degrees();
         // 3.4 mm at most where the apex is visible. Where it takes up no tracer, its distance from
         // the base follows from the proportions of hearts, which vary by 8 % of the length, and the
         // axis from the visible part of the wall: 14.8 mm and 10.5 degrees.
-        let dark = fit.localisation.as_ref().unwrap().dark_apex.is_some();
+        let dark = fit.model.localisation.as_ref().unwrap().dark_apex.is_some();
         let (far, askew) = if dark { (15.0, 11.0) } else { (4.0, 6.0) };
         assert!(
             off < far && angle < askew,
             "{name}: {off} mm, {angle} degrees"
         );
         assert_eq!(dark, name.contains("without any uptake"), "{name}");
-        let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
         let truth = Mask {
             shape: truth.shape,
             voxels: truth.voxels.iter().map(|v| *v > 0.5).collect(),
         };
         let agreement = compare(&mask, &truth, volume.frame.spacing(), &Monitor::silent()).unwrap();
         assert!(agreement.jaccard > least, "{name}: {}", agreement.jaccard);
-        assert_eq!(fit.self_intersections + fit.turned_triangles, 0, "{name}");
+        assert_eq!(
+            fit.model.self_intersections + fit.model.turned_triangles,
+            0,
+            "{name}"
+        );
     }
 }

@@ -3,7 +3,7 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::Fit;
+use ventriform::fit::Fit;
 use ventriform::geometry::Vec3;
 use ventriform::grid::agreement::compare;
 use ventriform::grid::voxelise::{Mask, voxelise};
@@ -41,15 +41,24 @@ fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
 }
 
 fn codes(fit: &Fit) -> Vec<&'static str> {
-    fit.flags.iter().map(|flag| flag.code()).collect()
+    fit.judgement.flags.iter().map(|flag| flag.code()).collect()
 }
 
 #[test]
 fn a_usual_scan_is_believed() {
     for seed in 1..4 {
         let fit = segmented(&scan(&PhantomParameters { seed, ..patient() }).volume).unwrap();
-        assert_eq!(codes(&fit), Vec::<&str>::new(), "{:?}", fit.evidence);
-        assert!(fit.confidence > 0.9, "{}", fit.confidence);
+        assert_eq!(
+            codes(&fit),
+            Vec::<&str>::new(),
+            "{:?}",
+            fit.judgement.evidence
+        );
+        assert!(
+            fit.judgement.confidence > 0.9,
+            "{}",
+            fit.judgement.confidence
+        );
     }
 }
 
@@ -64,8 +73,8 @@ fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
         match segmented(&scan(&moved).volume) {
             Ok(fit) => {
                 let doubted = codes(&fit).contains(&"motion");
-                assert!(doubted || motion_mm < 20.0, "{:?}", fit.evidence);
-                fit.confidence
+                assert!(doubted || motion_mm < 20.0, "{:?}", fit.judgement.evidence);
+                fit.judgement.confidence
             }
             Err(_) => 0.0,
         }
@@ -80,7 +89,11 @@ fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
 fn a_mask_of_a_heart_is_no_image_of_uptake() {
     if let Ok(fit) = segmented(&scan(&patient()).truth) {
         assert!(codes(&fit).contains(&"label_map"), "{:?}", codes(&fit));
-        assert!(fit.confidence <= 0.5, "{}", fit.confidence);
+        assert!(
+            fit.judgement.confidence <= 0.5,
+            "{}",
+            fit.judgement.confidence
+        );
     }
 }
 
@@ -109,7 +122,11 @@ fn balls_shells_and_beans_are_no_hearts() {
     });
     if let Ok(fit) = bean {
         assert!(codes(&fit).contains(&"label_map"), "{:?}", codes(&fit));
-        assert!(fit.confidence <= 0.5, "{}", fit.confidence);
+        assert!(
+            fit.judgement.confidence <= 0.5,
+            "{}",
+            fit.judgement.confidence
+        );
     }
 }
 
@@ -129,7 +146,7 @@ fn the_right_ventricles_wall_is_not_taken_for_an_infarcted_septum_without_doubt(
         };
         let Phantom { volume, truth, .. } = scan(&beside);
         let fit = segmented(&volume).unwrap();
-        let wall = &fit.surfaces.as_ref().unwrap().anatomical.mesh;
+        let wall = &fit.model.surfaces.as_ref().unwrap().anatomical.mesh;
         let mask = voxelise(wall, volume.shape, &volume.frame);
         let truth = Mask {
             shape: truth.shape,
@@ -142,7 +159,7 @@ fn the_right_ventricles_wall_is_not_taken_for_an_infarcted_septum_without_doubt(
             right || codes(&fit).contains(&"right_ventricle"),
             "{seed}: {} {:?}",
             agreement.jaccard,
-            fit.evidence
+            fit.judgement.evidence
         );
     }
 }
@@ -160,14 +177,13 @@ fn a_wall_that_is_not_seen_is_less_certain() {
     };
     let median = |parameters: &PhantomParameters| {
         let fit = segmented(&scan(parameters).volume).unwrap();
-        let surfaces = fit.surfaces.unwrap();
+        let uncertainty = fit.judgement.uncertainty.unwrap();
         // The other built-in hearts lie near, but not on the same surface.
-        let spreads = fit.nodes.iter().map(|node| node.spread.unwrap());
-        let mean = spreads.sum::<f64>() / fit.nodes.len() as f64;
+        let spreads = fit.judgement.nodes.iter().map(|node| node.spread.unwrap());
+        let mean = spreads.sum::<f64>() / fit.judgement.nodes.len() as f64;
         assert!((0.05..5.0).contains(&mean), "{mean}");
-        [surfaces.apparent, surfaces.anatomical].map(|surface| {
-            let mut all = surface.uncertainty;
-            assert_eq!(all.len(), surface.mesh.vertices.len());
+        [uncertainty.apparent, uncertainty.anatomical].map(|mut all| {
+            assert_eq!(all.len(), fit.model.mesh.vertices.len());
             all.sort_by(f64::total_cmp);
             all[all.len() * 9 / 10]
         })

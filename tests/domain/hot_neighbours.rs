@@ -96,13 +96,13 @@ fn a_hot_right_ventricle_is_left_out_or_doubted() {
         };
         let spacing = scan.truth.frame.spacing();
         let found = compare(&made.segmentation.mask, &truth, spacing, &Monitor::silent()).unwrap();
-        let doubted = !fit.flags.is_empty() || fit.confidence < 0.5;
+        let doubted = !fit.judgement.flags.is_empty() || fit.judgement.confidence < 0.5;
         let least = if infarct { 0.7 } else { 0.8 };
         assert!(
             found.jaccard > least || doubted,
             "{uptake} {infarct}: {:.3}, {:.2}",
             found.jaccard,
-            fit.confidence
+            fit.judgement.confidence
         );
     }
 }

@@ -5,7 +5,8 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::Matrix3;
-use ventriform::deform::{DeformParameters, Fit, fit};
+use ventriform::deform::DeformParameters;
+use ventriform::fit::{Fit, fit};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::field::Field;
@@ -74,9 +75,9 @@ fn fitted(volume: &Volume, parameters: &DeformParameters) -> (Fit, PolarMap) {
     let mesh = shapes::cup(75.0, 33.0, 13.0, 14);
     let template = Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).unwrap();
     let fit = fit(volume, &template, parameters, &Monitor::silent()).unwrap();
-    let surfaces = fit.surfaces.as_ref().unwrap();
+    let surfaces = fit.model.surfaces.as_ref().unwrap();
     let (apparent, anatomical) = (&surfaces.apparent.wall, &surfaces.anatomical.wall);
-    let source = fit.patient_orientation.unwrap().source;
+    let source = fit.model.patient_orientation.unwrap().source;
     let map = polar::map(volume, apparent, anatomical, &PolarParameters::default());
     (fit, map.counted_by(source))
 }
@@ -119,7 +120,7 @@ fn short_axis_slices_are_oriented_by_their_header_or_by_what_is_stated_or_not_at
                 "{apex_first} {superior:?}: {:?}",
                 map.segments
             );
-            let change = (fit.wall_ml / guessed.wall_ml - 1.0).abs();
+            let change = (fit.model.wall_ml / guessed.model.wall_ml - 1.0).abs();
             assert!(change < 0.1, "{apex_first} {superior:?}: {change}");
         }
     }

@@ -82,7 +82,7 @@ fn cohort(seeds: &[u64], offsets: &ReaderOffsets) -> TempDir {
         scan(&path, *seed);
         let made = segmented(&path, None, &FitParameters::default()).unwrap();
         let volume = &made.reading.volume;
-        let (fit, share) = drawn(made.segmentation.fit, offsets, &Monitor::silent()).unwrap();
+        let (fit, share) = drawn(made.segmentation.fit.model, offsets, &Monitor::silent()).unwrap();
         assert_eq!(share, 1.0);
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
         let mask = Volume {
@@ -190,7 +190,7 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
     let offsets = [1.5, -0.5, 3.0];
     let made = segmented(&path, Some(profile(offsets)), &defaults).unwrap();
     let frame = &made.reading.volume.frame;
-    let fit = &without.segmentation.fit;
+    let fit = &without.segmentation.fit.model;
     let found = measure(
         fit,
         &without.segmentation.mask,

@@ -83,6 +83,13 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "locate", "model",
         ],
     ),
+    (
+        "judge",
+        &[
+            "geometry", "numeric", "mesh", "progress", "grid", "locate", "model", "deform",
+        ],
+    ),
+    ("fit", &["progress", "grid", "model", "deform", "judge"]),
     ("polar", &["geometry", "grid", "draw", "locate", "model"]),
     (
         "reader",
@@ -160,6 +167,8 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "judge",
+            "fit",
             "polar",
             "reader",
             "report",
@@ -184,6 +193,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "export",
             "model",
             "deform",
+            "judge",
             "reader",
             "parameters",
             "pipeline",

@@ -131,6 +131,10 @@ pub mod model;
 
 pub mod deform;
 
+pub mod judge;
+
+pub mod fit;
+
 pub mod polar;
 
 pub mod reader;

@@ -13,9 +13,10 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use ventriform::deform::confidence::of_agreement;
-use ventriform::deform::{Evidence, Flag, WallEdge};
+use ventriform::deform::WallEdge;
 use ventriform::grid::agreement::compare;
+use ventriform::judge::confidence::of_agreement;
+use ventriform::judge::{Evidence, Flag};
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::report::object;
@@ -73,13 +74,13 @@ fn line(case: &Path) -> Result<String> {
         let gold = read_mask(&file(gold), &MaskChoice::default(), &limits, &monitor)?;
         let gold = gold.on((scan.shape, &scan.frame), false, &monitor)?.mask;
         let agreement = compare(&made.mask, &gold, scan.frame.spacing(), &monitor)?;
-        let flags: Vec<&str> = made.fit.flags.iter().map(Flag::code).collect();
+        let flags: Vec<&str> = made.fit.judgement.flags.iter().map(Flag::code).collect();
         Ok((
             agreement.jaccard,
             json!({
                 "jaccard": agreement.jaccard,
                 "contours_voxels": agreement.contours.map(|c| c.mean_voxels),
-                "confidence": made.fit.confidence,
+                "confidence": made.fit.judgement.confidence,
                 "flags": flags,
             }),
         ))
@@ -94,10 +95,11 @@ fn line(case: &Path) -> Result<String> {
     let candidates: Vec<_> = (made.candidates.iter())
         .map(|c| json!({"template": c.name, "chances": c.evidence.as_ref().map(chances)}))
         .collect();
-    let surfaces = made.fit.surfaces.as_ref();
+    let (model, judgement) = (&made.fit.model, &made.fit.judgement);
+    let surfaces = model.surfaces.as_ref();
     let nodes: Vec<_> = surfaces.map_or_else(Vec::new, |s| {
         let places = (s.apparent.mesh.vertices.iter()).zip(&s.anatomical.mesh.vertices);
-        let nodes = places.zip(&made.fit.nodes);
+        let nodes = places.zip(&judgement.nodes);
         nodes
             .map(|((p, q), n)| json!([p.x, p.y, p.z, q.x, q.y, q.z, n.seen, n.way, n.spread]))
             .collect()
@@ -111,16 +113,16 @@ fn line(case: &Path) -> Result<String> {
             "anatomical": of_anatomical.1,
             "evidence": report["evidence"],
             "localisation": report["localisation"],
-            "chances": made.fit.evidence.as_ref().map(chances),
+            "chances": judgement.evidence.as_ref().map(chances),
             "candidates": candidates,
-            "septal_overshoot": made.fit.evidence.as_ref().map(|e| e.septal_overshoot),
-            "place": made.fit.place_confidence(),
+            "septal_overshoot": judgement.evidence.as_ref().map(|e| e.septal_overshoot),
+            "place": judgement.position_confidence,
             "thickness_mm": report["thickness_mm"],
             "volumes_ml": report["volumes_ml"],
             "polar": report["polar"],
-            "uncertainty_mm": surfaces.map(|s| [&s.apparent.uncertainty, &s.anatomical.uncertainty]),
+            "uncertainty_mm": judgement.uncertainty.as_ref().map(|u| [&u.apparent, &u.anatomical]),
             "nodes": nodes,
-            "triangles": made.fit.mesh.triangles,
+            "triangles": model.mesh.triangles,
         })
     ))
 }

@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use nalgebra::Rotation3;
 use rand::RngExt;
-use ventriform::deform::{DeformParameters, fit};
+use ventriform::deform::DeformParameters;
+use ventriform::fit::fit;
 use ventriform::geometry::Vec3;
 use ventriform::geometry::random::{Purpose, stream};
 use ventriform::grid::field::Field;
@@ -161,7 +162,7 @@ impl Study {
     }
 
     fn measure(&self, scan: &Volume) -> Result<Figures> {
-        let fit = fit(scan, &self.template, &self.parameters, &Monitor::silent())?;
+        let fit = fit(scan, &self.template, &self.parameters, &Monitor::silent())?.model;
         let wall = fit.wall.context("the model is not a ventricle")?;
         let map = polar::map(scan, &wall, &wall, &PolarParameters::default());
         let means = map.segments.iter().map(|s| s.mean_percent.unwrap_or(0.0));

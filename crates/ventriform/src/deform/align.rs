@@ -16,11 +16,11 @@ use crate::mesh::TriMesh;
 use crate::model::area_shares;
 use crate::progress::{Cancelled, Monitor};
 
-const FIELDS: usize = 12;
-type Coefficients = SVector<f64, FIELDS>;
+const PARAMETER_COUNT: usize = 12;
+type Coefficients = SVector<f64, PARAMETER_COUNT>;
 
 /// Rounds of Gauss-Newton.
-const ROUNDS: usize = 12;
+const GAUSS_NEWTON_ROUNDS: usize = 12;
 
 /// Aligns `mesh` with the edges in `field`; `axis` is the long axis, any direction for organs
 /// other than ventricles. The sensors' reach falls from `settings.reach` to `last_reach`, mm.
@@ -37,7 +37,7 @@ pub fn align(
 ) -> Result<TriMesh, Cancelled> {
     let mut mesh = mesh.clone();
     let shares = area_shares(&mesh);
-    for round in 0..ROUNDS {
+    for round in 0..GAUSS_NEWTON_ROUNDS {
         let reach = reach_in(round, settings.reach, last_reach);
         let readings = sensors::read(
             &mesh,
@@ -66,7 +66,7 @@ pub fn align(
 
 /// The reach of the sensors in a round: from `first` to `last`, by the same factor from each round to the next.
 fn reach_in(round: usize, first: f64, last: f64) -> f64 {
-    let progress = round as f64 / (ROUNDS - 1) as f64;
+    let progress = round as f64 / (GAUSS_NEWTON_ROUNDS - 1) as f64;
     first * (last / first).powf(progress)
 }
 
@@ -87,12 +87,12 @@ struct Basis {
 }
 
 impl Basis {
-    fn fields(&self, p: &Vec3, n: &Vec3) -> [Vec3; FIELDS] {
+    fn fields(&self, p: &Vec3, n: &Vec3) -> [Vec3; PARAMETER_COUNT] {
         let r = p - self.centre;
         let along = self.axis * r.dot(&self.axis);
         // Turns and stretches are per 30 mm, so that every coefficient is about a shift of
         // the surface in millimetres.
-        const ARM: f64 = 30.0;
+        const LEVER_ARM_MM: f64 = 30.0;
         // 0 at the centre and apical of it, 1 at the rim.
         let basal = if self.base < -1.0 {
             (r.dot(&self.axis) / self.base).clamp(0.0, 1.0)
@@ -105,15 +105,15 @@ impl Basis {
             Vec3::x(),
             Vec3::y(),
             Vec3::z(),
-            Vec3::x().cross(&r) / ARM,
-            Vec3::y().cross(&r) / ARM,
-            Vec3::z().cross(&r) / ARM,
-            along / ARM,
-            (r - along) / ARM,
+            Vec3::x().cross(&r) / LEVER_ARM_MM,
+            Vec3::y().cross(&r) / LEVER_ARM_MM,
+            Vec3::z().cross(&r) / LEVER_ARM_MM,
+            along / LEVER_ARM_MM,
+            (r - along) / LEVER_ARM_MM,
             *n,
             lift,
-            lift * (r.dot(&e1) / ARM),
-            lift * (r.dot(&e2) / ARM),
+            lift * (r.dot(&e1) / LEVER_ARM_MM),
+            lift * (r.dot(&e2) / LEVER_ARM_MM),
         ]
     }
 
@@ -126,13 +126,13 @@ impl Basis {
     }
 
     fn solve(&self, readings: &[SensorReading]) -> Coefficients {
-        let mut matrix = SMatrix::<f64, FIELDS, FIELDS>::identity() * 0.005;
+        let mut matrix = SMatrix::<f64, PARAMETER_COUNT, PARAMETER_COUNT>::identity() * 0.005;
         // Thickness and stretch across are nearly the same thing on the epicardium alone;
         // the thickness of the blurred wall varies less between patients than their size.
         matrix[(8, 8)] += 0.02;
         matrix[(6, 6)] += LENGTH_PENALTY;
         matrix[(7, 7)] += BREADTH_PENALTY;
-        for field in 9..FIELDS {
+        for field in 9..PARAMETER_COUNT {
             matrix[(field, field)] += RIM_PENALTY;
         }
         let mut rhs = Coefficients::zeros();
@@ -169,10 +169,13 @@ mod tests {
 
     #[test]
     fn the_reach_falls_by_one_factor_from_the_first_to_the_last() {
-        let reaches: Vec<f64> = (0..ROUNDS)
+        let reaches: Vec<f64> = (0..GAUSS_NEWTON_ROUNDS)
             .map(|round| reach_in(round, 25.0, 6.0))
             .collect();
-        assert!((reaches[0] - 25.0).abs() < 1e-9 && (reaches[ROUNDS - 1] - 6.0).abs() < 1e-9);
+        assert!(
+            (reaches[0] - 25.0).abs() < 1e-9
+                && (reaches[GAUSS_NEWTON_ROUNDS - 1] - 6.0).abs() < 1e-9
+        );
         for three in reaches.windows(3) {
             assert!((three[1] / three[0] - three[2] / three[1]).abs() < 1e-9);
         }
@@ -294,7 +297,7 @@ mod tests {
             let row = Coefficients::from_fn(|i, _| fields[i].dot(&r.normal));
             pull += row * (r.share * r.weight * (r.offset - row.dot(&step)));
         }
-        for field in 0..FIELDS {
+        for field in 0..PARAMETER_COUNT {
             let penalty = 0.005
                 + match field {
                     6 => LENGTH_PENALTY,

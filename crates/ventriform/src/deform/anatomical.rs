@@ -7,7 +7,7 @@
 //!
 //! 1. Each ray of the wall is described by eleven numbers (`describe`): thickness and inner radius
 //!    of the whole wall, thickness, radius and uptake at the ray, and the way from apex to base.
-//! 2. Two linear functions of these numbers ([`INNER`], [`OUTER`]) are the distances by which the
+//! 2. Two linear functions of these numbers ([`INNER_SHIFT_MM`], [`OUTER_SHIFT_MM`]) are the distances by which the
 //!    two surfaces move along the ray.
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
@@ -32,30 +32,30 @@ use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
 use crate::numeric::order;
 
 /// The numbers that describe a ray.
-const TERMS: usize = 11;
+const RAY_TERMS: usize = 11;
 
 /// Distance by which the inner surface moves outward, mm, for each number that describes a ray.
-const INNER: [f64; TERMS] = [
+const INNER_SHIFT_MM: [f64; RAY_TERMS] = [
     2.838, 0.526, 1.454, -1.673, 0.413, 0.403, 1.411, 0.545, -1.927, 3.921, -0.076,
 ];
 /// Distance by which the outer surface moves outward, mm, likewise.
-const OUTER: [f64; TERMS] = [
+const OUTER_SHIFT_MM: [f64; RAY_TERMS] = [
     -1.066, -0.223, -1.725, -0.026, -0.417, 0.619, -1.1, -0.075, -1.404, -1.183, -2.356,
 ];
 
 /// A cavity that looks smaller than the first, ml, is as narrow as the blur: its edge hardly moves any
 /// more when the cavity shrinks, and so the inner surface moves outward less, by the second, mm, times the logarithm
 /// of the ratio.
-const SMALL: (f64, f64) = (25.0, 0.94);
+const NARROW_CAVITY_ML_MM: (f64, f64) = (25.0, 0.94);
 /// The outer surface moves outward more, the smaller the cavity looks: by the second, mm, times the logarithm of
 /// the ratio of the first, ml, and the cavity.
-const OF_SIZE: (f64, f64) = (68.0, 0.435);
+const CAVITY_SIZE_ML_MM: (f64, f64) = (68.0, 0.435);
 
 /// The thickness that is left at least, mm.
-const THINNEST: f64 = 4.0;
+const MIN_THICKNESS_MM: f64 = 4.0;
 
 /// Standard deviations of the smoothing of thickness, radius and uptake, rows and columns.
-const SMOOTHING: [f64; 2] = [1.5, 3.0];
+const SMOOTHING_SIGMA_RAYS: [f64; 2] = [1.5, 3.0];
 
 /// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall. `image` is
 /// the blurred image about it. If the image's `resolution` is known (full width of a point at half its
@@ -104,13 +104,13 @@ impl WallShifts {
             image.at(&(ray.start + ray.direction * middle))
         });
         let numbers = describe(&inner, &outer, &uptake);
-        let shift = |coefficients: &[f64; TERMS]| {
+        let shift = |coefficients: &[f64; RAY_TERMS]| {
             RayMap::from_fn(|index| {
                 let terms = coefficients.iter().zip(&numbers[index]);
                 terms.map(|(c, x)| c * x).sum()
             })
         };
-        let (mut inner_shift, mut outer_shift) = (shift(&INNER), shift(&OUTER));
+        let (mut inner_shift, mut outer_shift) = (shift(&INNER_SHIFT_MM), shift(&OUTER_SHIFT_MM));
         let of_size = shifts_of_size(wall.cavity_ml);
         for (shift, more) in [&mut inner_shift, &mut outer_shift]
             .into_iter()
@@ -152,7 +152,7 @@ fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut
     for index in 0..ROWS * COLUMNS {
         let thickness = outer.0[index] - inner.0[index];
         let less = inner_shift.0[index] - outer_shift.0[index];
-        let most = (thickness - THINNEST).max(0.0);
+        let most = (thickness - MIN_THICKNESS_MM).max(0.0);
         if less > most {
             inner_shift.0[index] *= most / less;
             outer_shift.0[index] *= most / less;
@@ -165,8 +165,8 @@ fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut
 fn shifts_of_size(cavity: f64) -> [f64; 2] {
     let size = cavity.max(1.0).ln();
     [
-        -SMALL.1 * (SMALL.0.ln() - size).max(0.0),
-        OF_SIZE.1 * (OF_SIZE.0.ln() - size),
+        -NARROW_CAVITY_ML_MM.1 * (NARROW_CAVITY_ML_MM.0.ln() - size).max(0.0),
+        CAVITY_SIZE_ML_MM.1 * (CAVITY_SIZE_ML_MM.0.ln() - size),
     ]
 }
 
@@ -181,7 +181,7 @@ fn mean_difference(a: &RayMap, b: &RayMap) -> f64 {
 /// across the axis and near them) over 15 mm and that squared, thickness at the ray less the median,
 /// exp(-radius / 12 mm), the missing share of uptake and that squared, the way from apex to base
 /// (less a half) and that squared, and exp(-way / 0.12).
-fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; TERMS]> {
+fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; RAY_TERMS]> {
     let thickness = RayMap::from_fn(|i| outer.0[i] - inner.0[i]).smoothed();
     let radius = inner.smoothed();
     let uptake = uptake.smoothed();
@@ -239,7 +239,7 @@ impl RayMap {
     /// Smoothed by a Gaussian along rows and columns. Columns are periodic; beyond the first and the
     /// last row the values there continue.
     fn smoothed(&self) -> Self {
-        let [along, around] = SMOOTHING.map(|sigma| {
+        let [along, around] = SMOOTHING_SIGMA_RAYS.map(|sigma| {
             let reach = (4.0 * sigma + 0.5) as i64;
             let weights: Vec<(i64, f64)> = (-reach..=reach)
                 .map(|d| (d, (-0.5 * (d as f64 / sigma).powi(2)).exp()))
@@ -313,8 +313,14 @@ mod tests {
             along += v * rows * rows;
             around += v * columns * columns;
         }
-        assert!((along.sqrt() - SMOOTHING[0]).abs() < 0.02, "{along}");
-        assert!((around.sqrt() - SMOOTHING[1]).abs() < 0.02, "{around}");
+        assert!(
+            (along.sqrt() - SMOOTHING_SIGMA_RAYS[0]).abs() < 0.02,
+            "{along}"
+        );
+        assert!(
+            (around.sqrt() - SMOOTHING_SIGMA_RAYS[1]).abs() < 0.02,
+            "{around}"
+        );
     }
 
     #[test]
@@ -342,7 +348,7 @@ mod tests {
         for index in 0..ROWS * COLUMNS {
             let (more, less) = (inner_shift.0[index], -outer_shift.0[index]);
             let left = looks(index) - more - less;
-            let expected = (looks(index) - 6.0).max(THINNEST.min(looks(index)));
+            let expected = (looks(index) - 6.0).max(MIN_THICKNESS_MM.min(looks(index)));
             assert!((left - expected).abs() < 1e-9, "{left} {expected}");
             assert!((more - 2.0 * less).abs() < 1e-9, "{more} {less}");
         }
@@ -406,7 +412,8 @@ mod tests {
         let level = |value: f64| RayMap::from_fn(|_| value);
         let shifts = |inner: &RayMap, outer: &RayMap, uptake: &RayMap, index: usize| {
             let numbers = describe(inner, outer, uptake)[index];
-            [INNER, OUTER].map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
+            [INNER_SHIFT_MM, OUTER_SHIFT_MM]
+                .map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
         };
         for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
             let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * COLUMNS);
@@ -493,7 +500,10 @@ mod tests {
             let before = thin.outer.0[index] - thin.inner.0[index];
             let loss = thin.inner_shift.0[index] - thin.outer_shift.0[index];
             let left = before - loss;
-            assert!(left > THINNEST.min(before) - 1e-9, "{left} of {before}");
+            assert!(
+                left > MIN_THICKNESS_MM.min(before) - 1e-9,
+                "{left} of {before}"
+            );
         }
     }
 
@@ -501,7 +511,7 @@ mod tests {
     fn a_narrow_cavity_keeps_more_of_its_wall_and_a_usual_one_is_left_as_calibrated() {
         let [inner, outer] = shifts_of_size(12.0);
         assert!(inner < -0.5 && outer > 0.5);
-        let [inner, outer] = shifts_of_size(OF_SIZE.0);
+        let [inner, outer] = shifts_of_size(CAVITY_SIZE_ML_MM.0);
         assert_eq!((inner, outer), (0.0, 0.0));
         // The wall never gets thinner by it, the smaller the heart.
         let added: Vec<f64> = [300.0, 100.0, 60.0, 30.0, 20.0, 10.0, 5.0, 0.0]

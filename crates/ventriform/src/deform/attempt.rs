@@ -1,31 +1,24 @@
 //! Runs of the motion, repeated with a stiffer model while the result is folded.
 
-use super::confidence;
-use super::doubts;
+use super::base_plane;
 use super::dynamics::{self, Moved};
 use super::elastic::Elastic;
-use super::evidence::{Edges, Evidence};
-use super::fit::Fit;
-use super::flags::Flag;
+use super::fitted_model::{FittedModel, WallSurface, WallSurfaces};
 use super::parameters::DeformParameters;
-use super::rim;
-use super::sensors::{PER_TRIANGLE, SensorReading, SensorSettings};
+use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
-use super::uncertainty::NodeEvidence;
-use super::views::Views;
-use crate::geometry::Vec3;
-use crate::grid::Volume;
-use crate::locate::patient_orientation::OrientationSource;
+use crate::locate::cup::Cup;
+use crate::locate::patient_orientation::{OrientationSource, PatientOrientation};
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{self, ROWS, VentricleWall};
-use crate::model::{Organ, Template};
+use crate::model::Template;
+use crate::model::wall::{self, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// Repetitions of a folded fit.
-const RETRIES: usize = 3;
+const MAX_RETRIES: usize = 3;
 /// Factor of the stiffness from one repetition to the next.
-const STIFFER: f64 = 4.0;
+const STIFFNESS_FACTOR: f64 = 4.0;
 
 /// One run of the motion and its folds.
 pub struct Attempt {
@@ -55,8 +48,10 @@ impl Attempt {
             ..wide
         };
         let mut best: Option<Self> = None;
-        for run in 1..=1 + RETRIES {
-            let stiffness = parameters.stiffness.times(STIFFER.powi(run as i32 - 1));
+        for run in 1..=1 + MAX_RETRIES {
+            let stiffness = parameters
+                .stiffness
+                .times(STIFFNESS_FACTOR.powi(run as i32 - 1));
             let body = Elastic::new(aligned, &template.struts, stiffness);
             let moved = dynamics::run(
                 aligned,
@@ -92,19 +87,18 @@ impl Attempt {
         self.intersections + self.turned
     }
 
-    /// The figures of the run.
+    /// The fitted model: the run's result with the base plane put, and both walls of a ventricle.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn into_fit(
+    pub fn into_model(
         self,
-        volume: &Volume,
         template: &Template,
         setup: &FitSetup,
         aligned: &TriMesh,
         parameters: &DeformParameters,
         monitor: &Monitor,
-    ) -> Result<Fit, Cancelled> {
+    ) -> Result<FittedModel, Cancelled> {
         let orientation = setup.patient_orientation;
         let (active, residual) = edges_seen(&self.moved.readings);
         let cup = template
@@ -114,37 +108,50 @@ impl Attempt {
             cup.map(|cup| VentricleWall::new(mesh, &cup, &orientation.superior, monitor))
                 .transpose()
         };
-        // The confidence is calibrated on the wall as the sensors left it, before its rim moves.
-        let felt = wall_of(&self.moved.mesh)?;
-        let superior = &orientation.superior;
-        let settled = match &parameters.base {
-            Some(base) => cup.and_then(|cup| rim::put(&self.moved.mesh, &cup, superior, base)),
-            None => cup
-                .filter(|_| orientation.source != OrientationSource::Unknown)
-                .and_then(|cup| rim::settled(&self.moved.mesh, &cup, superior)),
-        };
+        let sensed_wall = wall_of(&self.moved.mesh)?;
+        let settled = cup.and_then(|cup| settled(&self.moved.mesh, &cup, &orientation, parameters));
         let (mesh, wall) = match settled {
             Some(mesh) => {
                 let wall = wall_of(&mesh)?;
                 (mesh, wall)
             }
-            None => (self.moved.mesh, felt.clone()),
+            None => (self.moved.mesh, sensed_wall.clone()),
         };
         let posed = &setup.posed.vertices;
-        let mut fit = Fit {
-            displacements: mesh
-                .vertices
-                .iter()
-                .zip(posed)
-                .map(|(p, q)| p - q)
-                .collect(),
+        let displacements = mesh.vertices.iter().zip(posed).map(|(p, q)| p - q);
+        let displacements = displacements.collect();
+        let turned_triangles = turned(aligned, &mesh);
+        let wall_ml = mesh.volume() / 1000.0;
+        let (shown, surfaces) = match (wall, &cup) {
+            (Some(wall), Some(cup)) => {
+                let apparent = WallSurface {
+                    mesh,
+                    wall,
+                    wall_ml,
+                };
+                let resolution = parameters.resolution;
+                let image = &setup.field;
+                let both =
+                    WallSurfaces::new(apparent, cup, &orientation, image, resolution, monitor)?;
+                let shown = both.of(parameters.edge).clone();
+                ((shown.mesh, Some(shown.wall), shown.wall_ml), Some(both))
+            }
+            _ => ((mesh, None, wall_ml), None),
+        };
+        let (mesh, wall, wall_ml) = shown;
+        Ok(FittedModel {
+            mesh,
+            displacements,
+            localisation: setup.localisation.clone(),
             cup,
+            patient_orientation: cup.map(|_| orientation),
+            wall,
+            wall_ml,
+            surfaces,
+            sensed_wall,
+            readings: self.moved.readings,
             scale: setup.pose.scale(),
             rotation: *setup.pose.rotation(),
-            confidence: 0.0,
-            evidence: None,
-            nodes: Vec::new(),
-            localisation: setup.localisation.clone(),
             reason: self.moved.reason,
             iterations: self.moved.iterations,
             runs: self.runs,
@@ -153,39 +160,24 @@ impl Attempt {
             active,
             strain: self.strain,
             self_intersections: self.intersections,
-            turned_triangles: turned(aligned, &mesh),
-            wall_ml: mesh.volume() / 1000.0,
-            surfaces: None,
-            patient_orientation: cup.map(|_| setup.patient_orientation),
-            wall,
-            mesh,
-            flags: Vec::new(),
-        };
-        if let (Some(wall), Some(found)) = (&felt, &fit.localisation) {
-            let edges = Edges {
-                active,
-                residual,
-                strain: fit.strain.sqrt(),
-            };
-            let views = match orientation.source {
-                OrientationSource::Unknown => None,
-                _ => Views::of(&fit.mesh, superior, volume, monitor)?,
-            };
-            fit.evidence = Evidence::of(wall, &edges, found.hollowness, &setup.field, views);
-            fit.nodes = nodes_seen(&fit.mesh, wall, &self.moved.readings);
-        }
-        let chance = match &fit.evidence {
-            Some(evidence) => confidence::of_agreement(evidence, parameters.edge),
-            None => fit.place_confidence().min(0.5),
-        };
-        fit.confidence = fit.chance_there(chance);
-        let ventricle = template.organ == Organ::LeftVentricle;
-        fit.flags = doubts::flags(&fit, volume, ventricle);
-        // The chance is calibrated on images of uptake.
-        if fit.flags.iter().any(|f| matches!(f, Flag::LabelMap { .. })) {
-            fit.confidence = fit.confidence.min(0.5);
-        }
-        Ok(fit)
+            turned_triangles,
+        })
+    }
+}
+
+/// `mesh` of a ventricle with its base plane put: through the point that was given, or where anatomy and image
+/// together put it; `None` where it stays.
+fn settled(
+    mesh: &TriMesh,
+    cup: &Cup,
+    orientation: &PatientOrientation,
+    parameters: &DeformParameters,
+) -> Option<TriMesh> {
+    let superior = &orientation.superior;
+    match &parameters.base {
+        Some(base) => base_plane::put(mesh, cup, superior, base),
+        None if orientation.source == OrientationSource::Unknown => None,
+        None => base_plane::settled(mesh, cup, superior),
     }
 }
 
@@ -210,32 +202,6 @@ fn edges_seen(readings: &[SensorReading]) -> (f64, f64) {
     (active, residual)
 }
 
-/// What the sensors say of each node of `mesh`, whose place along the wall is that in `wall`.
-fn nodes_seen(
-    mesh: &TriMesh,
-    wall: &VentricleWall,
-    readings: &[SensorReading],
-) -> Vec<NodeEvidence> {
-    let mut sums = vec![[0.0; 2]; mesh.vertices.len()];
-    for (triangle, sensors) in mesh
-        .triangles
-        .iter()
-        .zip(readings.chunks_exact(PER_TRIANGLE))
-    {
-        for node in triangle {
-            let [seen, share] = &mut sums[*node as usize];
-            *seen += sensors.iter().map(|r| r.weight * r.share).sum::<f64>();
-            *share += sensors.iter().map(|r| r.share).sum::<f64>();
-        }
-    }
-    let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
-        seen: if share > 0.0 { seen / share } else { 0.0 },
-        way: ((wall.place(p).row + 0.5) / ROWS as f64).clamp(0.0, 1.0),
-        spread: None,
-    };
-    mesh.vertices.iter().zip(sums).map(of).collect()
-}
-
 /// The number of triangles whose normal turned by 90 degrees or more from `before` to `now`.
 fn turned(before: &TriMesh, now: &TriMesh) -> usize {
     (0..now.triangles.len())
@@ -246,6 +212,7 @@ fn turned(before: &TriMesh, now: &TriMesh) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
 
     /// Readings of a quarter and of three quarters of the area.
     fn readings(weights: [f64; 2], offsets: [f64; 2]) -> [SensorReading; 2] {

@@ -13,7 +13,7 @@
 use std::f64::consts::SQRT_2;
 
 /// Standard deviations in a full width at half maximum.
-const FWHM: f64 = 2.354_820_045;
+const SIGMAS_PER_FWHM: f64 = 2.354_820_045;
 
 /// What blur of `resolution` mm (full width at half maximum) adds to the thickness of a wall that
 /// looks `apparent` mm thick, mm.
@@ -51,7 +51,7 @@ pub fn resolution_of(thickness: f64, apparent: f64) -> f64 {
 
 /// Full width at half maximum of a slab of `thickness` mm, blurred by `resolution` mm.
 fn width(thickness: f64, resolution: f64) -> f64 {
-    let scale = 1.0 / (SQRT_2 * resolution / FWHM);
+    let scale = 1.0 / (SQRT_2 * resolution / SIGMAS_PER_FWHM);
     let half = 0.5 * thickness;
     let value = |x: f64| erf((x + half) * scale) - erf((x - half) * scale);
     let level = 0.5 * value(0.0);
@@ -100,7 +100,7 @@ mod tests {
         for resolution in [8.0, 11.5, 16.0] {
             for thickness in [8.5, 11.0, 15.0] {
                 // The slab convolved numerically.
-                let s = resolution / FWHM;
+                let s = resolution / SIGMAS_PER_FWHM;
                 let step = 0.01;
                 let value = |x: f64| -> f64 {
                     (0..(thickness / step) as usize)

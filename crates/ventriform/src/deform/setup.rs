@@ -53,7 +53,7 @@ pub struct FitSetup {
 
 /// Half of the angle that the right ventricle's wall may take up beside the septum, degrees. Chosen
 /// on the calibrating seeds (703 among them).
-const SEPTAL: f64 = 65.0;
+const RV_SECTOR_HALF_ANGLE_DEG: f64 = 65.0;
 
 impl FitSetup {
     /// Poses `template` at `place` and blurs the image about it.
@@ -109,7 +109,7 @@ impl FitSetup {
 
     /// The same with sensors that see nothing of the septum; `None` for other organs, and where the
     /// orientation is unknown.
-    pub fn without_septum(self) -> Option<Self> {
+    pub fn without_septum(&self) -> Option<Self> {
         let cup = self.localisation.as_ref()?.cup;
         if self.patient_orientation.source == OrientationSource::Unknown {
             return None;
@@ -120,9 +120,9 @@ impl FitSetup {
                 centre: cup.centre,
                 axis: cup.axis,
                 middle: cup.axis.cross(&anterior),
-                half_angle: SEPTAL,
+                half_angle: RV_SECTOR_HALF_ANGLE_DEG,
             }),
-            ..self
+            ..self.clone()
         })
     }
 

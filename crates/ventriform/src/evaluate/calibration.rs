@@ -12,7 +12,7 @@
 use super::cohort::{case_file, mask_file, mask_on};
 use super::paired::PairedDifference;
 use super::sample::Sample;
-use crate::deform::Fit;
+use crate::deform::FittedModel;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
@@ -212,7 +212,7 @@ pub fn calibrate(
 
 /// A case's fit and mask.
 struct ReadCase {
-    fit: Fit,
+    fit: FittedModel,
     drawn: Mask,
     frame: VoxelToPatient,
     measured: ReaderOffsets,
@@ -236,7 +236,7 @@ impl ReadCase {
         let volume = &made.reading.volume;
         let drawn = mask_on(&case.mask, &parameters.mask, volume);
         let drawn = drawn.map_err(|error| format!("its mask: {error}"))?;
-        let fit = made.segmentation.fit;
+        let fit = made.segmentation.fit.model;
         let frame = volume.frame.clone();
         let measured = reader::measure(&fit, &made.segmentation.mask, &drawn, &frame)
             .ok_or("its mask and the fitted wall have too little in common")?;

@@ -6,7 +6,7 @@
 use super::models::CohortModel;
 use super::rows::{Agreed, FitOutcome};
 use super::table::rounded;
-use crate::deform::Fit;
+use crate::fit::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::locate::cup::Cup;
@@ -47,6 +47,7 @@ impl CohortFit {
 
     /// The figures of `fit`, and its agreement with each gold standard.
     pub fn of(fit: &Fit, agreements: [Option<Agreement>; 2]) -> Self {
+        let Fit { model, judgement } = fit;
         let agreed = agreements.map(|agreement| {
             let a = agreement?;
             Some(Agreed {
@@ -58,14 +59,14 @@ impl CohortFit {
             })
         });
         let mut figures = BTreeMap::from([
-            ("confidence", fit.confidence),
+            ("confidence", judgement.confidence),
             ("merit", fit.merit()),
-            ("iterations", fit.iterations as f64),
-            ("self_intersections", fit.self_intersections as f64),
-            ("wall_ml", fit.wall_ml),
-            ("flags", fit.flags.len() as f64),
+            ("iterations", model.iterations as f64),
+            ("self_intersections", model.self_intersections as f64),
+            ("wall_ml", model.wall_ml),
+            ("flags", judgement.flags.len() as f64),
         ]);
-        if let Some(wall) = &fit.wall {
+        if let Some(wall) = &model.wall {
             figures.insert("cavity_ml", wall.cavity_ml);
         }
         let figures = figures
@@ -74,21 +75,21 @@ impl CohortFit {
             .map(|(name, value)| (name.to_owned(), rounded(value)))
             .collect();
         Self {
-            outcome: FitOutcome::Fitted(fit.reason.as_str().to_owned()),
+            outcome: FitOutcome::Fitted(model.reason.as_str().to_owned()),
             agreed,
             figures,
-            cup: fit.cup.map(|c| Cup {
+            cup: model.cup.map(|c| Cup {
                 centre: c.centre.map(rounded),
                 axis: c.axis.map(rounded),
                 length: rounded(c.length),
                 breadth: rounded(c.breadth),
             }),
-            superior: fit
+            superior: model
                 .patient_orientation
                 .unwrap_or(PatientOrientation::FRAME)
                 .superior
                 .map(rounded),
-            vertices: fit.mesh.vertices.iter().map(|v| v.map(rounded)).collect(),
+            vertices: model.mesh.vertices.iter().map(|v| v.map(rounded)).collect(),
         }
     }
 

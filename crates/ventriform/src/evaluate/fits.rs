@@ -13,8 +13,9 @@ use super::observer::{EvaluationObserver, EvaluationStep};
 use super::record::{self, Key};
 use super::rows::{FitOutcome, FitRow, Gold, ModelKind, Variant};
 use super::sample::Sample;
-use crate::deform::{DeformParameters, Fit};
+use crate::deform::DeformParameters;
 use crate::export::{self, Format, Metadata};
+use crate::fit::Fit;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::progress::Monitor;
@@ -235,9 +236,9 @@ impl PatientFits {
         let auto = self.auto.as_ref().map(move |fit| {
             let kind = ModelKind {
                 variant: Variant::Auto,
-                points: built_in::POINTS,
+                points: built_in::HEART_POINTS,
             };
-            row(built_in::NAME, kind, fit)
+            row(built_in::NAME_PREFIX, kind, fit)
         });
         own.chain(auto)
     }
@@ -330,7 +331,7 @@ impl PatientImages {
             Ok(fit) => fit,
             Err(reason) => return CohortFit::without_fit(FitOutcome::Lost(reason)),
         };
-        let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
         let spacing = volume.frame.spacing();
         let agreements = (self.golds.each_ref())
             .map(|gold| compare(&mask, gold.as_ref()?.as_ref().ok()?, spacing, &silent).ok());

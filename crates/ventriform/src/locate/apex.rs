@@ -12,14 +12,14 @@
 
 use std::f64::consts::TAU;
 
-use super::cup::{APEX, CENTRE, Cup, MIDDLE, Pattern, perpendicular};
-use super::cup_search::{COORDINATES, CupSearch};
+use super::cup::{APEX_SHARE, Cup, PIVOT_SHARE, Pattern, WALL_PROFILE, perpendicular};
+use super::cup_search::{CUP_COORDINATES, CupSearch};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 
 /// Share of the basal wall's uptake below which the apical wall does not show. Infarctions of the
 /// whole apex: 0.20 to 0.40; one of 70 % severity: 0.48; other simulated hearts: 0.6 and more.
-const UNSEEN: f64 = 0.42;
+const DARK_APEX_SHARE: f64 = 0.42;
 /// Breadth of cups whose length is not seen: the mean of those found in simulated hearts.
 const USUAL_BREADTH: f64 = 1.08;
 
@@ -38,12 +38,12 @@ pub fn by_base(search: &CupSearch, cup: &Cup) -> Option<DarkApex> {
     let search = CupSearch {
         pattern: Pattern::basal(),
         // All but the breadth: radius and length keep their proportion.
-        coordinates: COORDINATES - 1,
+        coordinates: CUP_COORDINATES - 1,
         ..*search
     };
     let basal = search.climb(&search.score(in_proportion(cup)));
     let uptake = apex_uptake(&basal.cup, search.field);
-    (uptake < UNSEEN).then_some(DarkApex {
+    (uptake < DARK_APEX_SHARE).then_some(DarkApex {
         cup: basal.cup,
         wall: basal.wall,
         uptake,
@@ -54,7 +54,7 @@ pub fn by_base(search: &CupSearch, cup: &Cup) -> Option<DarkApex> {
 fn in_proportion(cup: &Cup) -> Cup {
     let length = cup.length * cup.breadth / USUAL_BREADTH;
     Cup {
-        centre: cup.base() + cup.axis * (CENTRE * length),
+        centre: cup.base() + cup.axis * (PIVOT_SHARE * length),
         length,
         breadth: USUAL_BREADTH,
         ..*cup
@@ -68,7 +68,7 @@ fn in_proportion(cup: &Cup) -> Cup {
 fn apex_uptake(cup: &Cup, field: &Field) -> f64 {
     let (e1, e2) = perpendicular(&cup.axis);
     let place = |along: f64, across: Vec3| {
-        cup.axis * ((along - CENTRE) * cup.length) + across * (cup.length * cup.breadth)
+        cup.axis * ((along - PIVOT_SHARE) * cup.length) + across * (cup.length * cup.breadth)
     };
     let ring = |&(along, radius, count): &(f64, f64, usize)| -> Vec<Vec3> {
         let angles = (0..count).map(|n| TAU * n as f64 / count as f64);
@@ -81,11 +81,15 @@ fn apex_uptake(cup: &Cup, field: &Field) -> f64 {
         far.fold(f64::NEG_INFINITY, f64::max)
     };
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let tip = place(APEX, Vec3::zeros());
-    let apical = MIDDLE[4..].iter().flat_map(ring).chain([tip]).map(ridge);
+    let tip = place(APEX_SHARE, Vec3::zeros());
+    let apical = WALL_PROFILE[4..]
+        .iter()
+        .flat_map(ring)
+        .chain([tip])
+        .map(ridge);
     let mut apical: Vec<f64> = apical.collect();
     apical.sort_by(f64::total_cmp);
-    let basal = MIDDLE[..3].iter().flat_map(ring);
+    let basal = WALL_PROFILE[..3].iter().flat_map(ring);
     let mut basal: Vec<f64> = basal.map(|p| field.at(&(cup.centre + p))).collect();
     basal.sort_by(f64::total_cmp);
     apical[apical.len() / 2] / mean(&basal[basal.len() / 2..])

@@ -17,9 +17,9 @@ use crate::progress::{Cancelled, Monitor};
 use std::collections::BTreeMap;
 
 /// Samples of the coarse picture, mm.
-const COARSE: f64 = 4.0;
+const COARSE_VOXEL_MM: f64 = 4.0;
 /// Share of the maximum that belongs to the body.
-const LEVEL: f32 = 0.4;
+const BODY_LEVEL_SHARE: f32 = 0.4;
 
 /// A bright body.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,8 +38,8 @@ pub struct Blob {
 /// [`LocateError::Blank`] if no value is positive, [`LocateError::HintOutside`] if no part lies in
 /// the hinted region.
 pub fn find(volume: &Volume, hints: &Hints, monitor: &Monitor) -> Result<Blob, LocateError> {
-    let field = Field::coarse(volume, None, COARSE, monitor)?;
-    let level = LEVEL * field.values().iter().fold(0f32, |a, b| a.max(*b));
+    let field = Field::coarse(volume, None, COARSE_VOXEL_MM, monitor)?;
+    let level = BODY_LEVEL_SHARE * field.values().iter().fold(0f32, |a, b| a.max(*b));
     if !(level > 0.0) {
         return Err(LocateError::Blank);
     }

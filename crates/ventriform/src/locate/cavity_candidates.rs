@@ -18,11 +18,11 @@ use crate::mesh::shapes;
 use crate::progress::{Cancelled, Monitor};
 
 /// Spacing of the places where hollow balls are tried, mm.
-const STRIDE: f64 = 8.0;
+const SEARCH_STRIDE_MM: f64 = 8.0;
 /// Most places returned.
-const PLACES: usize = 60;
+const MAX_CANDIDATES: usize = 60;
 /// Balls whose shell is darker than this share of the brightest value are left out.
-const FAINT: f64 = 0.08;
+const MIN_SHELL_SHARE: f64 = 0.08;
 
 /// Where hollow balls fit best: local maxima of their correlation, best first.
 ///
@@ -42,10 +42,10 @@ pub fn places(
     let [nx, ny, nz] = field.shape();
     let mut scores = vec![f32::NEG_INFINITY; nx * ny * nz];
     let stride = [0, 1, 2].map(|a| {
-        let n = (STRIDE / field.spacing()[a]).round();
+        let n = (SEARCH_STRIDE_MM / field.spacing()[a]).round();
         if n >= 1.0 { n as usize } else { 1 }
     });
-    let least = (FAINT * brightest) as f32;
+    let least = (MIN_SHELL_SHARE * brightest) as f32;
     let planes = scores.par_chunks_mut(nx * ny).enumerate();
     planes
         .step_by(stride[2])
@@ -79,7 +79,7 @@ pub fn places(
         }
     }
     maxima.sort_by(|a, b| b.0.total_cmp(&a.0));
-    maxima.truncate(PLACES);
+    maxima.truncate(MAX_CANDIDATES);
     let mut places: Vec<Vec3> = maxima.into_iter().map(|m| m.1).collect();
     places.extend(hints.centre);
     Ok(places)
@@ -114,12 +114,13 @@ struct Padded {
 }
 
 /// The largest ball's outer samples, mm.
-const REACH: f64 = 33.0 + 17.0;
+const MAX_BALL_RADIUS_MM: f64 = 33.0 + 17.0;
 
 impl Padded {
     fn new(field: &Field) -> Self {
         let inner = field.shape();
-        let margin = [0, 1, 2].map(|a| (REACH / field.spacing()[a] * 1.5).ceil() as usize + 1);
+        let margin =
+            [0, 1, 2].map(|a| (MAX_BALL_RADIUS_MM / field.spacing()[a] * 1.5).ceil() as usize + 1);
         let shape = [0, 1, 2].map(|a| inner[a] + 2 * margin[a]);
         let clamped = |x: usize, a: usize| x.saturating_sub(margin[a]).min(inner[a] - 1);
         let mut values = Vec::with_capacity(shape.iter().product());
@@ -148,9 +149,9 @@ struct Ball {
 }
 
 /// Expected value of the shell, the middle and the outside of a ball, shell = 1.
-const EXPECTED: [f64; 3] = [1.0, 0.45, 0.3];
+const EXPECTED_BALL_VALUES: [f64; 3] = [1.0, 0.45, 0.3];
 /// Values above this share of the wall's mean are cut off.
-const CAP: f32 = 1.3;
+const VALUE_CAP_SHARE: f32 = 1.3;
 
 impl Ball {
     fn new(radius: f64, field: &Field, padded: &Padded) -> Self {
@@ -227,9 +228,9 @@ impl Row {
             let cap = &mut self.cap[low..=high];
             let run = |o: &isize| &run(o)[low..=high];
             // Hot neighbours are cut off, as in `Cup::match_score`.
-            cap.iter_mut().for_each(|c| *c *= CAP);
+            cap.iter_mut().for_each(|c| *c *= VALUE_CAP_SHARE);
             refill(&mut self.moments, cap.len(), Moments::default());
-            for (group, expected) in ball.groups.iter().zip(EXPECTED) {
+            for (group, expected) in ball.groups.iter().zip(EXPECTED_BALL_VALUES) {
                 refill(&mut self.sum, cap.len(), 0.0);
                 refill(&mut self.squares, cap.len(), 0.0);
                 for o in group {
@@ -249,7 +250,7 @@ impl Row {
             }
             let best = self.best[low..=high].iter_mut();
             for ((best, m), cap) in best.zip(&self.moments).zip(&*cap) {
-                if *cap >= least * CAP {
+                if *cap >= least * VALUE_CAP_SHARE {
                     *best = best.max(m.correlation() as f32);
                 }
             }
@@ -276,10 +277,14 @@ mod tests {
             return f64::NEG_INFINITY;
         }
         let mut moments = Moments::default();
-        for (group, expected) in ball.groups.iter().zip(EXPECTED) {
+        for (group, expected) in ball.groups.iter().zip(EXPECTED_BALL_VALUES) {
             let weight = 1.0 / group.len() as f64;
             for o in group {
-                moments.add(weight, expected, value(o).min(f64::from(CAP) * mean));
+                moments.add(
+                    weight,
+                    expected,
+                    value(o).min(f64::from(VALUE_CAP_SHARE) * mean),
+                );
             }
         }
         moments.correlation()
@@ -297,7 +302,7 @@ mod tests {
         field.blur(4.0, &Monitor::silent()).unwrap();
         let padded = Padded::new(&field);
         let balls = [22.0, 33.0].map(|radius| Ball::new(radius, &field, &padded));
-        let least = (FAINT as f32) * field.values().iter().fold(0f32, |a, b| a.max(*b));
+        let least = (MIN_SHELL_SHARE as f32) * field.values().iter().fold(0f32, |a, b| a.max(*b));
         let mut row = Row::default();
         let (mut seen, mut dark) = (0, 0);
         for (j, k) in [(10, 20), (24, 24), (30, 17), (47, 0)] {

@@ -10,19 +10,19 @@ use crate::geometry::Vec3;
 use crate::progress::{Cancelled, Monitor};
 
 /// Ratio of neighbouring levels.
-const RATIO: f64 = 0.93;
+const LEVEL_RATIO: f64 = 0.93;
 /// Number of levels: down to 4 % of the maximum.
-const LEVELS: usize = 44;
+const LEVEL_COUNT: usize = 44;
 /// The threshold is not lowered further once more than this lies above it, mm³: twice a heart,
 /// liver and gut together. Below that is background.
 const MOST_ABOVE: f64 = 8e6;
 /// Volumes of the parts listed, mm³.
-const VOLUMES: std::ops::Range<f64> = 15e3..500e3;
+const PART_VOLUMES_MM3: std::ops::Range<f64> = 15e3..500e3;
 /// Root-mean-square distances from the centroid of the parts listed, mm.
-const SPREADS: std::ops::Range<f64> = 12.0..55.0;
+const PART_SPREADS_MM: std::ops::Range<f64> = 12.0..55.0;
 
 /// A part is listed again once it has grown by this factor.
-const GROWN: f64 = 1.4;
+const RELISTED_GROWTH: f64 = 1.4;
 
 /// A connected part above a threshold.
 #[derive(Debug, Clone, Copy)]
@@ -103,17 +103,19 @@ pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancel
         roots.retain(|&r| parent[r as usize] == r);
         for &r in &roots {
             let s = &mut sums[r as usize];
-            if !VOLUMES.contains(&(s.count * voxel)) || s.count < GROWN * s.listed {
+            if !PART_VOLUMES_MM3.contains(&(s.count * voxel))
+                || s.count < RELISTED_GROWTH * s.listed
+            {
                 continue;
             }
             let centroid = s.position / s.count;
             let spread = (s.square / s.count - centroid.norm_squared())
                 .max(0.0)
                 .sqrt();
-            if SPREADS.contains(&spread) {
+            if PART_SPREADS_MM.contains(&spread) {
                 s.listed = s.count;
                 listed.push(Part {
-                    level: f64::from(blocks.maximum) * RATIO.powi(level as i32 + 1),
+                    level: f64::from(blocks.maximum) * LEVEL_RATIO.powi(level as i32 + 1),
                     centroid,
                 });
             }
@@ -126,37 +128,37 @@ pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancel
 /// Voxels in order of falling level, and where each level ends.
 fn sort_by_level(blocks: &GreyBlocks) -> (Vec<u32>, Vec<usize>) {
     // A fine linear table instead of a logarithm for each voxel.
-    const STEPS: usize = 2048;
-    let scale = STEPS as f32 / blocks.maximum;
-    let table: Vec<u8> = (0..=STEPS)
+    const BISECTION_STEPS: usize = 2048;
+    let scale = BISECTION_STEPS as f32 / blocks.maximum;
+    let table: Vec<u8> = (0..=BISECTION_STEPS)
         .map(|step| {
-            let share = (step as f64 + 0.5) / STEPS as f64;
-            (share.ln() / RATIO.ln()).clamp(0.0, LEVELS as f64) as u8
+            let share = (step as f64 + 0.5) / BISECTION_STEPS as f64;
+            (share.ln() / LEVEL_RATIO.ln()).clamp(0.0, LEVEL_COUNT as f64) as u8
         })
         .collect();
-    let step_of = |v: f32| ((v * scale) as usize).min(STEPS);
+    let step_of = |v: f32| ((v * scale) as usize).min(BISECTION_STEPS);
     let voxel = blocks.spacing.iter().product::<f64>();
     let floor = table
         .iter()
-        .position(|&l| l < LEVELS as u8)
-        .unwrap_or(STEPS);
+        .position(|&l| l < LEVEL_COUNT as u8)
+        .unwrap_or(BISECTION_STEPS);
     let floor = floor.max(lowest_step(
         blocks,
-        STEPS,
+        BISECTION_STEPS,
         step_of,
         (MOST_ABOVE / voxel) as usize,
     ));
     let floor_value = floor as f32 / scale;
-    let mut counts = vec![0; LEVELS + 1];
+    let mut counts = vec![0; LEVEL_COUNT + 1];
     let mut passed: Vec<(u32, u8)> = Vec::new();
     for (at, &v) in blocks.values.iter().enumerate() {
         if v >= floor_value {
-            let level = table[step_of(v)].min(LEVELS as u8 - 1);
+            let level = table[step_of(v)].min(LEVEL_COUNT as u8 - 1);
             counts[level as usize + 1] += 1;
             passed.push((at as u32, level));
         }
     }
-    for level in 0..LEVELS {
+    for level in 0..LEVEL_COUNT {
         counts[level + 1] += counts[level];
     }
     let ends = counts[1..].to_vec();

@@ -12,7 +12,7 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 
 /// Middle of the wall: (share of the length behind the base plane, share as radius).
-pub(super) const MIDDLE: [(f64, f64, usize); 6] = [
+pub(super) const WALL_PROFILE: [(f64, f64, usize); 6] = [
     (0.05, 0.350, 12),
     (0.22, 0.350, 12),
     (0.40, 0.345, 12),
@@ -22,15 +22,15 @@ pub(super) const MIDDLE: [(f64, f64, usize); 6] = [
 ];
 
 /// Where the middle of the wall crosses the axis at the apex.
-pub(super) const APEX: f64 = 0.91;
+pub(super) const APEX_SHARE: f64 = 0.91;
 
 /// Rings up to this share of the length are basal: segments 1 to 6 and most of 7 to 12.
-const BASAL: f64 = 0.6;
+const BASAL_RING_SHARE: f64 = 0.6;
 /// The wall has ended at this share of the length before the base plane.
-const BEYOND: f64 = 0.18;
+const WALL_END_SHARE: f64 = 0.18;
 
 /// The point on the axis about which poses turn and scale.
-pub(super) const CENTRE: f64 = 0.45;
+pub(super) const PIVOT_SHARE: f64 = 0.45;
 
 /// Place, direction and size of a left ventricle in the patient.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,18 +66,18 @@ struct Sample {
 pub struct Pattern(Vec<Sample>);
 
 /// What the wall, the cavity and the surroundings of a healthy heart show, wall = 1.
-const CAVITY: f64 = 0.40;
-const OUTSIDE: f64 = 0.25;
+const HEALTHY_CAVITY_VALUE: f64 = 0.40;
+const HEALTHY_OUTSIDE_VALUE: f64 = 0.25;
 /// The samples outside lie this far from the middle of the wall, mm.
-const CLEARANCE: f64 = 17.0;
+const OUTSIDE_DISTANCE_MM: f64 = 17.0;
 
 impl Default for Pattern {
     /// All samples of wall, cavity and surroundings.
     fn default() -> Self {
         let mut samples = Vec::new();
-        for (row, &(along, across, count)) in MIDDLE.iter().enumerate() {
+        for (row, &(along, across, count)) in WALL_PROFILE.iter().enumerate() {
             let at = Sample {
-                along: along - CENTRE,
+                along: along - PIVOT_SHARE,
                 across,
                 round: (1.0, 0.0),
                 outward: 0.0,
@@ -86,20 +86,22 @@ impl Default for Pattern {
                 weight: across * 0.5 / count as f64,
             };
             ring(&mut samples, count, row, &at);
-            let next = MIDDLE.get(row + 1).map_or((APEX, 0.0), |m| (m.0, m.1));
+            let next = WALL_PROFILE
+                .get(row + 1)
+                .map_or((APEX_SHARE, 0.0), |m| (m.0, m.1));
             let (rise, fall) = (next.0 - along, across - next.1);
             let norm = rise.hypot(fall);
             let outside = Sample {
-                outward: CLEARANCE,
+                outward: OUTSIDE_DISTANCE_MM,
                 tilt: (rise / norm, fall / norm),
-                expected: OUTSIDE,
+                expected: HEALTHY_OUTSIDE_VALUE,
                 weight: at.weight * 0.7,
                 ..at
             };
             ring(&mut samples, count, row, &outside);
         }
         let tip = Sample {
-            along: APEX - CENTRE,
+            along: APEX_SHARE - PIVOT_SHARE,
             across: 0.0,
             round: (1.0, 0.0),
             outward: 0.0,
@@ -108,8 +110,8 @@ impl Default for Pattern {
             weight: 0.04,
         };
         samples.push(Sample {
-            outward: CLEARANCE,
-            expected: OUTSIDE,
+            outward: OUTSIDE_DISTANCE_MM,
+            expected: HEALTHY_OUTSIDE_VALUE,
             ..tip
         });
         samples.push(tip);
@@ -123,9 +125,9 @@ impl Default for Pattern {
             (0.45, 0.11, 6, 0.08),
         ] {
             let at = Sample {
-                along: along - CENTRE,
+                along: along - PIVOT_SHARE,
                 across,
-                expected: CAVITY,
+                expected: HEALTHY_CAVITY_VALUE,
                 weight: weight / count as f64,
                 ..tip
             };
@@ -136,7 +138,7 @@ impl Default for Pattern {
 }
 
 /// What a wall without uptake shows, wall = 1: blood, and what blur and scatter bring there.
-const INFARCTED: f64 = 0.35;
+const INFARCTED_WALL_VALUE: f64 = 0.35;
 
 impl Pattern {
     /// The samples of a ventricle whose wall takes up next to nothing within `half_width` of the direction `middle`
@@ -149,7 +151,7 @@ impl Pattern {
         let dark = |s: &Sample| s.round.0 * cos + s.round.1 * sin >= half_width.cos();
         for s in samples.iter_mut().filter(|s| s.expected == 1.0) {
             if dark(s) {
-                s.expected = INFARCTED;
+                s.expected = INFARCTED_WALL_VALUE;
             }
         }
         Self(samples)
@@ -158,16 +160,16 @@ impl Pattern {
     /// The samples of the basal half: the wall's rings, their cavity and surroundings, and the end
     /// of the wall at the base. For hearts whose apex does not show.
     pub fn basal() -> Self {
-        let basal = |s: &Sample| s.along + CENTRE < BASAL;
+        let basal = |s: &Sample| s.along + PIVOT_SHARE < BASAL_RING_SHARE;
         let mut samples = Self::default().0;
         samples.retain(basal);
         let beyond = Sample {
-            along: -BEYOND - CENTRE,
-            across: MIDDLE[0].1,
+            along: -WALL_END_SHARE - PIVOT_SHARE,
+            across: WALL_PROFILE[0].1,
             round: (1.0, 0.0),
             outward: 0.0,
             tilt: (1.0, 0.0),
-            expected: OUTSIDE,
+            expected: HEALTHY_OUTSIDE_VALUE,
             weight: 0.15 / 12.0,
         };
         ring(&mut samples, 12, 0, &beyond);
@@ -190,12 +192,12 @@ fn ring(samples: &mut Vec<Sample>, count: usize, row: usize, at: &Sample) {
 impl Cup {
     /// The point on the axis where the base plane cuts it.
     pub fn base(&self) -> Vec3 {
-        self.centre - self.axis * (CENTRE * self.length)
+        self.centre - self.axis * (PIVOT_SHARE * self.length)
     }
 
     /// The outer apex.
     pub fn apex(&self) -> Vec3 {
-        self.centre + self.axis * ((1.0 - CENTRE) * self.length)
+        self.centre + self.axis * ((1.0 - PIVOT_SHARE) * self.length)
     }
 
     /// Whether a search that starts at `other` would find this place again: 12 mm and 25
@@ -222,7 +224,7 @@ impl Cup {
             scratch.push(value);
             if s.expected == 1.0 {
                 wall.add(s.weight, value);
-            } else if s.expected == CAVITY {
+            } else if s.expected == HEALTHY_CAVITY_VALUE {
                 cavity.add(s.weight, value);
             }
         }

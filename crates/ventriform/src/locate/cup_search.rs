@@ -24,8 +24,8 @@ use rayon::prelude::*;
 
 use super::cavity_candidates;
 use super::cup::{Cup, Pattern, perpendicular};
-use super::doubt::{NEEDED, NotAHeart, SOLID};
-use super::hints::{DISTINCT, Hints};
+use super::doubt::{MIN_CORRELATION, MIN_HOLLOWNESS, NotAHeart};
+use super::hints::{DISTINCT_DISTANCE_MM, Hints};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::grid::field::Field;
@@ -34,9 +34,9 @@ use crate::mesh::shapes;
 use crate::progress::{Cancelled, Monitor};
 
 /// Voxels of the coarse picture, mm.
-const COARSE: f64 = 6.5;
+const COARSE_VOXEL_MM: f64 = 6.5;
 /// The blur of the coarse picture, mm.
-const BLUR: f64 = 4.0;
+const COARSE_BLUR_MM: f64 = 4.0;
 /// Mean direction base to apex over the simulated hearts; anatomy books agree (LPS).
 const USUAL_AXIS: [f64; 3] = [0.64, -0.61, -0.44];
 /// Loss of score from the usual axis to one at a right angle to it.
@@ -44,19 +44,19 @@ const AXIS_PRIOR: f64 = 0.06;
 /// Mean length of hearts, mm, base plane to outer apex, and its logarithmic spread.
 const USUAL_LENGTH: (f64, f64) = (75.0, 0.25);
 /// Lengths tried first, mm.
-const LENGTHS: [f64; 3] = [60.0, 74.0, 92.0];
+const FIRST_LENGTHS_MM: [f64; 3] = [60.0, 74.0, 92.0];
 /// Cups that are moved, turned and scaled.
-const STARTS: usize = 40;
+const MOVED_CUPS: usize = 40;
 /// Directions that are also tried with the other lengths.
-const PROMISING: usize = 14;
+const PROMISING_DIRECTIONS: usize = 14;
 /// Half of the arc that an infarct of one territory takes up, and of two, degrees: a third of the circumference
 /// each, the border of two blurred by the wall beside it.
-const ARCS: [f64; 2] = [60.0, 100.0];
+const INFARCT_HALF_ARCS_DEG: [f64; 2] = [60.0, 100.0];
 /// Directions tried for the middle of that arc.
-const MIDDLES: i32 = 12;
+const ARC_DIRECTIONS: i32 = 12;
 /// By how much the best of so many patterns correlates better by chance. In scans without a heart the best score rises
 /// by 0.05 to 0.15, about 20 infarcts of one or two territories mostly by 0.2 to 0.3 (simulator's seeds 4102 and 4202).
-const ALLOWANCE: f64 = 0.1;
+const CHANCE_CORRELATION: f64 = 0.1;
 
 /// The picture that cups are compared with: of the whole volume, or of `region` (LPS mm).
 ///
@@ -67,8 +67,8 @@ pub fn picture(
     region: Option<&Aabb>,
     monitor: &Monitor,
 ) -> Result<Field, Cancelled> {
-    let mut field = Field::coarse(volume, region, COARSE, monitor)?;
-    field.blur(BLUR, monitor)?;
+    let mut field = Field::coarse(volume, region, COARSE_VOXEL_MM, monitor)?;
+    field.blur(COARSE_BLUR_MM, monitor)?;
     Ok(field)
 }
 
@@ -86,7 +86,7 @@ pub struct ScoredCup {
     /// How much darker the cavity is than the wall, 0..=1.
     pub hollowness: f64,
     /// Whether it is the wall that an infarct leaves: then `wall` and `hollowness` are those of what is left, and
-    /// [`ALLOWANCE`] is taken off score and correlation.
+    /// [`CHANCE_CORRELATION`] is taken off score and correlation.
     pub infarcted: bool,
 }
 
@@ -94,9 +94,9 @@ impl ScoredCup {
     /// What speaks against a ventricle, of what the cup itself shows.
     pub fn doubt(&self) -> Option<NotAHeart> {
         let (correlation, hollowness) = (self.correlation, self.hollowness);
-        if correlation < NEEDED {
+        if correlation < MIN_CORRELATION {
             Some(NotAHeart::Unlike { correlation })
-        } else if hollowness < SOLID {
+        } else if hollowness < MIN_HOLLOWNESS {
             Some(NotAHeart::Solid { hollowness })
         } else {
             None
@@ -120,7 +120,7 @@ impl<'a> CupSearch<'a> {
             field,
             pattern: Pattern::default(),
             hints,
-            coordinates: COORDINATES,
+            coordinates: CUP_COORDINATES,
         }
     }
 
@@ -144,7 +144,7 @@ impl<'a> CupSearch<'a> {
             .collect::<Result<_, Cancelled>>()?;
         let mut starts = starts.concat();
         starts.sort_by(|a, b| b.score.total_cmp(&a.score));
-        starts.truncate(STARTS);
+        starts.truncate(MOVED_CUPS);
         let mut found: Vec<ScoredCup> = Vec::new();
         for start in &starts {
             monitor.check()?;
@@ -173,7 +173,7 @@ impl<'a> CupSearch<'a> {
         let mut score = found.correlation - 0.015 * (length + breadth);
         // A solid body also differs from its surroundings; a ventricle is hollow. NaN (both values
         // are 0) counts as not hollow at all.
-        score -= 1.5 * (SOLID - found.hollowness.max(-1.0)).max(0.0);
+        score -= 1.5 * (MIN_HOLLOWNESS - found.hollowness.max(-1.0)).max(0.0);
         match &self.hints.axis {
             Some(axis) => {
                 let cos = cup.axis.dot(axis) / axis.norm();
@@ -182,7 +182,7 @@ impl<'a> CupSearch<'a> {
             None => score -= AXIS_PRIOR * (1.0 - cup.axis.dot(&Vec3::from(USUAL_AXIS))),
         }
         if let Some(centre) = &self.hints.centre {
-            score -= 0.05 * ((cup.centre - centre).norm() - DISTINCT).max(0.0);
+            score -= 0.05 * ((cup.centre - centre).norm() - DISTINCT_DISTANCE_MM).max(0.0);
         }
         if let Some(region) = &self.hints.region {
             score -= 0.05 * region.squared_distance(&cup.centre).sqrt();
@@ -207,10 +207,10 @@ impl<'a> CupSearch<'a> {
                 breadth: 1.0,
             })
         };
-        let [short, usual, long] = LENGTHS;
+        let [short, usual, long] = FIRST_LENGTHS_MM;
         let mut best: Vec<ScoredCup> = directions.iter().map(|d| turned(*d, usual)).collect();
         best.sort_by(|a, b| b.score.total_cmp(&a.score));
-        for n in 0..PROMISING {
+        for n in 0..PROMISING_DIRECTIONS {
             let axis = best[n].cup.axis;
             best.extend([turned(axis, short), turned(axis, long)]);
         }
@@ -260,10 +260,11 @@ pub fn infarcted(
     found: &[ScoredCup],
     monitor: &Monitor,
 ) -> Result<Vec<ScoredCup>, Cancelled> {
-    let searches: Vec<Vec<CupSearch>> = ARCS
+    let searches: Vec<Vec<CupSearch>> = INFARCT_HALF_ARCS_DEG
         .iter()
         .map(|half_width| {
-            let middles = (0..MIDDLES).map(|n| TAU * f64::from(n) / f64::from(MIDDLES));
+            let middles =
+                (0..ARC_DIRECTIONS).map(|n| TAU * f64::from(n) / f64::from(ARC_DIRECTIONS));
             let search = |middle| CupSearch {
                 pattern: Pattern::infarcted(middle, half_width.to_radians()),
                 ..CupSearch::new(field, hints)
@@ -283,8 +284,8 @@ pub fn infarcted(
             let climbed = searches.iter().filter_map(best);
             Ok(climbed
                 .map(|cup| ScoredCup {
-                    score: cup.score - ALLOWANCE,
-                    correlation: cup.correlation - ALLOWANCE,
+                    score: cup.score - CHANCE_CORRELATION,
+                    correlation: cup.correlation - CHANCE_CORRELATION,
                     infarcted: true,
                     ..cup
                 })
@@ -300,7 +301,7 @@ fn axis_directions() -> Vec<Vec3> {
 }
 
 /// Coordinates of a cup: see [`moved`].
-pub const COORDINATES: usize = 7;
+pub const CUP_COORDINATES: usize = 7;
 
 /// `cup` with one of its seven coordinates changed by `amount` steps: centre (8 mm), axis
 /// (0.2 rad), length and breadth (8 %).

@@ -3,14 +3,14 @@
 use crate::geometry::Vec3;
 
 /// Number of directions.
-pub const DIRECTIONS: usize = 96;
+pub const DIRECTION_COUNT: usize = 96;
 
 /// Evenly spread unit vectors (Fibonacci lattice).
 pub fn directions() -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
-    (0..DIRECTIONS)
+    (0..DIRECTION_COUNT)
         .map(|n| {
-            let z = 1.0 - (2.0 * n as f64 + 1.0) / DIRECTIONS as f64;
+            let z = 1.0 - (2.0 * n as f64 + 1.0) / DIRECTION_COUNT as f64;
             let r = (1.0 - z * z).sqrt();
             let angle = golden * n as f64;
             Vec3::new(r * angle.cos(), r * angle.sin(), z)
@@ -28,12 +28,12 @@ pub struct Compass {
 impl Compass {
     /// Cells along the side of a face: about 5 degrees each, a quarter of the directions'
     /// spacing.
-    const SIDE: usize = 18;
+    const CELLS_PER_SIDE: usize = 18;
 
     /// The compass of [`directions`].
     pub fn new() -> Self {
         let table = directions();
-        let side = Self::SIDE;
+        let side = Self::CELLS_PER_SIDE;
         let cells = (0..6 * side * side)
             .map(|cell| {
                 let (face, u, v) = (cell / (side * side), cell / side % side, cell % side);
@@ -44,7 +44,7 @@ impl Compass {
                 offset[(axis + 1) % 3] = coordinate(u);
                 offset[(axis + 2) % 3] = coordinate(v);
                 let along = |n: &usize| table[*n].dot(&offset);
-                let best = (0..DIRECTIONS).max_by(|a, b| along(a).total_cmp(&along(b)));
+                let best = (0..DIRECTION_COUNT).max_by(|a, b| along(a).total_cmp(&along(b)));
                 best.unwrap_or(0) as u8
             })
             .collect();
@@ -60,10 +60,11 @@ impl Compass {
         }
         let face = 2 * axis + usize::from(offset[axis] < 0.0);
         let cell = |r: usize| {
-            let c = (offset[r % 3] / height + 1.0) / 2.0 * Self::SIDE as f64;
-            (c as usize).min(Self::SIDE - 1)
+            let c = (offset[r % 3] / height + 1.0) / 2.0 * Self::CELLS_PER_SIDE as f64;
+            (c as usize).min(Self::CELLS_PER_SIDE - 1)
         };
-        let at = (face * Self::SIDE + cell(axis + 1)) * Self::SIDE + cell(axis + 2);
+        let at =
+            (face * Self::CELLS_PER_SIDE + cell(axis + 1)) * Self::CELLS_PER_SIDE + cell(axis + 2);
         usize::from(self.cells[at])
     }
 }

@@ -2,31 +2,33 @@
 
 /// Least correlation of a heart with a cup. Simulated and clinical hearts reach 0.76 to
 /// 0.99; where the heart was erased from five scans, the best other structure had 0.61 to 0.66.
-pub(super) const NEEDED: f64 = 0.6;
+pub(super) const MIN_CORRELATION: f64 = 0.6;
 /// Hollowness below which a body counts as solid. Hearts: 0.45 to 0.76; the others: 0.08 to 0.15.
-pub(super) const SOLID: f64 = 0.2;
+pub(super) const MIN_HOLLOWNESS: f64 = 0.2;
 /// Share of the wall's value above which the base counts as closed. Hearts: 0.2 to 0.7 (the
 /// latter in a scan with a background of half the heart's uptake); spherical shells, brains
 /// and stomachs: 1.0 and more.
-pub(super) const CLOSED: f64 = 0.85;
+pub(super) const MAX_LID_SHARE: f64 = 0.85;
 
 /// Why a candidate is not a heart.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum NotAHeart {
     /// The image does not look like a cup there.
-    #[error("correlates {correlation:.2} with a ventricle's wall ({NEEDED:.2} is needed)")]
+    #[error("correlates {correlation:.2} with a ventricle's wall ({MIN_CORRELATION:.2} is needed)")]
     Unlike {
         /// Correlation with a cup.
         correlation: f64,
     },
     /// It has no cavity.
-    #[error("is hollow by {hollowness:.2} ({SOLID:.2} is needed)")]
+    #[error("is hollow by {hollowness:.2} ({MIN_HOLLOWNESS:.2} is needed)")]
     Solid {
         /// 1 - cavity / wall.
         hollowness: f64,
     },
     /// It is closed at the base.
-    #[error("is closed at the base: {lid:.2} of the wall's value there (at most {CLOSED:.2})")]
+    #[error(
+        "is closed at the base: {lid:.2} of the wall's value there (at most {MAX_LID_SHARE:.2})"
+    )]
     Closed {
         /// Value across the base, wall = 1.
         lid: f64,

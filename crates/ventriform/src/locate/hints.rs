@@ -4,7 +4,7 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 
 /// Places nearer to each other than this are the same one, mm.
-pub const DISTINCT: f64 = 25.0;
+pub const DISTINCT_DISTANCE_MM: f64 = 25.0;
 
 /// What the caller knows of the ventricle's place; every hint is optional.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -22,7 +22,7 @@ impl Hints {
     pub fn admit(&self, p: &Vec3) -> bool {
         let near = self
             .centre
-            .is_none_or(|centre| (p - centre).norm() <= DISTINCT);
+            .is_none_or(|centre| (p - centre).norm() <= DISTINCT_DISTANCE_MM);
         let inside = self
             .region
             .as_ref()

@@ -10,9 +10,9 @@
 use super::apex;
 use super::cup::Cup;
 use super::cup_search::{self, CupSearch, ScoredCup};
-use super::doubt::{CLOSED, NEEDED, NotAHeart};
+use super::doubt::{MAX_LID_SHARE, MIN_CORRELATION, NotAHeart};
 use super::error::LocateError;
-use super::hints::{DISTINCT, Hints};
+use super::hints::{DISTINCT_DISTANCE_MM, Hints};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::grid::volume::Volume;
@@ -117,7 +117,7 @@ impl Cups {
 
     /// Whether `cup` is open at the base, or a hinted centre overrules the question.
     fn is_open(&self, cup: &ScoredCup) -> bool {
-        self.hints.centre.is_some() || cup.cup.lid(&self.field, cup.wall) <= CLOSED
+        self.hints.centre.is_some() || cup.cup.lid(&self.field, cup.wall) <= MAX_LID_SHARE
     }
 
     /// The place of `best`, and how sure it is in view of the best cup elsewhere.
@@ -125,7 +125,7 @@ impl Cups {
         let elsewhere = self
             .found
             .iter()
-            .filter(|s| (s.cup.centre - best.cup.centre).norm() > DISTINCT)
+            .filter(|s| (s.cup.centre - best.cup.centre).norm() > DISTINCT_DISTANCE_MM)
             .find(|s| self.is_open(s));
         let place = report(best, elsewhere);
         if best.infarcted {
@@ -145,7 +145,7 @@ impl Cups {
 }
 
 fn report(best: &ScoredCup, elsewhere: Option<&ScoredCup>) -> Localisation {
-    let quality = ((best.correlation - NEEDED) / (0.8 - NEEDED)).clamp(0.0, 1.0);
+    let quality = ((best.correlation - MIN_CORRELATION) / (0.8 - MIN_CORRELATION)).clamp(0.0, 1.0);
     let margin = elsewhere.map_or(1.0, |e| ((best.score - e.score) / 0.15).clamp(0.0, 1.0));
     let most = if best.infarcted { OF_A_PART } else { 1.0 };
     Localisation {

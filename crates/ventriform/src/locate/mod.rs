@@ -59,16 +59,16 @@ pub use doubt::NotAHeart;
 pub use error::LocateError;
 pub use hints::Hints;
 use localisation::{Cups, Localisation};
-use rays::{Cavity, DOUBTFUL, RaySearch};
+use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
 
 /// The centres that rays and cups find in one heart lie nearer to each other than this, mm.
 /// Rays find the middle of the cavity as far as it is closed, cups a point on the axis nearer to
 /// the base: 5 to 17 mm apart in simulated and clinical hearts.
 const SAME_HEART: f64 = 30.0;
 /// Correlation from which on the cup at a proposal settles the matter.
-const CLEAR: f64 = 0.75;
+const CLEAR_CORRELATION: f64 = 0.75;
 /// How far from a proposal the picture for its cup reaches, mm: a large heart and the blur.
-const SURROUNDINGS: f64 = 90.0;
+const SURROUNDINGS_MM: f64 = 90.0;
 
 /// The heart that [`find`] decided on.
 pub struct Heart<'v> {
@@ -98,12 +98,12 @@ pub fn find<'v>(
 ) -> Result<Heart<'v>, LocateError> {
     let rays = RaySearch::new(volume, monitor)?;
     let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
-    let proposal = proposal.filter(|c| c.score >= DOUBTFUL);
+    let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
     let decision = match proposal {
         Some(cavity) if is_clear(volume, hints, cavity, monitor)? => Decision::Rays(cavity.clone()),
         _ => {
             let mut cups = Cups::everywhere(volume, hints, monitor)?;
-            let clear = |best: &ScoredCup| best.correlation >= CLEAR;
+            let clear = |best: &ScoredCup| best.correlation >= CLEAR_CORRELATION;
             if hints.centre.is_some() && !cups.best(|_| true).is_ok_and(clear) {
                 cups.add_infarcted(monitor)?;
             }
@@ -132,20 +132,20 @@ fn is_clear(
 ) -> Result<bool, Cancelled> {
     let centre = to_patient(volume, &cavity.centre);
     let region = Aabb {
-        min: centre - Vec3::repeat(SURROUNDINGS),
-        max: centre + Vec3::repeat(SURROUNDINGS),
+        min: centre - Vec3::repeat(SURROUNDINGS_MM),
+        max: centre + Vec3::repeat(SURROUNDINGS_MM),
     };
     let field = cup_search::picture(volume, Some(&region), monitor)?;
     let found = CupSearch::new(&field, hints).around(centre);
-    let open = found.cup.lid(&field, found.wall) <= doubt::CLOSED;
+    let open = found.cup.lid(&field, found.wall) <= doubt::MAX_LID_SHARE;
     let near = (found.cup.centre - centre).norm() < SAME_HEART;
-    Ok(near && open && found.doubt().is_none() && found.correlation >= CLEAR)
+    Ok(near && open && found.doubt().is_none() && found.correlation >= CLEAR_CORRELATION)
 }
 
 impl Heart<'_> {
     /// The cavity with the distances of its wall; `None` where rays meet no wall there.
     ///
-    /// Look at its score: it is below [`rays::PLAUSIBLE`] where the heart is doubtful and the
+    /// Look at its score: it is below [`rays::PLAUSIBLE_SCORE`] where the heart is doubtful and the
     /// rays see none either.
     ///
     /// # Errors
@@ -162,11 +162,11 @@ impl Heart<'_> {
             }
         };
         let best = self.rays.best(within(SAME_HEART));
-        if best.is_some_and(|b| b.score >= DOUBTFUL) {
+        if best.is_some_and(|b| b.score >= UNCERTAIN_SCORE) {
             return Ok(best.cloned());
         }
         // A wall that is nowhere brighter than where it meets the liver is never a part by itself.
-        let starts = within(SAME_HEART + rays::FARTHEST);
+        let starts = within(SAME_HEART + rays::MAX_CENTRE_SHIFT_MM);
         let scanned = self.rays.lattice(starts, within(SAME_HEART), monitor)?;
         let better = scanned.as_ref().map(|s| s.score) > best.map(|b| b.score);
         Ok(if better { scanned } else { best.cloned() })

@@ -18,7 +18,7 @@
 //! Over 19 simulated scans the answer is within 2 degrees of the frame's. With the image rotated by
 //! 15 and 30 degrees about x, y and z, it follows within 3.1 degrees (median 0.5). The frame's
 //! superior direction is taken if less than [`LEAST_BODY`] of the body is in view, if its outline
-//! is no cylinder's ([`DISORDER`]), or if the answer is more than [`CONE`] degrees away. Not
+//! is no cylinder's ([`MAX_DISORDER`]), or if the answer is more than [`MAX_TILT_DEG`] degrees away. Not
 //! detected: a rotation by more than that, and a patient lying head down in a frame that says
 //! otherwise.
 //!
@@ -39,13 +39,13 @@ use crate::grid::volume::Volume;
 use crate::progress::{Cancelled, Monitor};
 
 /// Voxels of the coarse picture, mm.
-const COARSE: f64 = 8.0;
+const COARSE_VOXEL_MM: f64 = 8.0;
 /// Blur of the picture before and of the mask after the cut, mm.
-const BLUR: f64 = 8.0;
+const OUTLINE_BLUR_MM: f64 = 8.0;
 /// How far the heart's surroundings reach, mm.
-const SURROUNDINGS: f64 = 80.0;
+const SURROUNDINGS_MM: f64 = 80.0;
 /// The body's border as a share of the surroundings' median.
-const BORDER: f64 = 0.3;
+const BODY_BORDER_SHARE: f64 = 0.3;
 /// Least volume of body in view, litres. Simulated scans show 13 to 30 l, less where a side is
 /// cut off. Fields of view of 28 x 28 x 20 cm show 7 to 9 l of real patients, rounded off by the
 /// reconstruction's circle: answers there were up to 18 degrees off the frame's.
@@ -53,11 +53,11 @@ pub const LEAST_BODY: f64 = 10.0;
 /// Greatest mean of sin²(2φ) over that of normals in all directions alike. Simulated scans:
 /// 0.05 to 0.62 (the latter with the streaks of filtered backprojection); hearts without a torso
 /// and rounded fields of view: 0.74 to 0.9.
-pub const DISORDER: f64 = 0.72;
+pub const MAX_DISORDER: f64 = 0.72;
 /// Greatest angle between the answer and the frame's superior, degrees.
-pub const CONE: f64 = 45.0;
+pub const MAX_TILT_DEG: f64 = 45.0;
 /// Pull to the frame's superior, in the measure of the mean of sin²(2φ).
-const PULL: f64 = 0.05;
+const FRAME_PULL: f64 = 0.05;
 
 /// What decides the superior direction that segments are counted from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -211,21 +211,21 @@ impl PatientOrientation {
     /// # Errors
     /// [`Cancelled`].
     pub fn of_body(volume: &Volume, heart: &Vec3, monitor: &Monitor) -> Result<Self, Cancelled> {
-        let mut field = Field::coarse(volume, None, COARSE, monitor)?;
+        let mut field = Field::coarse(volume, None, COARSE_VOXEL_MM, monitor)?;
         monitor.check()?;
-        field.blur(BLUR, monitor)?;
+        field.blur(OUTLINE_BLUR_MM, monitor)?;
         let Some(body) = Torso::around(&field, heart) else {
             return Ok(Self::FRAME);
         };
         monitor.check()?;
         let mut mask = field.with_values(body.mask);
-        mask.blur(BLUR, monitor)?;
+        mask.blur(OUTLINE_BLUR_MM, monitor)?;
         let outline = Outline::of(&mask);
         let superior = outline.axis();
         let disorder = outline.disorder(&superior);
-        let within = superior.z > CONE.to_radians().cos();
+        let within = superior.z > MAX_TILT_DEG.to_radians().cos();
         // NaN (no outline in view) is not below the limit.
-        let seen = body.litres >= LEAST_BODY && within && disorder < DISORDER;
+        let seen = body.litres >= LEAST_BODY && within && disorder < MAX_DISORDER;
         Ok(match seen {
             true => Self {
                 superior,
@@ -250,7 +250,7 @@ impl Torso {
         let index = |v: usize| [v % nx, v / nx % ny, v / (nx * ny)];
         let near = |v: &usize| {
             let p = field.to_patient(&Vec3::from(index(*v).map(|x| x as f64)));
-            (p - heart).norm_squared() < SURROUNDINGS * SURROUNDINGS
+            (p - heart).norm_squared() < SURROUNDINGS_MM * SURROUNDINGS_MM
         };
         let near: Vec<usize> = (0..field.values().len()).filter(near).collect();
         let mut values: Vec<f32> = near.iter().map(|v| field.values()[*v]).collect();
@@ -259,7 +259,7 @@ impl Torso {
             return None;
         }
         let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
-        let level = BORDER as f32 * *median;
+        let level = BODY_BORDER_SHARE as f32 * *median;
         if !(level > 0.0) {
             return None;
         }
@@ -336,13 +336,13 @@ impl Outline {
         4.0 * (self.second.dot(&d) - (self.fourth * d).dot(&d)) / (8.0 / 15.0)
     }
 
-    /// The direction of least disorder within [`CONE`] and a little more, with the pull.
+    /// The direction of least disorder within [`MAX_TILT_DEG`] and a little more, with the pull.
     fn axis(&self) -> Vec3 {
-        let cost = |d: &Vec3| self.disorder(d) * (8.0 / 15.0) + PULL * (1.0 - d.z * d.z);
+        let cost = |d: &Vec3| self.disorder(d) * (8.0 / 15.0) + FRAME_PULL * (1.0 - d.z * d.z);
         let mut best = Vec3::z();
         let mut least = cost(&best);
         // A grid of 3 degrees, then smaller steps about its best.
-        let reach = (CONE / 3.0) as i32 + 1;
+        let reach = (MAX_TILT_DEG / 3.0) as i32 + 1;
         for a in -reach..=reach {
             for b in -reach..=reach {
                 let lean = Vec3::new(f64::from(a), f64::from(b), 0.0) * 3f64.to_radians();

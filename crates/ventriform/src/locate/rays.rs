@@ -24,7 +24,7 @@
 use rayon::prelude::*;
 
 use super::component_tree::{Part, parts};
-use super::directions::{DIRECTIONS, directions};
+use super::directions::{DIRECTION_COUNT, directions};
 use super::grey_blocks::GreyBlocks;
 use crate::geometry::Vec3;
 use crate::grid::volume::Volume;
@@ -35,17 +35,17 @@ const RAY_BLOCK: f64 = 4.0;
 /// Blocks in which parts are formed, mm: they only say where to look.
 const PART_BLOCK: f64 = 7.0;
 /// Spacing of the lattice that is searched when no part looks like a ventricle, mm.
-const LATTICE: f64 = 12.0;
+const LATTICE_SPACING_MM: f64 = 12.0;
 /// Points of the lattice that are judged in full.
 const LATTICE_BEST: usize = 200;
 /// Step along a ray, mm.
-const STEP: f64 = 3.0;
+const RAY_STEP_MM: f64 = 3.0;
 /// Samples along a ray: up to 66 mm.
-const SAMPLES: usize = 23;
+const RAY_SAMPLES: usize = 23;
 /// Farthest that a candidate's centre moves from its start, mm.
-pub(super) const FARTHEST: f64 = 45.0;
+pub(super) const MAX_CENTRE_SHIFT_MM: f64 = 45.0;
 /// Samples behind the peak in which the wall must end: 27 mm.
-const BEHIND: usize = 9;
+const WALL_END_SAMPLES: usize = 9;
 
 /// A ventricle's cavity and the distance of the wall round it.
 #[derive(Debug, Clone)]
@@ -59,12 +59,12 @@ pub struct Cavity {
     pub seen: Vec<bool>,
     /// Typical brightness of the wall (upper quartile of the rays' peaks).
     pub level: f64,
-    /// 0 to 1: how much like a ventricle it looks. Below [`PLAUSIBLE`] it is none.
+    /// 0 to 1: how much like a ventricle it looks. Below [`PLAUSIBLE_SCORE`] it is none.
     pub score: f64,
 }
 
 /// Score from which on a candidate that starts at a part counts as a ventricle.
-pub const PLAUSIBLE: f64 = 0.2;
+pub const PLAUSIBLE_SCORE: f64 = 0.2;
 /// The same for candidates of the lattice, of which there are many more to be wrong.
 const PLAUSIBLE_ON_LATTICE: f64 = 0.3;
 
@@ -73,7 +73,7 @@ const PLAUSIBLE_ON_LATTICE: f64 = 0.3;
 /// Of 133 distorted copies of the simulated patients (cropped, halved, noisy, mirrored, blurred,
 /// with hotter organs) every heart was found, 131 with 0.29 or more; of 19 scans with the heart
 /// painted over none reached 0.42.
-pub const DOUBTFUL: f64 = 0.45;
+pub const UNCERTAIN_SCORE: f64 = 0.45;
 
 /// The ray search in one volume.
 pub(super) struct RaySearch<'v> {
@@ -113,7 +113,7 @@ impl<'v> RaySearch<'v> {
 
     /// The best candidate that starts at a point of the lattice and whose centre is `admitted`,
     /// if its score is good enough for one of so many. No candidate lies farther than
-    /// [`FARTHEST`] from its start, so only starts that near to something admitted are tried.
+    /// [`MAX_CENTRE_SHIFT_MM`] from its start, so only starts that near to something admitted are tried.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -142,12 +142,12 @@ impl<'v> RaySearch<'v> {
         Ok(judged.into_iter().flatten().collect())
     }
 
-    /// The [`LATTICE_BEST`] points of a lattice of [`LATTICE`] mm from which most of every
+    /// The [`LATTICE_BEST`] points of a lattice of [`LATTICE_SPACING_MM`] mm from which most of every
     /// fourth ray meet a wall, at least half of them.
     fn lattice_points(&self, starts: impl Fn(&Vec3) -> bool + Sync) -> Vec<Part> {
         let grid = &self.blocks;
         let size = Vec3::from_fn(|r, _| grid.shape[r] as f64 * grid.spacing[r]);
-        let steps = [0, 1, 2].map(|r| (size[r] / LATTICE) as usize + 1);
+        let steps = [0, 1, 2].map(|r| (size[r] / LATTICE_SPACING_MM) as usize + 1);
         let floor = 0.08 * f64::from(grid.maximum);
         let points: Vec<usize> = (0..steps.iter().product()).collect();
         let mut hit: Vec<(usize, Part)> = points
@@ -158,7 +158,7 @@ impl<'v> RaySearch<'v> {
                     n / steps[0] % steps[1],
                     n / (steps[0] * steps[1]),
                 ];
-                let centroid = Vec3::from_fn(|r, _| (index[r] as f64 + 0.5) * LATTICE);
+                let centroid = Vec3::from_fn(|r, _| (index[r] as f64 + 0.5) * LATTICE_SPACING_MM);
                 let here = grid.at_mm(&centroid);
                 // In the dark around the body there is no cavity.
                 if !starts(&centroid) || here < 0.02 * f64::from(grid.maximum) {
@@ -172,7 +172,7 @@ impl<'v> RaySearch<'v> {
                 let hits = rays
                     .filter(|d| look(grid, &centroid, d, part.level).weight == 1.0)
                     .count();
-                (8 * hits >= DIRECTIONS).then_some((hits, part))
+                (8 * hits >= DIRECTION_COUNT).then_some((hits, part))
             })
             .collect();
         // Stable: of equals the first of the lattice.
@@ -204,19 +204,19 @@ struct RayHit {
 }
 
 fn look(blocks: &GreyBlocks, centre: &Vec3, direction: &Vec3, level: f64) -> RayHit {
-    let value = |n: usize| blocks.at_mm(&(centre + direction * (STEP * n as f64)));
+    let value = |n: usize| blocks.at_mm(&(centre + direction * (RAY_STEP_MM * n as f64)));
     // Five samples in a row: v is the middle one.
     let mut window = [value(0), value(1), value(2), value(3), 0.0];
     let mut darkest = window[0].min(window[1]);
-    for n in 2..SAMPLES {
+    for n in 2..RAY_SAMPLES {
         window[4] = value(n + 2);
         let v = window[2];
         let is_peak = v >= 0.7 * level && window.iter().all(|other| v >= *other);
         if is_peak && darkest <= 0.8 * v {
             let limit = 0.7 * v;
-            let ends = (n + 1..n + BEHIND).any(|m| value(m) <= limit);
+            let ends = (n + 1..n + WALL_END_SAMPLES).any(|m| value(m) <= limit);
             return RayHit {
-                distance: STEP * n as f64,
+                distance: RAY_STEP_MM * n as f64,
                 peak: v,
                 weight: if ends { 1.0 } else { 0.4 },
                 cavity: darkest / v,
@@ -273,7 +273,8 @@ fn judge(blocks: &GreyBlocks, table: &[Vec3], part: &Part) -> Option<Cavity> {
         let Some((fitted, radius)) = fit_sphere(&points) else {
             break;
         };
-        if !(12.0..55.0).contains(&radius) || (fitted - part.centroid).norm() > FARTHEST {
+        if !(12.0..55.0).contains(&radius) || (fitted - part.centroid).norm() > MAX_CENTRE_SHIFT_MM
+        {
             break;
         }
         let moved = (fitted - centre).norm();
@@ -293,7 +294,7 @@ fn near(value: f64, best: f64, width: f64) -> f64 {
 /// Scores a centre, or `None` where fewer than a quarter of the rays meet a wall.
 fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> Option<Cavity> {
     let hits: Vec<&RayHit> = walls.iter().filter(|w| w.weight > 0.0).collect();
-    if hits.len() < DIRECTIONS / 4 {
+    if hits.len() < DIRECTION_COUNT / 4 {
         return None;
     }
     let mut distances: Vec<f64> = hits.iter().map(|w| w.distance).collect();
@@ -312,7 +313,7 @@ fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> 
     let seen: Vec<bool> = walls.iter().map(belongs).collect();
     let kept: Vec<&RayHit> = walls.iter().filter(|w| belongs(w)).collect();
     let n = kept.len() as f64;
-    if n < DIRECTIONS as f64 / 4.0 {
+    if n < DIRECTION_COUNT as f64 / 4.0 {
         return None;
     }
     let mean = kept.iter().map(|w| w.distance).sum::<f64>() / n;
@@ -321,10 +322,10 @@ fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> 
         .map(|w| (w.distance - mean).powi(2))
         .sum::<f64>()
         / n;
-    let coverage = kept.iter().map(|w| w.weight).sum::<f64>() / DIRECTIONS as f64;
+    let coverage = kept.iter().map(|w| w.weight).sum::<f64>() / DIRECTION_COUNT as f64;
     let evenness = (-variance / (0.35 * mean).powi(2)).exp();
     let contrast = 1.0 - kept.iter().map(|w| w.cavity).sum::<f64>() / n;
-    let missing = DIRECTIONS as f64 - n;
+    let missing = DIRECTION_COUNT as f64 - n;
     let open: Vec3 = table
         .iter()
         .zip(&seen)

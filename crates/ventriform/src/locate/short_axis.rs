@@ -13,12 +13,12 @@ use crate::geometry::frame::VoxelToPatient;
 
 /// Greatest angle between the heart's axis and the third axis of the grid, across which slices are
 /// stored, degrees. A patient's heart hardly ever points so straight up or down.
-const THROUGH: f64 = 20.0;
+const MAX_THROUGH_ANGLE_DEG: f64 = 20.0;
 /// Greatest angle to the first and the second axis of the grid, degrees. Hearts that lie flat or point
 /// forward come near them.
-const WITHIN: f64 = 8.0;
+const MAX_IN_PLANE_ANGLE_DEG: f64 = 8.0;
 /// Greatest angle between the axes of a plain frame and the patient's, degrees.
-const PLAIN: f64 = 1.0;
+const MAX_PLAIN_ANGLE_DEG: f64 = 1.0;
 
 /// Slices cut across the heart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,9 +37,15 @@ impl ShortAxisSlices {
     pub fn of(frame: &VoxelToPatient, axis: &Vec3) -> Option<Self> {
         let grid = [0, 1, 2].map(|a| frame.linear().column(a).normalize());
         let along = |a: &usize| axis.dot(&grid[*a]).abs();
-        let limit = |a: usize| if a == 2 { THROUGH } else { WITHIN };
+        let limit = |a: usize| {
+            if a == 2 {
+                MAX_THROUGH_ANGLE_DEG
+            } else {
+                MAX_IN_PLANE_ANGLE_DEG
+            }
+        };
         let grid_axis = (0..3).max_by(|a, b| along(a).total_cmp(&along(b)))?;
-        let plain = |direction: &Vec3| direction.amax() > PLAIN.to_radians().cos();
+        let plain = |direction: &Vec3| direction.amax() > MAX_PLAIN_ANGLE_DEG.to_radians().cos();
         (along(&grid_axis) > limit(grid_axis).to_radians().cos()).then(|| Self {
             grid_axis,
             apex_first: axis.dot(&grid[grid_axis]) < 0.0,

@@ -6,9 +6,9 @@ use super::number::NumberType;
 use super::parsed::damaged;
 
 /// Longest line of text, bytes.
-const LINE: usize = 1 << 16;
+const MAX_LINE_BYTES: usize = 1 << 16;
 /// Longest word of text, bytes.
-const WORD: usize = 64;
+const MAX_WORD_BYTES: usize = 64;
 
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
@@ -69,17 +69,17 @@ impl<'a> Cursor<'a> {
     /// The next line without its end; `None` at the end of the file.
     ///
     /// # Errors
-    /// If it is longer than [`LINE`].
+    /// If it is longer than [`MAX_LINE_BYTES`].
     pub fn line(&mut self) -> Result<Option<&'a [u8]>, MeshFileError> {
         let rest = self.rest();
         if rest.is_empty() {
             return Ok(None);
         }
-        let seen = &rest[..rest.len().min(LINE + 1)];
+        let seen = &rest[..rest.len().min(MAX_LINE_BYTES + 1)];
         let end = match seen.iter().position(|b| *b == b'\n') {
             Some(end) => end,
-            None if seen.len() > LINE => {
-                return Err(self.damaged(format!("a line has more than {LINE} bytes")));
+            None if seen.len() > MAX_LINE_BYTES => {
+                return Err(self.damaged(format!("a line has more than {MAX_LINE_BYTES} bytes")));
             }
             None => seen.len(),
         };
@@ -91,7 +91,7 @@ impl<'a> Cursor<'a> {
     /// The next word; `None` at the end of the file.
     ///
     /// # Errors
-    /// If it is longer than [`WORD`].
+    /// If it is longer than [`MAX_WORD_BYTES`].
     pub fn word(&mut self) -> Result<Option<&'a [u8]>, MeshFileError> {
         let rest = self.rest();
         let white = rest.iter().position(|b| !b.is_ascii_whitespace());
@@ -101,12 +101,12 @@ impl<'a> Cursor<'a> {
         };
         self.at += begin;
         let rest = self.rest();
-        let seen = &rest[..rest.len().min(WORD + 1)];
+        let seen = &rest[..rest.len().min(MAX_WORD_BYTES + 1)];
         let end = seen.iter().position(u8::is_ascii_whitespace);
         let end = match end {
             Some(end) => end,
-            None if seen.len() > WORD => {
-                return Err(self.damaged(format!("a word has more than {WORD} bytes")));
+            None if seen.len() > MAX_WORD_BYTES => {
+                return Err(self.damaged(format!("a word has more than {MAX_WORD_BYTES} bytes")));
             }
             None => seen.len(),
         };

@@ -22,9 +22,9 @@ use std::marker::PhantomData;
 
 const FORMAT: MeshFormat = MeshFormat::Gltf;
 /// Most nodes, meshes, accessors ... of a file.
-const MOST: usize = 1024;
+const MAX_ITEMS: usize = 1024;
 /// Longest JSON document, bytes, without the buffers in it.
-const LONGEST: usize = 4 << 20;
+const MAX_JSON_BYTES: usize = 4 << 20;
 
 /// The matrix of the node of our own files, by columns: LPS millimetres to metres, Y up (`export::gltf`).
 const PATIENT_TO_WORLD: [f64; 16] = [
@@ -34,7 +34,7 @@ const PATIENT_TO_WORLD: [f64; 16] = [
     0.0, 0.0, 0.0, 1.0,
 ];
 
-/// A list of at most [`MOST`] entries.
+/// A list of at most [`MAX_ITEMS`] entries.
 #[derive(Debug)]
 struct Few<T>(Vec<T>);
 
@@ -51,15 +51,15 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Few<T> {
             type Value = Few<T>;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "a list of at most {MOST} entries")
+                write!(f, "a list of at most {MAX_ITEMS} entries")
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> Result<Few<T>, A::Error> {
                 let mut list = Vec::new();
                 while let Some(entry) = from.next_element()? {
-                    if list.len() == MOST {
+                    if list.len() == MAX_ITEMS {
                         return Err(A::Error::invalid_length(
-                            MOST + 1,
+                            MAX_ITEMS + 1,
                             &self as &dyn de::Expected,
                         ));
                     }
@@ -211,10 +211,10 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
             _ => return Err(broken(format!("buffer {number}"), "it has no bytes".into())),
         });
     }
-    if json.len().saturating_sub(embedded) > LONGEST {
+    if json.len().saturating_sub(embedded) > MAX_JSON_BYTES {
         return Err(MeshFileError::TooLong {
             bytes: json.len() as u64,
-            limit: LONGEST as u64,
+            limit: MAX_JSON_BYTES as u64,
         });
     }
     let mut said = Said::default();

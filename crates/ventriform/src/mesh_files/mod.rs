@@ -86,7 +86,7 @@ impl MeshFormat {
     }
 
     /// Endings of the names of such files, without the dot.
-    pub const ENDINGS: [&'static str; 8] =
+    pub const FILE_EXTENSIONS: [&'static str; 8] =
         ["stl", "ply", "obj", "vtk", "vtp", "glb", "gltf", "json"];
 }
 

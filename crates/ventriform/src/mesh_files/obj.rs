@@ -10,7 +10,7 @@ use crate::geometry::Vec3;
 const FORMAT: MeshFormat = MeshFormat::Obj;
 
 /// Statements that say nothing of the surface.
-const PASSED: [&[u8]; 17] = [
+const SKIPPED_STATEMENTS: [&[u8]; 17] = [
     b"vn",
     b"vt",
     b"vp",
@@ -58,7 +58,7 @@ pub(super) fn is_obj(start: &[u8]) -> bool {
                 known |= has(b"space=lps") || has(b"space=ras") || has(b"wavefront");
             }
             Some(b"f" | b"l" | b"p") => {}
-            Some(word) if PASSED.contains(&word) => {}
+            Some(word) if SKIPPED_STATEMENTS.contains(&word) => {}
             Some(_) => return false,
         }
     }
@@ -92,7 +92,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
                 faces.polygon(corners, vertices.len())?;
             }
             Some(b"l" | b"p") => lines += 1,
-            Some(word) if PASSED.contains(&word) => {}
+            Some(word) if SKIPPED_STATEMENTS.contains(&word) => {}
             Some(word) => {
                 let shown = word[..word.len().min(32)].escape_ascii();
                 return Err(MeshFileError::Unsupported {

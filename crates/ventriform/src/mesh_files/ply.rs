@@ -13,7 +13,7 @@ use crate::geometry::Vec3;
 
 const FORMAT: MeshFormat = MeshFormat::Ply;
 /// Most properties of an element, and most elements.
-const MOST: usize = 256;
+const MAX_PROPERTIES: usize = 256;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Encoding {
@@ -168,7 +168,7 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>, Said), Mes
                     _ => return Err(wrong(cursor)),
                 });
             }
-            Some(b"element") if elements.len() < MOST => {
+            Some(b"element") if elements.len() < MAX_PROPERTIES => {
                 let name = words_of_line.next().map(<[u8]>::to_vec);
                 let count = words_of_line.next().and_then(whole);
                 let (Some(name), Some(count)) = (name, count) else {
@@ -188,7 +188,9 @@ fn header(cursor: &mut Cursor<'_>) -> Result<(Encoding, Vec<Element>, Said), Mes
                     word => (None, word.and_then(kind_of)),
                 };
                 let name = next().map(<[u8]>::to_vec);
-                let room = elements.last().is_some_and(|e| e.properties.len() < MOST);
+                let room = elements
+                    .last()
+                    .is_some_and(|e| e.properties.len() < MAX_PROPERTIES);
                 let (Some(kind), Some(name), true, false) = (kind, name, room, list == Some(None))
                 else {
                     return Err(wrong(cursor));

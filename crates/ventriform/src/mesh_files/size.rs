@@ -1,20 +1,20 @@
 //! Whether a mesh is as large as an organ.
 //!
 //! A ventricle is 60 to 130 mm long, that of an infant 25 mm, a liver 250 mm. The unit of a mesh whose greatest extent lies
-//! outside [`LEAST`] to [`GREATEST`] must be stated, so that metres or centimetres are never read as millimetres.
+//! outside [`MIN_EXTENT_MM`] to [`MAX_EXTENT_MM`] must be stated, so that metres or centimetres are never read as millimetres.
 
 use super::statement::MeshUnit;
 use crate::geometry::bvh::Aabb;
 use crate::mesh::TriMesh;
 
 /// Smallest extent of an organ, mm. That of 25 cm in centimetres is above the one of 19 cm read as centimetres.
-const LEAST: f64 = 20.0;
+const MIN_EXTENT_MM: f64 = 20.0;
 /// Greatest extent of an organ, mm.
-const GREATEST: f64 = 500.0;
+const MAX_EXTENT_MM: f64 = 500.0;
 
 /// An extent that is not that of an organ.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the mesh is {extent} {} across, which is no organ: one is {LEAST} to {GREATEST} mm across{}", unit.as_str(), self.guess())]
+#[error("the mesh is {extent} {} across, which is no organ: one is {MIN_EXTENT_MM} to {MAX_EXTENT_MM} mm across{}", unit.as_str(), self.guess())]
 pub struct UnlikelySize {
     /// Greatest extent along an axis, in `unit`.
     pub extent: f64,
@@ -47,7 +47,7 @@ pub(super) fn unlikely(mesh: &TriMesh, unit: MeshUnit) -> Option<UnlikelySize> {
     let extent = (bounds.max - bounds.min).amax() / unit.in_millimetres();
     let organ = |unit: MeshUnit| {
         let millimetres = extent * unit.in_millimetres();
-        (LEAST..=GREATEST).contains(&millimetres)
+        (MIN_EXTENT_MM..=MAX_EXTENT_MM).contains(&millimetres)
     };
     // Three digits are enough for people.
     let rounded = format!("{extent:.2e}").parse().unwrap_or(extent);

@@ -11,19 +11,19 @@ use super::parsed::Parsed;
 use super::said::Said;
 use crate::geometry::Vec3;
 
-const HEADER: usize = 84;
-const TRIANGLE: usize = 50;
+const HEADER_BYTES: usize = 84;
+const TRIANGLE_BYTES: usize = 50;
 
 /// Whether a file of `length` bytes that begins with `start` is a binary STL file.
 pub(super) fn is_binary(start: &[u8], length: u64) -> bool {
     count(start).is_some_and(|count| {
-        count > 0 && HEADER as u64 + TRIANGLE as u64 * u64::from(count) == length
+        count > 0 && HEADER_BYTES as u64 + TRIANGLE_BYTES as u64 * u64::from(count) == length
     })
 }
 
 /// The number of triangles of a binary file.
 fn count(start: &[u8]) -> Option<u32> {
-    let count = start.get(80..HEADER)?;
+    let count = start.get(80..HEADER_BYTES)?;
     Some(u32::from_le_bytes([count[0], count[1], count[2], count[3]]))
 }
 
@@ -44,7 +44,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
 fn binary(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
     let mut said = Said::default();
     said.hear(&bytes[..80])?;
-    let body = bytes[HEADER..].chunks_exact(TRIANGLE);
+    let body = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES);
     let mut parsed = soup(body.len());
     for triangle in body {
         for corner in triangle[12..48].chunks_exact(12) {

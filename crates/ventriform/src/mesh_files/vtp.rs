@@ -16,9 +16,9 @@ use std::io::Read;
 
 const FORMAT: MeshFormat = MeshFormat::Vtp;
 /// Most pieces of a file.
-const PIECES: usize = 64;
+const MAX_PIECES: usize = 64;
 /// Deepest tags.
-const DEEPEST: usize = 16;
+const MAX_TAG_DEPTH: usize = 16;
 
 /// An array as its tag states it.
 #[derive(Debug, Clone, Copy)]
@@ -69,8 +69,12 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
                 break;
             }
             (b"Piece", _) => {
-                if pieces.len() == PIECES {
-                    return Err(damaged(FORMAT, at, format!("more than {PIECES} pieces")));
+                if pieces.len() == MAX_PIECES {
+                    return Err(damaged(
+                        FORMAT,
+                        at,
+                        format!("more than {MAX_PIECES} pieces"),
+                    ));
                 }
                 pieces.push(Piece {
                     stated_points: tag.value(b"NumberOfPoints").and_then(whole),
@@ -104,7 +108,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
             _ => {}
         }
         if !tag.empty {
-            if path.len() == DEEPEST {
+            if path.len() == MAX_TAG_DEPTH {
                 return Err(damaged(FORMAT, at, "the tags nest too deep"));
             }
             path.push(tag.name);

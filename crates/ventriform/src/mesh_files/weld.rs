@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 /// Share of the greatest coordinate within which points may become one: eight steps of single precision.
-const NEAR: f64 = 1.0 / (1 << 20) as f64;
+const WELD_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 /// Joins vertices of `mesh` as far as it takes to close it; always those of equal coordinates if the format repeats
 /// them (`corners_only`).
@@ -39,7 +39,7 @@ pub(super) fn close(
     };
     let greatest = mesh.vertices.iter().map(|p| p.amax()).fold(0.0, f64::max);
     let mut nearer = mesh.clone();
-    apply(&mut nearer, &near(&mesh.vertices, greatest * NEAR));
+    apply(&mut nearer, &near(&mesh.vertices, greatest * WELD_SHARE));
     let joined = mesh.vertices.len() - nearer.vertices.len();
     let mut later = Vec::new();
     tidy(&mut nearer, &mut later);
@@ -48,7 +48,7 @@ pub(super) fn close(
     }
     notes.push(format!(
         "{joined} vertices within {:.1e} of others were joined with them.",
-        greatest * NEAR
+        greatest * WELD_SHARE
     ));
     notes.append(&mut later);
     *mesh = nearer;

@@ -8,9 +8,9 @@ use super::error::MeshFileError;
 use super::parsed::damaged;
 
 /// Most attributes of a tag.
-const MOST: usize = 32;
+const MAX_ATTRIBUTES: usize = 32;
 /// Longest tag, bytes.
-const LONGEST: usize = 4096;
+const MAX_TAG_BYTES: usize = 4096;
 
 /// A tag.
 #[derive(Debug)]
@@ -72,7 +72,7 @@ pub(super) fn find(bytes: &[u8], at: usize, what: &[u8]) -> Option<usize> {
 
 fn tag(bytes: &[u8], begin: usize) -> Result<Tag<'_>, MeshFileError> {
     let wrong = |reason: &str| damaged(MeshFormat::Vtp, begin, reason);
-    let seen = &bytes[begin + 1..bytes.len().min(begin + 1 + LONGEST)];
+    let seen = &bytes[begin + 1..bytes.len().min(begin + 1 + MAX_TAG_BYTES)];
     let mut quote = None;
     let end = seen.iter().position(|b| {
         match (quote, *b) {
@@ -97,7 +97,7 @@ fn tag(bytes: &[u8], begin: usize) -> Result<Tag<'_>, MeshFileError> {
         if rest.is_empty() {
             break;
         }
-        let attribute = attribute(rest).filter(|_| attributes.len() < MOST);
+        let attribute = attribute(rest).filter(|_| attributes.len() < MAX_ATTRIBUTES);
         let (name, value, after) = attribute.ok_or_else(|| wrong("an attribute is malformed"))?;
         attributes.push((name, value));
         rest = after;

@@ -2,14 +2,14 @@
 //!
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
-//!    wall would get thinner than [`THINNEST`], both move less.
-//! 2. The rim moves along the long axis; nodes up to [`rim::REACH`] from it move
+//!    wall would get thinner than [`MIN_THICKNESS_MM`], both move less.
+//! 2. The rim moves along the long axis; nodes up to [`base_plane::STRETCHED_LENGTH_MM`] from it move
 //!    less and less, so that the wall is stretched there.
 //!
 //! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
 
 use super::profile::ReaderOffsets;
-use crate::deform::{Fit, rim};
+use crate::deform::{FittedModel, base_plane};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
@@ -17,19 +17,19 @@ use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// The thickness that is left at least, mm.
-const THINNEST: f64 = 3.0;
+const MIN_THICKNESS_MM: f64 = 3.0;
 
 /// `fit` with the shown wall moved by `offsets`, and the share of them that was applied: 1, or less
 /// where the whole would make the surface intersect itself. Its two measured walls
-/// ([`Fit::surfaces`]) stay. Organs other than ventricles stay as they are.
+/// ([`FittedModel::surfaces`]) stay. Organs other than ventricles stay as they are.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn drawn(
-    fit: Fit,
+    fit: FittedModel,
     offsets: &ReaderOffsets,
     monitor: &Monitor,
-) -> Result<(Fit, f64), Cancelled> {
+) -> Result<(FittedModel, f64), Cancelled> {
     let (Some(cup), Some(orientation), Some(wall)) = (fit.cup, fit.patient_orientation, &fit.wall)
     else {
         return Ok((fit, 0.0));
@@ -41,7 +41,7 @@ pub fn drawn(
     let moved = |share: f64| {
         let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
         let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
-        rim::extended(&mesh, &cup, superior, offsets.rim)
+        base_plane::extended(&mesh, &cup, superior, offsets.rim)
     };
     // A fit that intersects itself already must not do so more often.
     let before = self_intersections(&fit.mesh).len();
@@ -54,7 +54,7 @@ pub fn drawn(
         return Ok((fit, 0.0));
     };
     let wall = VentricleWall::new(&mesh, &cup, superior, monitor)?;
-    let fit = Fit {
+    let fit = FittedModel {
         wall_ml: mesh.volume() / 1000.0,
         wall: Some(wall),
         mesh,
@@ -86,7 +86,7 @@ impl WallEdges {
             let first = (0..ROWS).find_map(known);
             for row in 0..ROWS {
                 last = known(row).or(last);
-                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, THINNEST]);
+                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, MIN_THICKNESS_MM]);
             }
         }
         Self(edges)
@@ -98,7 +98,7 @@ impl WallEdges {
         let [inner, outer] = self.at(place.row, place.column);
         let thickness = (outer - inner).max(1e-6);
         let thinner = offsets.endocardium - offsets.epicardium;
-        let most = (thickness - THINNEST).max(0.0);
+        let most = (thickness - MIN_THICKNESS_MM).max(0.0);
         let part = if thinner > most { most / thinner } else { 1.0 };
         let depth = ((place.distance - inner) / thickness).clamp(0.0, 1.0);
         let along = offsets.endocardium * (1.0 - depth) + offsets.epicardium * depth;
@@ -172,7 +172,7 @@ mod tests {
             }
             assert!(judged.iter().all(|n| *n > 200), "{judged:?}");
         }
-        let lower = rim::extended(&mesh, &cup, &Vec3::y(), 3.0);
+        let lower = base_plane::extended(&mesh, &cup, &Vec3::y(), 3.0);
         let top = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MIN, f64::max);
         assert!((top(&lower) - top(&mesh) - 3.0).abs() < 0.2);
         let apex = |mesh: &TriMesh| mesh.vertices.iter().map(|p| p.z).fold(f64::MAX, f64::min);

@@ -1,9 +1,9 @@
 //! From the distances measured on some masks to a profile.
 //!
 //! Of each distance: the mean over the masks, times n / (n + s²/t²), where n is the number of masks, s
-//! their standard deviation and t how far readers differ at all ([`READERS`]). That is the mean of the
+//! their standard deviation and t how far readers differ at all ([`READER_OFFSETS_MM`]). That is the mean of the
 //! posterior if readers scatter by t about zero, and the masks of one reader by s about the reader. As
-//! few masks say little about s, [`PRIOR_MASKS`] masks with the spread that is usual ([`USUAL`]) are
+//! few masks say little about s, [`PRIOR_MASKS`] masks with the spread that is usual ([`MASK_SPREAD_MM`]) are
 //! added to it. A mean that is smaller than its own standard error cannot be told from none and is not
 //! applied.
 
@@ -14,10 +14,10 @@ use super::profile::{ReaderOffset, ReaderOffsets};
 /// With the spread below, a profile of one mask applies a third of what that mask showed. Two real masks,
 /// perhaps of two readers, that were drawn 2.5 and 0.8 mm outside the fitted edge are the reason: the
 /// whole of the first would harm the second.
-pub const READERS: [f64; 3] = [1.5, 1.5, 3.0];
+pub const READER_OFFSETS_MM: [f64; 3] = [1.5, 1.5, 3.0];
 /// Usual standard deviation over the masks of one reader, mm.
-pub const USUAL: [f64; 3] = [2.0, 2.0, 4.0];
-/// As many masks stand behind [`USUAL`].
+pub const MASK_SPREAD_MM: [f64; 3] = [2.0, 2.0, 4.0];
+/// As many masks stand behind [`MASK_SPREAD_MM`].
 pub const PRIOR_MASKS: f64 = 3.0;
 
 /// The profile's distances, from those measured on each mask. `None` without a mask.
@@ -30,9 +30,9 @@ pub fn learn(measured: &[ReaderOffsets]) -> Option<[ReaderOffset; 3]> {
         let values: Vec<f64> = measured.iter().map(|m| m.to_array()[which]).collect();
         let mean = values.iter().sum::<f64>() / n;
         let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-        let usual = USUAL[which] * USUAL[which];
+        let usual = MASK_SPREAD_MM[which] * MASK_SPREAD_MM[which];
         let variance = (squares + PRIOR_MASKS * usual) / (n - 1.0 + PRIOR_MASKS);
-        let share = n / (n + variance / (READERS[which] * READERS[which]));
+        let share = n / (n + variance / (READER_OFFSETS_MM[which] * READER_OFFSETS_MM[which]));
         let told = mean.abs() >= (variance / n).sqrt();
         let share = if told { share } else { 0.0 };
         let spread = if n > 1.0 {

@@ -3,7 +3,7 @@
 //! In go a fit, the mask of its shown wall and a reader's mask on the same grid; out come three distances.
 //!
 //! 1. Each ray of the fitted wall is followed from the middle of the wall inward and outward, in steps of
-//!    [`STEP`], to where it leaves the mask (trilinear between voxels, half-way). The difference to where it
+//!    [`RAY_STEP_MM`], to where it leaves the mask (trilinear between voxels, half-way). The difference to where it
 //!    leaves the fitted wall is one measurement.
 //! 2. From the middle of the wall near its rim, a line along the axis to the base ends at the rim of the
 //!    wall and at that of the mask.
@@ -13,10 +13,10 @@
 //! 4. Between voxels a narrow cavity closes by up to half a millimetre. The medians for the mask of the fitted
 //!    wall itself show by how much, and are subtracted.
 //!
-//! A ray that does not start in the mask, or does not leave it within [`REACH`], counts for nothing.
+//! A ray that does not start in the mask, or does not leave it within [`MAX_EDGE_DISTANCE_MM`], counts for nothing.
 
 use super::profile::ReaderOffsets;
-use crate::deform::Fit;
+use crate::deform::FittedModel;
 use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::{Vec3, triangle};
 use crate::grid::voxelise::Mask;
@@ -24,9 +24,9 @@ use crate::mesh::TriMesh;
 use crate::model::wall::{COLUMNS, ROWS};
 
 /// Steps along a ray, mm.
-const STEP: f64 = 0.25;
+const RAY_STEP_MM: f64 = 0.25;
 /// How far from the middle of the wall its edges are looked for, mm.
-const REACH: f64 = 25.0;
+const MAX_EDGE_DISTANCE_MM: f64 = 25.0;
 /// How far above the last row of the wall the line to the rim begins, rows.
 const ABOVE_RIM: usize = 4;
 /// Share of the rays that must be usable.
@@ -35,7 +35,7 @@ const LEAST_SEEN: f64 = 0.4;
 /// The distances from the shown wall of `fit`, whose mask is `own`, to that of the mask `drawn`. The grid of
 /// both is at `frame`. `None` if the two overlap in too little of the wall, or the organ is no ventricle.
 pub fn measure(
-    fit: &Fit,
+    fit: &FittedModel,
     own: &Mask,
     drawn: &Mask,
     frame: &VoxelToPatient,
@@ -48,7 +48,7 @@ pub fn measure(
 }
 
 /// The medians of the distances from the surface of `fit` to a mask.
-fn medians(fit: &Fit, drawn: &Mask, frame: &VoxelToPatient) -> Option<ReaderOffsets> {
+fn medians(fit: &FittedModel, drawn: &Mask, frame: &VoxelToPatient) -> Option<ReaderOffsets> {
     let (wall, cup) = (fit.wall.as_ref()?, fit.cup?);
     let drawn = MaskField { mask: drawn, frame };
     let (mut inner, mut outer, mut rim) = (Vec::new(), Vec::new(), Vec::new());
@@ -125,12 +125,12 @@ impl MaskField<'_> {
         if before < 0.5 {
             return None;
         }
-        let steps = (REACH / STEP) as usize;
+        let steps = (MAX_EDGE_DISTANCE_MM / RAY_STEP_MM) as usize;
         for step in 1..=steps {
-            let here = value(step as f64 * STEP);
+            let here = value(step as f64 * RAY_STEP_MM);
             if here < 0.5 {
                 let share = (before - 0.5) / (before - here);
-                return Some((step as f64 - 1.0 + share) * STEP);
+                return Some((step as f64 - 1.0 + share) * RAY_STEP_MM);
             }
             before = here;
         }

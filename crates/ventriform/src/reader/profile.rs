@@ -75,7 +75,7 @@ pub enum ProfileError {
     #[error("this is no reader's profile: {0}")]
     Syntax(String),
     /// It was written by a program that knows more.
-    #[error("the profile has version {0}; this program reads version {VERSION}")]
+    #[error("the profile has version {0}; this program reads version {PROFILE_VERSION}")]
     Version(u32),
     /// A field holds something that no profile can hold.
     #[error("`{field}`: {reason}")]
@@ -88,11 +88,11 @@ pub enum ProfileError {
 }
 
 /// The version of the JSON.
-const VERSION: u32 = 1;
+const PROFILE_VERSION: u32 = 1;
 /// What the JSON says that it is.
 const FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
-const OFFSETS: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
+const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
 /// Longest JSON that is read, bytes.
 pub const MOST_BYTES: usize = 1 << 20;
 /// Most masks of a profile.
@@ -147,7 +147,7 @@ impl ReaderProfile {
         let [endocardium, epicardium, rim] = self.offsets;
         let document = ProfileDocument {
             format: FORMAT.into(),
-            version: VERSION,
+            version: PROFILE_VERSION,
             edge: self.edge.as_str().into(),
             masks: self.masks(),
             offsets_mm: LearntOffsets {
@@ -188,7 +188,7 @@ impl ReaderProfile {
             return Err(ProfileError::Syntax(reason));
         }
         let version = any["version"].as_u64().unwrap_or(0);
-        if version != u64::from(VERSION) {
+        if version != u64::from(PROFILE_VERSION) {
             let version = u32::try_from(version).unwrap_or(u32::MAX);
             return Err(ProfileError::Version(version));
         }
@@ -197,7 +197,7 @@ impl ReaderProfile {
             .ok_or_else(|| refused("edge", "it must be apparent or anatomical"))?;
         let given = document.offsets_mm;
         let offsets = [given.endocardium, given.epicardium, given.rim];
-        for ((name, most), offset) in OFFSETS.iter().zip(&offsets) {
+        for ((name, most), offset) in MAX_OFFSETS_MM.iter().zip(&offsets) {
             let within = |x: f64| x.abs() <= *most;
             if !(within(offset.value)
                 && within(offset.mean)

@@ -1,8 +1,9 @@
 //! The parts of a segmentation's report that come from its fit.
 
 use super::json_number::{not_stated, or_nan, point, round};
-use crate::deform::{Evidence, Fit, confidence, consensus};
+use crate::deform::FittedModel;
 use crate::geometry::Vec3;
+use crate::judge::{Evidence, Judgement, confidence, consensus};
 use crate::locate::cup::Cup;
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::PatientOrientation;
@@ -230,12 +231,12 @@ impl Posture {
 }
 
 impl FitReport {
-    pub(super) fn of(fit: &Fit) -> Self {
+    pub(super) fn of(fit: &FittedModel, judgement: &Judgement) -> Self {
         let turn = fit.rotation.matrix();
         let row = |r: usize| [0, 1, 2].map(|c| round(turn[(r, c)]));
         Self {
             reason: fit.reason.as_str().to_owned(),
-            confidence: round(fit.confidence),
+            confidence: round(judgement.confidence),
             iterations: fit.iterations,
             runs: fit.runs,
             residual_mm: round(fit.residual),
@@ -268,7 +269,7 @@ impl LongAxis {
 }
 
 impl FittedVolumes {
-    pub(super) fn of(fit: &Fit) -> Self {
+    pub(super) fn of(fit: &FittedModel) -> Self {
         let [apparent, anatomical] = match &fit.surfaces {
             Some(both) => [&both.apparent, &both.anatomical].map(|surface| {
                 Some(WallVolumes {
@@ -289,7 +290,7 @@ impl FittedVolumes {
 
 impl Thicknesses {
     /// Those of a ventricle.
-    pub(super) fn of(fit: &Fit) -> Option<Self> {
+    pub(super) fn of(fit: &FittedModel) -> Option<Self> {
         let both = fit.surfaces.as_ref()?;
         let of = |wall: &VentricleWall| Thickness {
             mean: round(wall.thickness),
@@ -304,11 +305,11 @@ impl Thicknesses {
 
 impl Uncertainties {
     /// Those of a ventricle.
-    pub(super) fn of(fit: &Fit) -> Option<Self> {
-        let both = fit.surfaces.as_ref()?;
+    pub(super) fn of(judgement: &Judgement) -> Option<Self> {
+        let both = judgement.uncertainty.as_ref()?;
         Some(Self {
-            apparent: Uncertainty::over(&both.apparent.uncertainty)?,
-            anatomical: Uncertainty::over(&both.anatomical.uncertainty)?,
+            apparent: Uncertainty::over(&both.apparent)?,
+            anatomical: Uncertainty::over(&both.anatomical)?,
         })
     }
 }
@@ -328,8 +329,8 @@ impl Uncertainty {
 
 impl EvidenceReport {
     /// The evidence of a ventricle.
-    pub(super) fn of(fit: &Fit) -> Option<Self> {
-        let e: &Evidence = fit.evidence.as_ref()?;
+    pub(super) fn of(judgement: &Judgement) -> Option<Self> {
+        let e: &Evidence = judgement.evidence.as_ref()?;
         Some(Self {
             active_sensors: round(e.active),
             residual_mm: round(e.residual),
@@ -348,7 +349,7 @@ impl EvidenceReport {
             displacement_mm: e.views.map(|v| round(v.displacement)),
             displaced_share: e.views.map(|v| round(v.share)),
             chance_of_motion: round(confidence::of_motion(e)),
-            template_spread_mm: consensus::spread(&fit.nodes).map(round),
+            template_spread_mm: consensus::spread(&judgement.nodes).map(round),
         })
     }
 }

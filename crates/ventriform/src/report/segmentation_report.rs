@@ -10,9 +10,9 @@ use super::fit_report::{
 };
 use super::input::FileFacts;
 use super::json_number::{not_stated, or_nan, round};
-use crate::deform::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
+use crate::judge::Fit;
 use crate::polar::PolarSummary;
 use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
@@ -197,6 +197,7 @@ const MYOCARDIAL_DENSITY: f64 = 1.05;
 impl SegmentationReport {
     /// Joins the figures of `fit` to the other parts.
     pub fn new(fit: &Fit, parts: SegmentationParts) -> Self {
+        let (fit, judgement) = (&fit.model, &fit.judgement);
         let anatomical = fit.surfaces.as_ref().map(|both| &both.anatomical);
         Self {
             template: parts.template,
@@ -205,18 +206,18 @@ impl SegmentationReport {
             refused: parts.refused,
             localisation: fit.localisation.as_ref().map(LocalisationReport::of),
             posture: fit.patient_orientation.as_ref().map(Posture::of),
-            fit: FitReport::of(fit),
-            evidence: EvidenceReport::of(fit),
+            fit: FitReport::of(fit, judgement),
+            evidence: EvidenceReport::of(judgement),
             volumes_ml: FittedVolumes::of(fit),
             mass_g: anatomical.map(|surface| round(MYOCARDIAL_DENSITY * surface.wall_ml)),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),
             thickness_mm: Thicknesses::of(fit),
-            uncertainty_mm: Uncertainties::of(fit),
+            uncertainty_mm: Uncertainties::of(judgement),
             resolution_mm: parts.resolution,
             reader: parts.reader,
             measures: parts.measures,
             polar: parts.polar,
-            flags: (fit.flags.iter())
+            flags: (judgement.flags.iter())
                 .map(|flag| RaisedFlag {
                     code: flag.code().to_owned(),
                     reason: flag.to_string(),

@@ -21,17 +21,17 @@ use crate::volume::{AffineSource, Reading};
 use serde::Serialize;
 
 /// The mask of the wall that was asked for.
-const MASK: &str = "mask.nii.gz";
+const MASK_FILE: &str = "mask.nii.gz";
 /// The mask of the anatomical wall, where `mask.nii.gz` shows the apparent one.
 const ANATOMICAL_MASK: &str = "mask_anatomical.nii.gz";
 /// The mask of the apparent wall, where `mask.nii.gz` shows the anatomical one.
 const APPARENT_MASK: &str = "mask_apparent.nii.gz";
 /// The wall as 1 and the cavity as 2.
-const LABELS: &str = "labels.nii.gz";
+const LABELS_FILE: &str = "labels.nii.gz";
 /// The same for 3D Slicer.
-const SEGMENTS: &str = "labels.seg.nrrd";
+const SEGMENTS_FILE: &str = "labels.seg.nrrd";
 /// The scan about the organ, which the page shows.
-const REGION: &str = "region.nii.gz";
+const REGION_FILE: &str = "region.nii.gz";
 
 /// One file of a segmentation.
 #[derive(Debug, Clone)]
@@ -80,17 +80,17 @@ impl SegmentedVolume {
         let edge = self.parameters.deform.edge;
         let place = MaskPlace::of(&self.reading, self.parameters.mask_grid).ok_or_else(|| {
             SegmentationFilesError::Other {
-                what: MASK,
+                what: MASK_FILE,
                 reason: "a grid at right angles that covers so skewed a scan has too many voxels; \
                          leave out mask_grid, or resample the scan first"
                     .into(),
             }
         })?;
-        let mask = place.mask(&segmentation.mask, &segmentation.fit.mesh);
-        let mut files = vec![self.mask(MASK, &mask, &place, monitor)?];
+        let mask = place.mask(&segmentation.mask, &segmentation.fit.model.mesh);
+        let mut files = vec![self.mask(MASK_FILE, &mask, &place, monitor)?];
         if let (Some(mask), Some(surface)) = (
             &segmentation.other_mask,
-            segmentation.fit.other_surface(edge),
+            segmentation.fit.model.other_surface(edge),
         ) {
             let name = match edge {
                 WallEdge::Apparent => ANATOMICAL_MASK,
@@ -118,12 +118,12 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: self.segmentation.slices.clone(),
         });
-        let region = region(&self.reading.volume, &fit.mesh, monitor)?;
+        let region = region(&self.reading.volume, &fit.model.mesh, monitor)?;
         let region = nifti::write(&region, StoredType::Scaled8, true);
         files.push(NamedFile {
-            name: REGION.into(),
+            name: REGION_FILE.into(),
             media_type: "application/gzip",
-            bytes: region.map_err(|error| other(REGION, &error))?,
+            bytes: region.map_err(|error| other(REGION_FILE, &error))?,
         });
         files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
@@ -172,14 +172,15 @@ impl SegmentedVolume {
             quality: report::object(&self.summary()),
             ..Metadata::new("Fitted model")
         };
-        let shown = fit.shown_uncertainty(edge).unwrap_or_default();
-        let mut meshes = vec![("mesh", &fit.mesh, shown)];
-        if let Some(other) = fit.other_surface(edge) {
+        let shown = fit.uncertainty(edge).unwrap_or_default();
+        let mut meshes = vec![("mesh", &fit.model.mesh, shown)];
+        if let Some(other) = fit.model.other_surface(edge) {
             let name = match edge {
                 WallEdge::Apparent => "mesh_anatomical",
                 WallEdge::Anatomical => "mesh_apparent",
             };
-            meshes.push((name, &other.mesh, &other.uncertainty));
+            let uncertainty = fit.uncertainty(edge.other()).unwrap_or_default();
+            meshes.push((name, &other.mesh, uncertainty));
         }
         let described = |(name, mesh, uncertainty): (&'static str, &'a TriMesh, &[f64])| {
             let metadata = Metadata {
@@ -195,7 +196,7 @@ impl SegmentedVolume {
 
     /// The part of the wall that each triangle of `mesh` is of; empty for other organs.
     fn parts(&self, mesh: &TriMesh, monitor: &Monitor<'_>) -> Result<Vec<Part>, Cancelled> {
-        let parts = match &self.segmentation.fit.cup {
+        let parts = match &self.segmentation.fit.model.cup {
             Some(cup) => wall_parts(mesh, cup, monitor)?,
             None => None,
         };
@@ -204,7 +205,7 @@ impl SegmentedVolume {
 
     /// The uptake of the wall at every vertex of `mesh`; ventricles only.
     fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
-        let surfaces = self.segmentation.fit.surfaces.as_ref()?;
+        let surfaces = self.segmentation.fit.model.surfaces.as_ref()?;
         let map = self.segmentation.polar.as_ref()?;
         let of = |p| map.uptake_at(&surfaces.apparent.wall, p);
         let values: Vec<f64> = mesh.vertices.iter().map(of).collect();
@@ -237,15 +238,18 @@ impl SegmentedVolume {
         let map = map.map(|map| report::object(&map).into());
         let page = report::segmentation_page(&SegmentationPage {
             report: &self.report(),
-            mesh: &fit.mesh,
-            uncertainty: fit.shown_uncertainty(edge).unwrap_or_default(),
-            other: fit
-                .other_surface(edge)
-                .map(|other| (&other.mesh, other.uncertainty.as_slice())),
+            mesh: &fit.model.mesh,
+            uncertainty: fit.uncertainty(edge).unwrap_or_default(),
+            other: fit.model.other_surface(edge).map(|other| {
+                (
+                    &other.mesh,
+                    fit.uncertainty(edge.other()).unwrap_or_default(),
+                )
+            }),
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
             polar_map: map.as_ref(),
-            region: bytes(REGION),
+            region: bytes(REGION_FILE),
             scan,
         });
         NamedFile {
@@ -257,7 +261,10 @@ impl SegmentedVolume {
 
     /// The main figures, for lists and mesh files.
     pub fn summary(&self) -> SegmentationSummary {
-        SegmentationSummary::of(self.report(), self.segmentation.fit.mesh.vertices.len())
+        SegmentationSummary::of(
+            self.report(),
+            self.segmentation.fit.model.mesh.vertices.len(),
+        )
     }
 
     /// The scan that the results belong to, with the given identity.
@@ -280,11 +287,17 @@ impl SegmentedVolume {
         let placed = (&made.mask, &self.reading.volume.frame);
         let cavity = report.axes().and_then(|(axis, superior)| {
             // A silent monitor is never cancelled.
-            let cavity = cavity(&axis, &superior, &made.fit.mesh, placed, &Monitor::silent());
+            let cavity = cavity(
+                &axis,
+                &superior,
+                &made.fit.model.mesh,
+                placed,
+                &Monitor::silent(),
+            );
             cavity.unwrap_or_default()
         });
         let text = json_line(&report);
-        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.mesh, &text)
+        let results = DicomResults::new(scan, structure, &made.mask, &made.fit.model.mesh, &text)
             .with_figures(&report)
             .with_cavity(cavity.as_ref())
             .with_pictures(Some(&made.slices), polar.as_deref());
@@ -325,7 +338,7 @@ impl SegmentedVolume {
         place: &MaskPlace<'_>,
         monitor: &Monitor<'_>,
     ) -> Result<[NamedFile; 2], SegmentationFilesError> {
-        let mesh = &self.segmentation.fit.mesh;
+        let mesh = &self.segmentation.fit.model.mesh;
         let cavity = match self.report().axes() {
             Some((axis, superior)) => {
                 cavity(&axis, &superior, mesh, (wall, &place.frame), monitor)?
@@ -345,11 +358,11 @@ impl SegmentedVolume {
         let grid = (place.shape, &place.frame);
         let nifti = nifti::write_labels(&labels, &entries, grid, place.stated, monitor);
         let nrrd = NamedFile {
-            name: SEGMENTS.into(),
+            name: SEGMENTS_FILE.into(),
             media_type: seg_nrrd::MEDIA_TYPE,
             bytes: seg_nrrd::encode(&labels, &segments, grid, monitor)?,
         };
-        Ok([nifti_file(LABELS, nifti)?, nrrd])
+        Ok([nifti_file(LABELS_FILE, nifti)?, nrrd])
     }
 
     fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {

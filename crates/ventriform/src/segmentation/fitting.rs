@@ -3,9 +3,9 @@
 use super::built_in;
 use super::error::SegmentationError;
 use super::named_template::{NamedTemplate, RefusedTemplate};
-use crate::deform::{
-    DeformError, DeformParameters, Evidence, Fit, OrganPlace, WallEdge, consensus, fit_at,
-};
+use crate::deform::{DeformError, DeformParameters, OrganPlace, WallEdge};
+use crate::fit::{Fit, fit_at};
+use crate::judge::{Evidence, consensus};
 use crate::locate::LocateError;
 use crate::model::Template;
 use crate::progress::Monitor;
@@ -72,7 +72,7 @@ impl OrganSearch {
 pub struct RankedTemplate {
     /// The template's name.
     pub name: String,
-    /// The figure that templates are ranked by ([`Fit::confidence`]), by this fit alone.
+    /// The figure that templates are ranked by ([`Judgement::confidence`](crate::judge::Judgement::confidence)), by this fit alone.
     pub confidence: f64,
     /// What decides between equals ([`Fit::merit`]).
     pub merit: f64,
@@ -119,17 +119,19 @@ impl Trials {
             let ((a, merit), (b, other)) = (rank(*a), rank(*b));
             a.total_cmp(&b).then(merit.total_cmp(&other))
         })?;
-        let fit = self.fits[best].clone();
+        let fit = &self.fits[best];
         let members: Vec<Option<&Fit>> = self
             .built_in
             .iter()
             .map(|place| place.map(|n| &self.fits[n]))
             .collect();
         let own = self.built_in.iter().position(|n| *n == Some(best));
-        Some(match members.len() {
-            0 => (best, fit),
-            _ => (best, consensus::judged(fit, &members, own, edge)),
-        })
+        let judgement = match members.len() {
+            0 => fit.judgement.clone(),
+            _ => consensus::judgement(fit, &members, own, edge),
+        };
+        let model = fit.model.clone();
+        Some((best, Fit { model, judgement }))
     }
 }
 
@@ -182,12 +184,12 @@ pub fn try_all(
                 }
                 trials.candidates.push(RankedTemplate {
                     name,
-                    confidence: fit.confidence,
+                    confidence: fit.judgement.confidence,
                     merit: fit.merit(),
-                    active: fit.active,
-                    strain: fit.strain.sqrt(),
-                    residual: fit.residual,
-                    evidence: fit.evidence,
+                    active: fit.model.active,
+                    strain: fit.model.strain.sqrt(),
+                    residual: fit.model.residual,
+                    evidence: fit.judgement.evidence,
                 });
                 trials.fits.push(fit);
             }

@@ -11,10 +11,10 @@
 //!    out, and the report says why.
 //! 4. The expert's mask is read and brought to the volume's grid ([`given_mask`](crate::volume::given_mask)).
 //! 5. Every template is fitted, with one search for the organ ([`OrganSearch`]), and the fit with
-//!    the greatest [`Fit::confidence`](crate::deform::Fit::confidence) is chosen, of equals the one with
-//!    the greatest [`Fit::merit`](crate::deform::Fit::merit). A template whose fit fails is left out,
+//!    the greatest [confidence](crate::judge::Judgement::confidence) is chosen, of equals the one with
+//!    the greatest [merit](crate::fit::Fit::merit). A template whose fit fails is left out,
 //!    unless all fail or half of the built-in hearts find no wall. The fits of the built-in hearts
-//!    judge the chosen one together ([`consensus`](crate::deform::consensus)).
+//!    judge the chosen one together ([`consensus`](crate::judge::consensus)).
 //! 6. With a reader's profile, the wall is drawn as that reader would ([`crate::reader`]).
 //! 7. [`segment`](mod@segment) makes mask, measures, polar map and [`slices`] of the fit.
 //! 8. [`SegmentedVolume::report`] is the report; [`SegmentedVolume::files`] are the files written, the same on

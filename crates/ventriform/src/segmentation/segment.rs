@@ -5,7 +5,8 @@ use super::fitting::{OrganSearch, RankedTemplate, Trials, try_all};
 use super::named_template::{NamedTemplate, RefusedTemplate};
 use super::order::NamedReader;
 use super::slices::{self, Cut};
-use crate::deform::{DeformParameters, Fit, blur_correction};
+use crate::deform::{DeformParameters, FittedModel, blur_correction};
+use crate::fit::Fit;
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
@@ -72,8 +73,8 @@ pub struct ImageResolution {
 }
 
 impl ImageResolution {
-    fn of(fit: &Fit, given: Option<f64>) -> Option<Self> {
-        let surfaces = fit.surfaces.as_ref()?;
+    fn of(model: &FittedModel, given: Option<f64>) -> Option<Self> {
+        let surfaces = model.surfaces.as_ref()?;
         let estimated = || {
             let [thickness, apparent] =
                 [&surfaces.anatomical, &surfaces.apparent].map(|s| s.wall.thickness);
@@ -110,23 +111,28 @@ pub fn segment(
     } = trials;
     monitor.report(Stage::Polar, 0.0)?;
     // Uptake is sampled through the wall as it looks, whichever wall is shown.
-    let polar = fit.surfaces.as_ref().map(|surfaces| {
+    let polar = fit.model.surfaces.as_ref().map(|surfaces| {
         let [wall, anatomical] = [&surfaces.apparent, &surfaces.anatomical].map(|s| &s.wall);
-        let source = fit.patient_orientation.map(|o| o.source);
+        let source = fit.model.patient_orientation.map(|o| o.source);
         polar::map(volume, wall, anatomical, &parameters.polar)
             .counted_by(source.unwrap_or_default())
     });
     let (fit, reader) = match &parameters.reader {
         Some(reader) => {
-            let (fit, share) = reader::drawn(fit, &reader.profile.offsets(), monitor)?;
+            let Fit { model, judgement } = fit;
+            let (model, share) = reader::drawn(model, &reader.profile.offsets(), monitor)?;
             let reader = reader.clone();
-            (fit, Some(AppliedReader { reader, share }))
+            (
+                Fit { model, judgement },
+                Some(AppliedReader { reader, share }),
+            )
         }
         None => (fit, None),
     };
     monitor.report(Stage::Report, 0.0)?;
-    let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+    let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
     let other_mask = fit
+        .model
         .other_surface(parameters.deform.edge)
         .map(|other| voxelise(&other.mesh, volume.shape, &volume.frame));
     monitor.report(Stage::Report, 0.5)?;
@@ -136,10 +142,16 @@ pub fn segment(
         None => None,
     };
     monitor.report(Stage::Report, 0.8)?;
-    let slices = slices::png(volume, &fit.mesh, &Cut::of(&fit), expert, monitor)?;
+    let slices = slices::png(
+        volume,
+        &fit.model.mesh,
+        &Cut::of(&fit.model),
+        expert,
+        monitor,
+    )?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
-        resolution: ImageResolution::of(&fit, parameters.deform.resolution),
+        resolution: ImageResolution::of(&fit.model, parameters.deform.resolution),
         fit,
         mask,
         other_mask,

@@ -10,7 +10,7 @@ use super::{IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, is
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::grid::survey::Survey;
-use crate::locate::rays::{DOUBTFUL, PLAUSIBLE};
+use crate::locate::rays::{PLAUSIBLE_SCORE, UNCERTAIN_SCORE};
 use crate::locate::{self, LocateError};
 use crate::progress::Monitor;
 use crate::volume::Volume;
@@ -83,14 +83,14 @@ fn find_ventricle(
         Err(LocateError::HintOutside) => return Err(SurfaceError::HintOutside),
         Err(_) => None,
     };
-    let Some(cavity) = found.filter(|c| c.score >= PLAUSIBLE) else {
+    let Some(cavity) = found.filter(|c| c.score >= PLAUSIBLE_SCORE) else {
         facts.warnings.push(
             "no left ventricle was recognised; the largest connected part was taken instead".into(),
         );
         return Ok(None);
     };
     facts.ventricle_score = Some(cavity.score);
-    if cavity.score < DOUBTFUL {
+    if cavity.score < UNCERTAIN_SCORE {
         facts.warnings.push(format!(
             "the left ventricle was recognised with little certainty (score {:.2} of 1): look whether the region is right, or give a box or a seed",
             cavity.score

@@ -102,22 +102,22 @@ pub(super) fn reference_in_box(
         survey.minimum
     };
     // A histogram instead of a sorted copy: the box may be the whole of a large volume.
-    const BINS: usize = 4096;
+    const HISTOGRAM_BINS: usize = 4096;
     let width = f64::from(highest) - f64::from(floor);
     if !(width > 0.0) {
         return highest;
     }
-    let mut histogram = vec![0u64; BINS];
+    let mut histogram = vec![0u64; HISTOGRAM_BINS];
     for v in values().filter(|v| v.is_finite() && *v > floor) {
-        let bin = ((f64::from(v) - f64::from(floor)) / width * BINS as f64) as usize;
-        histogram[bin.min(BINS - 1)] += 1;
+        let bin = ((f64::from(v) - f64::from(floor)) / width * HISTOGRAM_BINS as f64) as usize;
+        histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
     }
     let total: u64 = histogram.iter().sum();
     let mut below = 0;
     for (bin, n) in histogram.iter().enumerate() {
         below += n;
         if 100 * below >= 98 * total {
-            return (f64::from(floor) + (bin as f64 + 0.5) / BINS as f64 * width) as f32;
+            return (f64::from(floor) + (bin as f64 + 0.5) / HISTOGRAM_BINS as f64 * width) as f32;
         }
     }
     highest

@@ -25,7 +25,7 @@ use crate::progress::{Cancelled, Monitor};
 
 /// Least distance of a vertex from its edge's ends, in voxels. Keeps triangles from
 /// degenerating where samples equal the iso-value; moves no vertex by more.
-pub const CLAMP: f32 = 0.05;
+pub const MIN_END_DISTANCE: f32 = 0.05;
 
 /// The samples that place the vertices.
 #[derive(Debug, Clone, Copy)]
@@ -296,7 +296,7 @@ impl<'a> VertexPlacement<'a> {
             let t = (f64::from(self.iso) - f0) / (f64::from(f1) - f0);
             // An infinite sample leaves no ratio: take the middle.
             if t.is_finite() {
-                return (t as f32).clamp(CLAMP, 1.0 - CLAMP);
+                return (t as f32).clamp(MIN_END_DISTANCE, 1.0 - MIN_END_DISTANCE);
             }
         }
         0.5
@@ -472,7 +472,10 @@ mod tests {
                             }
                             let (p, q) = (corner(i64::from(a)), corner(i64::from(b)));
                             let (f, g) = (at(p), at(q));
-                            let t = f64::from(((iso - f) / (g - f)).clamp(CLAMP, 1.0 - CLAMP));
+                            let t = f64::from(
+                                ((iso - f) / (g - f))
+                                    .clamp(MIN_END_DISTANCE, 1.0 - MIN_END_DISTANCE),
+                            );
                             let [p, q] = [p, q].map(|p| Vec3::from(p.map(|x| x as f64)));
                             let place = frame.to_patient(&(p + (q - p) * t));
                             vertex.insert(super::super::table::edge_between(a, b), place);

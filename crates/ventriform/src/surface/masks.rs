@@ -27,9 +27,9 @@ use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
 /// Multiple of sigma at which the Gaussian is cut off.
-const CUT: f64 = 4.0;
+const KERNEL_SIGMAS: f64 = 4.0;
 /// Passes of Taubin's smoothing that are tried, most first.
-const PASSES: [usize; 4] = [10, 5, 2, 0];
+const TAUBIN_PASSES: [usize; 4] = [10, 5, 2, 0];
 /// Largest change of the volume by Taubin's smoothing, as a share.
 const PASS_SLACK: f64 = 0.05;
 /// Deviation of the surface's volume from the mask's at which the search for the level ends.
@@ -228,7 +228,7 @@ fn parts(labels: &Labels) -> usize {
 fn with_sigma(mask: &Labels, sigma: f64, frame: &VoxelToPatient) -> Smoothed {
     let edge = frame.voxel_volume().cbrt();
     let sigmas = frame.spacing().map(|spacing| sigma * edge / spacing);
-    let margin = sigmas.map(|sigma| (CUT * sigma).ceil() as usize + 1);
+    let margin = sigmas.map(|sigma| (KERNEL_SIGMAS * sigma).ceil() as usize + 1);
     let shape = [0, 1, 2].map(|r| mask.extent[r] + 2 * margin[r]);
     let mut values = vec![0f32; shape.iter().product()];
     for p in mask.voxels() {
@@ -237,7 +237,7 @@ fn with_sigma(mask: &Labels, sigma: f64, frame: &VoxelToPatient) -> Smoothed {
     }
     if sigma > 0.0 {
         // The margin is wider than the kernel: all values at the border of the box are 0.
-        let kernels = sigmas.map(|sigma| Kernel::gaussian(sigma, CUT));
+        let kernels = sigmas.map(|sigma| Kernel::gaussian(sigma, KERNEL_SIGMAS));
         blur(&mut values, shape, &kernels, &Monitor::silent())
             .expect("a silent monitor is never cancelled");
     }
@@ -264,7 +264,7 @@ fn levelled(
     }
     let start = smoothed.level;
     let mut best = (f64::INFINITY, start, 0);
-    for passes in PASSES {
+    for passes in TAUBIN_PASSES {
         let off = |level| {
             let volume = volume_at(&smoothed, level, passes, frame, monitor)?;
             Ok::<f64, MarchingCubesError>(volume / wanted - 1.0)

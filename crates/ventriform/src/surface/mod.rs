@@ -327,7 +327,7 @@ fn warn_of_topology(facts: &mut SurfaceFacts, largest: usize) {
 }
 
 /// Share of the volume's border from which the object at an iso-value is likely its surroundings.
-const SURROUNDINGS: f64 = 0.5;
+const SURROUNDINGS_BORDER_SHARE: f64 = 0.5;
 
 fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
     if object.mask.is_none() {
@@ -348,7 +348,7 @@ fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
         None => share_of_border(object),
         Some(_) => 0.0,
     };
-    if share > SURROUNDINGS {
+    if share > SURROUNDINGS_BORDER_SHARE {
         facts.warnings.push(format!(
             "the region takes {:.0} % of the volume's border: an object darker than its surroundings is taken by `iso` = below:{}",
             100.0 * share,

@@ -24,11 +24,11 @@ use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// Greatest distance of the ventricle's voxels outward from the middle of the wall, mm.
-const OUTER: f64 = 24.0;
+const MAX_OUTWARD_MM: f64 = 24.0;
 /// Voxels within this distance of the middle of the wall belong to its core, mm.
-const CORE: f64 = 8.0;
+const CORE_DISTANCE_MM: f64 = 8.0;
 /// The same for the search of the reference, mm.
-const WALL: f64 = 12.0;
+const REFERENCE_DISTANCE_MM: f64 = 12.0;
 
 /// The wall about a cavity, in a box of the volume that holds it.
 #[derive(Debug, Clone)]
@@ -82,7 +82,7 @@ impl<'a> WallShell<'a> {
     /// Measures the wall's intensity.
     pub fn new(volume: &'a Volume, cavity: &'a Cavity) -> Self {
         let spacing = volume.frame.spacing();
-        let reach = cavity.distances.iter().copied().fold(0.0, f64::max) + OUTER + 6.0;
+        let reach = cavity.distances.iter().copied().fold(0.0, f64::max) + MAX_OUTWARD_MM + 6.0;
         let mut origin = [0; 3];
         let mut extent = [0; 3];
         for r in 0..3 {
@@ -124,8 +124,8 @@ impl<'a> WallShell<'a> {
 
     fn zone(&self, p: [usize; 3]) -> Zone {
         match self.depth(p) {
-            (depth, _) if depth > OUTER => Zone::Beyond,
-            (depth, true) if depth.abs() <= CORE => Zone::Core,
+            (depth, _) if depth > MAX_OUTWARD_MM => Zone::Beyond,
+            (depth, true) if depth.abs() <= CORE_DISTANCE_MM => Zone::Core,
             _ => Zone::Between,
         }
     }
@@ -138,7 +138,7 @@ impl<'a> WallShell<'a> {
             .par_voxels()
             .filter(|&p| {
                 let (depth, seen) = self.depth(p);
-                seen && depth.abs() <= WALL
+                seen && depth.abs() <= REFERENCE_DISTANCE_MM
             })
             .map(|p| self.value(p))
             .filter(|v| v.is_finite())
@@ -201,12 +201,12 @@ impl<'a> WallShell<'a> {
 
     /// Watershed between the wall's core and everything beyond it.
     fn cut(&self, region: &mut Region, zones: &[([usize; 3], Zone)]) {
-        const FREE: u8 = 0;
-        const OURS: u8 = 1;
-        const THEIRS: u8 = 2;
+        const FREE_VOXEL: u8 = 0;
+        const VENTRICLE_VOXEL: u8 = 1;
+        const NEIGHBOUR_VOXEL: u8 = 2;
         let [nx, ny, nz] = self.extent;
         let index = |p: [usize; 3]| p[0] + nx * (p[1] + ny * p[2]);
-        let mut owner = vec![FREE; nx * ny * nz];
+        let mut owner = vec![FREE_VOXEL; nx * ny * nz];
         let mut heap = BinaryHeap::new();
         let neighbours = |p: [usize; 3]| {
             (0..6).filter_map(move |n| {
@@ -222,8 +222,8 @@ impl<'a> WallShell<'a> {
         };
         for &(p, zone) in zones {
             let mark = match zone {
-                Zone::Core => OURS,
-                Zone::Beyond => THEIRS,
+                Zone::Core => VENTRICLE_VOXEL,
+                Zone::Beyond => NEIGHBOUR_VOXEL,
                 Zone::Between => continue,
             };
             if region.labels.get(p) {
@@ -234,7 +234,7 @@ impl<'a> WallShell<'a> {
         while let Some((_, std::cmp::Reverse(at))) = heap.pop() {
             let p = [at % nx, at / nx % ny, at / (nx * ny)];
             for q in neighbours(p) {
-                if region.labels.get(q) && owner[index(q)] == FREE {
+                if region.labels.get(q) && owner[index(q)] == FREE_VOXEL {
                     owner[index(q)] = owner[at];
                     heap.push((ordered(self.value(q)), std::cmp::Reverse(index(q))));
                 }
@@ -242,13 +242,13 @@ impl<'a> WallShell<'a> {
         }
         let spacing = self.spacing;
         for &(p, _) in zones {
-            if owner[index(p)] != THEIRS {
+            if owner[index(p)] != NEIGHBOUR_VOXEL {
                 continue;
             }
             region.cut_voxels += 1;
             region.labels.set(p, false);
             for q in neighbours(p) {
-                if owner[index(q)] == OURS {
+                if owner[index(q)] == VENTRICLE_VOXEL {
                     let axis = (0..3).find(|&r| p[r] != q[r]).unwrap_or(0);
                     region.cut_area += spacing[(axis + 1) % 3] * spacing[(axis + 2) % 3];
                 }

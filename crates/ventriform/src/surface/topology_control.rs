@@ -90,11 +90,11 @@ fn grow(
     if let Some(p) = start {
         // The first voxel is no neighbour of anything, hence not simple.
         let at = ball.index(p);
-        ball.cells[at] |= INSIDE;
+        ball.cells[at] |= INSIDE_BALL;
         ball.push_around(
             at,
             &mut front,
-            |cell| cell & (INSIDE | OBJECT) == OBJECT,
+            |cell| cell & (INSIDE_BALL | INSIDE_OBJECT) == INSIDE_OBJECT,
             |p| ordered(value(p)),
         );
     }
@@ -104,15 +104,15 @@ fn grow(
         if steps.is_multiple_of(1 << 16) {
             monitor.check()?;
         }
-        if ball.cells[at] & INSIDE != 0 || !is_simple(ball.around(at)) {
+        if ball.cells[at] & INSIDE_BALL != 0 || !is_simple(ball.around(at)) {
             continue;
         }
-        ball.cells[at] |= INSIDE;
+        ball.cells[at] |= INSIDE_BALL;
         // A neighbour that was not simple before may have become so.
         ball.push_around(
             at,
             &mut front,
-            |cell| cell & (INSIDE | OBJECT) == OBJECT,
+            |cell| cell & (INSIDE_BALL | INSIDE_OBJECT) == INSIDE_OBJECT,
             |p| ordered(value(p)),
         );
     }
@@ -133,9 +133,9 @@ fn shrink(
         let Some(p) = ball.voxel(at) else {
             continue;
         };
-        ball.cells[at] |= INSIDE;
+        ball.cells[at] |= INSIDE_BALL;
         let on_side = (0..3).any(|r| p[r] == low[r] || p[r] + 1 == low[r] + extent[r]);
-        if on_side && ball.cells[at] & OBJECT == 0 {
+        if on_side && ball.cells[at] & INSIDE_OBJECT == 0 {
             front.push(&mut ball, at, !ordered(value(p)));
         }
     }
@@ -145,15 +145,15 @@ fn shrink(
         if steps.is_multiple_of(1 << 16) {
             monitor.check()?;
         }
-        if ball.cells[at] & INSIDE == 0 || !is_simple(ball.around(at)) {
+        if ball.cells[at] & INSIDE_BALL == 0 || !is_simple(ball.around(at)) {
             continue;
         }
-        ball.cells[at] &= !INSIDE;
+        ball.cells[at] &= !INSIDE_BALL;
         // Background is 26-connected: removing a voxel may make any of its 26 simple.
         ball.push_around(
             at,
             &mut front,
-            |cell| cell & (INSIDE | OBJECT) == INSIDE,
+            |cell| cell & (INSIDE_BALL | INSIDE_OBJECT) == INSIDE_BALL,
             |p| !ordered(value(p)),
         );
     }
@@ -167,23 +167,23 @@ struct Front(BinaryHeap<(u32, std::cmp::Reverse<usize>)>);
 
 impl Front {
     fn push(&mut self, grid: &mut Grid, at: usize, key: u32) {
-        grid.cells[at] |= WAITING;
+        grid.cells[at] |= IN_QUEUE;
         self.0.push((key, std::cmp::Reverse(at)));
     }
 
     fn pop(&mut self, grid: &mut Grid) -> Option<usize> {
         let (_, std::cmp::Reverse(at)) = self.0.pop()?;
-        grid.cells[at] &= !WAITING;
+        grid.cells[at] &= !IN_QUEUE;
         Some(at)
     }
 }
 
 /// The voxel belongs to the ball.
-const INSIDE: u8 = 1;
+const INSIDE_BALL: u8 = 1;
 /// The voxel belongs to the given object.
-const OBJECT: u8 = 2;
+const INSIDE_OBJECT: u8 = 2;
 /// The voxel is in the queue.
-const WAITING: u8 = 4;
+const IN_QUEUE: u8 = 4;
 
 /// A box of voxels as bytes with a border of one voxel, where neighbours are plain offsets.
 struct Grid {
@@ -203,7 +203,7 @@ impl Grid {
         };
         for p in object.voxels() {
             let at = grid.index(p);
-            grid.cells[at] = OBJECT;
+            grid.cells[at] = INSIDE_OBJECT;
         }
         grid
     }
@@ -233,7 +233,7 @@ impl Grid {
         let mut bits = 0;
         for (n, row) in self.rows_around(at).into_iter().enumerate() {
             for (k, cell) in self.cells[row..row + 3].iter().enumerate() {
-                bits |= u32::from(cell & INSIDE) << (3 * n + k);
+                bits |= u32::from(cell & INSIDE_BALL) << (3 * n + k);
             }
         }
         bits
@@ -250,7 +250,7 @@ impl Grid {
         for row in self.rows_around(at) {
             for q in row..row + 3 {
                 let cell = self.cells[q];
-                if cell & WAITING == 0
+                if cell & IN_QUEUE == 0
                     && wanted(cell)
                     && let Some(p) = self.voxel(q)
                 {
@@ -262,7 +262,7 @@ impl Grid {
 
     fn into_labels(self, like: &Labels) -> Labels {
         let mut labels = Labels::empty(like.origin, like.extent);
-        for at in (0..self.cells.len()).filter(|&at| self.cells[at] & INSIDE != 0) {
+        for at in (0..self.cells.len()).filter(|&at| self.cells[at] & INSIDE_BALL != 0) {
             if let Some(p) = self.voxel(at) {
                 labels.set(p, true);
             }
@@ -287,9 +287,9 @@ const fn not_at(axis: u32, coordinate: u32) -> u32 {
 
 const NOT_LOW: [u32; 3] = [not_at(0, 0), not_at(1, 0), not_at(2, 0)];
 const NOT_HIGH: [u32; 3] = [not_at(0, 2), not_at(1, 2), not_at(2, 2)];
-const CENTRE: u32 = 1 << 13;
-const FACES: u32 = 1 << 4 | 1 << 10 | 1 << 12 | 1 << 14 | 1 << 16 | 1 << 22;
-const CORNERS: u32 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 18 | 1 << 20 | 1 << 24 | 1 << 26;
+const CENTRE_BIT: u32 = 1 << 13;
+const FACE_BITS: u32 = 1 << 4 | 1 << 10 | 1 << 12 | 1 << 14 | 1 << 16 | 1 << 22;
+const CORNER_BITS: u32 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 18 | 1 << 20 | 1 << 24 | 1 << 26;
 
 /// The cells and their neighbours along one axis.
 fn spread(cells: u32, axis: usize) -> u32 {
@@ -311,9 +311,9 @@ fn flood(seed: u32, within: u32, step: impl Fn(u32) -> u32) -> u32 {
 
 /// Whether the middle of a 3×3×3 neighbourhood is simple (object 6-, background 26-connected).
 fn is_simple(around: u32) -> bool {
-    let object = around & !CENTRE & !CORNERS;
-    let faces = object & FACES;
-    let background = !around & !CENTRE & ((1 << 27) - 1);
+    let object = around & !CENTRE_BIT & !CORNER_BITS;
+    let faces = object & FACE_BITS;
+    let background = !around & !CENTRE_BIT & ((1 << 27) - 1);
     if faces == 0 || background == 0 {
         return false;
     }
@@ -376,12 +376,12 @@ mod tests {
         let mut front = BinaryHeap::new();
         for at in 0..ball.cells.len() {
             if let Some(p) = ball.voxel(at) {
-                ball.cells[at] |= INSIDE;
+                ball.cells[at] |= INSIDE_BALL;
                 front.push((!ordered(value(p)), std::cmp::Reverse(at)));
             }
         }
         while let Some((_, std::cmp::Reverse(at))) = front.pop() {
-            if ball.cells[at] == INSIDE && is_simple(ball.around(at)) {
+            if ball.cells[at] == INSIDE_BALL && is_simple(ball.around(at)) {
                 ball.cells[at] = 0;
                 for q in ball
                     .rows_around(at)

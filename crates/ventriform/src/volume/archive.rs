@@ -27,18 +27,18 @@ use std::io::{self, Read, Seek, SeekFrom};
 const MOST_ENTRY: u64 = 512;
 
 /// Bytes of an end record without its comment.
-const END: usize = 22;
+const END_RECORD_BYTES: usize = 22;
 
 /// Bytes at the end of a file among which the directory's end record begins.
-const END_REACH: u64 = END as u64 + 0xffff;
+const END_REACH: u64 = END_RECORD_BYTES as u64 + 0xffff;
 
 /// Bytes of a zip64 end record without what may extend it, and of its locator.
-const END64: usize = 56;
-const LOCATOR: usize = 20;
+const ZIP64_END_BYTES: usize = 56;
+const LOCATOR_BYTES: usize = 20;
 
 /// Bytes of an entry in the directory, and of its header before its content, without what varies.
-const ENTRY: usize = 46;
-const LOCAL: usize = 30;
+const ENTRY_BYTES: usize = 46;
+const LOCAL_HEADER_BYTES: usize = 30;
 
 /// A field that says that zip64 states the quantity.
 const IN_ZIP64: u64 = 0xffff_ffff;
@@ -47,7 +47,7 @@ const IN_ZIP64: u64 = 0xffff_ffff;
 const ZIP64_FIELD: u16 = 1;
 
 /// Flags of an entry: encrypted, also by a certificate; its name is UTF-8.
-const ENCRYPTED: u16 = 1 | 1 << 6 | 1 << 13;
+const ENCRYPTED_FLAGS: u16 = 1 | 1 << 6 | 1 << 13;
 
 /// The files in `file` if that is a zip archive.
 ///
@@ -81,7 +81,7 @@ pub(super) fn files_in(
         if entry.name.ends_with(['/', '\\']) || is_company(&entry.name) {
             continue;
         }
-        if entry.flags & ENCRYPTED != 0 {
+        if entry.flags & ENCRYPTED_FLAGS != 0 {
             return Err(VolumeError::Unsupported {
                 file: file.name().into(),
                 format: "an encrypted zip archive".into(),
@@ -198,11 +198,11 @@ impl Archive<'_> {
         let begin = self.size.saturating_sub(END_REACH);
         let tail = self.read(begin, (self.size - begin) as usize)?;
         let tail = tail.unwrap_or_default();
-        for place in (0..tail.len().saturating_sub(END - 1)).rev() {
+        for place in (0..tail.len().saturating_sub(END_RECORD_BYTES - 1)).rev() {
             let record = &tail[place..];
             let comment = || number::<2>(record, 20) as usize;
             if record.starts_with(b"PK\x05\x06")
-                && END + comment() <= record.len()
+                && END_RECORD_BYTES + comment() <= record.len()
                 && let Some(directory) = self.directory_of(record, begin + place as u64)?
             {
                 return Ok(directory);
@@ -265,20 +265,20 @@ impl Archive<'_> {
 
     /// What the zip64 end record says whose locator ends at byte `at`; `None` if there is none.
     fn zip64(&mut self, at: u64) -> Result<Option<End>, VolumeError> {
-        let Some(locator_at) = at.checked_sub(LOCATOR as u64) else {
+        let Some(locator_at) = at.checked_sub(LOCATOR_BYTES as u64) else {
             return Ok(None);
         };
-        let locator = self.read(locator_at, LOCATOR)?.unwrap_or_default();
+        let locator = self.read(locator_at, LOCATOR_BYTES)?.unwrap_or_default();
         if !locator.starts_with(b"PK\x06\x07") {
             return Ok(None);
         }
         // Bytes before the archive move the record; it lies right before its locator then.
         let stated = number::<8>(&locator, 8);
-        for place in [Some(stated), locator_at.checked_sub(END64 as u64)] {
+        for place in [Some(stated), locator_at.checked_sub(ZIP64_END_BYTES as u64)] {
             let Some(place) = place.filter(|place| *place < locator_at) else {
                 continue;
             };
-            let record = self.read(place, END64)?.unwrap_or_default();
+            let record = self.read(place, ZIP64_END_BYTES)?.unwrap_or_default();
             if !record.starts_with(b"PK\x06\x06") {
                 continue;
             }
@@ -310,18 +310,18 @@ impl Archive<'_> {
     ) -> Result<(Entry, &'d [u8]), VolumeError> {
         let at = directory.at + (directory.bytes.len() - rest.len()) as u64;
         let cut = || self.corrupt(at, "its directory ends within an entry");
-        if rest.len() < ENTRY {
+        if rest.len() < ENTRY_BYTES {
             return Err(cut());
         }
         if !rest.starts_with(b"PK\x01\x02") {
             return Err(self.corrupt(at, "an entry of its directory begins wrongly"));
         }
         let [name, extra, comment] = [28, 30, 32].map(|field| number::<2>(rest, field) as usize);
-        let end = ENTRY + name + extra + comment;
+        let end = ENTRY_BYTES + name + extra + comment;
         if rest.len() < end {
             return Err(cut());
         }
-        let extra = &rest[ENTRY + name..][..extra];
+        let extra = &rest[ENTRY_BYTES + name..][..extra];
         let mut wide = zip64_fields(extra);
         let mut quantity = |field: usize| match number::<4>(rest, field) {
             IN_ZIP64 => wide.next().ok_or(()),
@@ -335,7 +335,7 @@ impl Archive<'_> {
         };
         let header = header.checked_add(directory.before);
         let entry = Entry {
-            name: String::from_utf8_lossy(&rest[ENTRY..][..name]).into_owned(),
+            name: String::from_utf8_lossy(&rest[ENTRY_BYTES..][..name]).into_owned(),
             flags: number::<2>(rest, 8) as u16,
             method: number::<2>(rest, 10) as u16,
             packed,
@@ -348,13 +348,13 @@ impl Archive<'_> {
     /// Where the content of an entry begins.
     fn content_of(&mut self, entry: &Entry) -> Result<u64, VolumeError> {
         let wrong = "an entry does not lie where the directory says";
-        let header = self.read(entry.header, LOCAL)?;
+        let header = self.read(entry.header, LOCAL_HEADER_BYTES)?;
         let header = header.filter(|header| header.starts_with(b"PK\x03\x04"));
         let Some(header) = header else {
             return Err(self.corrupt(entry.header, wrong));
         };
         let names = number::<2>(&header, 26) + number::<2>(&header, 28);
-        let begin = entry.header + LOCAL as u64 + names;
+        let begin = entry.header + LOCAL_HEADER_BYTES as u64 + names;
         match begin.checked_add(entry.packed) {
             Some(end) if end <= self.size => Ok(begin),
             _ => Err(self.corrupt(entry.header, "an entry ends after the archive")),

@@ -8,12 +8,12 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use std::cell::Cell;
 
 /// Voxels decoded at a time: a few milliseconds of unpacking and at most half a mebibyte.
-const PORTION: usize = 1 << 16;
+const VOXELS_PER_PORTION: usize = 1 << 16;
 
 /// Bits of the `f32` above which not every whole number is representable.
-const EXACT: u32 = 16_777_216_f32.to_bits();
-const INFINITY: u32 = f32::INFINITY.to_bits();
-const SIGN: u32 = 1 << 31;
+const MAX_EXACT_BITS: u32 = 16_777_216_f32.to_bits();
+const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
+const SIGN_BIT: u32 = 1 << 31;
 
 /// Data type of a stored voxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -253,7 +253,7 @@ impl<'a> VoxelReader<'a> {
         let end = begin + count as u64 * self.decoder.format.data_type.size() as u64;
         self.source.prepare(end)?;
         self.source.skip_to(begin)?;
-        let mut voxels = Vec::with_capacity(PORTION.min(count));
+        let mut voxels = Vec::with_capacity(VOXELS_PER_PORTION.min(count));
         self.portions(end, count, report, |decoder, bytes, done| {
             voxels.clear();
             decoder.append(bytes, done, &mut voxels)?;
@@ -277,7 +277,7 @@ impl<'a> VoxelReader<'a> {
         let end = begin + count as u64 * self.decoder.format.data_type.size() as u64;
         self.source.prepare(end)?;
         self.source.skip_to(begin)?;
-        let mut labels = Vec::with_capacity(PORTION.min(count));
+        let mut labels = Vec::with_capacity(VOXELS_PER_PORTION.min(count));
         self.portions(end, count, report, |decoder, bytes, done| {
             labels.clear();
             exact_labels(bytes, &decoder.format, &mut labels);
@@ -299,7 +299,7 @@ impl<'a> VoxelReader<'a> {
         let mut done = 0;
         while done < count {
             report(done as f64 / count as f64)?;
-            let portion = (count - done).min(PORTION);
+            let portion = (count - done).min(VOXELS_PER_PORTION);
             let bytes = match self.source.lend(portion * size) {
                 Some(bytes) => bytes,
                 None => {
@@ -323,10 +323,10 @@ impl<'a> VoxelReader<'a> {
         count: usize,
         report: &mut dyn FnMut(f64) -> Result<(), Cancelled>,
     ) -> Result<Vec<f32>, VolumeError> {
-        let mut decoded = Vec::with_capacity(PORTION.min(count));
-        for done in (0..count).step_by(PORTION) {
+        let mut decoded = Vec::with_capacity(VOXELS_PER_PORTION.min(count));
+        for done in (0..count).step_by(VOXELS_PER_PORTION) {
             report(done as f64 / count as f64)?;
-            let portion = (count - done).min(PORTION);
+            let portion = (count - done).min(VOXELS_PER_PORTION);
             let begin = place + size_of::<f32>() * done;
             let bytes = &bytemuck::cast_slice(&words)[begin..begin + size_of::<f32>() * portion];
             decoded.clear();
@@ -423,9 +423,9 @@ impl Odd {
         let (mut infinite, mut large) = (false, false);
         for v in &*voxels {
             // Non-negative floats have the same order as their bits.
-            let size = v.to_bits() & !SIGN;
-            infinite |= size == INFINITY;
-            large |= size > EXACT && size < INFINITY;
+            let size = v.to_bits() & !SIGN_BIT;
+            infinite |= size == INFINITY_BITS;
+            large |= size > MAX_EXACT_BITS && size < INFINITY_BITS;
         }
         if large && format.data_type != DataType::F32 {
             self.inexact = Some(format.data_type);

@@ -18,7 +18,7 @@ use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
 /// Above this size 32-bit floats do not tell all whole numbers apart.
-const EXACT: f32 = 16_777_216.0;
+const MAX_EXACT_WHOLE: f32 = 16_777_216.0;
 
 /// A volume and the facts about the file it was read from.
 #[derive(Debug, Clone)]
@@ -62,7 +62,7 @@ impl Reading {
 pub(super) fn is_rounded(intensity: &IntensitySummary, data_type: &str) -> bool {
     let wide = !matches!(data_type, "uint8" | "int8" | "uint16" | "int16" | "float32");
     let size = intensity.maximum.max(-intensity.minimum);
-    wide && intensity.integral && size >= EXACT
+    wide && intensity.integral && size >= MAX_EXACT_WHOLE
 }
 
 /// A file whose header has been read and checked.
@@ -124,7 +124,7 @@ pub(super) trait OpenVolume {
         take: &mut dyn FnMut(usize, &[i64]),
         monitor: &Monitor,
     ) -> Result<(), VolumeError> {
-        let label = |v: &f32| match v.fract() == 0.0 && v.abs() <= EXACT {
+        let label = |v: &f32| match v.fract() == 0.0 && v.abs() <= MAX_EXACT_WHOLE {
             true => *v as i64,
             false => NO_LABEL,
         };

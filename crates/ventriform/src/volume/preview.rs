@@ -19,10 +19,10 @@ use crate::geometry::frame::VoxelToPatient;
 const LONGEST_SIDE: usize = 256;
 
 /// Black columns between the slices.
-const GAP: usize = 4;
+const SLICE_GAP_PX: usize = 4;
 
 /// Share of the shown pixels that are not saturated.
-const PERCENTILE: f64 = 0.995;
+const UNSATURATED_SHARE: f64 = 0.995;
 
 /// Draws the three middle slices of `volume`; at most 776 x 256 pixels.
 pub fn preview(volume: &Volume) -> Image<1> {
@@ -99,7 +99,7 @@ impl MiddlePlanes {
         let longest = longest.into_iter().fold(0.0, f64::max);
         let slices = views.map(|(right, down)| self.slice(right, down, longest));
         let window = window(&slices);
-        Image::side_by_side(&slices.map(|slice| slice.grey(window)), GAP)
+        Image::side_by_side(&slices.map(|slice| slice.grey(window)), SLICE_GAP_PX)
     }
 
     /// The middle slice whose columns run along `right` and rows along `down`.
@@ -184,7 +184,7 @@ struct PatientAxes {
 
 impl PatientAxes {
     fn of(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
-        const ORDERS: [[usize; 3]; 6] = [
+        const AXIS_ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],
             [0, 2, 1],
             [1, 0, 2],
@@ -195,7 +195,7 @@ impl PatientAxes {
         let cosine = |patient, array| direction_cosine(frame, patient, array);
         let fit = |order: &[usize; 3]| -> f64 { (0..3).map(|p| cosine(p, order[p]).abs()).sum() };
         // Of equally good orders the first is used, so that the choice is deterministic.
-        let best = ORDERS.iter().fold(&ORDERS[0], |best, order| {
+        let best = AXIS_ORDERS.iter().fold(&AXIS_ORDERS[0], |best, order| {
             if fit(order) > fit(best) { order } else { best }
         });
         let spacing = frame.spacing();
@@ -242,7 +242,7 @@ fn window(slices: &[Slice]) -> (f32, f32) {
         .iter()
         .flat_map(|s| s.values.iter().copied())
         .collect();
-    let rank = ((values.len() - 1) as f64 * PERCENTILE) as usize;
+    let rank = ((values.len() - 1) as f64 * UNSATURATED_SHARE) as usize;
     let (below, &mut high, above) = values.select_nth_unstable_by(rank, f32::total_cmp);
     let low = below.iter().copied().fold(0.0, f32::min);
     let highest = above.iter().copied().fold(high, f32::max);
@@ -271,7 +271,7 @@ mod tests {
 
     /// Whether the brightest pixel of panel `n` lies right of its middle, and below it.
     fn side(image: &Image<1>, n: usize) -> (bool, bool) {
-        let panel = LONGEST_SIDE + GAP;
+        let panel = LONGEST_SIDE + SLICE_GAP_PX;
         let inside = |i: usize| (n * panel..n * panel + LONGEST_SIDE).contains(&(i % image.width));
         let pixels = image.pixels.iter().enumerate().filter(|(i, _)| inside(*i));
         let (i, _) = pixels.max_by_key(|(_, p)| **p).unwrap();
@@ -318,7 +318,7 @@ mod tests {
         let image = preview(&volume);
         assert_eq!(
             (image.width, image.height),
-            (256 + 256 + 128 + 2 * GAP, 256)
+            (256 + 256 + 128 + 2 * SLICE_GAP_PX, 256)
         );
         assert!(image.pixels.iter().all(|p| *p == [0]));
         assert!(preview_png(&volume).starts_with(b"\x89PNG"));

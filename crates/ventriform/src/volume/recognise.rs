@@ -7,7 +7,7 @@ use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
 
 /// Unpacked bytes that are examined.
-const EXAMINED: usize = 1024;
+const EXAMINED_BYTES: usize = 1024;
 
 /// Files that together hold one volume or several.
 #[derive(Debug)]
@@ -232,8 +232,8 @@ fn stem(file: &VolumeFile, ending: &str) -> Option<String> {
 
 /// The kind of `file`, and its first bytes.
 fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(FileKind, Vec<u8>), VolumeError> {
-    let mut start = vec![0; EXAMINED];
-    let mut source = Source::open(file, limits.unpacked_bytes.max(EXAMINED as u64))?;
+    let mut start = vec![0; EXAMINED_BYTES];
+    let mut source = Source::open(file, limits.unpacked_bytes.max(EXAMINED_BYTES as u64))?;
     let there = source.fill(&mut start)?;
     start.truncate(there);
     if start.is_empty() {
@@ -261,8 +261,9 @@ fn is_analyze(start: &[u8]) -> bool {
 
 /// The error for a file that is not supported, with the name of its format if `start` shows it.
 fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
-    const CONVERT: &str = "Convert it to NIfTI (.nii.gz).";
-    const ANALYZE: &str = "Convert it to NIfTI: Analyze files do not state which side is left.";
+    const CONVERT_ADVICE: &str = "Convert it to NIfTI (.nii.gz).";
+    const ANALYZE_ADVICE: &str =
+        "Convert it to NIfTI: Analyze files do not state which side is left.";
     let known: &[(usize, &[u8], &'static str)] = &[
         (0, b"CDF\x01", "a MINC 1 (netCDF) file"),
         (0, b"CDF\x02", "a MINC 1 (netCDF) file"),
@@ -294,7 +295,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
         return VolumeError::Unsupported {
             file: name,
             format: "an Analyze 7.5 header (it has no NIfTI magic)".into(),
-            fix: ANALYZE,
+            fix: ANALYZE_ADVICE,
         };
     }
     for (at, magic, format) in known {
@@ -302,7 +303,7 @@ fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
             return VolumeError::Unsupported {
                 file: name,
                 format: (*format).into(),
-                fix: CONVERT,
+                fix: CONVERT_ADVICE,
             };
         }
     }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Packed bytes are read in portions of this size.
-const PORTION: usize = 128 * 1024;
+const PORTION_BYTES: usize = 128 * 1024;
 
 /// Largest ratio of unpacked to packed size of any deflate stream (1032:1 according to zlib's
 /// technical details).
@@ -204,11 +204,11 @@ impl Source {
         let stored = reader.seek(SeekFrom::End(0)).map_err(io)?;
         reader.rewind().map_err(io)?;
         let mut mark = [0; 2];
-        let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP;
+        let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP_MAGIC;
         reader.rewind().map_err(io)?;
         let body = match gzipped {
             true => Body::Gzip(Box::new(Members::new(reader))),
-            false => Body::Plain(BufReader::with_capacity(PORTION, reader)),
+            false => Body::Plain(BufReader::with_capacity(PORTION_BYTES, reader)),
         };
         let mut source = Self::new(file, body, stored, limit);
         source.gzip = gzipped;
@@ -251,7 +251,7 @@ impl Source {
     }
 
     fn inflater(packed: Box<dyn Read>) -> Body {
-        let packed = BufReader::with_capacity(PORTION, packed);
+        let packed = BufReader::with_capacity(PORTION_BYTES, packed);
         Body::Deflated(Box::new(DeflateDecoder::new(packed)))
     }
 
@@ -392,9 +392,9 @@ impl Source {
             self.position = target;
             return Ok(());
         }
-        let mut scratch = vec![0; PORTION];
+        let mut scratch = vec![0; PORTION_BYTES];
         while self.position < target {
-            let part = (target - self.position).min(PORTION as u64) as usize;
+            let part = (target - self.position).min(PORTION_BYTES as u64) as usize;
             self.fill_all(&mut scratch[..part], target)?;
         }
         Ok(())
@@ -404,7 +404,7 @@ impl Source {
     /// Returns whether the file has more bytes. Reads at most one portion, so that appended data cannot
     /// exhaust time or memory.
     pub(super) fn finish(&mut self) -> Result<bool, VolumeError> {
-        let mut rest = vec![0; PORTION];
+        let mut rest = vec![0; PORTION_BYTES];
         self.limit = u64::MAX;
         let left_over = self.fill(&mut rest)? > 0;
         match self.cut_off {
@@ -495,7 +495,7 @@ impl Inflated {
     fn new(packed: Window, size: u64) -> Self {
         // A size that the packed bytes cannot reach is not believed.
         let length = size.min(packed.length.saturating_mul(GREATEST_RATIO));
-        let packed = BufReader::with_capacity(PORTION, packed);
+        let packed = BufReader::with_capacity(PORTION_BYTES, packed);
         Self {
             inflater: Some(DeflateDecoder::new(packed)),
             length,
@@ -565,7 +565,7 @@ impl Read for Source {
 }
 
 /// The first two bytes of a gzip member.
-const GZIP: [u8; 2] = [0x1f, 0x8b];
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// Gzip members, one after the other. (`MultiGzDecoder` of flate2 treats padding after the last member
 /// as a damaged member.)
@@ -577,7 +577,10 @@ struct Members {
 impl Members {
     fn new(packed: Box<dyn ReadSeek>) -> Self {
         Self {
-            current: Some(GzDecoder::new(BufReader::with_capacity(PORTION, packed))),
+            current: Some(GzDecoder::new(BufReader::with_capacity(
+                PORTION_BYTES,
+                packed,
+            ))),
             first: true,
         }
     }
@@ -593,7 +596,7 @@ impl Members {
         let mut packed = ended.into_inner();
         // The buffer may hold only one more byte. One is enough to recognise padding; a member that
         // starts correctly and continues wrongly is reported as an error.
-        let follows = packed.fill_buf()?.first() == Some(&GZIP[0]);
+        let follows = packed.fill_buf()?.first() == Some(&GZIP_MAGIC[0]);
         Ok(Self {
             current: follows.then(|| GzDecoder::new(packed)),
             first: false,

@@ -13,7 +13,7 @@ use crate::grid::survey::many_are_pieces;
 use std::collections::BTreeMap;
 
 /// Voxels per partial sum.
-const PORTION: usize = 1 << 16;
+const VOXELS_PER_SUM: usize = 1 << 16;
 
 /// Largest number of different values in a label map that is not one beyond doubt
 /// ([`many_are_pieces`]).
@@ -29,7 +29,7 @@ const LEAST_COHERENCE: f64 = 0.5;
 /// Figures over `voxels`, which are stored in rows of `row` voxels along i.
 pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
     let mut tally = Tally::default();
-    for portion in voxels.chunks(PORTION) {
+    for portion in voxels.chunks(VOXELS_PER_SUM) {
         tally.add_portion(portion);
     }
     tally.with_labels(voxels, row)
@@ -87,17 +87,17 @@ impl Tally {
     }
 
     /// Figures over one portion, computed in lanes for the vector unit, block by block.
-    fn of(portion: &[f32], add: impl Fn(&mut Lanes, &[f32; BLOCK])) -> Self {
+    fn of(portion: &[f32], add: impl Fn(&mut Lanes, &[f32; VALUES_PER_CHECK])) -> Self {
         let mut lanes = Lanes::new();
-        let (blocks, rest) = portion.as_chunks::<BLOCK>();
+        let (blocks, rest) = portion.as_chunks::<VALUES_PER_CHECK>();
         for block in blocks {
             add(&mut lanes, block);
         }
         // The last block is padded with missing voxels, which are subtracted below.
-        let mut last = [f32::NAN; BLOCK];
+        let mut last = [f32::NAN; VALUES_PER_CHECK];
         last[..rest.len()].copy_from_slice(rest);
         lanes.add_block(&last);
-        let padding = (BLOCK - rest.len()) as u64;
+        let padding = (VALUES_PER_CHECK - rest.len()) as u64;
         let missing = lanes.missing - padding;
         Self {
             minimum: lanes.minimum.into_iter().fold(f32::INFINITY, f32::min),
@@ -150,19 +150,19 @@ impl Tally {
 }
 
 /// Values processed side by side.
-const LANES: usize = 8;
+const PARALLEL_VALUES: usize = 8;
 
 /// Values per check for the rare cases: missing and fractional values.
-const BLOCK: usize = 16 * LANES;
+const VALUES_PER_CHECK: usize = 16 * PARALLEL_VALUES;
 
 /// From this value on, every `f32` is a whole number.
-const WHOLE: f32 = 8_388_608.0;
+const WHOLE_FROM: f32 = 8_388_608.0;
 
 /// Figures over every eighth voxel (arrays) and over all (scalars).
 struct Lanes {
-    minimum: [f32; LANES],
-    maximum: [f32; LANES],
-    sum: [f64; LANES],
+    minimum: [f32; PARALLEL_VALUES],
+    maximum: [f32; PARALLEL_VALUES],
+    sum: [f64; PARALLEL_VALUES],
     missing: u64,
     fractional: bool,
 }
@@ -170,9 +170,9 @@ struct Lanes {
 impl Lanes {
     fn new() -> Self {
         Self {
-            minimum: [f32::INFINITY; LANES],
-            maximum: [f32::NEG_INFINITY; LANES],
-            sum: [0.0; LANES],
+            minimum: [f32::INFINITY; PARALLEL_VALUES],
+            maximum: [f32::NEG_INFINITY; PARALLEL_VALUES],
+            sum: [0.0; PARALLEL_VALUES],
             missing: 0,
             fractional: false,
         }
@@ -180,7 +180,7 @@ impl Lanes {
 
     /// Adds a block without branches on single values: most blocks have no missing values, and once a
     /// fraction has been found the search for fractions ends.
-    fn add_block(&mut self, block: &[f32; BLOCK]) {
+    fn add_block(&mut self, block: &[f32; VALUES_PER_CHECK]) {
         let missing = block.iter().map(|v| u64::from(v.is_nan())).sum::<u64>();
         self.missing += missing;
         match missing {
@@ -195,21 +195,21 @@ impl Lanes {
             self.fractional = block.iter().fold(false, |any, v| {
                 // Adding 2^23 rounds a number to a whole one.
                 let size = v.abs();
-                let whole = (size + WHOLE) - WHOLE == size || size >= WHOLE;
+                let whole = (size + WHOLE_FROM) - WHOLE_FROM == size || size >= WHOLE_FROM;
                 any | !(whole | v.is_nan())
             });
         }
     }
 
     /// Adds a block of which no value is missing to minimum, maximum and sum.
-    fn add_figures(&mut self, block: &[f32; BLOCK]) {
+    fn add_figures(&mut self, block: &[f32; VALUES_PER_CHECK]) {
         self.add_extremes(block);
         self.add_sum(block);
     }
 
-    fn add_extremes(&mut self, block: &[f32; BLOCK]) {
-        for group in block.as_chunks::<LANES>().0 {
-            for l in 0..LANES {
+    fn add_extremes(&mut self, block: &[f32; VALUES_PER_CHECK]) {
+        for group in block.as_chunks::<PARALLEL_VALUES>().0 {
+            for l in 0..PARALLEL_VALUES {
                 // Comparisons with NaN are false.
                 let (v, low, high) = (group[l], self.minimum[l], self.maximum[l]);
                 self.minimum[l] = if v < low { v } else { low };
@@ -218,9 +218,9 @@ impl Lanes {
         }
     }
 
-    fn add_sum(&mut self, block: &[f32; BLOCK]) {
-        for group in block.as_chunks::<LANES>().0 {
-            for l in 0..LANES {
+    fn add_sum(&mut self, block: &[f32; VALUES_PER_CHECK]) {
+        for group in block.as_chunks::<PARALLEL_VALUES>().0 {
+            for l in 0..PARALLEL_VALUES {
                 self.sum[l] += f64::from(group[l]);
             }
         }
@@ -231,9 +231,9 @@ impl Lanes {
 /// alike.
 fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
     let mut coherence = Coherence::new(row);
-    let portions = || voxels.chunks(PORTION);
+    let portions = || voxels.chunks(VOXELS_PER_SUM);
     for (n, portion) in portions().enumerate() {
-        coherence.add(n * PORTION, portion);
+        coherence.add(n * VOXELS_PER_SUM, portion);
     }
     if !coherence.suits_labels() {
         return None;
@@ -408,7 +408,7 @@ mod tests {
 
     #[test]
     fn portions_add_up() {
-        let n = 3 * PORTION + 17;
+        let n = 3 * VOXELS_PER_SUM + 17;
         let voxels: Vec<f32> = (0..n).map(|i| (i % 7) as f32).collect();
         let sum: f64 = voxels.iter().map(|&v| f64::from(v)).sum();
         let s = summarise(&voxels, 128);
@@ -418,10 +418,10 @@ mod tests {
 
     #[test]
     fn whole_portions_have_the_same_figures() {
-        for n in [1, BLOCK, 2 * PORTION + 17] {
+        for n in [1, VALUES_PER_CHECK, 2 * VOXELS_PER_SUM + 17] {
             let voxels: Vec<f32> = (0..n).map(|i| (i * 37 % 4001) as f32 - 300.0).collect();
             let (mut any, mut whole) = (Tally::default(), Tally::default());
-            for portion in voxels.chunks(PORTION) {
+            for portion in voxels.chunks(VOXELS_PER_SUM) {
                 any.add_portion(portion);
                 whole.add_whole_portion(portion);
             }
@@ -511,7 +511,7 @@ mod tests {
             let longest = [1, 2, 3, 9, 5000][round / 5 % 5];
             let kinds = [1, 3, 255, 256, 257, 5000][round % 6];
             let length = if round % 40 == 4 {
-                2 * PORTION + 333
+                2 * VOXELS_PER_SUM + 333
             } else {
                 random.random_range(0..4000)
             };

@@ -28,9 +28,9 @@ const LEAST_ACROSS: f64 = 32.0;
 /// Most voxels, a cube of 128.
 const MOST_VOXELS: f64 = 2_097_152.0;
 /// Voxels beyond the surface on each side.
-const BORDER: f64 = 2.0;
+const BORDER_VOXELS: f64 = 2.0;
 /// Bytes that are read at once.
-const PORTION: usize = 1 << 16;
+const PORTION_BYTES: usize = 1 << 16;
 
 /// A surface whose file was read and checked.
 pub(super) struct SurfaceFile {
@@ -67,7 +67,7 @@ pub(super) fn recognise(
 fn whole(file: &VolumeFile, limits: &ReadLimits) -> Result<Vec<u8>, VolumeError> {
     let mut source = Source::open(file, limits.mesh_bytes)?;
     let mut bytes = Vec::new();
-    let mut portion = vec![0; PORTION];
+    let mut portion = vec![0; PORTION_BYTES];
     loop {
         let got = source.fill(&mut portion)?;
         if got == 0 {
@@ -144,7 +144,7 @@ fn grid(mesh: &TriMesh) -> Option<([usize; 3], VoxelToPatient)> {
     }
     // Each round brings the grid nearer to what is allowed, whatever the border takes.
     loop {
-        let across = size.map(|s| (s / spacing).ceil() + 1.0 + 2.0 * BORDER);
+        let across = size.map(|s| (s / spacing).ceil() + 1.0 + 2.0 * BORDER_VOXELS);
         if across.product() <= MOST_VOXELS {
             let shape = [0, 1, 2].map(|a| across[a] as usize);
             let frame = VoxelToPatient::centred(shape, [spacing; 3], centre).ok()?;

@@ -9,17 +9,17 @@
 //! The result is allocated as 32-bit words, so that voxels of four bytes can be decoded in place.
 //!
 //! Guaranteed: the bytes are the same as those of the streaming decoder, their checksum is correct,
-//! and the memory taken is at most [`MOST`] plus the size of the file.
+//! and the memory taken is at most [`MAX_UNPACKED_BYTES`] plus the size of the file.
 
 use flate2::bufread::GzDecoder;
 use libdeflater::Decompressor;
 use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
 /// Most bytes to unpack at once: about 40 ms of work, during which cancellation is not checked.
-const MOST: u64 = 16 << 20;
+const MAX_UNPACKED_BYTES: u64 = 16 << 20;
 
 /// Length of the checksum and the size at the end of a gzip member, four bytes each.
-const TRAILER: usize = 8;
+const TRAILER_BYTES: usize = 8;
 
 /// The bytes of an unpacked file, stored in 32-bit words.
 #[derive(Default)]
@@ -63,16 +63,16 @@ pub(super) fn at_once(
     least: u64,
     limit: u64,
 ) -> io::Result<Option<Unpacked>> {
-    if stored > MOST || stored < TRAILER as u64 {
+    if stored > MAX_UNPACKED_BYTES || stored < TRAILER_BYTES as u64 {
         return Ok(None);
     }
-    let mut trailer = [0; TRAILER];
-    packed.seek(SeekFrom::End(-(TRAILER as i64)))?;
+    let mut trailer = [0; TRAILER_BYTES];
+    packed.seek(SeekFrom::End(-(TRAILER_BYTES as i64)))?;
     packed.read_exact(&mut trailer)?;
     let [c0, c1, c2, c3, l0, l1, l2, l3] = trailer;
     let checksum = u32::from_le_bytes([c0, c1, c2, c3]);
     let length = u32::from_le_bytes([l0, l1, l2, l3]);
-    if !(least..=limit.min(MOST)).contains(&u64::from(length)) {
+    if !(least..=limit.min(MAX_UNPACKED_BYTES)).contains(&u64::from(length)) {
         return Ok(None);
     }
     let mut file = Vec::with_capacity(stored as usize);

@@ -83,7 +83,7 @@ fn centroid(a: usize, b: usize, shift: usize) -> [f64; 3] {
 const WEIGHT_EXPONENT: f64 = 1.5;
 
 /// Triangles that are read between two checks of the cancel token.
-const PORTION: usize = 64;
+const TRIANGLES_PER_CHECK: usize = 64;
 
 /// Reads all sensors of `mesh` in `field`: [`PER_TRIANGLE`] for each triangle, in the order of the
 /// triangles.
@@ -107,7 +107,7 @@ pub fn read(
     let mut readings = Vec::with_capacity(mesh.triangles.len() * PER_TRIANGLE);
     let mut widths = Vec::with_capacity(readings.capacity());
     for (t, triangle) in mesh.triangles.iter().enumerate() {
-        if t % PORTION == 0 {
+        if t % TRIANGLES_PER_CHECK == 0 {
             monitor.check()?;
         }
         let share = mesh.area_normal(t).norm() / total;

@@ -5,14 +5,14 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 
 /// Distance of the samples along a profile, mm.
-const STEP: f64 = 1.0;
+const SAMPLE_STEP_MM: f64 = 1.0;
 /// Half the distance between the samples of a difference quotient, in steps.
-const HALF: usize = 2;
+const SLOPE_HALF_STEPS: usize = 2;
 /// Farthest distance of the ridge and the trough from an edge, in steps.
-const FLANK: isize = 14;
+const MAX_FLANK_STEPS: isize = 14;
 /// Farthest distance of the half-way point from the steepest slope, in steps: a farther one belongs
 /// to another structure.
-const NEAR: f64 = 2.0;
+const MAX_HALFWAY_STEPS: f64 = 2.0;
 
 /// The edge on a profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,12 +38,12 @@ pub struct Profile {
 impl Profile {
     /// A profile for sensors with these settings.
     pub fn new(settings: &SensorSettings) -> Self {
-        let half = (settings.reach / STEP).ceil().max(1.0) as usize;
+        let half = (settings.reach / SAMPLE_STEP_MM).ceil().max(1.0) as usize;
         Self {
             settings: *settings,
             half,
             nearness: (0..=2 * half)
-                .map(|s| settings.nearness((s as f64 - half as f64) * STEP))
+                .map(|s| settings.nearness((s as f64 - half as f64) * SAMPLE_STEP_MM))
                 .collect(),
             values: Vec::new(),
             slopes: Vec::new(),
@@ -52,9 +52,9 @@ impl Profile {
 
     /// The edge near `place`, along `normal`.
     pub fn edge(&mut self, field: &Field, place: &Vec3, normal: &Vec3) -> ProfileEdge {
-        let reach = self.half + HALF;
+        let reach = self.half + SLOPE_HALF_STEPS;
         let start = field.to_index(place);
-        let step = field.step(normal) * STEP;
+        let step = field.step(normal) * SAMPLE_STEP_MM;
         self.values.clear();
         self.values.extend((0..=2 * reach).map(|s| {
             let t = s as f64 - reach as f64;
@@ -67,7 +67,8 @@ impl Profile {
         }
         self.slopes.clear();
         self.slopes.extend((0..=2 * self.half).map(|s| {
-            let slope = (self.values[s] - self.values[s + 2 * HALF]) / (2.0 * HALF as f64 * STEP);
+            let slope = (self.values[s] - self.values[s + 2 * SLOPE_HALF_STEPS])
+                / (2.0 * SLOPE_HALF_STEPS as f64 * SAMPLE_STEP_MM);
             match self.settings.kind {
                 SensorKind::Unsigned => slope.abs(),
                 _ => slope.max(0.0),
@@ -87,7 +88,7 @@ impl Profile {
         let steepest = top as f64 - self.half as f64;
         let half_way = (self.settings.kind == SensorKind::HalfMaximum && seen > 0.0).then(|| {
             // Most of these samples were taken above.
-            let middle = (top + HALF) as isize;
+            let middle = (top + SLOPE_HALF_STEPS) as isize;
             let value = |s: isize| match usize::try_from(middle + s) {
                 Ok(known) if known < self.values.len() => self.values[known],
                 _ => {
@@ -98,11 +99,11 @@ impl Profile {
             half_way(value)
         });
         let (beyond, half_width) = match half_way {
-            Some((beyond, width)) => (beyond, Some(width * STEP)),
+            Some((beyond, width)) => (beyond, Some(width * SAMPLE_STEP_MM)),
             None => (parabola(&self.slopes, top), None),
         };
         ProfileEdge {
-            offset: (steepest + beyond) * STEP,
+            offset: (steepest + beyond) * SAMPLE_STEP_MM,
             score: seen,
             half_width,
         }
@@ -122,15 +123,15 @@ impl Profile {
         }
         let (t, slope) = best.unwrap_or((0.0, 0.0));
         ProfileEdge {
-            offset: t * STEP,
-            score: slope / STEP * self.settings.nearness(t * STEP),
+            offset: t * SAMPLE_STEP_MM,
+            score: slope / SAMPLE_STEP_MM * self.settings.nearness(t * SAMPLE_STEP_MM),
             half_width: None,
         }
     }
 }
 
 /// Steps from the steepest fall (0) to where `value` passes half-way from the ridge before it
-/// to the trough behind it, at most [`NEAR`] either way, and from the ridge to there.
+/// to the trough behind it, at most [`MAX_HALFWAY_STEPS`] either way, and from the ridge to there.
 fn half_way(value: impl Fn(isize) -> f64) -> (f64, f64) {
     let ridge = turning(&value, -1);
     let trough = turning(&value, 1);
@@ -139,7 +140,7 @@ fn half_way(value: impl Fn(isize) -> f64) -> (f64, f64) {
     let sign = towards as f64;
     let mut last = value(0);
     let mut crossing = 0.0;
-    for s in 0..FLANK {
+    for s in 0..MAX_FLANK_STEPS {
         let next = value((s + 1) * towards);
         if (next - level) * sign <= 0.0 {
             // `last` lies strictly on the other side, or s is 0 and the level is here.
@@ -149,14 +150,17 @@ fn half_way(value: impl Fn(isize) -> f64) -> (f64, f64) {
         }
         last = next;
     }
-    (crossing.clamp(-NEAR, NEAR), crossing + ridge.0)
+    (
+        crossing.clamp(-MAX_HALFWAY_STEPS, MAX_HALFWAY_STEPS),
+        crossing + ridge.0,
+    )
 }
 
 /// The end of the fall on a profile, backward (`towards` = -1) to the ridge or forward (1) to the
 /// trough: steps from 0 and value.
 fn turning(value: impl Fn(isize) -> f64, towards: isize) -> (f64, f64) {
     let (mut s, mut last) = (0, value(0));
-    while s < FLANK {
+    while s < MAX_FLANK_STEPS {
         let next = value((s + 1) * towards);
         if (next - last) * towards as f64 >= 0.0 {
             break;
@@ -219,7 +223,7 @@ mod tests {
     #[test]
     fn a_profile_without_end_stays_near() {
         let (crossing, width) = half_way(|s| -(s * s * s) as f64);
-        assert!(crossing.abs() <= NEAR && width.is_finite());
+        assert!(crossing.abs() <= MAX_HALFWAY_STEPS && width.is_finite());
         assert_eq!(half_way(|_| 1.0), (0.0, 0.0));
     }
 

@@ -1,10 +1,10 @@
 //! The figures of a report as Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID 1500 of
 //! PS3.16.
 //!
-//! One measurement group holds what was measured of the whole structure ([`FIGURES`]). It is a
+//! One measurement group holds what was measured of the whole structure ([`STRUCTURE_FIGURES`]). It is a
 //! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
 //! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
-//! wall and cavity have a group of TID 1501 each ([`PARTS`]), and so has each of the 17 segments of the heart
+//! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
 //! measured, not at the figure. A figure that the report lacks is left out.
 
@@ -60,7 +60,7 @@ const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Fig
 }
 
 /// What is measured of the whole structure. A new figure of the report is a new line here.
-const FIGURES: &[Figure] = &[
+const STRUCTURE_FIGURES: &[Figure] = &[
     figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
     figure(|r| r.mass_g, MASS, GRAM),
     mean(|r| r.wall_thickness_mm, THICKNESS, MILLIMETRE),
@@ -101,7 +101,7 @@ struct Part {
 const APPARENT: Code = own("APPARENT", "With the blur of the image");
 const ANATOMICAL: Code = own("ANATOMICAL", "Without the blur of the image");
 
-const PARTS: [Part; 5] = [
+const WALL_FIGURES: [Part; 5] = [
     Part {
         name: "cavity",
         method: None,
@@ -222,7 +222,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
 
 /// Language, observer and procedure.
 fn context(results: &DicomResults<'_>) -> Vec<DataSet> {
-    const OBSERVER: &str = "HAS OBS CONTEXT";
+    const OBSERVER_RELATION: &str = "HAS OBS CONTEXT";
     let english = Code {
         value: "en",
         scheme: "RFC5646",
@@ -240,13 +240,17 @@ fn context(results: &DicomResults<'_>) -> Vec<DataSet> {
     vec![
         concept("HAS CONCEPT MOD", language, english),
         concept(
-            OBSERVER,
+            OBSERVER_RELATION,
             dcm("121005", "Observer Type"),
             dcm("121007", "Device"),
         ),
-        unique(OBSERVER, dcm("121012", "Device Observer UID"), &device),
+        unique(
+            OBSERVER_RELATION,
+            dcm("121012", "Device Observer UID"),
+            &device,
+        ),
         text(
-            OBSERVER,
+            OBSERVER_RELATION,
             dcm("121013", "Device Observer Name"),
             "ventriform",
         ),
@@ -269,7 +273,11 @@ fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
-    groups.extend(PARTS.iter().filter_map(|part| of_part(results, part)));
+    groups.extend(
+        WALL_FIGURES
+            .iter()
+            .filter_map(|part| of_part(results, part)),
+    );
     let polar = results.figures.and_then(|report| report.polar.as_ref());
     for segment in polar.iter().flat_map(|polar| &polar.segments) {
         let number = segment.number;
@@ -318,7 +326,7 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
         }
     }
     if let Some(report) = results.figures {
-        content.extend(measured(report, FIGURES));
+        content.extend(measured(report, STRUCTURE_FIGURES));
         let comment = dcm("121106", "Comment");
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
@@ -376,11 +384,15 @@ fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
 }
 
 fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
-    const OBSERVATION: &str = "HAS OBS CONTEXT";
+    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
     vec![
-        text(OBSERVATION, dcm("112039", "Tracking Identifier"), name),
+        text(
+            OBSERVATION_RELATION,
+            dcm("112039", "Tracking Identifier"),
+            name,
+        ),
         unique(
-            OBSERVATION,
+            OBSERVATION_RELATION,
             dcm("112040", "Tracking Unique Identifier"),
             uid,
         ),

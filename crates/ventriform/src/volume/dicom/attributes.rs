@@ -18,7 +18,7 @@ const MOST_BYTES: usize = 16 << 20;
 /// An attribute that the reader needs: its tag, its sequences and its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Attribute {
-    /// The sequences, from the outermost, whose first items hold the attribute. [`FRAME`] stands for
+    /// The sequences, from the outermost, whose first items hold the attribute. [`PER_FRAME_GROUPS`] stands for
     /// the functional groups of a frame or of all frames.
     path: &'static [Tag],
     tag: Tag,
@@ -34,49 +34,49 @@ macro_rules! attributes {
             name: $name,
         };)*
         /// Every attribute above.
-        const WANTED: &[Attribute] = &[$($id),*];
+        const WANTED_ATTRIBUTES: &[Attribute] = &[$($id),*];
     };
 }
 
 /// Shared Functional Groups Sequence.
-const SHARED: Tag = Tag(0x5200, 0x9229);
+const SHARED_GROUPS: Tag = Tag(0x5200, 0x9229);
 /// Per-frame Functional Groups Sequence. In a path it stands for the shared groups too.
-const FRAME: Tag = Tag(0x5200, 0x9230);
+const PER_FRAME_GROUPS: Tag = Tag(0x5200, 0x9230);
 
 /// Segment Sequence, whose items are counted like frames.
-const SEGMENT: Tag = Tag(0x0062, 0x0002);
+const SEGMENT_SEQUENCE: Tag = Tag(0x0062, 0x0002);
 
-const DETECTOR: &[Tag] = &[Tag(0x0054, 0x0022)];
+const DETECTOR_PATH: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
-const PHARMACEUTICAL: &[Tag] = &[Tag(0x0054, 0x0016)];
+const PHARMACEUTICAL_PATH: &[Tag] = &[Tag(0x0054, 0x0016)];
 const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
 const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
 const CONTEXT_NAME: &[Tag] = &[Tag(0x0040, 0x0555), Tag(0x0040, 0xa168)];
 const PROTOCOL_CODE: &[Tag] = &[Tag(0x0040, 0x0260)];
-const FRAME_POSITION_PATH: &[Tag] = &[FRAME, Tag(0x0020, 0x9113)];
-const FRAME_ORIENTATION_PATH: &[Tag] = &[FRAME, Tag(0x0020, 0x9116)];
-const FRAME_MEASURES: &[Tag] = &[FRAME, Tag(0x0028, 0x9110)];
-const FRAME_RESCALE: &[Tag] = &[FRAME, Tag(0x0028, 0x9145)];
-const FRAME_REAL_WORLD: &[Tag] = &[FRAME, Tag(0x0040, 0x9096)];
-const FRAME_CONTENT: &[Tag] = &[FRAME, Tag(0x0020, 0x9111)];
-const FRAME_SEGMENT_PATH: &[Tag] = &[FRAME, Tag(0x0062, 0x000a)];
-const FRAME_CARDIAC: &[Tag] = &[FRAME, Tag(0x0018, 0x9118)];
-const FRAME_RESPIRATORY: &[Tag] = &[FRAME, Tag(0x0020, 0x9253)];
-const FRAME_TEMPORAL: &[Tag] = &[FRAME, Tag(0x0020, 0x9310)];
-const FRAME_ECHO: &[Tag] = &[FRAME, Tag(0x0018, 0x9114)];
-const FRAME_DIFFUSION: &[Tag] = &[FRAME, Tag(0x0018, 0x9117)];
-const FRAME_CT_DETAILS: &[Tag] = &[FRAME, Tag(0x0018, 0x9325)];
-const FRAME_TYPE_MR: &[Tag] = &[FRAME, Tag(0x0018, 0x9226)];
-const FRAME_TYPE_CT: &[Tag] = &[FRAME, Tag(0x0018, 0x9329)];
-const FRAME_TYPE_PET: &[Tag] = &[FRAME, Tag(0x0018, 0x9751)];
+const FRAME_POSITION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9113)];
+const FRAME_ORIENTATION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9116)];
+const FRAME_MEASURES: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0028, 0x9110)];
+const FRAME_RESCALE: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0028, 0x9145)];
+const FRAME_REAL_WORLD: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0040, 0x9096)];
+const FRAME_CONTENT: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9111)];
+const FRAME_SEGMENT_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0062, 0x000a)];
+const FRAME_CARDIAC: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9118)];
+const FRAME_RESPIRATORY: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9253)];
+const FRAME_TEMPORAL: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9310)];
+const FRAME_ECHO: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9114)];
+const FRAME_DIFFUSION: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9117)];
+const FRAME_CT_DETAILS: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9325)];
+const FRAME_TYPE_MR: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9226)];
+const FRAME_TYPE_CT: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9329)];
+const FRAME_TYPE_PET: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9751)];
 /// Attributes of single-frame images for which Legacy Converted Enhanced images have no group.
-const FRAME_UNASSIGNED: &[Tag] = &[FRAME, Tag(0x0020, 0x9171)];
-const SEGMENT_TYPE_PATH: &[Tag] = &[SEGMENT, Tag(0x0062, 0x000f)];
-const SEGMENT_REGION_PATH: &[Tag] = &[SEGMENT, Tag(0x0008, 0x2218)];
+const FRAME_UNASSIGNED: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9171)];
+const SEGMENT_TYPE_PATH: &[Tag] = &[SEGMENT_SEQUENCE, Tag(0x0062, 0x000f)];
+const SEGMENT_REGION_PATH: &[Tag] = &[SEGMENT_SEQUENCE, Tag(0x0008, 0x2218)];
 
 attributes! {
     CHARACTER_SET = &[], 0x0008, 0x0005, "Specific Character Set (0008,0005)";
-    PHARMACEUTICAL_SET = PHARMACEUTICAL, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
+    PHARMACEUTICAL_SET = PHARMACEUTICAL_PATH, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
     PHARMACEUTICAL_CODE_SET = PHARMACEUTICAL_CODE, 0x0008, 0x0005,
         "Specific Character Set (0008,0005)";
     NUCLIDE_SET = NUCLIDE_CODE, 0x0008, 0x0005, "Specific Character Set (0008,0005)";
@@ -169,13 +169,13 @@ attributes! {
     IMAGE_INDEX = &[], 0x0054, 0x1330, "Image Index (0054,1330)";
     SEGMENTATION_TYPE = &[], 0x0062, 0x0001, "Segmentation Type (0062,0001)";
     MAXIMUM_FRACTION = &[], 0x0062, 0x000e, "Maximum Fractional Value (0062,000E)";
-    DETECTOR_POSITION = DETECTOR, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
-    DETECTOR_ORIENTATION = DETECTOR, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
+    DETECTOR_POSITION = DETECTOR_PATH, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
+    DETECTOR_ORIENTATION = DETECTOR_PATH, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
     REAL_WORLD_INTERCEPT = REAL_WORLD, 0x0040, 0x9224, "Real World Value Intercept (0040,9224)";
     REAL_WORLD_SLOPE = REAL_WORLD, 0x0040, 0x9225, "Real World Value Slope (0040,9225)";
-    PHARMACEUTICAL_NAME = PHARMACEUTICAL, 0x0018, 0x0031, "Radiopharmaceutical (0018,0031)";
-    INJECTED_DOSE = PHARMACEUTICAL, 0x0018, 0x1074, "Radionuclide Total Dose (0018,1074)";
-    INJECTION_TIME = PHARMACEUTICAL, 0x0018, 0x1072, "Radiopharmaceutical Start Time (0018,1072)";
+    PHARMACEUTICAL_NAME = PHARMACEUTICAL_PATH, 0x0018, 0x0031, "Radiopharmaceutical (0018,0031)";
+    INJECTED_DOSE = PHARMACEUTICAL_PATH, 0x0018, 0x1074, "Radionuclide Total Dose (0018,1074)";
+    INJECTION_TIME = PHARMACEUTICAL_PATH, 0x0018, 0x1072, "Radiopharmaceutical Start Time (0018,1072)";
     PHARMACEUTICAL_MEANING = PHARMACEUTICAL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     NUCLIDE_MEANING = NUCLIDE_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     CONTEXT_MEANING = CONTEXT_NAME, 0x0008, 0x0104, "Code Meaning (0008,0104)";
@@ -225,8 +225,8 @@ attributes! {
     OLD_ACQUISITION_TIME = FRAME_UNASSIGNED, 0x0008, 0x0032, "Acquisition Time (0008,0032)";
     OLD_IMAGE_INDEX = FRAME_UNASSIGNED, 0x0054, 0x1330, "Image Index (0054,1330)";
     OLD_INSTANCE_NUMBER = FRAME_UNASSIGNED, 0x0020, 0x0013, "Instance Number (0020,0013)";
-    SEGMENT_NUMBER = &[SEGMENT], 0x0062, 0x0004, "Segment Number (0062,0004)";
-    SEGMENT_LABEL = &[SEGMENT], 0x0062, 0x0005, "Segment Label (0062,0005)";
+    SEGMENT_NUMBER = &[SEGMENT_SEQUENCE], 0x0062, 0x0004, "Segment Number (0062,0004)";
+    SEGMENT_LABEL = &[SEGMENT_SEQUENCE], 0x0062, 0x0005, "Segment Label (0062,0005)";
     SEGMENT_TYPE_VALUE = SEGMENT_TYPE_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
     SEGMENT_TYPE_MEANING = SEGMENT_TYPE_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     SEGMENT_REGION_VALUE = SEGMENT_REGION_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
@@ -245,16 +245,21 @@ impl Attribute {
     /// belongs to the data set or to all frames.
     pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Option<usize>)> {
         let (frame, outer) = match open.first() {
-            Some((many @ (FRAME | SEGMENT), items)) => (Some(items.checked_sub(1)?), Some(*many)),
-            Some((SHARED, 1)) => (None, Some(FRAME)),
+            Some((many @ (PER_FRAME_GROUPS | SEGMENT_SEQUENCE), items)) => {
+                (Some(items.checked_sub(1)?), Some(*many))
+            }
+            Some((SHARED_GROUPS, 1)) => (None, Some(PER_FRAME_GROUPS)),
             _ => (None, None),
         };
         let first = usize::from(outer.is_some());
         if open[first..].iter().any(|(_, items)| *items != 1) {
             return None;
         }
-        let wanted = WANTED.iter().find(|a| {
-            let own = a.path.first().filter(|t| [FRAME, SEGMENT].contains(t));
+        let wanted = WANTED_ATTRIBUTES.iter().find(|a| {
+            let own = a
+                .path
+                .first()
+                .filter(|t| [PER_FRAME_GROUPS, SEGMENT_SEQUENCE].contains(t));
             a.tag == tag
                 && own == outer.as_ref()
                 && a.path.len() == open.len()
@@ -275,8 +280,8 @@ const MOST_CODES: usize = 16;
 
 /// `text`, cut to 100 characters for an error message, control characters escaped.
 pub(super) fn clip(text: &str) -> String {
-    const LONGEST: usize = 100;
-    match text.char_indices().nth(LONGEST) {
+    const MAX_TEXT_CHARS: usize = 100;
+    match text.char_indices().nth(MAX_TEXT_CHARS) {
         Some((end, _)) => format!("{}...", escaped(&text[..end])),
         None => escaped(text).into_owned(),
     }

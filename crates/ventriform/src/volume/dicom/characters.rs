@@ -15,7 +15,7 @@
 //! are errors. A term that DICOM does not define names no set: text of ASCII is read, no other.
 //!
 //! The tables of single sets are those of `encoding_rs`; where they follow the web's habits instead
-//! of JIS X 0208, [`JIS`] puts the standard's characters in place.
+//! of JIS X 0208, [`JIS_DIFFERENCES`] puts the standard's characters in place.
 
 use crate::text::is_printable;
 use dicom_core::VR;
@@ -24,7 +24,7 @@ use encoding_rs::{
     ISO_8859_6, ISO_8859_7, ISO_8859_8, ISO_8859_15, WINDOWS_874, WINDOWS_1254,
 };
 
-const ESCAPE: u8 = 0x1b;
+const ESCAPE_BYTE: u8 = 0x1b;
 
 /// A coded character set.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ const fn right(number: &'static str, escape: &'static [u8], set: Set) -> Term {
 }
 
 /// PS3.3 tables C.12-2 to C.12-4.
-const TERMS: [Term; 17] = [
+const DEFINED_TERMS: [Term; 17] = [
     Term {
         number: "6",
         g0: Some(ASCII),
@@ -113,7 +113,7 @@ const TERMS: [Term; 17] = [
 ];
 
 /// Where `encoding_rs` gives another character than JIS X 0208 (Unicode's JIS0208.TXT) has.
-const JIS: [(char, char); 6] = [
+const JIS_DIFFERENCES: [(char, char); 6] = [
     ('\u{ff5e}', '\u{301c}'),
     ('\u{2225}', '\u{2016}'),
     ('\u{ff0d}', '\u{2212}'),
@@ -187,7 +187,9 @@ impl CharacterSets {
             let number = text.strip_prefix("ISO 2022 IR ");
             let number = number.or_else(|| text.strip_prefix("ISO_IR "));
             let number = if text.is_empty() { Some("6") } else { number };
-            let term = TERMS.iter().find(|term| Some(term.number) == number);
+            let term = DEFINED_TERMS
+                .iter()
+                .find(|term| Some(term.number) == number);
             match (whole, term, place) {
                 (Some(whole), _, 0) => sets.whole = Some(whole),
                 (None, Some(term), place) => sets.add(term, place == 0),
@@ -243,7 +245,7 @@ impl CharacterSets {
         let mut rest = bytes;
         while let Some(byte) = rest.first().copied() {
             let at = bytes.len() - rest.len() + 1;
-            if byte == ESCAPE {
+            if byte == ESCAPE_BYTE {
                 let known = self
                     .escapes
                     .iter()
@@ -316,7 +318,7 @@ impl Set {
             Set::Right(encoding) => (byte >= 0xa0).then(|| one(encoding, &[byte]))?,
             Set::Kanji => {
                 let found = one(EUC_JP, &pair(code, 0x21)?)?;
-                let standard = JIS.iter().find(|(web, _)| *web == found);
+                let standard = JIS_DIFFERENCES.iter().find(|(web, _)| *web == found);
                 Some(standard.map_or(found, |(_, standard)| *standard))
             }
             Set::MoreKanji => {

@@ -6,7 +6,7 @@ use dicom_core::dictionary::{UidDictionary, UidDictionaryEntry};
 use dicom_dictionary_std::StandardSopClassDictionary;
 
 /// What the caller can send.
-const READABLE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
+const READABLE_ADVICE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
     RECON TOMO or RECON GATED TOMO, an Enhanced PET, CT or MR image, all files of one PET, CT or MR \
     series (as several files or as one zip), or a Segmentation.";
 
@@ -28,7 +28,7 @@ pub(super) enum Kind {
 }
 
 /// SOP classes of the objects that hold slices, after their common prefix.
-const READ: [(&str, Kind); 12] = [
+const READ_CLASSES: [(&str, Kind); 12] = [
     ("20", Kind::Nuclear { gated: false }),
     ("2", Kind::Slice),
     ("4", Kind::Slice),
@@ -44,17 +44,19 @@ const READ: [(&str, Kind); 12] = [
 ];
 
 /// Beginning of the SOP classes of stored objects.
-const STORAGE: &str = "1.2.840.10008.5.1.4.1.1.";
+const STORAGE_UID_PREFIX: &str = "1.2.840.10008.5.1.4.1.1.";
 
 /// UIDs of the SOP classes that can hold slices.
 pub(super) fn classes() -> impl Iterator<Item = String> {
-    READ.iter().map(|(suffix, _)| format!("{STORAGE}{suffix}"))
+    READ_CLASSES
+        .iter()
+        .map(|(suffix, _)| format!("{STORAGE_UID_PREFIX}{suffix}"))
 }
 
 /// Whether an object of that SOP class is one slice of a series.
 pub(super) fn is_slice_class(class: &str) -> bool {
-    let suffix = class.strip_prefix(STORAGE).unwrap_or_default();
-    READ.contains(&(suffix, Kind::Slice))
+    let suffix = class.strip_prefix(STORAGE_UID_PREFIX).unwrap_or_default();
+    READ_CLASSES.contains(&(suffix, Kind::Slice))
 }
 
 /// Whether the object is a CT image.
@@ -63,13 +65,13 @@ pub(super) fn is_ct(attributes: &Attributes) -> bool {
     let class = class.or_else(|| attributes.media_class.clone());
     let suffix = class
         .as_deref()
-        .and_then(|class| class.strip_prefix(STORAGE));
+        .and_then(|class| class.strip_prefix(STORAGE_UID_PREFIX));
     matches!(suffix, Some("2" | "2.1" | "2.2"))
 }
 
-/// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE`]; the first entry
+/// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE_UID_PREFIX`]; the first entry
 /// that fits counts.
-const OTHERS: [(&str, &str); 17] = [
+const OTHER_CLASSES: [(&str, &str); 17] = [
     ("7", "a picture without a position in the patient"),
     ("66.5", "surfaces, not voxels"),
     ("66", "a registration or measurement, not an image"),
@@ -102,7 +104,7 @@ const OTHERS: [(&str, &str); 17] = [
 ];
 
 /// The directory of a medium.
-const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+const DIRECTORY_UID: &str = "1.2.840.10008.1.3.10";
 
 impl Kind {
     /// The kind of the object with `attributes`.
@@ -119,19 +121,19 @@ impl Kind {
                 file: attributes.file.clone(),
                 found,
                 reason,
-                fix: READABLE,
+                fix: READABLE_ADVICE,
             })
         };
         let Some(class) = class else {
             let found = "a DICOM data set without a SOP Class UID (0008,0016)".into();
             return refuse(found, "it does not say what it holds");
         };
-        if class == DIRECTORY {
+        if class == DIRECTORY_UID {
             let found = "a DICOMDIR (Media Storage Directory)".into();
             return refuse(found, "a list of files; send the image files that it lists");
         }
-        let suffix = class.strip_prefix(STORAGE).unwrap_or_default();
-        if let Some((_, kind)) = READ.iter().find(|(read, _)| *read == suffix) {
+        let suffix = class.strip_prefix(STORAGE_UID_PREFIX).unwrap_or_default();
+        if let Some((_, kind)) = READ_CLASSES.iter().find(|(read, _)| *read == suffix) {
             return match kind {
                 Self::Nuclear { .. } => nuclear(attributes, &image_type),
                 Self::Segmentation => Ok(Self::Segmentation),
@@ -153,7 +155,7 @@ impl Kind {
             let rest = suffix.strip_prefix(begin);
             rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
-        let other = OTHERS.iter().find(|(begin, _)| begins(begin));
+        let other = OTHER_CLASSES.iter().find(|(begin, _)| begins(begin));
         let reason = other.map_or("an object of a kind that is not read", |(_, reason)| reason);
         // RT, MR and NM are spoken letter by letter.
         let spelled = ["RT ", "MR ", "NM "]
@@ -209,7 +211,7 @@ fn check_slices(attributes: &Attributes, image_type: &[String]) -> Result<(), Vo
             file: attributes.file.clone(),
             found,
             reason,
-            fix: READABLE,
+            fix: READABLE_ADVICE,
         })
     };
     let series_type = attributes.texts(SERIES_TYPE);

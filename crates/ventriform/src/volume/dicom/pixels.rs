@@ -456,7 +456,7 @@ fn check_surplus(
 /// The stored numbers that are padding (PS3.3 C.7.5.1.1.2), and what they count as: no uptake, or air in
 /// CT images in Hounsfield units.
 fn padding(scan: &Scan, data_type: DataType, unused_bits: u32) -> Option<Padding> {
-    const AIR: f32 = -1000.0;
+    const AIR_HU: f32 = -1000.0;
     let a = &scan.attributes;
     if scan.kind == Kind::Segmentation {
         return None;
@@ -502,7 +502,7 @@ fn padding(scan: &Scan, data_type: DataType, unused_bits: u32) -> Option<Padding
         low,
         high,
         untrimmed: low < least || high > most,
-        value: if in_hounsfield { AIR } else { 0.0 },
+        value: if in_hounsfield { AIR_HU } else { 0.0 },
     })
 }
 

@@ -22,10 +22,10 @@ use dicom_parser::dataset::lazy_read::LazyDataSetReader;
 use dicom_parser::{DynStatefulDecoder, StatefulDecode, StatefulDecoder};
 
 /// Deepest nesting of sequences that is read.
-const DEEPEST: usize = 32;
+const MAX_SEQUENCE_DEPTH: usize = 32;
 
 /// Longest value of a needed attribute, bytes.
-const LONGEST: u64 = 1 << 20;
+const MAX_VALUE_BYTES: u64 = 1 << 20;
 
 /// Most pieces of compressed pixels in one file.
 const MOST_FRAGMENTS: usize = 1 << 18;
@@ -84,7 +84,7 @@ pub(super) struct Fragment {
 ///
 /// # Errors
 /// [`VolumeError`] for damaged data sets, stated lengths beyond the file's size, sequences nested
-/// deeper than [`DEEPEST`], and data sets without pixels.
+/// deeper than [`MAX_SEQUENCE_DEPTH`], and data sets without pixels.
 pub(super) fn scan(
     source: &mut Source,
     syntax: &Syntax,
@@ -334,7 +334,7 @@ impl Pieces {
             return decoder.skip_bytes(length);
         }
         // A longer table belongs to more frames than are read, and is not needed.
-        if u64::from(length) > LONGEST {
+        if u64::from(length) > MAX_VALUE_BYTES {
             return decoder.skip_bytes(length);
         }
         let mut bytes = Vec::new();
@@ -373,11 +373,11 @@ impl Walk {
 
     fn enter(&mut self, tag: Tag) -> Result<(), VolumeError> {
         self.path.push((tag, 0));
-        match self.path.len() > DEEPEST {
+        match self.path.len() > MAX_SEQUENCE_DEPTH {
             true => Err(self.attributes.wrong(
                 "depth of sequences",
                 &self.path.len().to_string(),
-                format!("sequences may be nested at most {DEEPEST} deep"),
+                format!("sequences may be nested at most {MAX_SEQUENCE_DEPTH} deep"),
             )),
             false => Ok(()),
         }
@@ -421,8 +421,8 @@ impl Walk {
                 .attributes
                 .wrong(attribute.name, "given too often", reason));
         }
-        if length > LONGEST {
-            let reason = format!("a value may be at most {LONGEST} bytes long");
+        if length > MAX_VALUE_BYTES {
+            let reason = format!("a value may be at most {MAX_VALUE_BYTES} bytes long");
             let value = format!("{length} bytes long");
             return Err(self.attributes.wrong(attribute.name, &value, reason));
         }

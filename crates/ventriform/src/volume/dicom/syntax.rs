@@ -24,14 +24,14 @@ const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
 const EXPLICIT_BIG: &str = "1.2.840.10008.1.2.2";
 
 /// Deflated Explicit VR Little Endian, the only transfer syntax that compresses whole data sets.
-const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
+const DEFLATED_UID: &str = "1.2.840.10008.1.2.1.99";
 
 /// The transfer syntaxes that are read.
 pub(super) fn read() -> impl Iterator<Item = &'static str> {
-    let whole = [IMPLICIT_LITTLE, EXPLICIT_LITTLE, EXPLICIT_BIG, DEFLATED];
+    let whole = [IMPLICIT_LITTLE, EXPLICIT_LITTLE, EXPLICIT_BIG, DEFLATED_UID];
     whole
         .into_iter()
-        .chain(COMPRESSED.iter().map(|(uid, _)| *uid))
+        .chain(COMPRESSED_SYNTAXES.iter().map(|(uid, _)| *uid))
 }
 
 /// How the pixels are compressed.
@@ -51,7 +51,7 @@ pub(super) enum Compression {
 
 /// The transfer syntaxes with compressed pixels that are read. A lossless one never holds numbers that
 /// were changed.
-const COMPRESSED: [(&str, Compression); 8] = [
+const COMPRESSED_SYNTAXES: [(&str, Compression); 8] = [
     ("1.2.840.10008.1.2.5", Compression::Rle),
     (
         "1.2.840.10008.1.2.4.50",
@@ -268,8 +268,8 @@ pub(super) fn find(file: &VolumeFile, limits: &ReadLimits) -> Result<Syntax, Vol
         None => guess(&start[meta.end..]).ok_or_else(unknown)?.uid(),
     };
     let transfer_syntax = TransferSyntaxRegistry.get(uid);
-    let deflated = uid == DEFLATED;
-    let listed = COMPRESSED.iter().find(|(known, _)| *known == uid);
+    let deflated = uid == DEFLATED_UID;
+    let listed = COMPRESSED_SYNTAXES.iter().find(|(known, _)| *known == uid);
     let compression = match (transfer_syntax, listed) {
         (Some(_), Some((_, compression))) => Some(*compression),
         (Some(syntax), None) if deflated || syntax.is_codec_free() => Some(Compression::None),

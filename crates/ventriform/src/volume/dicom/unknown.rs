@@ -13,7 +13,7 @@ use std::cell::Cell;
 use std::io::Read;
 
 /// Pixel Data: its undefined length means fragments.
-const PIXELS: Tag = Tag(0x7fe0, 0x0010);
+const PIXEL_DATA: Tag = Tag(0x7fe0, 0x0010);
 
 /// A decoder of headers in Explicit VR Little Endian that reads sequences of unknown representation too.
 #[derive(Default)]
@@ -31,7 +31,7 @@ impl<S: Read> DecodeFrom<S> for UnknownSequences {
             0 => DecodeFrom::decode_header(&self.explicit, source)?,
             _ => DecodeFrom::decode_header(&self.implicit, source)?,
         };
-        let unknown = header.vr == VR::UN && header.tag != PIXELS;
+        let unknown = header.vr == VR::UN && header.tag != PIXEL_DATA;
         if header.len.is_undefined() && (open > 0 || unknown) {
             self.open.set(open + 1);
         }

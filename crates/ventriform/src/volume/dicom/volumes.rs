@@ -39,7 +39,7 @@ use std::cmp::Ordering;
 const MOST_DIMENSIONS: usize = 16;
 
 /// Largest deviation of a step of cardiac delays from the mean step.
-const EVEN: f64 = 0.25;
+const MAX_DELAY_DEVIATION: f64 = 0.25;
 
 /// How the value of a criterion is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -503,7 +503,7 @@ impl Dealer<'_> {
             let steps = delays.iter().flat_map(|delays| delays.windows(2));
             let mut steps = steps.map(|pair| pair[1] - pair[0]);
             // A cycle begins at the trigger.
-            *first <= step && steps.all(|each| (each - step).abs() <= EVEN * step)
+            *first <= step && steps.all(|each| (each - step).abs() <= MAX_DELAY_DEVIATION * step)
         };
         let told = groups[0].len() > 2 && ranked.iter().all(even);
         told.then(|| transposed(&ranked))

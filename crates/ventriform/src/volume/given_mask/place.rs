@@ -1,7 +1,7 @@
 //! A mask on the grid of a volume.
 //!
 //! Two grids are of one lattice if the map from the voxel indices of one to those of the other is a
-//! permutation of axes with signs and whole steps, within [`SAME`] of a voxel everywhere on the mask.
+//! permutation of axes with signs and whole steps, within [`SAME_LATTICE_VOXELS`] of a voxel everywhere on the mask.
 //! Such a mask is carried over voxel by voxel, exactly.
 
 use super::GivenMask;
@@ -14,10 +14,10 @@ use crate::progress::Monitor;
 use nalgebra::Matrix3;
 
 /// Largest distance of corresponding voxel centres of one lattice, in voxels.
-const SAME: f64 = 1e-3;
+const SAME_LATTICE_VOXELS: f64 = 1e-3;
 
 /// Voxels between two checks of the cancel token.
-const PORTION: usize = 1 << 14;
+const VOXELS_PER_CHECK: usize = 1 << 14;
 
 /// Most voxels of the box that holds two masks.
 const MOST_VOXELS: u64 = 1 << 28;
@@ -51,7 +51,7 @@ impl GivenMask {
         let mut mask = Mask::empty(shape);
         let (mut inside, mut all) = (0, 0);
         for (v, _) in self.mask.voxels.iter().enumerate().filter(|(_, set)| **set) {
-            if all % PORTION == 0 {
+            if all % VOXELS_PER_CHECK == 0 {
                 monitor.check()?;
             }
             all += 1;
@@ -94,7 +94,7 @@ impl GivenMask {
         if lattice.is_none() {
             let [nx, ny, _] = shape;
             for (v, set) in mask.voxels.iter_mut().enumerate() {
-                if v % PORTION == 0 {
+                if v % VOXELS_PER_CHECK == 0 {
                     monitor.check()?;
                 }
                 let index = [v % nx, v / nx % ny, v / (nx * ny)].map(|x| x as f64);
@@ -122,7 +122,7 @@ impl GivenMask {
             .filter(|(_, set)| **set)
             .enumerate()
         {
-            if n % PORTION == 0 {
+            if n % VOXELS_PER_CHECK == 0 {
                 monitor.check()?;
             }
             let index = self.frame.to_voxel(&other.centre(v));
@@ -183,7 +183,7 @@ impl GivenMask {
                 0 => 0.0,
                 _ => self.mask.shape[a] as f64 - 1.0,
             });
-            (at(end) - (turn * Vec3::from(end) + first)).amax() <= SAME
+            (at(end) - (turn * Vec3::from(end) + first)).amax() <= SAME_LATTICE_VOXELS
         };
         (0..8).all(near).then_some(turn)
     }

@@ -63,18 +63,18 @@ pub(super) enum HeldKind {
 }
 
 /// Whole numbers that are labels however they lie.
-const FEW: usize = 8;
+const SMALL_LABELS: usize = 8;
 
 /// Codes of the myocardium: of the heart, and of the left ventricle (SNOMED CT, SNOMED RT, FMA).
-const MYOCARDIUM: [&str; 5] = ["74281007", "49848007", "T-32020", "9462", "9558"];
+const MYOCARDIUM_CODES: [&str; 5] = ["74281007", "49848007", "T-32020", "9462", "9558"];
 /// Our code of the cavity (`export::dicom`).
-const CAVITY: &str = "LV-CAVITY";
+const CAVITY_CODE: &str = "LV-CAVITY";
 /// Words of code meanings that say what is not the wall.
 const OTHER_MUSCLE: [&str; 8] = [
     "right", "atri", "infarct", "scar", "ischem", "ischaem", "defect", "segment",
 ];
 /// Words of code meanings for what the wall encloses.
-const ENCLOSED: [&str; 4] = ["cavity", "blood pool", "bloodpool", "lumen"];
+const ENCLOSED_WORDS: [&str; 4] = ["cavity", "blood pool", "bloodpool", "lumen"];
 
 /// The structures of a DICOM Segmentation.
 pub(super) fn of_segments(segments: &[Segment]) -> HeldStructures {
@@ -89,7 +89,7 @@ pub(super) fn of_segments(segments: &[Segment]) -> HeldStructures {
             let mut values = segment.codes.iter().map(|code| code.value.as_str());
             values.any(|value| codes.contains(&value))
         };
-        let cavity = coded(&[CAVITY]) || says(&ENCLOSED);
+        let cavity = coded(&[CAVITY_CODE]) || says(&ENCLOSED_WORDS);
         let label = segment.label.iter().cloned();
         let codes = segment.codes.iter();
         let codes = codes.flat_map(|code| [code.meaning.clone(), code.value.clone()]);
@@ -100,7 +100,7 @@ pub(super) fn of_segments(segments: &[Segment]) -> HeldStructures {
             names,
             voxels: None,
             myocardium: !cavity
-                && (coded(&MYOCARDIUM) || says(&["myocard"]) && !says(&OTHER_MUSCLE)),
+                && (coded(&MYOCARDIUM_CODES) || says(&["myocard"]) && !says(&OTHER_MUSCLE)),
             cavity,
         }
     };
@@ -162,7 +162,7 @@ pub(super) fn of_volume(volume: &Volume) -> HeldStructures {
         };
         // Counts are whole numbers, too.
         let counts = || matches!(survey::label_map(volume, &Monitor::silent()), Ok(None));
-        if objects.len() > FEW && counts() {
+        if objects.len() > SMALL_LABELS && counts() {
             return held(HeldKind::None, Vec::new(), Vec::new());
         }
         let list = |map: BTreeMap<i64, usize>| map.into_iter().map(label).collect();

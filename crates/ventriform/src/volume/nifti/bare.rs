@@ -16,8 +16,8 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 use std::ops::Range;
 
 /// Bytes of the headers of both versions.
-const FIRST: usize = 348;
-const SECOND: usize = 540;
+const NIFTI1_BYTES: usize = 348;
+const NIFTI2_BYTES: usize = 540;
 
 /// The fields of a NIfTI-1 header that hold text: `data_type` and `db_name`, `descrip` and
 /// `aux_file`, `intent_name`.
@@ -27,10 +27,10 @@ const FIRST_TEXT: [Range<usize>; 3] = [4..32, 148..252, 328..344];
 const SECOND_TEXT: [Range<usize>; 3] = [240..344, 508..524, 525..540];
 
 /// Flags of a gzip member that something precedes its data: other fields, a name, a comment.
-const NAMED: u8 = 4 | 8 | 16;
+const GZIP_FIELD_FLAGS: u8 = 4 | 8 | 16;
 
 /// Bytes read at a time.
-const PORTION: usize = 128 << 10;
+const PORTION_BYTES: usize = 128 << 10;
 
 /// Whether `file` is a NIfTI file of one part that holds voxels, where they lie and nothing else. Reads it
 /// to its end.
@@ -63,13 +63,13 @@ pub fn is_bare(
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(false),
         Err(error) => return Err(io(error)),
     }
-    let packed = BufReader::with_capacity(PORTION, bytes);
+    let packed = BufReader::with_capacity(PORTION_BYTES, bytes);
     if mark[..2] != [0x1f, 0x8b] {
         let mut plain = packed;
         return Ok(Content::read(&mut plain, end, monitor, &io)?
             .is_some_and(|content| content.is_bare(&header)));
     }
-    if mark[3] & NAMED != 0 {
+    if mark[3] & GZIP_FIELD_FLAGS != 0 {
         return Ok(false);
     }
     let mut member: GzDecoder<BufReader<Box<dyn ReadSeek>>> = GzDecoder::new(packed);
@@ -93,7 +93,7 @@ impl Content {
         io: &impl Fn(io::Error) -> VolumeError,
     ) -> Result<Option<Self>, VolumeError> {
         let (mut start, mut count) = (Vec::new(), 0_u64);
-        let mut portion = vec![0; PORTION];
+        let mut portion = vec![0; PORTION_BYTES];
         loop {
             let read = match from.read(&mut portion) {
                 Ok(0) => break,
@@ -110,7 +110,7 @@ impl Content {
                 }
                 Err(error) => return Err(io(error)),
             };
-            if start.len() < PORTION {
+            if start.len() < PORTION_BYTES {
                 start.extend_from_slice(&portion[..read]);
             }
             count += read as u64;
@@ -124,8 +124,8 @@ impl Content {
 
     fn is_bare(&self, header: &Header) -> bool {
         let (size, texts, descrip) = match header.is_second() {
-            true => (SECOND, SECOND_TEXT, 240),
-            false => (FIRST, FIRST_TEXT, 148),
+            true => (NIFTI2_BYTES, SECOND_TEXT, 240),
+            false => (NIFTI1_BYTES, FIRST_TEXT, 148),
         };
         let blank = |bytes: Option<&[u8]>| bytes.is_some_and(|bytes| bytes.iter().all(|b| *b == 0));
         let own = |text: &Range<usize>| {
@@ -185,7 +185,11 @@ mod tests {
             &plain,
             GzBuilder::new().extra(b"doe".to_vec())
         )));
-        for at in FIRST_TEXT.into_iter().flatten().chain(FIRST..FIRST + 4) {
+        for at in FIRST_TEXT
+            .into_iter()
+            .flatten()
+            .chain(NIFTI1_BYTES..NIFTI1_BYTES + 4)
+        {
             let mut named = plain.clone();
             named[at] = b'd';
             assert!(!bare(&named), "{at}");
@@ -194,7 +198,7 @@ mod tests {
         // An extension, a gap, what follows the voxels, a second member, and bytes after the first one.
         for (flag, length) in [(1, 16), (0, 16), (1, 200_000)] {
             let mut extended = plain.clone();
-            extended[FIRST] = flag;
+            extended[NIFTI1_BYTES] = flag;
             extended[108..112].copy_from_slice(&(352.0 + length as f32).to_le_bytes());
             let mut field = vec![0; length];
             field[8..11].copy_from_slice(b"doe");

@@ -9,7 +9,7 @@ use super::stated::{StatedHeader, StatedOffset};
 use ::nifti::{NiftiHeader, NiftiType};
 
 /// Bytes between the header and the first voxel that announce extensions.
-const EXTENDER: u64 = 4;
+const EXTENDER_BYTES: u64 = 4;
 
 /// The fields of a header after all checks, the same for both versions.
 #[derive(Debug, Clone)]
@@ -182,9 +182,9 @@ impl Header {
 /// # Errors
 /// The reason why voxels of the type are not supported.
 fn data_type(code: i16) -> Result<DataType, &'static str> {
-    const PARTS: &str = "complex numbers are not supported: the uptake cannot be told from two \
+    const COMPLEX_REFUSAL: &str = "complex numbers are not supported: the uptake cannot be told from two \
                          parts per voxel";
-    const COLOUR: &str = "colour images are not supported";
+    const COLOUR_REFUSAL: &str = "colour images are not supported";
     let header = NiftiHeader {
         datatype: code,
         ..NiftiHeader::default()
@@ -201,8 +201,10 @@ fn data_type(code: i16) -> Result<DataType, &'static str> {
         Ok(NiftiType::Float32) => Ok(DataType::F32),
         Ok(NiftiType::Float64) => Ok(DataType::F64),
         Ok(NiftiType::Float128) => Err("float128 is not supported: convert to float32"),
-        Ok(NiftiType::Complex64 | NiftiType::Complex128 | NiftiType::Complex256) => Err(PARTS),
-        Ok(NiftiType::Rgb24 | NiftiType::Rgba32) => Err(COLOUR),
+        Ok(NiftiType::Complex64 | NiftiType::Complex128 | NiftiType::Complex256) => {
+            Err(COMPLEX_REFUSAL)
+        }
+        Ok(NiftiType::Rgb24 | NiftiType::Rgba32) => Err(COLOUR_REFUSAL),
         Err(_) if code == 1 => Err("single bits are not supported"),
         Err(_) => Err("NIfTI defines no such data type"),
     }
@@ -211,7 +213,7 @@ fn data_type(code: i16) -> Result<DataType, &'static str> {
 impl StatedHeader {
     /// The dimensions, each at least 1.
     fn extents(&self) -> Result<Vec<usize>, VolumeError> {
-        const NAMES: [&str; 8] = [
+        const FIELD_NAMES: [&str; 8] = [
             "dim[0]", "dim[1]", "dim[2]", "dim[3]", "dim[4]", "dim[5]", "dim[6]", "dim[7]",
         ];
         let rank = (self.dim[0] as usize).min(7);
@@ -220,7 +222,7 @@ impl StatedHeader {
             _ => {
                 let reason = "a dimension must be at least 1".into();
                 let at = self.offsets.dim(index);
-                Err(self.invalid(NAMES[index], self.dim[index], reason, at))
+                Err(self.invalid(FIELD_NAMES[index], self.dim[index], reason, at))
             }
         };
         (1..=rank).map(extent).collect()
@@ -256,7 +258,7 @@ impl StatedHeader {
     fn first_voxel(&self) -> Result<u64, VolumeError> {
         let least = match self.pair {
             true => 0,
-            false => self.offsets.size as u64 + EXTENDER,
+            false => self.offsets.size as u64 + EXTENDER_BYTES,
         };
         let invalid = |value: String, reason: String| {
             self.invalid("vox_offset", value, reason, self.offsets.vox_offset)

@@ -19,7 +19,7 @@ use crate::geometry::frame::VoxelToPatient;
 use nalgebra::{Matrix4, Vector4};
 
 /// Distance between sform and qform, as a share of a voxel, above which there is a warning.
-const TOLERANCE: f64 = 0.1;
+const FORM_TOLERANCE: f64 = 0.1;
 
 /// Relative difference of two voxel sizes above which there is a warning. Sizes are stated in 32-bit
 /// floats, and some writers round them to three decimals.
@@ -89,8 +89,8 @@ fn wrong(header: &Header, field: &'static str, value: impl ToString, reason: &st
 }
 
 fn sform(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
-    const NAMES: [&str; 3] = ["srow_x", "srow_y", "srow_z"];
-    for (row, name) in header.srow.iter().zip(NAMES) {
+    const ROW_NAMES: [&str; 3] = ["srow_x", "srow_y", "srow_z"];
+    for (row, name) in header.srow.iter().zip(ROW_NAMES) {
         if row.iter().any(|v| !v.is_finite()) {
             let reason = "must be four finite numbers";
             return Err(wrong(header, name, format!("{row:?}"), reason));
@@ -155,7 +155,7 @@ fn from_spacing(header: &Header) -> Result<Matrix4<f64>, VolumeError> {
 /// The absolute values of the spacing, as in the reference library; 1 for dimensions that the file
 /// does not have.
 fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
-    const NAMES: [&str; 3] = ["pixdim[1]", "pixdim[2]", "pixdim[3]"];
+    const SPACING_NAMES: [&str; 3] = ["pixdim[1]", "pixdim[2]", "pixdim[3]"];
     let mut spacing = [1.0; 3];
     for axis in 0..header.dim.len().min(3) {
         let stated = header.pixdim[axis + 1].abs();
@@ -165,7 +165,7 @@ fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
             false => {
                 let value = header.pixdim[axis + 1];
                 let reason = "the spacing must be a positive number";
-                return Err(wrong(header, NAMES[axis], value, reason));
+                return Err(wrong(header, SPACING_NAMES[axis], value, reason));
             }
         }
     }
@@ -258,13 +258,13 @@ fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
     let voxel = (0..3).map(|c| axis(sform, c).norm());
     let voxel = voxel.fold(f64::INFINITY, f64::min);
     let hands = [sform, &qform].map(|m| m.fixed_view::<3, 3>(0, 0).determinant() > 0.0);
-    if apart <= TOLERANCE * voxel && hands[0] == hands[1] {
+    if apart <= FORM_TOLERANCE * voxel && hands[0] == hands[1] {
         return None;
     }
     let scale = header.unit.in_millimetres();
     let mut differences = Vec::new();
     let origins = [sform, &qform].map(|m| axis(m, 3) * scale);
-    if (origins[0] - origins[1]).norm() > TOLERANCE * voxel * scale {
+    if (origins[0] - origins[1]).norm() > FORM_TOLERANCE * voxel * scale {
         let [s, q] = origins.map(|o| format!("({:.3}, {:.3}, {:.3})", o.x, o.y, o.z));
         differences.push(format!("origins {s} and {q} mm, RAS"));
     }

@@ -38,7 +38,7 @@ impl Offsets {
     }
 }
 
-const FIRST: Offsets = Offsets {
+const NIFTI1_OFFSETS: Offsets = Offsets {
     size: FIRST_SIZE,
     dim: 40,
     dim_width: 2,
@@ -50,7 +50,7 @@ const FIRST: Offsets = Offsets {
     scl_inter: 116,
 };
 
-const SECOND: Offsets = Offsets {
+const NIFTI2_OFFSETS: Offsets = Offsets {
     size: SECOND_SIZE,
     dim: 16,
     dim_width: 8,
@@ -111,7 +111,11 @@ impl StatedHeader {
             bytes.resize(SECOND_SIZE, 0);
             source.fill_all(&mut bytes[FIRST_SIZE..], SECOND_SIZE as u64)?;
         }
-        let offsets = if second { SECOND } else { FIRST };
+        let offsets = if second {
+            NIFTI2_OFFSETS
+        } else {
+            NIFTI1_OFFSETS
+        };
         let file = source.file();
         let byte_order = byte_order(&bytes, offsets.size as i32, file)?;
         let fields = Fields {
@@ -146,7 +150,7 @@ impl StatedHeader {
                 Endianness::Little => ByteOrder::Little,
                 Endianness::Big => ByteOrder::Big,
             },
-            offsets: FIRST,
+            offsets: NIFTI1_OFFSETS,
             // The crate reads the standard's signed numbers as unsigned ones.
             dim: h.dim.map(|d| i64::from(d.cast_signed())),
             intent_code: i32::from(h.intent_code),
@@ -172,15 +176,15 @@ impl StatedHeader {
             second_version: true,
             pair: fields.bytes[4..].starts_with(b"ni"),
             byte_order,
-            offsets: SECOND,
-            dim: std::array::from_fn(|i| fields.long(SECOND.dim(i))),
-            intent_code: fields.int(SECOND.intent_code),
-            datatype: fields.short(SECOND.datatype),
-            bitpix: fields.short(SECOND.bitpix),
+            offsets: NIFTI2_OFFSETS,
+            dim: std::array::from_fn(|i| fields.long(NIFTI2_OFFSETS.dim(i))),
+            intent_code: fields.int(NIFTI2_OFFSETS.intent_code),
+            datatype: fields.short(NIFTI2_OFFSETS.datatype),
+            bitpix: fields.short(NIFTI2_OFFSETS.bitpix),
             pixdim: fields.doubles(104),
-            vox_offset: StatedOffset::Whole(fields.long(SECOND.vox_offset)),
-            scl_slope: fields.double(SECOND.scl_slope),
-            scl_inter: fields.double(SECOND.scl_inter),
+            vox_offset: StatedOffset::Whole(fields.long(NIFTI2_OFFSETS.vox_offset)),
+            scl_slope: fields.double(NIFTI2_OFFSETS.scl_slope),
+            scl_inter: fields.double(NIFTI2_OFFSETS.scl_inter),
             xyzt_units: fields.int(500),
             qform_code: fields.int(344),
             sform_code: fields.int(348),

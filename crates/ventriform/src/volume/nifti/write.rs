@@ -31,7 +31,7 @@ pub(super) const DESCRIPTION: &[u8] = b"ventriform";
 const VOX_OFFSET: usize = 352;
 
 /// Largest deviation of the columns of a rotation from unit length and from a right angle.
-const RIGID: f64 = 1e-5;
+const RIGID_TOLERANCE: f64 = 1e-5;
 
 /// Data type of the stored voxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,10 +124,10 @@ pub fn write_labels(
     monitor: &Monitor<'_>,
 ) -> Result<Vec<u8>, MaskError> {
     /// NIFTI_INTENT_LABEL
-    const LABELS: i16 = 1002;
+    const INTENT_LABELS: i16 = 1002;
     let extension = extension(entries);
     let mut header = mask_header(shape, frame, grid)?;
-    header.intent_code = LABELS;
+    header.intent_code = INTENT_LABELS;
     header.vox_offset = (VOX_OFFSET + extension.len()) as f32;
     let mut bytes = to_bytes(&header);
     // The four bytes after the header: extensions follow.
@@ -145,7 +145,7 @@ pub fn write_labels(
 /// The extension with the table of `entries`: its length, a multiple of 16, its code and the text.
 fn extension(entries: &[LabelEntry]) -> Vec<u8> {
     /// NIFTI_ECODE_IGNORE: nibabel gives the content of no other code that fits as it is.
-    const PLAIN: i32 = 0;
+    const ECODE_IGNORE: i32 = 0;
     let mut text = String::from(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<CaretExtension>\n<VolumeInformation \
          Index=\"0\">\n<LabelTable>\n",
@@ -166,7 +166,7 @@ fn extension(entries: &[LabelEntry]) -> Vec<u8> {
     );
     let length = (8 + text.len()).next_multiple_of(16);
     let mut bytes = (length as i32).to_le_bytes().to_vec();
-    bytes.extend(PLAIN.to_le_bytes());
+    bytes.extend(ECODE_IGNORE.to_le_bytes());
     bytes.extend(text.into_bytes());
     bytes.resize(length, 0);
     bytes
@@ -249,11 +249,11 @@ fn scaling_to_bytes(voxels: &[f32]) -> Scaling {
 
 /// The scaling that maps the range of `voxels` to the range of the stored numbers.
 fn scaling(voxels: &[f32]) -> Scaling {
-    const REACH: f64 = 32_000.0;
+    const MAX_STORED_VALUE: f64 = 32_000.0;
     let [low, high] = range(voxels);
     let mut numbers = voxels.iter().filter(|v| v.is_finite());
     let whole = numbers.all(|v| v.trunc() == *v);
-    if !(low < high) || (whole && low >= -REACH && high <= REACH) {
+    if !(low < high) || (whole && low >= -MAX_STORED_VALUE && high <= MAX_STORED_VALUE) {
         return match low.is_finite() && !whole {
             true => Scaling {
                 slope: 1.0,
@@ -263,7 +263,7 @@ fn scaling(voxels: &[f32]) -> Scaling {
         };
     }
     Scaling {
-        slope: ((high - low) / (2.0 * REACH)) as f32,
+        slope: ((high - low) / (2.0 * MAX_STORED_VALUE)) as f32,
         inter: ((high + low) / 2.0) as f32,
     }
 }
@@ -391,7 +391,7 @@ fn quaternion(frame: &VoxelToPatient) -> Option<[f32; 3]> {
     let off = (rotation.transpose() * rotation - Matrix3::identity())
         .abs()
         .max();
-    if off > RIGID {
+    if off > RIGID_TOLERANCE {
         return None;
     }
     let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));

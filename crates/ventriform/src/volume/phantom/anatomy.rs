@@ -18,10 +18,10 @@ use std::f64::consts::{PI, TAU};
 pub(super) const FIELD_CENTRE: Vec3 = Vec3::new(25.0, -20.0, 0.0);
 
 /// Middle of the LV before the random shift.
-const HEART: Vec3 = Vec3::new(45.0, -35.0, 10.0);
+const HEART_CENTRE_MM: Vec3 = Vec3::new(45.0, -35.0, 10.0);
 
 /// Sub-voxels along each axis near the heart: partial volume in steps of 1/27.
-const SUPERSAMPLING: usize = 3;
+const SUBVOXELS_PER_AXIS: usize = 3;
 
 /// An ellipsoid with axes along those of the patient.
 struct Ellipsoid {
@@ -52,7 +52,7 @@ const LUNGS: [Ellipsoid; 2] = [
     Ellipsoid::new([-85.0, 5.0, 60.0], [60.0, 85.0, 120.0]),
 ];
 /// Half axes of the torso's cross-section, left-right and front-back.
-const TORSO: [f64; 2] = [170.0, 115.0];
+const TORSO_HALF_AXES_MM: [f64; 2] = [170.0, 115.0];
 /// Uptake of the lungs as a share of the torso's.
 const LUNG_SHARE: f64 = 0.4;
 /// Thickness of the right ventricle's wall.
@@ -114,7 +114,7 @@ impl<'a> Anatomy<'a> {
         let wide = p.width_mm / 2.0;
         Self {
             parameters,
-            centre: HEART + shift,
+            centre: HEART_CENTRE_MM + shift,
             to_heart: Matrix3::from_rows(&rows),
             slant: [slant.cos(), slant.sin()],
             outer: [wide, long],
@@ -209,7 +209,7 @@ impl<'a> Anatomy<'a> {
             return (self.elsewhere(&middle) as f32, 0.0);
         }
         let (mut uptake, mut wall) = (0.0, 0);
-        let s = SUPERSAMPLING;
+        let s = SUBVOXELS_PER_AXIS;
         for part in 0..s.pow(3) {
             let offset = |n: usize| (n as f64 + 0.5) / s as f64 - 0.5;
             let step = Vec3::new(offset(part % s), offset(part / s % s), offset(part / s / s));
@@ -285,7 +285,7 @@ impl<'a> Anatomy<'a> {
     /// Uptake outside the heart.
     fn elsewhere(&self, p: &Vec3) -> f64 {
         let parameters = self.parameters;
-        if (p.x / TORSO[0]).powi(2) + (p.y / TORSO[1]).powi(2) > 1.0 {
+        if (p.x / TORSO_HALF_AXES_MM[0]).powi(2) + (p.y / TORSO_HALF_AXES_MM[1]).powi(2) > 1.0 {
             return 0.0;
         }
         if LIVER.holds(p) {

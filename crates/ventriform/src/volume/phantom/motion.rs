@@ -19,23 +19,23 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Views over half a turn.
-const VIEWS: usize = 60;
+const VIEW_COUNT: usize = 60;
 /// Angle of the first view's rows (towards the patient's left and right), from i to j.
-const FIRST: f64 = 0.75 * PI;
+const FIRST_VIEW_RAD: f64 = 0.75 * PI;
 
 /// The image of a patient who moves along k during the scan, as `p` says. What comes in from outside continues
 /// the first or last slice.
 pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
     let (shape, spacing_mm) = (p.shape, p.spacing_mm);
     let after = displaced(voxels, shape, p.motion_mm / spacing_mm[2]);
-    let of_a_head = VIEWS / usize::from(p.heads);
+    let of_a_head = VIEW_COUNT / usize::from(p.heads);
     let first_after = ((1.0 - p.motion_share) * of_a_head as f64).round() as usize;
     let few_after = first_after > of_a_head / 2;
     let (mut image, other) = match few_after {
         true => (voxels.to_vec(), after.as_slice()),
         false => (after, voxels),
     };
-    let views: Vec<View> = (0..VIEWS)
+    let views: Vec<View> = (0..VIEW_COUNT)
         .filter(|n| (n % of_a_head >= first_after) == few_after)
         .map(|n| View::new(n, shape, spacing_mm))
         .collect();
@@ -91,7 +91,7 @@ struct View {
 impl View {
     fn new(number: usize, shape: [usize; 3], spacing_mm: [f64; 3]) -> Self {
         let bin = spacing_mm[0].min(spacing_mm[1]);
-        let (sin, cos) = (FIRST + PI * number as f64 / VIEWS as f64).sin_cos();
+        let (sin, cos) = (FIRST_VIEW_RAD + PI * number as f64 / VIEW_COUNT as f64).sin_cos();
         let step = [spacing_mm[0] / bin * cos, spacing_mm[1] / bin * sin];
         let half = [0, 1].map(|axis| 0.5 * (shape[axis] - 1) as f64);
         let reach = step[0].abs() * half[0] + step[1].abs() * half[1];
@@ -101,7 +101,7 @@ impl View {
             step,
             start: middle - step[0] * half[0] - step[1] * half[1],
             bins: 2 * middle as usize + 2,
-            weight: spacing_mm[0] * spacing_mm[1] / bin.powi(2) * PI / VIEWS as f64,
+            weight: spacing_mm[0] * spacing_mm[1] / bin.powi(2) * PI / VIEW_COUNT as f64,
         }
     }
 

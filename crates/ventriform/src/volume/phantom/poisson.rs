@@ -8,13 +8,13 @@ use crate::geometry::random::uniform;
 use rand::Rng;
 
 /// Smallest mean for which PTRS is valid.
-const LARGE: f64 = 10.0;
+const MIN_PTRS_MEAN: f64 = 10.0;
 
 /// A Poisson-distributed whole number of the given mean; 0 for a mean of 0 or less.
 pub(super) fn draw(mean: f64, random: &mut impl Rng) -> f64 {
     if !(mean > 0.0) {
         0.0
-    } else if mean < LARGE {
+    } else if mean < MIN_PTRS_MEAN {
         by_multiplication(mean, random)
     } else {
         by_rejection(mean, random)

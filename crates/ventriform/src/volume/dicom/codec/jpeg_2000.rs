@@ -89,15 +89,15 @@ pub(super) fn decode(
 
 /// The code stream in `bytes`, which may be wrapped in a JP2 file (annex I).
 fn code_stream(bytes: &[u8]) -> Result<&[u8], String> {
-    const START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
-    const JP2: [u8; 8] = *b"\0\0\0\x0cjP  ";
-    if bytes.starts_with(&START) {
+    const CODESTREAM_START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
+    const JP2_SIGNATURE: [u8; 8] = *b"\0\0\0\x0cjP  ";
+    if bytes.starts_with(&CODESTREAM_START) {
         return Ok(bytes);
     }
-    if !bytes.starts_with(&JP2) {
+    if !bytes.starts_with(&JP2_SIGNATURE) {
         return Err("the frame is no JPEG 2000 stream: it does not begin with FF 4F FF 51".into());
     }
-    let start = bytes.windows(4).position(|four| four == START);
+    let start = bytes.windows(4).position(|four| four == CODESTREAM_START);
     let (boxes, stream) = bytes.split_at(start.unwrap_or(bytes.len()));
     match boxes.windows(4).any(|four| four == b"pclr") {
         true => Err("the JPEG 2000 frame has a palette".into()),

@@ -5,14 +5,16 @@
 
 use super::FrameLayout;
 
-const HEADER: usize = 64;
+const HEADER_BYTES: usize = 64;
 
 /// Decodes the frame in `bytes`.
 ///
 /// # Errors
 /// What is wrong with the bytes.
 pub(super) fn decode(bytes: &[u8], layout: FrameLayout) -> Result<Vec<u8>, String> {
-    let header = bytes.get(..HEADER).ok_or("the RLE header is cut off")?;
+    let header = bytes
+        .get(..HEADER_BYTES)
+        .ok_or("the RLE header is cut off")?;
     let (numbers, _) = header.as_chunks::<4>();
     let numbers: Vec<usize> = numbers
         .iter()
@@ -33,7 +35,7 @@ pub(super) fn decode(bytes: &[u8], layout: FrameLayout) -> Result<Vec<u8>, Strin
             true => offsets[segment + 1],
             false => bytes.len(),
         };
-        let packed = bytes.get(begin..end).filter(|_| begin >= HEADER);
+        let packed = bytes.get(begin..end).filter(|_| begin >= HEADER_BYTES);
         let packed = packed.ok_or("an RLE segment lies outside its frame")?;
         // The most significant byte comes last in a little endian number.
         let place = layout.size - 1 - segment;
@@ -94,10 +96,10 @@ mod tests {
         // High bytes 1 1 1 1 2 3; low bytes 9 8 7 7 7 7, then padding.
         let high = [253, 1, 1, 2, 3];
         let low = [1, 9, 8, 128, 253, 7, 0];
-        let mut frame = vec![0; HEADER];
+        let mut frame = vec![0; HEADER_BYTES];
         frame[0] = 2;
-        frame[4] = HEADER as u8;
-        frame[8] = (HEADER + high.len()) as u8;
+        frame[4] = HEADER_BYTES as u8;
+        frame[8] = (HEADER_BYTES + high.len()) as u8;
         frame.extend(high);
         frame.extend(low);
         let numbers = [0x109, 0x108, 0x107, 0x107, 0x207, 0x307];

@@ -1,9 +1,9 @@
-//! Reasons to doubt a fit, as codes and sentences for the report.
+//! Warnings about a fit, as codes and sentences for the report.
 
-use super::dynamics::StopReason;
 use super::evidence::Evidence;
+use crate::deform::dynamics::StopReason;
 
-/// A reason to doubt a fit.
+/// A warning about a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Flag {
     /// The confidence of the place is below 0.6.

@@ -9,18 +9,18 @@ use std::ops::Range;
 
 use nalgebra::Matrix3;
 
-use super::views::Views;
+use super::motion::Views;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
 use crate::numeric::order;
 
 /// Rows between the apical cap and the rim, where hearts are round.
-const BODY: Range<usize> = 14..28;
+const BODY_ROWS: Range<usize> = 14..28;
 /// Columns about the middle of the septum.
-const SEPTAL: Range<usize> = 22..38;
+const SEPTAL_COLUMNS: Range<usize> = 22..38;
 /// Columns that are clear of the septum: those before the first and those from the second on.
-const FREE: [usize; 2] = [18, 42];
+const FREE_WALL_COLUMNS: [usize; 2] = [18, 42];
 
 /// Figures of a fitted ventricle that tell good fits from bad ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ impl Evidence {
         let outer: Vec<f64> = of_body(wall, 0..COLUMNS)
             .map(|[_, leaves]| leaves)
             .collect();
-        let free: Vec<f64> = [0..FREE[0], FREE[1]..COLUMNS]
+        let free: Vec<f64> = [0..FREE_WALL_COLUMNS[0], FREE_WALL_COLUMNS[1]..COLUMNS]
             .into_iter()
             .flat_map(|columns| middles(wall, columns))
             .collect();
@@ -102,7 +102,7 @@ impl Evidence {
             unroundness: (squares / radii.len() as f64).sqrt() / radius,
             offset: first_harmonic(&middle) / radius,
             slenderness: (wall.extent[1] - wall.extent[0]) / mean(&outer)?,
-            septal_bulge: mean(&middles(wall, SEPTAL))? / mean(&free)?,
+            septal_bulge: mean(&middles(wall, SEPTAL_COLUMNS))? / mean(&free)?,
             septal_overshoot: septal_overshoot(wall),
             dark: uptake.dark,
             beside: uptake.beside,
@@ -118,9 +118,9 @@ struct WallUptake {
 }
 
 /// Quantile of the wall's uptake that counts as that of bright wall.
-const BRIGHT: f64 = 0.85;
+const BRIGHT_WALL_QUANTILE: f64 = 0.85;
 /// Where it is looked for neighbours, mm beyond the outer surface.
-const BEYOND: [i32; 2] = [12, 18];
+const NEIGHBOUR_DISTANCE_MM: [i32; 2] = [12, 18];
 
 impl WallUptake {
     fn of(wall: &VentricleWall, image: &Field) -> Option<Self> {
@@ -138,7 +138,7 @@ impl WallUptake {
                 let middle = ray.direction * f64::midpoint(enters, leaves);
                 let along = wall.along_axis(&(ray.start + middle)) - wall.along_axis(&ray.start);
                 let across = (middle.norm_squared() - along * along).max(0.0).sqrt();
-                let [near, far] = BEYOND.map(|mm| leaves + f64::from(mm));
+                let [near, far] = NEIGHBOUR_DISTANCE_MM.map(|mm| leaves + f64::from(mm));
                 Some([
                     greatest(ray, enters, leaves),
                     greatest(ray, near, far),
@@ -152,7 +152,7 @@ impl WallUptake {
         if uptakes.is_empty() || !(area > 0.0) {
             return None;
         }
-        let half = 0.5 * order::quantile(&uptakes, BRIGHT);
+        let half = 0.5 * order::quantile(&uptakes, BRIGHT_WALL_QUANTILE);
         let share = |what: &dyn Fn(&[f64; 3]) -> bool| {
             let of: f64 = rays.iter().filter(|r| what(r)).map(|r| r[2]).sum();
             of / area
@@ -176,16 +176,18 @@ fn septal_overshoot(wall: &VentricleWall) -> f64 {
                 Some([middle * cos, middle * sin])
             })
         };
-        let free: Vec<[f64; 2]> = places(0..FREE[0]).chain(places(FREE[1]..COLUMNS)).collect();
-        let septum: Vec<[f64; 2]> = places(SEPTAL).collect();
-        if 3 * free.len() < COLUMNS || 2 * septum.len() < SEPTAL.len() {
+        let free: Vec<[f64; 2]> = places(0..FREE_WALL_COLUMNS[0])
+            .chain(places(FREE_WALL_COLUMNS[1]..COLUMNS))
+            .collect();
+        let septum: Vec<[f64; 2]> = places(SEPTAL_COLUMNS).collect();
+        if 3 * free.len() < COLUMNS || 2 * septum.len() < SEPTAL_COLUMNS.len() {
             return None;
         }
         let ([x, y], radius) = circle(&free)?;
         let outside = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y) / radius - 1.0;
         mean(&septum.iter().map(outside).collect::<Vec<_>>())
     };
-    mean(&BODY.filter_map(of_row).collect::<Vec<_>>()).unwrap_or(0.0)
+    mean(&BODY_ROWS.filter_map(of_row).collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
 /// Centre and radius of the circle through points in the sense of least squares (Kåsa 1976); `None` if
@@ -204,8 +206,8 @@ fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
 
 /// Where the rays of these columns, between the apical cap and the rim, enter and leave the wall.
 fn of_body(wall: &VentricleWall, columns: Range<usize>) -> impl Iterator<Item = [f64; 2]> {
-    const { assert!(BODY.end <= ROWS) };
-    let rows = BODY.flat_map(move |row| columns.clone().map(move |c| row * COLUMNS + c));
+    const { assert!(BODY_ROWS.end <= ROWS) };
+    let rows = BODY_ROWS.flat_map(move |row| columns.clone().map(move |c| row * COLUMNS + c));
     rows.filter_map(|index| wall.rays[index].wall)
 }
 
@@ -347,9 +349,14 @@ mod tests {
         // A third of a turn of the free wall and half of the septum have to show.
         let seen = |free: usize, septum: usize| {
             let mut part = wall(&bulged);
-            let free = (FREE[1]..COLUMNS).chain(0..FREE[0]).skip(free);
-            for row in BODY {
-                for column in free.clone().chain(SEPTAL.start + septum..SEPTAL.end) {
+            let free = (FREE_WALL_COLUMNS[1]..COLUMNS)
+                .chain(0..FREE_WALL_COLUMNS[0])
+                .skip(free);
+            for row in BODY_ROWS {
+                for column in free
+                    .clone()
+                    .chain(SEPTAL_COLUMNS.start + septum..SEPTAL_COLUMNS.end)
+                {
                     part.rays[row * COLUMNS + column].wall = None;
                 }
             }

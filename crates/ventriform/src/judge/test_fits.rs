@@ -1,6 +1,8 @@
 //! Fits for the tests of this folder.
 
-use super::{DeformParameters, Fit, fit};
+use super::{Fit, judge};
+use crate::deform::setup::FitSetup;
+use crate::deform::{self, DeformParameters, OrganPlace};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::Volume;
@@ -17,6 +19,11 @@ pub(super) fn ball() -> (Volume, Fit) {
     let silent = Monitor::silent();
     let model = shapes::icosphere(25.0, 2);
     let template = Template::new(model, Organ::Generic, &silent).unwrap();
-    let fit = fit(&volume, &template, &DeformParameters::default(), &silent).unwrap();
-    (volume, fit)
+    let parameters = DeformParameters::default();
+    let position = OrganPlace::find(&volume, &template, &parameters, &silent).unwrap();
+    let setup = FitSetup::new(&position, &volume, &template, &parameters, &silent).unwrap();
+    let model = deform::fit(&setup, &template, &parameters, &silent).unwrap();
+    let edge = parameters.edge;
+    let judgement = judge(&model, &setup, &volume, Organ::Generic, edge, &silent).unwrap();
+    (volume, Fit { model, judgement })
 }

@@ -14,7 +14,12 @@
 //!
 //! Not guaranteed: a heart in the wrong place. Its nodes are as near to each other's fits as those of a right one.
 
-use super::parameters::WallEdge;
+use super::confidence;
+use crate::deform::sensors::{PER_TRIANGLE, SensorReading};
+use crate::deform::{FittedModel, WallEdge};
+use crate::geometry::Vec3;
+use crate::mesh::TriMesh;
+use crate::model::wall::{ROWS, VentricleWall};
 
 /// What is known of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,32 +32,91 @@ pub struct NodeEvidence {
     pub spread: Option<f64>,
 }
 
+/// The standard deviation of the distance of each node from both walls, mm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WallUncertainty {
+    /// From the wall as it looks in the image.
+    pub apparent: Vec<f64>,
+    /// From the wall itself.
+    pub anatomical: Vec<f64>,
+}
+
+impl WallUncertainty {
+    /// That of both walls of `model`, a good fit with this `chance`; `None` for organs other than ventricles.
+    pub(super) fn of_model(
+        model: &FittedModel,
+        nodes: &[NodeEvidence],
+        chance: f64,
+    ) -> Option<Self> {
+        model.surfaces.as_ref()?;
+        Some(Self {
+            apparent: of_nodes(nodes, chance, WallEdge::Apparent),
+            anatomical: of_nodes(nodes, chance, WallEdge::Anatomical),
+        })
+    }
+
+    /// That of the wall with this `edge`.
+    pub fn of(&self, edge: WallEdge) -> &[f64] {
+        match edge {
+            WallEdge::Apparent => &self.apparent,
+            WallEdge::Anatomical => &self.anatomical,
+        }
+    }
+}
+
+/// The sensors' readings about each node of `mesh`, and its way along the `wall`.
+pub(super) fn node_evidence(
+    mesh: &TriMesh,
+    wall: &VentricleWall,
+    readings: &[SensorReading],
+) -> Vec<NodeEvidence> {
+    let mut sums = vec![[0.0; 2]; mesh.vertices.len()];
+    for (triangle, sensors) in mesh
+        .triangles
+        .iter()
+        .zip(readings.chunks_exact(PER_TRIANGLE))
+    {
+        for node in triangle {
+            let [seen, share] = &mut sums[*node as usize];
+            *seen += sensors.iter().map(|r| r.weight * r.share).sum::<f64>();
+            *share += sensors.iter().map(|r| r.share).sum::<f64>();
+        }
+    }
+    let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
+        seen: if share > 0.0 { seen / share } else { 0.0 },
+        way: ((wall.place(p).row + 0.5) / ROWS as f64).clamp(0.0, 1.0),
+        spread: None,
+    };
+    mesh.vertices.iter().zip(sums).map(of).collect()
+}
+
 /// Coefficients: 1, edge, ln(distance from other fits / mm + 0.3), ln(odds), way from apex to rim less
 /// a half, and that squared.
 type UncertaintyTerms = [f64; 6];
 
-const APPARENT: UncertaintyTerms = [1.515, -1.017, 0.482, -0.112, -0.046, 1.002];
-const ANATOMICAL: UncertaintyTerms = [1.448, -1.190, 0.641, -0.124, 0.151, 1.292];
+const APPARENT_TERMS: UncertaintyTerms = [1.515, -1.017, 0.482, -0.112, -0.046, 1.002];
+const ANATOMICAL_TERMS: UncertaintyTerms = [1.448, -1.190, 0.641, -0.124, 0.151, 1.292];
 
 /// The distance that stands for that from other fits where there are none: its median, mm.
-const USUAL_SPREAD: f64 = 0.8;
+const MEDIAN_SPREAD_MM: f64 = 0.8;
 /// Least and greatest result, mm.
-const RANGE: [f64; 2] = [0.5, 15.0];
+const UNCERTAINTY_RANGE_MM: [f64; 2] = [0.5, 15.0];
 
 /// The standard deviation of the distance of each node from the wall of that `edge`, mm, where a good fit
 /// has this `chance`.
 pub fn of_nodes(nodes: &[NodeEvidence], chance: f64, edge: WallEdge) -> Vec<f64> {
     let terms = match edge {
-        WallEdge::Apparent => &APPARENT,
-        WallEdge::Anatomical => &ANATOMICAL,
+        WallEdge::Apparent => &APPARENT_TERMS,
+        WallEdge::Anatomical => &ANATOMICAL_TERMS,
     };
-    let odds = super::confidence::log_odds(chance);
+    let odds = confidence::log_odds(chance);
     let of = |node: &NodeEvidence| {
         let way = node.way.clamp(0.0, 1.0) - 0.5;
-        let spread = node.spread.unwrap_or(USUAL_SPREAD);
+        let spread = node.spread.unwrap_or(MEDIAN_SPREAD_MM);
         let values = [1.0, node.seen, (spread + 0.3).ln(), odds, way, way * way];
         let sum: f64 = terms.iter().zip(values).map(|(c, x)| c * x).sum();
-        sum.exp().clamp(RANGE[0], RANGE[1])
+        sum.exp()
+            .clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
     };
     nodes.iter().map(of).collect()
 }
@@ -89,13 +153,13 @@ mod tests {
                 way: 1.0,
                 spread: Some(1e6),
             };
-            assert_eq!(of(lost, 0.0), RANGE[1]);
+            assert_eq!(of(lost, 0.0), UNCERTAINTY_RANGE_MM[1]);
             let sure = NodeEvidence {
                 seen: 1.0,
                 spread: Some(0.0),
                 ..node
             };
-            assert!((RANGE[0]..1.0).contains(&of(sure, 1.0)));
+            assert!((UNCERTAINTY_RANGE_MM[0]..1.0).contains(&of(sure, 1.0)));
         }
     }
 }

@@ -4,12 +4,12 @@
 //! segment reads normal; a wall of the right ventricle lengthens it. In go the fitted model, its cup and the
 //! patient's superior direction; out comes the model with its rim moved along the long axis.
 //!
-//! 1. The rim's height in each of [`DIRECTIONS`] directions about the axis.
-//! 2. The shape of the rim that hearts have ([`MEAN`], [`PRECISION`], in three harmonics and shares of
+//! 1. The rim's height in each of [`RIM_DIRECTIONS`] directions about the axis.
+//! 2. The shape of the rim that hearts have ([`RIM_MEAN`], [`RIM_PRECISION`], in three harmonics and shares of
 //!    the heart's length) is fitted to them, robustly: a short stretch far from the rest hardly pulls it.
 //! 3. The distance from that shape is the sum of what is true of this heart and what the signal took away
 //!    or added. A piecewise linear function ([`correction`]) says how much of it to take back.
-//! 4. Nodes within [`REACH`] of the rim move along the axis, those at the rim by the whole, so that the wall
+//! 4. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the wall
 //!    is stretched or compressed there.
 //!
 //! Shape and function are least-squares fits to simulated hearts whose rims are known. On hearts that were
@@ -29,15 +29,15 @@ use crate::model::wall::anterior;
 use crate::numeric::order;
 
 /// Directions about the axis: from lateral over anterior, septal and inferior.
-const DIRECTIONS: usize = 30;
+const RIM_DIRECTIONS: usize = 30;
 /// Harmonics of the rim's shape: the cosines and sines of one to three times the angle.
-const HARMONICS: usize = 3;
-const TERMS: usize = 2 * HARMONICS;
+const RIM_HARMONICS: usize = 3;
+const RIM_TERMS: usize = 2 * RIM_HARMONICS;
 
 /// Mean coefficients of the rim's height towards the apex, shares of the heart's length.
-const MEAN: [f64; TERMS] = [-0.0638, 0.0248, 0.0188, -0.0082, -0.0038, 0.0008];
+const RIM_MEAN: [f64; RIM_TERMS] = [-0.0638, 0.0248, 0.0188, -0.0082, -0.0038, 0.0008];
 /// Inverse of their covariance.
-const PRECISION: [[f64; TERMS]; TERMS] = [
+const RIM_PRECISION: [[f64; RIM_TERMS]; RIM_TERMS] = [
     [2029.0, 51.0, 1485.0, -24.0, -998.0, -454.0],
     [51.0, 2307.0, -383.0, 1555.0, 172.0, -110.0],
     [1485.0, -383.0, 6336.0, -677.0, 1556.0, -2108.0],
@@ -47,14 +47,14 @@ const PRECISION: [[f64; TERMS]; TERMS] = [
 ];
 
 /// Distance from the shape at which a direction counts half, mm.
-const ODD: f64 = 4.0;
+const OUTLIER_DISTANCE_MM: f64 = 4.0;
 /// Neighbouring directions are not independent: as many of them count as one.
-const TOGETHER: f64 = 3.0;
+const CORRELATED_DIRECTIONS: f64 = 3.0;
 /// Rounds of reweighting.
-const ROUNDS: usize = 30;
+const REWEIGHTING_ROUNDS: usize = 30;
 
 /// Length of wall next to the rim that is stretched, mm.
-pub const REACH: f64 = 25.0;
+pub const STRETCHED_LENGTH_MM: f64 = 25.0;
 
 /// How far towards the base the rim is moved where it lies `distance` mm too near to the apex, mm.
 fn correction(distance: f64) -> f64 {
@@ -84,32 +84,33 @@ pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<TriMesh> {
 pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> TriMesh {
     let frame = RimFrame::of(cup, superior);
     match frame.heights(mesh) {
-        Some(rim) => frame.stretched(mesh, &rim, &[distance; DIRECTIONS]),
+        Some(rim) => frame.stretched(mesh, &rim, &[distance; RIM_DIRECTIONS]),
         None => mesh.clone(),
     }
 }
 
 /// `mesh` with its whole rim moved along the axis, so that its median height is that of `base`. It is moved less
-/// where the whole way is longer than [`FARTHEST`] or would make the surface intersect itself; `None` without a
+/// where the whole way is longer than [`RIM_SHIFT_RANGE_MM`] or would make the surface intersect itself; `None` without a
 /// rim in every direction, and where it cannot be moved at all.
 pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<TriMesh> {
     let frame = RimFrame::of(cup, superior);
     let rim = frame.heights(mesh)?;
-    let distance = (median(&rim) - frame.along(base)).clamp(FARTHEST[0], FARTHEST[1]);
+    let distance =
+        (median(&rim) - frame.along(base)).clamp(RIM_SHIFT_RANGE_MM[0], RIM_SHIFT_RANGE_MM[1]);
     [1.0, 0.75, 0.5, 0.25]
         .into_iter()
-        .map(|share| frame.stretched(mesh, &rim, &[share * distance; DIRECTIONS]))
+        .map(|share| frame.stretched(mesh, &rim, &[share * distance; RIM_DIRECTIONS]))
         .find(|moved| self_intersections(moved).is_empty())
 }
 
-/// How far a rim is moved at most, mm towards the base. Towards the apex, wall of the length [`REACH`] is pushed
+/// How far a rim is moved at most, mm towards the base. Towards the apex, wall of the length [`STRETCHED_LENGTH_MM`] is pushed
 /// together, so it must stay below that.
-const FARTHEST: [f64; 2] = [-20.0, 40.0];
+const RIM_SHIFT_RANGE_MM: [f64; 2] = [-20.0, 40.0];
 
 /// The shape of a rim with these heights, mm, of a heart of this length.
 fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
-    let basis = DMatrix::from_fn(DIRECTIONS, TERMS + 1, |direction, term| {
-        let angle = TAU * (direction as f64 + 0.5) / DIRECTIONS as f64;
+    let basis = DMatrix::from_fn(RIM_DIRECTIONS, RIM_TERMS + 1, |direction, term| {
+        let angle = TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64;
         let times = term.div_ceil(2) as f64;
         match term {
             0 => 1.0,
@@ -117,24 +118,27 @@ fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
             _ => (times * angle).sin(),
         }
     });
-    let mean = DVector::from_fn(TERMS + 1, |term, _| match term {
+    let mean = DVector::from_fn(RIM_TERMS + 1, |term, _| match term {
         0 => 0.0,
-        term => MEAN[term - 1] * length,
+        term => RIM_MEAN[term - 1] * length,
     });
-    let prior = DMatrix::from_fn(TERMS + 1, TERMS + 1, |a, b| match (a, b) {
+    let prior = DMatrix::from_fn(RIM_TERMS + 1, RIM_TERMS + 1, |a, b| match (a, b) {
         (0, _) | (_, 0) => 0.0,
-        (a, b) => PRECISION[a - 1][b - 1] / (length * length),
+        (a, b) => RIM_PRECISION[a - 1][b - 1] / (length * length),
     });
     let heights = DVector::from_column_slice(rim);
     let usual = &basis * &mean;
     let level: Vec<f64> = (&heights - &usual).iter().copied().collect();
     let mut shape = usual.add_scalar(median(&level));
-    for _ in 0..ROUNDS {
+    for _ in 0..REWEIGHTING_ROUNDS {
         let weights = (&heights - &shape).map(|r| {
-            let odd = r / ODD;
-            1.0 / (1.0 + odd * odd) / (ODD * ODD * TOGETHER)
+            let odd = r / OUTLIER_DISTANCE_MM;
+            1.0 / (1.0 + odd * odd)
+                / (OUTLIER_DISTANCE_MM * OUTLIER_DISTANCE_MM * CORRELATED_DIRECTIONS)
         });
-        let weighted = DMatrix::from_fn(TERMS + 1, DIRECTIONS, |t, d| basis[(d, t)] * weights[d]);
+        let weighted = DMatrix::from_fn(RIM_TERMS + 1, RIM_DIRECTIONS, |t, d| {
+            basis[(d, t)] * weights[d]
+        });
         let system = &weighted * &basis + &prior;
         let right = &weighted * &heights + &prior * &mean;
         shape = &basis * system.cholesky()?.solve(&right);
@@ -165,11 +169,11 @@ impl RimFrame {
         (p - self.centre).dot(&self.axis)
     }
 
-    /// 0..[`DIRECTIONS`]; direction n lies at n.
+    /// 0..[`RIM_DIRECTIONS`]; direction n lies at n.
     fn direction(&self, p: &Vec3) -> f64 {
         let r = p - self.centre;
         let angle = r.dot(&self.anterior).atan2(r.dot(&self.lateral));
-        (angle / TAU * DIRECTIONS as f64 - 0.5).rem_euclid(DIRECTIONS as f64)
+        (angle / TAU * RIM_DIRECTIONS as f64 - 0.5).rem_euclid(RIM_DIRECTIONS as f64)
     }
 
     /// `mesh` with its rim, which has these heights, moved towards the base by `shifts` mm.
@@ -178,7 +182,7 @@ impl RimFrame {
         for p in &mut moved.vertices {
             let direction = self.direction(p);
             let above = self.along(p) - between(rim, direction);
-            let share = (1.0 - above / REACH).clamp(0.0, 1.0);
+            let share = (1.0 - above / STRETCHED_LENGTH_MM).clamp(0.0, 1.0);
             *p -= self.axis * (share * between(shifts, direction));
         }
         moved
@@ -187,9 +191,9 @@ impl RimFrame {
     /// How far towards the apex the mesh begins in each direction, mm from the cup's centre: the most basal
     /// crossing of its edges with the half plane there. `None` if there is a direction without any.
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
-        (0..DIRECTIONS)
+        (0..RIM_DIRECTIONS)
             .map(|direction| {
-                let (sin, cos) = (TAU * (direction as f64 + 0.5) / DIRECTIONS as f64).sin_cos();
+                let (sin, cos) = (TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64).sin_cos();
                 let outward = self.lateral * cos + self.anterior * sin;
                 let aside = self.anterior * cos - self.lateral * sin;
                 let mut height = f64::INFINITY;
@@ -216,7 +220,7 @@ impl RimFrame {
 /// The value at a direction, linear between the given ones.
 fn between(values: &[f64], direction: f64) -> f64 {
     let (low, share) = (direction.floor(), direction.fract());
-    let at = |n: usize| values[n % DIRECTIONS];
+    let at = |n: usize| values[n % RIM_DIRECTIONS];
     at(low as usize) * (1.0 - share) + at(low as usize + 1) * share
 }
 
@@ -245,11 +249,11 @@ mod tests {
         let least = mesh.vertices.iter().map(|p| frame.along(p));
         let base = least.fold(f64::MAX, f64::min);
         for p in &mut mesh.vertices {
-            let angle = TAU * (frame.direction(p) + 0.5) / DIRECTIONS as f64;
-            let usual: f64 = (0..TERMS)
+            let angle = TAU * (frame.direction(p) + 0.5) / RIM_DIRECTIONS as f64;
+            let usual: f64 = (0..RIM_TERMS)
                 .map(|t| {
                     let times = (t / 2 + 1) as f64 * angle;
-                    MEAN[t] * 70.0 * if t % 2 == 0 { times.cos() } else { times.sin() }
+                    RIM_MEAN[t] * 70.0 * if t % 2 == 0 { times.cos() } else { times.sin() }
                 })
                 .sum();
             let off = (angle.to_degrees() - 90.0).abs();
@@ -268,7 +272,7 @@ mod tests {
     fn a_stretch_of_rim_that_is_missing_is_put_back() {
         let (whole, cup) = heart(0.0);
         let (cut, _) = heart(12.0);
-        let anterior = DIRECTIONS / 4;
+        let anterior = RIM_DIRECTIONS / 4;
         let settled = settled(&cut, &cup, &Vec3::y()).unwrap();
         let heights = [&whole, &cut, &settled].map(|m| rim(m, &cup)[anterior]);
         let [whole, cut, settled] = heights;
@@ -309,7 +313,7 @@ mod tests {
     }
 
     fn wave(term: usize, direction: usize) -> f64 {
-        let angle = TAU * (direction as f64 + 0.5) / DIRECTIONS as f64;
+        let angle = TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64;
         let times = (term / 2 + 1) as f64 * angle;
         if term.is_multiple_of(2) {
             times.cos()
@@ -322,14 +326,18 @@ mod tests {
     /// opposite to it.
     #[test]
     fn the_mean_rim_is_that_of_hearts() {
-        let height = |d: usize| (0..TERMS).map(|t| MEAN[t] * wave(t, d)).sum::<f64>();
+        let height = |d: usize| {
+            (0..RIM_TERMS)
+                .map(|t| RIM_MEAN[t] * wave(t, d))
+                .sum::<f64>()
+        };
         let by_height = |a: &usize, b: &usize| height(*a).total_cmp(&height(*b));
-        let angle = |direction: usize| 360.0 * (direction as f64 + 0.5) / DIRECTIONS as f64;
-        let shortest = angle((0..DIRECTIONS).max_by(by_height).unwrap());
-        let longest = angle((0..DIRECTIONS).min_by(by_height).unwrap());
+        let angle = |direction: usize| 360.0 * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64;
+        let shortest = angle((0..RIM_DIRECTIONS).max_by(by_height).unwrap());
+        let longest = angle((0..RIM_DIRECTIONS).min_by(by_height).unwrap());
         assert!((145.0..170.0).contains(&shortest), "{shortest}");
         assert!((300.0..350.0).contains(&longest), "{longest}");
-        let precision = DMatrix::from_fn(TERMS, TERMS, |a, b| PRECISION[a][b]);
+        let precision = DMatrix::from_fn(RIM_TERMS, RIM_TERMS, |a, b| RIM_PRECISION[a][b]);
         assert_eq!(precision, precision.transpose());
         assert!(precision.cholesky().is_some());
     }
@@ -339,7 +347,7 @@ mod tests {
     #[test]
     fn the_expected_rim_is_the_best_compromise() {
         for length in [60.0, 95.0] {
-            let rim: Vec<f64> = (0..DIRECTIONS)
+            let rim: Vec<f64> = (0..RIM_DIRECTIONS)
                 .map(|n| 3.0 + 2.0 * (1.7 * n as f64).sin() + if n < 4 { 9.0 } else { 0.0 })
                 .collect();
             let cost = |shape: &[f64]| {
@@ -347,25 +355,26 @@ mod tests {
                     .iter()
                     .zip(shape)
                     .map(|(h, s)| (1.0 + ((h - s) / 4.0).powi(2)).ln() / 2.0 / 3.0);
-                let off: [f64; TERMS] = std::array::from_fn(|t| {
-                    let sum: f64 = (0..DIRECTIONS).map(|d| shape[d] * wave(t, d)).sum();
-                    2.0 * sum / DIRECTIONS as f64 / length - MEAN[t]
+                let off: [f64; RIM_TERMS] = std::array::from_fn(|t| {
+                    let sum: f64 = (0..RIM_DIRECTIONS).map(|d| shape[d] * wave(t, d)).sum();
+                    2.0 * sum / RIM_DIRECTIONS as f64 / length - RIM_MEAN[t]
                 });
                 let mut prior = 0.0;
-                for a in 0..TERMS {
-                    for b in 0..TERMS {
-                        prior += off[a] * PRECISION[a][b] * off[b] / 2.0;
+                for a in 0..RIM_TERMS {
+                    for b in 0..RIM_TERMS {
+                        prior += off[a] * RIM_PRECISION[a][b] * off[b] / 2.0;
                     }
                 }
                 robust.sum::<f64>() + prior
             };
             let shape = expected(&rim, length).unwrap();
             let least = cost(&shape);
-            for term in 0..=TERMS {
+            for term in 0..=RIM_TERMS {
                 for step in [-0.02, 0.02] {
-                    let by = |d: usize| if term < TERMS { wave(term, d) } else { 1.0 };
-                    let moved: Vec<f64> =
-                        (0..DIRECTIONS).map(|d| shape[d] + step * by(d)).collect();
+                    let by = |d: usize| if term < RIM_TERMS { wave(term, d) } else { 1.0 };
+                    let moved: Vec<f64> = (0..RIM_DIRECTIONS)
+                        .map(|d| shape[d] + step * by(d))
+                        .collect();
                     assert!(cost(&moved) > least, "{length} {term} {step}");
                 }
             }
@@ -390,9 +399,9 @@ mod tests {
 
     #[test]
     fn values_between_directions_are_linear_and_go_round() {
-        let mut values = [1.0; DIRECTIONS];
-        (values[0], values[DIRECTIONS - 1], values[7]) = (5.0, 3.0, 2.0);
-        let last = (DIRECTIONS - 1) as f64;
+        let mut values = [1.0; RIM_DIRECTIONS];
+        (values[0], values[RIM_DIRECTIONS - 1], values[7]) = (5.0, 3.0, 2.0);
+        let last = (RIM_DIRECTIONS - 1) as f64;
         for (at, value) in [
             (0.0, 5.0),
             (0.25, 4.0),

@@ -1,135 +1,25 @@
-//! How likely a fit is a good one.
+//! The chances of a good fit, of motion and of a heart.
 //!
-//! In go the figures of a fit ([`Evidence`]); out come two chances:
+//! In go the figures of a fit ([`Evidence`]), or of several fits to one volume; out come chances, 0..=1:
 //!
-//! - [`of_agreement`]: the chance that the mask agrees with the one an expert would draw by a Jaccard
-//!   index of 0.75 or more;
-//! - [`of_motion`]: the chance that the patient moved during the scan.
+//! - [`of_agreement`]: that the mask agrees with the one an expert would draw by a Jaccard index of 0.75 or more;
+//!   [`of_set`]: the same of the best of several fits;
+//! - [`of_motion`]: that the patient moved during the scan;
+//! - [`of_heart`]: that what was fitted is a left ventricle.
 //!
-//! Both are logistic functions of a weighted sum of terms. The weights are maximum-likelihood
-//! estimates with a ridge of 1 on the standardised terms.
+//! 1. All are [logistic models](super::logistic) whose constants `scripts/calibrate.py` estimates from fits to simulated
+//!    hearts ([`calibration`]). Hearts that are hard to fit are over-represented, so the chances are cautious.
+//! 2. Of several fits the mean logarithm of the odds scatters less than that of one.
+//! 3. Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join the chances.
 //!
-//! Calibrated on 139 fits of simulated hearts with the built-in model: the cohort, and hearts of the
-//! simulator's seeds 411 and 701 (all kinds) and 702 (motion, hot right ventricle, infarcts). Of the
-//! apparent wall 25 of them lie below 0.75, of the anatomical wall 36. Such hearts are
-//! over-represented, so the chance is on the cautious side. Left out one by one, the chance separates
-//! good from bad fits with an area under the curve of 0.89 for both walls; on 72 held-out hearts
-//! (seeds 801 and 802, 7 and 14 below 0.75) with 0.85. The terms were chosen among 14 sets by the
-//! former figure. The confidence of the search alone reaches 0.64,
-//! [`Fit::merit`](super::Fit::merit) 0.85, the residual 0.86, the share of active sensors 0.84 (on
-//! the fits of an earlier version); beside the terms used, the residual adds nothing.
-//! docs/evaluation.md has the table.
-//!
-//! Of several fits to one volume, [`of_set`] takes the mean logarithm of the odds, which scatters less
-//! than that of one fit: over the four built-in hearts the area under the curve of [`of_agreement`] rises
-//! from 0.896 to 0.916 (apparent wall) and from 0.885 to 0.902 (anatomical), each case left out. Its
-//! constants come from 174 fits: the cohort and the simulator's seeds 411, 701, 702, 703 (hot right
-//! ventricle) and 704 (motion and others). The distance of the fits from each other was tried as a term
-//! in six forms and adds nothing (0.916 and 0.906 with it): where a fit is bad, all start from
-//! the same wrong place. Nor do figures of the profiles across the wall (34 were tried one by one).
-//!
-//! The chance of motion by the shape of the wall comes from the same 174 fits (24 with a displacement of 6 to
-//! 26 mm). Two of its terms tell what else makes a wall uneven: infarcts ([`Evidence::dark`]) and neighbours
-//! ([`Evidence::beside`]). With them the area under the curve is 0.97, each case left out, without them 0.89.
-//!
-//! Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join both chances. Those weights
-//! come from 99 fits of the simulator's seeds 911, 1101 and 1102 (18 with motion of 6 to 26 mm; 24 and 33 below 0.75,
-//! apparent and anatomical wall). Each case left out, the area under the curve of motion rises from 0.89 to 0.997,
-//! that of the apparent wall from 0.79 to 0.87, of the anatomical one from 0.83 to 0.90. The agreement of the views, the
-//! displacement and the slenderness were tried beside it and add nothing. docs/evaluation.md has the held-out figures.
-//!
-//! The chance of a good anatomical wall knows the size of the cavity besides: 115 fits (the cohort and the
-//! simulator's seeds 2101, 2103, 2104; 28 below 0.75). Each left out, the area under the curve rises from 0.82 to 0.89.
-//!
-//! The chance of a heart ([`of_heart`]) comes from 106 fits of hearts and 59 of what was found beside one, in scans
-//! without one, or where it was erased and the right ventricle is not hot (the same cohort and seeds). Each left out, an
-//! even chance tells all but two apart. The share of active sensors and the residual were tried beside its terms and
-//! add nothing.
-//!
-//! Not guaranteed: that a displaced heart is noticed. A displacement in the last views only leaves an image of one
-//! heart in one place, which may not be its place in another image.
+//! Guaranteed: a chance rises or falls with each figure alone. Not guaranteed: that a displaced heart is noticed. A
+//! displacement in the last views only leaves an image of one heart in one position, which may not be its position in
+//! another image. docs/evaluation.md has the sets, the areas under the curve, and what else was tried.
 
+use super::calibration;
 use super::evidence::Evidence;
-use super::parameters::WallEdge;
-use super::views::Views;
-
-/// One term of a weighted sum.
-struct Term {
-    /// Mean of the term over the calibration set.
-    centre: f64,
-    /// Its standard deviation there.
-    scale: f64,
-    /// Its weight, after it was centred and scaled.
-    weight: f64,
-}
-
-const fn term(centre: f64, scale: f64, weight: f64) -> Term {
-    Term {
-        centre,
-        scale,
-        weight,
-    }
-}
-
-/// Standardised terms are kept within this many standard deviations: nothing is known beyond.
-const FARTHEST: f64 = 4.0;
-
-/// Constant and terms of a bad fit of the apparent wall (Jaccard index below 0.75).
-const BAD: (f64, [Term; 5]) = (
-    -2.524,
-    [
-        // share of the surface with edges
-        term(0.7538, 0.1554, -1.118),
-        // ln(spread of the thickness / mm)
-        term(0.6063, 0.1388, 0.774),
-        // strain
-        term(0.1049, 0.0258, 0.211),
-        // ln(unroundness)
-        term(-2.3805, 0.2250, 1.320),
-        // hollowness
-        term(0.5492, 0.1123, 0.082),
-    ],
-);
-
-/// Constant and terms of a bad fit of the anatomical wall, likewise.
-const BAD_ANATOMICAL: (f64, [Term; 5]) = (
-    -1.639,
-    [
-        // share of the surface with edges
-        term(0.7538, 0.1554, -1.307),
-        // ln(spread of the thickness / mm)
-        term(0.6063, 0.1388, 1.008),
-        // strain
-        term(0.1049, 0.0258, 0.678),
-        // ln(unroundness)
-        term(-2.3805, 0.2250, 0.632),
-        // hollowness
-        term(0.5492, 0.1123, 0.152),
-    ],
-);
-
-/// Constant and terms of motion.
-const MOTION: (f64, [Term; 8]) = (
-    -3.360,
-    [
-        // share of the surface with edges
-        term(0.7465, 0.1530, -1.727),
-        // ln(spread of the thickness / mm)
-        term(0.4669, 0.1528, 0.984),
-        // ln(cavity / ml)
-        term(3.9231, 0.6107, 0.154),
-        // slenderness
-        term(2.3731, 0.1880, 0.599),
-        // ln(unroundness)
-        term(-2.4416, 0.2221, 1.009),
-        // offset
-        term(0.0152, 0.0087, 0.278),
-        // dark share of the wall
-        term(0.0808, 0.1147, -1.688),
-        // share of the wall with something beside it
-        term(0.0550, 0.0624, -1.612),
-    ],
-);
+use super::motion::Views;
+use crate::deform::{FittedModel, WallEdge};
 
 /// The chance that a fit's mask of the wall with this `edge` has a Jaccard index of 0.75 or more,
 /// 0..=1: with an expert's mask drawn on the image (apparent) or with the wall itself (anatomical).
@@ -141,28 +31,15 @@ pub fn of_agreement(e: &Evidence, edge: WallEdge) -> f64 {
         e.unroundness.max(1e-3).ln(),
         e.hollowness,
     ];
-    let (constant, terms) = match edge {
-        WallEdge::Apparent => &BAD,
-        WallEdge::Anatomical => &BAD_ANATOMICAL,
+    let bad_fit = match edge {
+        WallEdge::Apparent => &calibration::BAD_FIT_APPARENT,
+        WallEdge::Anatomical => &calibration::BAD_FIT_ANATOMICAL,
     };
-    1.0 - logistic(*constant, terms, &values)
+    1.0 - bad_fit.probability(&values)
 }
 
-/// Constant and factor of the mean logarithm of the odds, apparent and anatomical wall, where it is unknown
-/// how the patient lay.
-const OF_SET: [[f64; 2]; 2] = [[-0.236, 1.096], [0.05, 0.953]];
-
-/// Constant and factors of the mean logarithm of the odds and of [`doubling`], apparent wall.
-const OF_SET_AND_VIEWS: [f64; 3] = [-3.413, 0.444, -1.207];
-/// The same of the anatomical wall, and the factor of the logarithm of the cavity / ml: the thin wall of a large heart
-/// agrees less with a fitted one that lies off by as much.
-const OF_SET_VIEWS_AND_SIZE: [f64; 4] = [2.683, 0.840, -0.950, -1.537];
-
-/// Constant and factors of [`doubling`] and of the logarithm of the odds by the shape, in the chance of motion.
-const MOTION_BY_VIEWS: [f64; 3] = [6.559, 2.550, 0.438];
-
-/// The logarithm of the gain by two places of the wall ([`Views::gain`]), from about that of a patient at rest on.
-fn doubling(views: &Views) -> f64 {
+/// The logarithm of [`Views::gain`], from about that of a patient at rest on.
+fn log_gain(views: &Views) -> f64 {
     (views.gain.clamp(0.0, 1.0) + 0.01).ln()
 }
 
@@ -172,27 +49,42 @@ fn doubling(views: &Views) -> f64 {
 pub fn of_set(chances: &[f64], best: &Evidence, edge: WallEdge) -> f64 {
     let sum: f64 = chances.iter().map(|chance| log_odds(*chance)).sum();
     let mean = sum / chances.len().max(1) as f64;
-    let odds = match (&best.views, edge) {
-        (None, WallEdge::Apparent) => OF_SET[0][0] + OF_SET[0][1] * mean,
-        (None, WallEdge::Anatomical) => OF_SET[1][0] + OF_SET[1][1] * mean,
-        (Some(views), WallEdge::Apparent) => {
-            let [constant, factor, of_doubling] = OF_SET_AND_VIEWS;
-            constant + factor * mean + of_doubling * doubling(views)
+    match (&best.views, edge) {
+        (None, WallEdge::Apparent) => calibration::GOOD_SET_APPARENT.unlimited_probability(&[mean]),
+        (None, WallEdge::Anatomical) => {
+            calibration::GOOD_SET_ANATOMICAL.unlimited_probability(&[mean])
         }
+        (Some(views), WallEdge::Apparent) => calibration::GOOD_SET_APPARENT_BY_PROJECTIONS
+            .unlimited_probability(&[mean, log_gain(views)]),
         (Some(views), WallEdge::Anatomical) => {
-            let [constant, factor, of_doubling, of_size] = OF_SET_VIEWS_AND_SIZE;
             let size = best.cavity_ml.max(1.0).ln();
-            constant + factor * mean + of_doubling * doubling(views) + of_size * size
+            calibration::GOOD_SET_ANATOMICAL_BY_PROJECTIONS.unlimited_probability(&[
+                mean,
+                log_gain(views),
+                size,
+            ])
         }
-    };
-    1.0 / (1.0 + (-odds).exp())
+    }
 }
 
-/// The chance of a good fit where a part of the wall alone told its place, from that of the others: of 13 such fits
+/// Factor of the chance of a good fit whose position was found by a part of the wall alone: of 13 such fits
 /// to hearts that are refused without a hint, whose chances have a mean of 0.64, 3 have a Jaccard index of 0.75 or
 /// more (12 infarcts and a turned heart of the simulator's seeds 2101, 2103, 4102 and 4202).
-pub fn of_a_part(chance: f64) -> f64 {
-    0.35 * chance
+const PARTIAL_WALL_FACTOR: f64 = 0.35;
+
+/// The chance of a good fit of `model`, which has this `chance` by all else, in view of how its position was found.
+pub(super) fn in_view_of_search(chance: f64, model: &FittedModel) -> f64 {
+    match &model.localisation {
+        Some(found) if found.infarcted => PARTIAL_WALL_FACTOR * chance,
+        _ => chance,
+    }
+}
+
+/// The confidence of a model's position, 0 (a guess) to 1: that of the search for a ventricle, lowered where few
+/// sensors see an edge. 0.5 or less for other organs.
+pub fn of_position(model: &FittedModel) -> f64 {
+    let search = model.localisation.as_ref().map_or(0.5, |l| l.confidence);
+    search * (model.active / 0.5).min(1.0)
 }
 
 /// The logarithm of the odds of a chance, between those of about 1 and 99 per cent.
@@ -213,45 +105,21 @@ pub fn of_motion(e: &Evidence) -> f64 {
         e.dark,
         e.beside,
     ];
-    let by_shape = logistic(MOTION.0, &MOTION.1, &values);
-    let Some(views) = &e.views else {
-        return by_shape;
-    };
-    let [constant, of_doubling, of_shape] = MOTION_BY_VIEWS;
-    let odds = constant + of_doubling * doubling(views) + of_shape * log_odds(by_shape);
-    1.0 / (1.0 + (-odds).exp())
+    let by_shape = calibration::MOTION_BY_SHAPE.probability(&values);
+    e.views.as_ref().map_or(by_shape, |views| {
+        let values = [log_gain(views), log_odds(by_shape)];
+        calibration::MOTION_BY_PROJECTIONS.unlimited_probability(&values)
+    })
 }
 
-/// Constant and terms of a heart.
-const HEART: (f64, [Term; 3]) = (
-    1.58,
-    [
-        // hollowness
-        term(0.437, 0.171, 1.66),
-        // agreement of the views
-        term(0.760, 0.203, 2.28),
-        // confidence of the search
-        term(0.718, 0.364, 1.36),
-    ],
-);
-
-/// The chance that what was fitted is a left ventricle in its place, 0..=1, where the search has the confidence
+/// The chance that what was fitted is a left ventricle in its position, 0..=1, where the search has the confidence
 /// `search`; `None` where it is unknown how the patient lay.
 ///
 /// No image without a heart is as dark within a ring as a ventricle and shows the fitted wall in all projections.
 pub fn of_heart(e: &Evidence, search: f64) -> Option<f64> {
     let views = e.views.as_ref()?;
     let values = [e.hollowness, views.agreement, search];
-    Some(logistic(HEART.0, &HEART.1, &values))
-}
-
-fn logistic<const N: usize>(constant: f64, terms: &[Term; N], values: &[f64; N]) -> f64 {
-    let sum: f64 = terms
-        .iter()
-        .zip(values)
-        .map(|(t, value)| t.weight * ((value - t.centre) / t.scale).clamp(-FARTHEST, FARTHEST))
-        .sum();
-    1.0 / (1.0 + (-constant - sum).exp())
+    Some(calibration::HEART_FITTED.probability(&values))
 }
 
 #[cfg(test)]
@@ -371,20 +239,6 @@ mod tests {
     }
 
     #[test]
-    fn figures_far_from_all_that_is_known_count_as_four_deviations() {
-        let terms = [term(2.0, 4.0, -3.0), term(1.0, 0.5, 0.7)];
-        let odds = |values: [f64; 2]| {
-            let chance = logistic(0.5, &terms, &values);
-            (chance / (1.0 - chance)).ln()
-        };
-        assert!((odds([2.0, 1.0]) - 0.5).abs() < 1e-9);
-        assert!((odds([6.0, 1.0]) - (0.5 - 3.0)).abs() < 1e-9);
-        assert!((odds([2.0, 0.5]) - (0.5 - 0.7)).abs() < 1e-9);
-        assert!((odds([2.0, 99.0]) - (0.5 + 4.0 * 0.7)).abs() < 1e-9);
-        assert!((odds([-99.0, 1.0]) - (0.5 + 4.0 * 3.0)).abs() < 1e-6);
-    }
-
-    #[test]
     fn the_odds_are_those_of_the_chance_and_end_at_about_one_per_cent() {
         for chance in [0.1, 0.35, 0.5, 0.9] {
             let exact = f64::ln(chance / (1.0 - chance));
@@ -416,7 +270,7 @@ mod tests {
 
     #[test]
     fn the_logarithm_of_the_gain_has_ends() {
-        let of = |gain: f64| doubling(&views(gain));
+        let of = |gain: f64| log_gain(&views(gain));
         assert_eq!((of(-1.0), of(5.0)), (of(0.0), of(1.0)));
         assert!((of(0.0) - 0.01f64.ln()).abs() < 1e-9 && (of(0.24) - 0.25f64.ln()).abs() < 1e-9);
     }
@@ -448,9 +302,8 @@ mod tests {
 
     /// Three of 13 fits whose chances had a mean of 0.64 were good.
     #[test]
-    fn a_place_told_by_a_part_of_the_wall_leaves_the_chance_of_such_fits() {
-        assert!((of_a_part(0.64) - 3.0 / 13.0).abs() < 0.02);
-        assert!(of_a_part(0.3) < of_a_part(0.9) && of_a_part(1.0) < 0.5);
+    fn a_position_found_by_a_part_of_the_wall_leaves_the_chance_of_such_fits() {
+        assert!((PARTIAL_WALL_FACTOR * 0.64 - 3.0 / 13.0).abs() < 0.02);
     }
 
     #[test]

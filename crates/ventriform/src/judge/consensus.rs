@@ -1,17 +1,17 @@
-//! What the fits of several models to one volume say of one of them.
+//! The judgement of one fit by the fits of several models to the same volume.
 //!
-//! In go the chosen fit and the fits of the built-in hearts; out comes the chosen fit with the
+//! In go the chosen fit and the fits of the built-in hearts; out comes its judgement with the
 //! [`confidence`](super::confidence::of_set) that they give it together, their distance from it, and the
 //! [`uncertainty`](super::uncertainty) of each of its nodes.
 //!
-//! Guaranteed: nodes, triangles and measures stay. Not guaranteed: that fits which agree are right. All
+//! Not guaranteed: that fits which agree are right. All
 //! start from one search, and where that is wrong they agree on the wrong place.
 
 use super::confidence;
-use super::doubts;
-use super::fit::Fit;
-use super::parameters::WallEdge;
-use super::uncertainty::NodeEvidence;
+use super::flag_rules;
+use super::uncertainty::{NodeEvidence, WallUncertainty};
+use super::{Fit, Judgement};
+use crate::deform::WallEdge;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
 use crate::mesh::TriMesh;
@@ -19,44 +19,54 @@ use crate::mesh::TriMesh;
 /// A fit of a built-in heart, or `None` where it failed.
 pub type MemberFit<'a> = Option<&'a Fit>;
 
-/// The chosen `fit`, whose wall with this `edge` is shown, as the `members` judge it. `own` is its place
-/// among them, if it is one of them.
-pub fn judged(mut fit: Fit, members: &[MemberFit<'_>], own: Option<usize>, edge: WallEdge) -> Fit {
-    let Some(evidence) = fit.evidence else {
-        return fit;
+/// The judgement of the chosen `fit`, whose wall with this `edge` is shown, by the `members` together. `own` is its
+/// index among them, if it is one of them.
+pub fn judgement(
+    fit: &Fit,
+    members: &[MemberFit<'_>],
+    own: Option<usize>,
+    edge: WallEdge,
+) -> Judgement {
+    let alone = &fit.judgement;
+    let Some(evidence) = &alone.evidence else {
+        return alone.clone();
     };
     let others: Vec<&TriMesh> = members
         .iter()
         .enumerate()
-        .filter(|(place, _)| Some(*place) != own)
+        .filter(|(index, _)| Some(*index) != own)
         .filter_map(|(_, member)| apparent((*member)?))
         .collect();
     let chance = |member: &MemberFit<'_>| {
-        let evidence = member.and_then(|member| member.evidence);
+        let evidence = member.and_then(|member| member.judgement.evidence);
         evidence.map_or(0.0, |e| confidence::of_agreement(&e, edge))
     };
     let mut chances: Vec<f64> = members.iter().map(chance).collect();
     if own.is_none() {
-        chances.push(confidence::of_agreement(&evidence, edge));
+        chances.push(confidence::of_agreement(evidence, edge));
     }
-    let distances = apparent(&fit).map(|mesh| distances(mesh, &others));
-    for (node, distance) in fit.nodes.iter_mut().zip(distances.iter().flatten()) {
+    let distances = apparent(fit).map(|mesh| distances(mesh, &others));
+    let mut nodes = alone.nodes.clone();
+    for (node, distance) in nodes.iter_mut().zip(distances.iter().flatten()) {
         node.spread = Some(*distance);
     }
-    fit.confidence = fit.chance_there(confidence::of_set(&chances, &evidence, edge));
-    doubts::doubt_again(&mut fit);
-    let [apparent, anatomical] =
-        [WallEdge::Apparent, WallEdge::Anatomical].map(|edge| fit.uncertainty(edge));
-    if let Some(surfaces) = &mut fit.surfaces {
-        surfaces.apparent.uncertainty = apparent;
-        surfaces.anatomical.uncertainty = anatomical;
+    let chance = confidence::of_set(&chances, evidence, edge);
+    let chance = confidence::in_view_of_search(chance, &fit.model);
+    let confidence = flag_rules::limited(chance, &alone.flags);
+    Judgement {
+        confidence,
+        position_confidence: alone.position_confidence,
+        evidence: Some(*evidence),
+        uncertainty: WallUncertainty::of_model(&fit.model, &nodes, confidence),
+        nodes,
+        flags: flag_rules::with_chance(alone.flags.clone(), confidence, evidence),
     }
-    fit
 }
 
 /// The wall as it looks.
 fn apparent(fit: &Fit) -> Option<&TriMesh> {
-    fit.surfaces.as_ref().map(|s| &s.apparent.mesh)
+    let surfaces = fit.model.surfaces.as_ref();
+    surfaces.map(|s| &s.apparent.mesh)
 }
 
 /// The root mean square distance of each node of `mesh` from the surfaces of the others, mm; empty

@@ -1,0 +1,130 @@
+//! Judges a fitted model: how likely it is right, and what gives reason for a warning.
+//!
+//! In go a [`FittedModel`], the image that it was fitted to and the volume; out comes a [`Judgement`]. No other
+//! image and no mask is needed.
+//!
+//! 1. [`evidence`]: figures of the wall as the sensors left it, before its base plane was put;
+//!    [`motion`]: whether the projections of the image show the wall in two positions.
+//! 2. [`confidence`]: the chances of a good fit, of motion and of a heart, by calibrated logistic models.
+//! 3. [`flags`]: the warnings, by [`flag_rules`]; [`uncertainty`]: how far each node may be off.
+//! 4. [`septum`]: whether the fit is to be made again without the septum's sensors; [`refusal`]: whether it is a
+//!    heart at all.
+//! 5. [`consensus`]: of several models' fits to one volume, the judgement of the chosen one by all of them.
+//!
+//! Guaranteed: the model is not changed. Not guaranteed: that a wrong fit is noticed; docs/evaluation.md has the
+//! figures of hearts that were held out.
+
+pub mod calibration;
+pub mod confidence;
+pub mod consensus;
+pub mod evidence;
+mod fit;
+mod flag_rules;
+pub mod flags;
+pub mod logistic;
+pub mod motion;
+pub mod refusal;
+pub mod septum;
+#[cfg(test)]
+mod test_fits;
+pub mod uncertainty;
+
+pub use evidence::Evidence;
+pub use fit::Fit;
+pub use flags::Flag;
+pub use uncertainty::{NodeEvidence, WallUncertainty};
+
+use crate::deform::setup::FitSetup;
+use crate::deform::{FittedModel, WallEdge};
+use crate::grid::Volume;
+use crate::locate::patient_orientation::OrientationSource;
+use crate::model::Organ;
+use crate::progress::{Cancelled, Monitor};
+use evidence::Edges;
+use motion::Views;
+
+/// How likely a fitted model is right, and why.
+#[derive(Debug, Clone)]
+pub struct Judgement {
+    /// Of a ventricle, the chance that the mask agrees with an expert's by a Jaccard index of 0.75
+    /// or more ([`confidence::of_agreement`]). Of other organs, half the share of the surface that
+    /// sees an edge, at most 0.5.
+    pub confidence: f64,
+    /// Confidence of the model's position, 0 (a guess) to 1 ([`confidence::of_position`]).
+    pub position_confidence: f64,
+    /// The figures behind the confidence; ventricles only.
+    pub evidence: Option<Evidence>,
+    /// The figures behind the uncertainty of each node; empty for other organs.
+    pub nodes: Vec<NodeEvidence>,
+    /// Standard deviation of each node's distance from both walls, mm; ventricles only.
+    pub uncertainty: Option<WallUncertainty>,
+    /// Warnings.
+    pub flags: Vec<Flag>,
+}
+
+/// Judges `model`, fitted from `setup` to the `organ` in `volume`, whose wall with this `edge` is shown.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn judge(
+    model: &FittedModel,
+    setup: &FitSetup,
+    volume: &Volume,
+    organ: Organ,
+    edge: WallEdge,
+    monitor: &Monitor,
+) -> Result<Judgement, Cancelled> {
+    let evidence = evidence_of(model, setup, volume, monitor)?;
+    let position_confidence = confidence::of_position(model);
+    let chance = match &evidence {
+        Some(evidence) => confidence::of_agreement(evidence, edge),
+        None => position_confidence.min(0.5),
+    };
+    let chance = confidence::in_view_of_search(chance, model);
+    let ventricle = organ == Organ::LeftVentricle;
+    let flags = flag_rules::flags(model, evidence.as_ref(), chance, volume, ventricle);
+    let confidence = flag_rules::limited(chance, &flags);
+    let nodes = match (&model.sensed_wall, &model.localisation) {
+        (Some(wall), Some(_)) => {
+            uncertainty::node_evidence(model.apparent_mesh(), wall, &model.readings)
+        }
+        _ => Vec::new(),
+    };
+    Ok(Judgement {
+        confidence,
+        position_confidence,
+        evidence,
+        uncertainty: WallUncertainty::of_model(model, &nodes, confidence),
+        nodes,
+        flags,
+    })
+}
+
+/// The evidence of a ventricle. The confidence is calibrated on the wall as the sensors left it.
+fn evidence_of(
+    model: &FittedModel,
+    setup: &FitSetup,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<Evidence>, Cancelled> {
+    let (Some(wall), Some(found)) = (&model.sensed_wall, &model.localisation) else {
+        return Ok(None);
+    };
+    let edges = Edges {
+        active: model.active,
+        residual: model.residual,
+        strain: model.strain.sqrt(),
+    };
+    let orientation = &setup.patient_orientation;
+    let views = match orientation.source {
+        OrientationSource::Unknown => None,
+        _ => Views::of(
+            model.apparent_mesh(),
+            &orientation.superior,
+            volume,
+            monitor,
+        )?,
+    };
+    let hollowness = found.hollowness;
+    Ok(Evidence::of(wall, &edges, hollowness, &setup.field, views))
+}
