@@ -17,10 +17,11 @@ use ventriform::volume::{PhantomParameters, ReadLimits, phantom};
 use ventriform_http::{Running, install_cryptography};
 use ventriform_program::server::start;
 use ventriform_service::config::{Flags, PostgresSettings, Settings};
-use ventriform_service::jobs::{
-    Claimant, Clock, Failure, GivenParameters, JobFilter, JobOutcome, JobState, JobStore, Lease,
-    ListRequest, Needs, NewJob, Resource, StoredItem, SystemClock, Work, WorkError, WorkInput,
-    WorkOutput, random_id,
+use ventriform_service::items::{StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use ventriform_service::records::{
+    Claimant, Clock, Failure, JobFilter, JobOutcome, JobState, JobStore, Lease, ListRequest,
+    NewJob, Resource, SystemClock, random_id,
 };
 use ventriform_service::work::Engine;
 use ventriform_store::{SqlStore, open_database};

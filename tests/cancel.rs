@@ -18,7 +18,9 @@ use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume};
-use ventriform_service::jobs::{LocalFile, StoredItem, Work, WorkError, WorkInput};
+use ventriform_service::items::StoredItem;
+use ventriform_service::jobs::{Work, WorkError, WorkInput};
+use ventriform_service::records::LocalFile;
 use ventriform_service::work::Engine;
 
 /// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not

@@ -159,9 +159,10 @@ fn mesh_corpus() -> Vec<Vec<u8>> {
 /// A PDU or an item of one: type, length, content.
 fn framed(kind: u8, wide: bool, content: &[u8]) -> Vec<u8> {
     let length = content.len();
-    let length = match wide {
-        true => (length as u32).to_be_bytes().to_vec(),
-        false => (length as u16).to_be_bytes().to_vec(),
+    let length = if wide {
+        (length as u32).to_be_bytes().to_vec()
+    } else {
+        (length as u16).to_be_bytes().to_vec()
     };
     [&[kind, 0], &length[..], content].concat()
 }
@@ -396,9 +397,10 @@ fn stored_zip(content: &[u8]) -> Vec<u8> {
 
 /// A multi-frame NM file of 2 × 3 × 4 voxels, with explicit or implicit value representations.
 fn dicom_file(implicit: bool) -> Vec<u8> {
-    let uid = match implicit {
-        true => "1.2.840.10008.1.2\0",
-        false => "1.2.840.10008.1.2.1\0",
+    let uid = if implicit {
+        "1.2.840.10008.1.2\0"
+    } else {
+        "1.2.840.10008.1.2.1\0"
     };
     let mut bytes = vec![0; 128];
     bytes.extend(b"DICM");

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
 use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
-use ventriform_service::jobs::ListRequest;
+use ventriform_service::records::ListRequest;
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use std::time::Instant;
 use ventriform::progress::{Observer, Plan, Stage, TotalProgress};
 
-const STEPS: u64 = 1000;
+const BAR_STEPS: u64 = 1000;
 
 /// Shows the stage and the progress on standard error, and measures the time.
 pub struct Bar {
@@ -27,7 +27,7 @@ impl Bar {
         } else {
             ProgressDrawTarget::hidden()
         };
-        let bar = ProgressBar::with_draw_target(Some(STEPS), target);
+        let bar = ProgressBar::with_draw_target(Some(BAR_STEPS), target);
         let style = ProgressStyle::with_template("{msg:<9} [{bar:40}] {percent:>3} %");
         if let Ok(style) = style {
             bar.set_style(style.progress_chars("=> "));
@@ -43,7 +43,7 @@ impl Bar {
     pub fn show(&self, stage: &str, fraction: f64) {
         self.bar.set_message(stage.to_owned());
         self.bar
-            .set_position((fraction.clamp(0.0, 1.0) * STEPS as f64) as u64);
+            .set_position((fraction.clamp(0.0, 1.0) * BAR_STEPS as f64) as u64);
     }
 
     /// Removes the bar from the screen.

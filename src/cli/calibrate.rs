@@ -58,10 +58,10 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
     Ok(())
 }
 
-/// What is printed of each case: the name, the figure and its decimals.
+/// Columns of the table of cases: the name, the figure and its decimals.
 type Column = (&'static str, fn(&CaseFigures) -> f64, usize);
 
-const COLUMNS: [Column; 4] = [
+const TABLE_COLUMNS: [Column; 4] = [
     ("E_J", |f| f.jaccard, 3),
     ("E_CD, voxels", |f| f.contour, 3),
     ("wall, ml", |f| f.wall_ml, 1),
@@ -88,7 +88,7 @@ fn table(made: &Calibration) -> String {
     }
     let samples = [Sample::HeldOut, Sample::InSample];
     let [held_out, in_sample] = samples.map(Sample::as_str);
-    for (what, figure, decimals) in COLUMNS {
+    for (what, figure, decimals) in TABLE_COLUMNS {
         text += &format!(
             "{what:<16} {:>10} {held_out:>10} {in_sample:>10}\n",
             "without"
@@ -112,7 +112,7 @@ fn table(made: &Calibration) -> String {
     text
 }
 
-/// What the profile changes, as a line.
+/// The changes by the profile, as a line.
 pub(super) fn gain(made: &Calibration, sample: Sample) -> String {
     let Some(gain) = made.gain(sample) else {
         return format!("E_J, {}: there is one mask only\n", sample.as_str());

@@ -89,13 +89,17 @@ impl DicomArgs {
         let found = volume::provenance(files, &ReadOptions { frame }, limits, &Monitor::silent())
             .map_err(|error| anyhow!(error.with_advice()))?;
         // The new identity of a DICOM scan is not meant to be the one in its file.
-        let known = match self.deidentify && found.is_some() {
-            true => (stated.check()).and_then(|()| identity(found.as_ref(), &Default::default())),
-            false => identity(found.as_ref(), &stated),
+        let known = if self.deidentify && found.is_some() {
+            (stated.check()).and_then(|()| identity(found.as_ref(), &Default::default()))
+        } else {
+            identity(found.as_ref(), &stated)
         };
-        let known = known.and_then(|known| match self.deidentify {
-            true => Ok(known),
-            false => legible(&known).map(|()| known),
+        let known = known.and_then(|known| {
+            if self.deidentify {
+                Ok(known)
+            } else {
+                legible(&known).map(|()| known)
+            }
         });
         let identity = known.map_err(|error| anyhow!(error.with_advice()))?;
         let secret = || {

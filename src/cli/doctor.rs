@@ -8,7 +8,7 @@ use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::config::{BlobPlace, Flags, Settings};
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 use ventriform_store::Examination;
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)
@@ -71,9 +71,10 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     let s3 = s3_location(&settings);
     let found = ventriform_store::examine(&args.data_dir, s3.as_ref(), heirs);
     let found = Runtime::new()?.block_on(found)?;
-    match args.json {
-        true => json(&serde_json::to_string_pretty(&found)?),
-        false => print(&found),
+    if args.json {
+        json(&serde_json::to_string_pretty(&found)?)
+    } else {
+        print(&found)
     }
     if found.is_healthy() {
         return Ok(());

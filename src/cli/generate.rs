@@ -85,9 +85,10 @@ pub fn run(args: &GenerateArgs) -> Result<()> {
     let options = ReadOptions {
         frame: parameters.frame,
     };
-    let whose = match args.deidentify {
-        false => volume::provenance(&files, &options, &limits, &monitor)?,
-        true => None,
+    let whose = if !args.deidentify {
+        volume::provenance(&files, &options, &limits, &monitor)?
+    } else {
+        None
     };
     for path in &args.report {
         let text = report_text(path, (&model, whose.as_ref()), &surface, &monitor)?;

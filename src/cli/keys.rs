@@ -11,7 +11,7 @@ use ventriform_service::access::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::{Size, Span};
-use ventriform_service::jobs::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use ventriform_service::records::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
 
 /// Make, list and revoke API keys, also while the service runs
 #[derive(Debug, Args)]
@@ -73,7 +73,7 @@ struct RevokeArgs {
 }
 
 /// Who acts in the audit trail.
-const AGENT: &str = "command line";
+const AUDIT_AGENT: &str = "command line";
 
 /// Runs the command.
 ///
@@ -160,5 +160,5 @@ async fn revoke(args: &RevokeArgs) -> Result<()> {
 }
 
 fn event(activity: Activity, key: &ApiKey, now: Timestamp) -> AuditEvent {
-    AuditEvent::new(now, activity, key.tenant.clone(), AGENT.into()).on(&key.id)
+    AuditEvent::new(now, activity, key.tenant.clone(), AUDIT_AGENT.into()).on(&key.id)
 }

@@ -9,10 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
 use ventriform::volume::ReadLimits;
-use ventriform_service::config::{DatabaseUrl, Settings};
-use ventriform_service::jobs::{
-    Failure, NotAdded, ProductRoom, Queue, QueueSettings, SystemClock, TemplateSource, Tenant,
-};
+use ventriform_service::config::DatabaseUrl;
+use ventriform_service::items::{Items, NotAdded, TemplateSource};
+use ventriform_service::records::{Failure, ProductRoom, SystemClock, Tenant};
 use ventriform_service::work::{Engine, TEMPLATE_BYTES};
 use ventriform_store::{Store, StoreSettings};
 
@@ -59,15 +58,11 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             ..StoreSettings::default()
         };
         let store = Store::open_with(&settings.data_dir, database).await?;
-        let queue = Arc::new(Queue::new(
-            store.rows.clone(),
+        let items = Arc::new(Items::new(
             store.rows.clone(),
             store.blobs.clone(),
             Arc::new(SystemClock),
-            QueueSettings {
-                limit: Settings::default().queue_limit,
-                workers: 1,
-            },
+            None,
         ));
         let engine = Engine::new(ReadLimits::default());
         let room = ProductRoom {
@@ -75,7 +70,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             bytes: settings.quota_bytes.0.map(|size| size.0),
         };
         for path in &args.models {
-            let id = add(&queue, &engine, path, args, room)
+            let id = add(&items, &engine, path, args, room)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
             say!("{id} {}", name(path));
@@ -85,7 +80,7 @@ pub fn import(args: &ImportArgs) -> Result<()> {
 }
 
 async fn add(
-    queue: &Arc<Queue>,
+    items: &Arc<Items>,
     engine: &Engine,
     path: &Path,
     args: &ImportArgs,
@@ -104,7 +99,7 @@ async fn add(
         volume: None,
         library: args.library.then_some(true),
     };
-    let added = queue.add_template(source, organ, output, room).await;
+    let added = items.add_template(source, organ, output, room).await;
     let (template, _) = added.map_err(|error| match error {
         NotAdded::Refused(failure) | NotAdded::TooMany(failure) | NotAdded::TooLarge(failure) => {
             refused(&failure)

@@ -1,7 +1,7 @@
 //! The log of the service: lines of `tracing` on standard error.
 //!
 //! The threads that serve only form a line and append it to a buffer; a thread of its own escapes and writes
-//! what has gathered, at most every [`GATHERING`]. So no request waits for whoever reads standard error, and
+//! what has gathered, at most every [`FLUSH_EVERY`]. So no request waits for whoever reads standard error, and
 //! a line costs neither a system call nor an allocation: with a call for each line, or a queue of lines
 //! (tracing-appender), small requests took a tenth longer. At most [`GATHERED_BYTES`] wait; lines beyond that
 //! are dropped, and a line says how many.
@@ -22,7 +22,7 @@ use ventriform::text::{escaped_json, escaped_lines};
 use ventriform_service::config::{LogFormat, Settings};
 
 /// Time from the first line of a batch until the batch is written.
-const GATHERING: Duration = Duration::from_millis(10);
+const FLUSH_EVERY: Duration = Duration::from_millis(10);
 
 /// Longest time to write the lines that wait when the service has ended.
 const LAST_LINES: Duration = Duration::from_secs(2);
@@ -151,7 +151,7 @@ impl Lines {
             let empty = |lines: &mut Gathered| lines.text.is_empty() && !lines.ended;
             let first = self.0.1.wait_while(self.gathered(), empty);
             if !first.unwrap_or_else(PoisonError::into_inner).ended {
-                thread::sleep(GATHERING);
+                thread::sleep(FLUSH_EVERY);
             }
             let mut gathered = self.gathered();
             std::mem::swap(&mut batch.text, &mut gathered.text);

@@ -81,9 +81,10 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     }
     // A surface has no grid of its own.
     let turned = a.mask.surface.is_some() && b.mask.surface.is_none();
-    let (holder, carried, path) = match turned {
-        false => (a.mask, b.mask, &args.b),
-        true => (b.mask, a.mask, &args.a),
+    let (holder, carried, path) = if !turned {
+        (a.mask, b.mask, &args.b)
+    } else {
+        (b.mask, a.mask, &args.a)
     };
     let refused = |error: GivenMaskError| anyhow!("{}: {}", path.display(), error.with_advice());
     // No voxel of either is lost beyond the other's border.
@@ -102,9 +103,10 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
         note!("{}: resampled to the grid of A", path.display());
     }
     let spacing = holder.frame.spacing();
-    let (judged, reference) = match turned {
-        false => (&holder.mask, &placed.mask),
-        true => (&placed.mask, &holder.mask),
+    let (judged, reference) = if !turned {
+        (&holder.mask, &placed.mask)
+    } else {
+        (&placed.mask, &holder.mask)
     };
     let agreement = compare(judged, reference, spacing, &monitor)?;
     json(&serde_json::to_string_pretty(&AgreementReport::of(

@@ -10,7 +10,7 @@ use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
 use ventriform::volume::ReadLimits;
 use ventriform_service::work::problems::Explain;
 
-/// What is stated of meshes.
+/// Statements about meshes.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct MeshArgs {
     /// Unit of meshes (STL, PLY, OBJ, VTK, VTP, glTF) that do not state theirs: mm, cm or m

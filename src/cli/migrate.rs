@@ -111,14 +111,15 @@ fn print(done: &Migrated) {
         say!("{:>10} {}", table.rows, table.name);
     }
     let rows: u64 = done.tables.iter().map(|table| table.rows).sum();
-    match done.was_done {
-        true => say!("{rows} rows are the same on both sides: it was moved before"),
-        false => say!(
+    if done.was_done {
+        say!("{rows} rows are the same on both sides: it was moved before")
+    } else {
+        say!(
             "{rows} rows, {} items ({} of them copied now), {} received objects",
             done.items,
             done.copied,
             done.received
-        ),
+        )
     }
 }
 

@@ -69,7 +69,7 @@ enum Command {
     Audit(audit::AuditArgs),
     Phantom(phantom::PhantomArgs),
     Healthcheck(Box<serve::HealthcheckArgs>),
-    #[command(name = serve::COMPUTE, hide = true)]
+    #[command(name = serve::COMPUTE_COMMAND, hide = true)]
     Compute(serve::ComputeArgs),
     Doctor(doctor::DoctorArgs),
     Backup(doctor::BackupArgs),
@@ -123,9 +123,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             note!("error: {error:#}");
-            match error.is::<UnusableArgument>() {
-                true => ExitCode::from(USAGE_STATUS),
-                false => ExitCode::FAILURE,
+            if error.is::<UnusableArgument>() {
+                ExitCode::from(USAGE_STATUS)
+            } else {
+                ExitCode::FAILURE
             }
         }
     }

@@ -70,7 +70,7 @@ pub struct SegmentArgs {
 }
 
 /// The word that stands for the built-in hearts.
-const AUTO: &str = FitParameters::AUTO;
+const MODEL_AUTO: &str = FitParameters::AUTO;
 
 fn parse_format(text: &str) -> Result<Format, String> {
     Format::from_extension(text).ok_or_else(|| {
@@ -89,7 +89,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     let named: Vec<&PathBuf> = args
         .model
         .iter()
-        .filter(|m| m.as_os_str() != AUTO)
+        .filter(|m| m.as_os_str() != MODEL_AUTO)
         .collect();
     let limits = args.limits.limits()?;
     let volume = volume_files(&args.input, &limits)?;

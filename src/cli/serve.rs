@@ -83,16 +83,16 @@ pub fn run(args: &ServeArgs) -> Result<()> {
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn limit_arenas() -> std::io::Result<()> {
     use std::os::unix::process::CommandExt;
-    const ARENAS: &str = "MALLOC_ARENA_MAX";
+    const MALLOC_ARENAS_VARIABLE: &str = "MALLOC_ARENA_MAX";
     let mut arguments = std::env::args_os();
-    let (Some(name), None) = (arguments.next(), std::env::var_os(ARENAS)) else {
+    let (Some(name), None) = (arguments.next(), std::env::var_os(MALLOC_ARENAS_VARIABLE)) else {
         return Ok(());
     };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     Err(std::process::Command::new("/proc/self/exe")
         .arg0(name)
         .args(arguments)
-        .env(ARENAS, cores.max(2).to_string())
+        .env(MALLOC_ARENAS_VARIABLE, cores.max(2).to_string())
         .exec())
 }
 
@@ -174,7 +174,7 @@ fn engine(settings: &Settings) -> Engine {
 }
 
 /// The name of the command of [`compute`].
-pub const COMPUTE: &str = "compute-job";
+pub const COMPUTE_COMMAND: &str = "compute-job";
 
 /// Compute the job that standard input describes; started by the service
 #[derive(Debug, Args)]
@@ -209,12 +209,13 @@ impl ComputeArgs {
     fn isolation(&self) -> Option<Isolation> {
         // The link names the running program even after its file was replaced by another version.
         let link = Path::new("/proc/self/exe");
-        let program = match link.exists() {
-            true => link.to_owned(),
-            false => std::env::current_exe().ok()?,
+        let program = if link.exists() {
+            link.to_owned()
+        } else {
+            std::env::current_exe().ok()?
         };
         let arguments = [
-            COMPUTE.to_owned(),
+            COMPUTE_COMMAND.to_owned(),
             format!("--voxel-limit={}", self.voxel_limit),
             format!("--unpacked-limit={}", self.unpacked_limit),
             format!("--file-limit={}", self.file_limit),

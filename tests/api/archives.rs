@@ -13,16 +13,16 @@ use ventriform::progress::{Monitor, Plan};
 use ventriform::volume::ReadLimits;
 use ventriform_service::archive::{Archive, Archives, Credentials};
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
-    Failure, GivenParameters, Resource, StoredItem, Work, WorkError, WorkInput, WorkOutput,
-};
+use ventriform_service::items::{StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Work, WorkError, WorkInput};
+use ventriform_service::records::{Failure, Resource};
 use ventriform_service::work::Engine;
 
-const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
+pub const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
 const SERIES: &str = "1.2.826.0.1.3680043.8.498.1.2";
 
 /// An archive of the settings.
-fn archive(entry: &[(&str, &str)], tenants: &[&str]) -> Archive {
+pub fn archive(entry: &[(&str, &str)], tenants: &[&str]) -> Archive {
     let value = |key: &str| entry.iter().find(|(k, _)| *k == key).map(|(_, v)| *v);
     let tenants = tenants.iter().map(|name| name.parse().unwrap()).collect();
     Archive::read(value, tenants).unwrap()
@@ -721,9 +721,10 @@ async fn who_erases_whose_scan_it_is_erases_its_uids_in_jobs() {
         let job = sent(&app, &job, "delivered").await;
         assert_eq!(job["source"]["study"], JANE.study);
         let volume = text(&job["links"]["volume"]);
-        let erased = match whole {
-            true => volume.clone(),
-            false => format!("{volume}/identity"),
+        let erased = if whole {
+            volume.clone()
+        } else {
+            format!("{volume}/identity")
         };
         let erased = app.delete(&erased).send().await.unwrap();
         assert!(erased.status().is_success());

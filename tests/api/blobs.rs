@@ -14,10 +14,12 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
-use ventriform_service::jobs::{
+use ventriform_service::items::Items;
+use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
+use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
-    LocalFile, NewJob, Queue, QueueSettings, Resource, Shelved, StagedFiles, StagedFor,
-    StoredVolume, SystemClock, Tags, Tenant, Timestamp, WorkerSettings, Workers,
+    LocalFile, NewJob, Resource, Shelved, StagedFiles, StagedFor, StoredVolume, SystemClock, Tags,
+    Tenant, Timestamp,
 };
 use ventriform_store::Store;
 
@@ -173,10 +175,15 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
     let blobs = MemoryBlobs::default();
-    let queue = Arc::new(Queue::new(
-        store.rows.clone(),
+    let items = Items::new(
         store.rows.clone(),
         Arc::new(blobs.clone()),
+        Arc::new(SystemClock),
+        None,
+    );
+    let queue = Arc::new(Queue::new(
+        store.rows.clone(),
+        Arc::new(items),
         Arc::new(SystemClock),
         QueueSettings {
             limit: 10,
@@ -202,7 +209,10 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         facts: json!({}),
     };
     let (tenant, tags) = (Tenant::default(), Tags::default());
-    let added = queue.add_volume(record, staged, &tenant, &tags, None).await;
+    let added = queue
+        .items()
+        .add_volume(record, staged, &tenant, &tags, None)
+        .await;
     let (_, new) = added.unwrap();
     assert!(new);
 
@@ -233,7 +243,11 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let job = job.unwrap();
     assert_eq!(job.state, JobState::Succeeded, "{:?}", job.failure);
 
-    let model = queue.catalogue.product(&tenant, &job.result.unwrap()).await;
+    let model = queue
+        .items()
+        .catalogue()
+        .product(&tenant, &job.result.unwrap())
+        .await;
     let model = model.unwrap().unwrap().item;
     let report = model.file("report.json").unwrap();
     let content = blobs
@@ -243,7 +257,11 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     let content: Vec<Bytes> = content.try_collect().await.unwrap();
     assert_eq!(content.concat().len() as u64, report.bytes);
 
-    let stored = queue.with_files(model, work.page_files()).await.unwrap();
+    let stored = queue
+        .items()
+        .with_files(model, work.page_files())
+        .await
+        .unwrap();
     assert!(work.page(&stored, &Map::new()).unwrap().contains("<title>"));
     let path = stored.files[0].to_path_buf();
     assert!(path.exists());

@@ -21,7 +21,7 @@ use ventriform_service::hooks::{
 use ventriform_service::intake::{
     Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
 };
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
     ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
     Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
@@ -30,7 +30,7 @@ use ventriform_service::jobs::{
     SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
-    AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
+    AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
 use ventriform_store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
 
@@ -1561,7 +1561,7 @@ async fn work_items_change_once(on: &Stores) {
         revision: 0,
         state: WorkitemState::Scheduled,
         transaction: None,
-        performer: None,
+        performer: Performer::None,
         attributes: DataSetJson::of(object(json!({
             "00741000": {"vr": "CS", "Value": ["SCHEDULED"]}
         })))
@@ -1588,7 +1588,7 @@ async fn work_items_change_once(on: &Stores) {
     assert_eq!(on.b.scheduled_workitems(0, 10).await.unwrap().len(), 2);
     let mut mine = on.b.workitem(&tenant(), "1.2.1").await.unwrap().unwrap();
     mine.state = WorkitemState::InProgress;
-    (mine.transaction, mine.performer) = (Some("1.9".into()), Some(String::new()));
+    (mine.transaction, mine.performer) = (Some("1.9".into()), Performer::Claimed);
     let changed = tokio::join!(on.a.change_workitem(&mine), on.b.change_workitem(&mine));
     assert!(
         changed.0.unwrap() != changed.1.unwrap(),
@@ -2078,7 +2078,7 @@ fn workitem(uid: &str, label: &str) -> Workitem {
         revision: 0,
         state: WorkitemState::Scheduled,
         transaction: None,
-        performer: None,
+        performer: Performer::None,
         attributes: DataSetJson::of(object(json!({
             "00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
             "00741204": {"vr": "LO", "Value": [label]},

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 use ventriform_store::{backup, examine};
 
 /// A volume and a model; returns the paths that must be served, and the folder's service.

@@ -3,7 +3,7 @@
 use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, ItemFilter, JobOutcome,
     JobState, JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tags, Tenant,
     random_id,

@@ -27,9 +27,10 @@ use ventriform_service::access::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
-    Clock, Failure, Fault, GivenParameters, LocalFile, Needs, OutputFile, Resource, ScanFields,
-    StoredItem, SystemClock, Work, WorkError, WorkInput, WorkOutput,
+use ventriform_service::items::{OutputFile, StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use ventriform_service::records::{
+    Clock, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock,
 };
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 use ventriform_store::{open_database, open_rows};
@@ -266,13 +267,12 @@ pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (Stri
         expires_at: None,
     };
     let (key, text) = ApiKey::make(request, now).unwrap();
-    let store = match on_postgres() {
-        true => {
-            let url = super::postgres::database_of(data).await.0.unwrap();
-            let settings = super::postgres::reached_at(url);
-            open_database(data, Some(&settings)).await.unwrap()
-        }
-        false => open_rows(data).await.unwrap(),
+    let store = if on_postgres() {
+        let url = super::postgres::database_of(data).await.0.unwrap();
+        let settings = super::postgres::reached_at(url);
+        open_database(data, Some(&settings)).await.unwrap()
+    } else {
+        open_rows(data).await.unwrap()
     };
     let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
     store.add_key(&key, &event.on(&key.id)).await.unwrap();
@@ -624,9 +624,10 @@ impl Service {
         variables: &[(&str, String)],
         log: Stdio,
     ) -> Self {
-        let database = match on_postgres() {
-            true => Some(super::postgres::database_of(data).await.to_string()),
-            false => None,
+        let database = if on_postgres() {
+            Some(super::postgres::database_of(data).await.to_string())
+        } else {
+            None
         };
         let mut process = Command::new(env!("CARGO_BIN_EXE_ventriform"))
             .envs(database.map(|url| ("VENTRIFORM_DATABASE", url)))

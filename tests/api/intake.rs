@@ -15,6 +15,7 @@ use ventriform_http::ServeError;
 use ventriform_program::server::start;
 use ventriform_service::access::{Quota, Scope};
 use ventriform_service::config::Settings;
+use ventriform_service::start::OpenError;
 use ventriform_service::work::Engine;
 
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -339,13 +340,17 @@ async fn strangers_cannot_send_from_other_machines_unless_told_so() {
         settings.dicom_listen = "off".parse().unwrap();
         settings.rules = r#"[{ kind = "cup" }]"#.parse().unwrap();
     });
-    assert!(matches!(rules.await, Err(ServeError::Rules(why)) if why.contains("rule 1")));
+    assert!(
+        matches!(rules.await, Err(ServeError::Open(OpenError::Rules(why))) if why.contains("rule 1"))
+    );
     let to = begin(|settings| {
         settings.dicom_listen = "off".parse().unwrap();
         let rule = r#"[{ kind = "segmentation", send = ["mask.dcm"], to = "pacs" }]"#;
         settings.rules = rule.parse().unwrap();
     });
-    assert!(matches!(to.await, Err(ServeError::Rules(why)) if why.contains("pacs")));
+    assert!(
+        matches!(to.await, Err(ServeError::Open(OpenError::Rules(why))) if why.contains("pacs"))
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -6,9 +6,8 @@ use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use ventriform_service::jobs::{
-    Claimant, Filed, Isolation, JobStore, NewJob, Tenant, serve_isolated,
-};
+use ventriform_service::jobs::{Isolation, serve_isolated};
+use ventriform_service::records::{Claimant, Filed, JobStore, NewJob, Tenant};
 use ventriform_service::work::Engine;
 use ventriform_store::Store;
 

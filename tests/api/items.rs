@@ -8,11 +8,13 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
-use ventriform_service::jobs::{
+use ventriform_service::background::Upkeep;
+use ventriform_service::items::{Items, RetentionAges};
+use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
+use ventriform_service::records::{
     Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, Filed,
-    JobState, JobStore, LegalHold, ListRequest, NewJob, Queue, QueueSettings, Resource,
-    RetentionAges, StagedFiles, StagedFor, StoredVolume, Tags, Tenant, Timestamp, Upkeep,
-    WorkerSettings, Workers,
+    JobState, JobStore, LegalHold, ListRequest, NewJob, Resource, StagedFiles, StagedFor,
+    StoredVolume, Tags, Tenant, Timestamp,
 };
 use ventriform_store::Store;
 
@@ -49,13 +51,8 @@ impl Bench {
             limit: 10,
             workers: 1,
         };
-        let queue = Queue::new(
-            store.rows.clone(),
-            store.rows.clone(),
-            store.blobs.clone(),
-            clock.clone(),
-            settings,
-        );
+        let items = Items::new(store.rows.clone(), store.blobs.clone(), clock.clone(), None);
+        let queue = Queue::new(store.rows.clone(), Arc::new(items), clock.clone(), settings);
         Self {
             queue: Arc::new(queue),
             clock,
@@ -94,6 +91,7 @@ impl Bench {
         let volume = self.volume(id);
         let added = self
             .queue
+            .items()
             .add_volume(volume, files, &tenant, &tags, None)
             .await;
         added.unwrap();
@@ -166,6 +164,7 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     let volume = bench.volume("vol_1");
     let added = bench
         .queue
+        .items()
         .add_volume(volume, files, &tenant, &tags, None)
         .await;
     let error = added.err().unwrap();
@@ -188,7 +187,7 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
 async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
     let bench = Bench::new().await;
     bench.add("vol_1").await;
-    let hold = bench.queue.hold("vol_1").await;
+    let hold = bench.queue.items().pin("vol_1").await;
     bench.clock.set(10_000);
     let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
     let order = ErasureOrder {
@@ -199,7 +198,10 @@ async fn an_item_on_hold_is_deleted_neither_by_request_nor_by_age() {
         by: ErasureAgent::default(),
         reason: ErasureReason::Request,
     };
-    assert_eq!(bench.queue.erase(order).await.unwrap(), Erased::InUse);
+    assert_eq!(
+        bench.queue.items().erase(order).await.unwrap(),
+        Erased::InUse
+    );
     upkeep.run_once().await.unwrap();
     assert!(bench.has_files("vol_1"));
     drop(hold);
@@ -223,6 +225,7 @@ async fn the_age_of_a_volume_counts_from_its_last_upload() {
             let tags = Tags::default();
             let renewed = bench
                 .queue
+                .items()
                 .renew_volume(&tenant, "vol_1", &tags, None)
                 .await;
             assert!(renewed.unwrap().is_some());
@@ -255,7 +258,11 @@ async fn the_age_of_a_volume_counts_from_the_last_use_by_its_tenant() {
     let (mine, other) = (Tenant::default(), "other".parse::<Tenant>().unwrap());
     bench.add("vol_1").await;
     let tags = Tags::default();
-    let held = bench.queue.renew_volume(&other, "vol_1", &tags, None).await;
+    let held = bench
+        .queue
+        .items()
+        .renew_volume(&other, "vol_1", &tags, None)
+        .await;
     assert!(held.unwrap().is_some_and(|(_, new)| new));
     bench.clock.set(4_000);
     let job = use_volume(&bench, &mine).await;

@@ -413,9 +413,10 @@ async fn a_key_that_reads_gets_no_upload_that_may_name_a_patient() {
             let own = app.get(&path).bearer_auth(&submit).send().await.unwrap();
             assert_eq!(own.status(), 200);
             let answer = app.get(&path).bearer_auth(&read).send().await.unwrap();
-            match allowed {
-                true => assert_eq!(answer.status(), 200, "{path}"),
-                false => drop(problem(answer, 403, "insufficient-scope").await),
+            if allowed {
+                assert_eq!(answer.status(), 200, "{path}")
+            } else {
+                drop(problem(answer, 403, "insufficient-scope").await)
             }
         }
     }

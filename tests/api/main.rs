@@ -44,6 +44,7 @@ mod openapi;
 mod operations;
 mod postgres;
 mod proxies;
+mod quotas;
 mod readers;
 mod receiver;
 mod records;

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tempfile::TempDir;
 use ventriform_service::access::{Quota, Scope, verify};
 use ventriform_service::config::{AwsVariables, Settings};
-use ventriform_service::jobs::{Resource, random_id};
+use ventriform_service::records::{Resource, random_id};
 use ventriform_store::{
     Destination, MigrateError, Migrated, OpenError, Progress, Store, StoreSettings, migrate,
     open_database, open_rows,

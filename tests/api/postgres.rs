@@ -60,9 +60,10 @@ fn shell() -> Command {
         use std::os::unix::fs::MetadataExt;
         own.uid() == 0
     });
-    let mut command = match root {
-        true => Command::new("setpriv"),
-        false => Command::new("sh"),
+    let mut command = if root {
+        Command::new("setpriv")
+    } else {
+        Command::new("sh")
     };
     if root {
         command.args([
@@ -149,7 +150,7 @@ impl Server {
 
     /// Makes an empty database, and returns its URL.
     pub async fn database(&self) -> String {
-        let name = ventriform_service::jobs::random_id("t_");
+        let name = ventriform_service::records::random_id("t_");
         self.run("postgres", &format!("CREATE DATABASE {name}"))
             .await;
         self.url(&name)

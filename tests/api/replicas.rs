@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, News, Resource,
     StoreFault, StoredVolume, Tags, Tenant, random_id,
 };
@@ -174,7 +174,7 @@ async fn an_item_is_erased_for_all_processes_unless_one_holds_it() {
     assert_eq!(copied(&b), 1);
 
     let queue = b.running.as_ref().unwrap().queue().clone();
-    let hold = queue.hold(&id).await.unwrap();
+    let hold = queue.items().pin(&id).await.unwrap();
     let kept = a.delete(&format!("{path}?cascade=true"));
     problem(kept.send().await.unwrap(), 409, "in-use").await;
     // A hold that ends while the erasure waits for it does not stop it.
@@ -278,34 +278,34 @@ async fn one_process_has_the_duty_and_all_hear_the_news() {
     let ((first, _kept), (second, _too)) = (shared.store().await, shared.store().await);
     let (a, b) = (first.peers.clone().unwrap(), second.peers.clone().unwrap());
     let short = Duration::from_millis(600);
-    assert!(a.take_duty("sweep", short).await.unwrap());
-    assert!(!b.take_duty("sweep", short).await.unwrap());
-    assert!(a.take_duty("sweep", short).await.unwrap());
+    assert!(a.lead("sweep", short).await.unwrap());
+    assert!(!b.lead("sweep", short).await.unwrap());
+    assert!(a.lead("sweep", short).await.unwrap());
     within("the duty is not free", async || {
-        b.take_duty("sweep", short).await.unwrap().then_some(())
+        b.lead("sweep", short).await.unwrap().then_some(())
     })
     .await;
-    assert!(!a.take_duty("sweep", short).await.unwrap());
+    assert!(!a.lead("sweep", short).await.unwrap());
     b.leave().await.unwrap();
-    assert!(a.take_duty("sweep", short).await.unwrap());
+    assert!(a.lead("sweep", short).await.unwrap());
 
     let long = Duration::from_secs(60);
     for (peers, workers) in [(&a, 2), (&b, 3)] {
-        peers.live(workers, long).await.unwrap();
+        peers.heartbeat(workers, long).await.unwrap();
     }
     assert_eq!(a.workers().await.unwrap(), 5);
     let item = [random_id(Resource::Volume.prefix())];
-    a.hold("token", &item[0]).await.unwrap();
-    assert!(!a.held_by_others(&item).await.unwrap());
-    assert!(b.held_by_others(&item).await.unwrap());
+    a.pin("token", &item[0]).await.unwrap();
+    assert!(!a.pinned_by_others(&item).await.unwrap());
+    assert!(b.pinned_by_others(&item).await.unwrap());
     // A process that does not live holds nothing.
-    a.live(2, Duration::ZERO).await.unwrap();
-    assert!(!b.held_by_others(&item).await.unwrap());
-    a.live(2, long).await.unwrap();
+    a.heartbeat(2, Duration::ZERO).await.unwrap();
+    assert!(!b.pinned_by_others(&item).await.unwrap());
+    a.heartbeat(2, long).await.unwrap();
     b.tidy().await.unwrap();
-    assert!(b.held_by_others(&item).await.unwrap());
-    a.release("token").await.unwrap();
-    assert!(!b.held_by_others(&item).await.unwrap());
+    assert!(b.pinned_by_others(&item).await.unwrap());
+    a.unpin("token").await.unwrap();
+    assert!(!b.pinned_by_others(&item).await.unwrap());
 
     let mut news = b.news();
     assert_eq!(news.next().await, News::Missed);
@@ -342,10 +342,10 @@ async fn one_process_has_the_duty_and_all_hear_the_news() {
         renewed_before: None,
         ..order
     };
-    b.hold("of b", &item[0]).await.unwrap();
+    b.pin("of b", &item[0]).await.unwrap();
     let kept = first.rows.erase(&order, &item, 2).await.unwrap();
     assert_eq!(kept, Erased::InUse);
-    b.release("of b").await.unwrap();
+    b.unpin("of b").await.unwrap();
     let erased = first.rows.erase(&order, &item, 2).await.unwrap();
     assert!(matches!(erased, Erased::Done(_)));
     assert_eq!(news.next().await, News::Erased(item[0].clone()));

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
 use ventriform_service::config::{AwsVariables, Settings};
 use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
     StoredVolume, Tenant, random_id,
 };

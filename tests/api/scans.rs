@@ -10,7 +10,7 @@ use ventriform::progress::Monitor;
 use ventriform::volume::dicom::Provenance;
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform_service::access::{Quota, Scope};
-use ventriform_service::jobs::Tenant;
+use ventriform_service::records::Tenant;
 use ventriform_service::work::Engine;
 use ventriform_store::open_rows;
 
@@ -442,7 +442,7 @@ async fn volumes_of_older_versions_are_read_at_the_next_start() {
     }
     let data = app.stop().await;
     let rows = open_rows(data.path()).await.unwrap();
-    use ventriform_service::jobs::Scans;
+    use ventriform_service::records::Scans;
     let id = text(&volume["id"]);
     assert!(rows.scan(&Tenant::default(), &id).await.unwrap().is_some());
     assert!(rows.unread_scans(0, 10).await.unwrap().is_empty());

@@ -20,7 +20,7 @@ use ventriform_service::access::{
     AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{Clock, SystemClock, Tenant};
+use ventriform_service::records::{Clock, SystemClock, Tenant};
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
@@ -237,7 +237,7 @@ async fn beyond_loopback_nobody_is_served_without_credentials() {
     };
     let everywhere = || TcpListener::bind("0.0.0.0:0").unwrap();
     let refused = start(settings(false), fake_engine(), everywhere()).await;
-    let Err(ServeError::Open(_)) = refused.map(|_| ()) else {
+    let Err(ServeError::OpenHttp(_)) = refused.map(|_| ()) else {
         panic!("it must not start");
     };
     let open = start(settings(true), fake_engine(), everywhere())

@@ -130,9 +130,10 @@ async fn without_its_database_a_folder_with_items_is_refused_and_left_alone() {
     let database = data.path().join("ventriform.db");
     let whole = std::fs::read(&database).unwrap();
     for emptied in [false, true] {
-        match emptied {
-            true => std::fs::write(&database, "").unwrap(),
-            false => std::fs::remove_file(&database).unwrap(),
+        if emptied {
+            std::fs::write(&database, "").unwrap()
+        } else {
+            std::fs::remove_file(&database).unwrap()
         }
         let Err(refusal) = Store::open(data.path()).await else {
             panic!("it started");

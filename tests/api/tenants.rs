@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use ventriform_http::document_json;
 use ventriform_service::access::{Quota, Scope};
 use ventriform_service::config::Settings;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Filed, Idempotency, JobStore, NewJob, StoredVolume, Tags, Tenant,
 };
 use ventriform_store::Store;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 use ventriform_service::access::{AuditFilter, fhir};
-use ventriform_service::jobs::{Timestamp, parse_rfc3339};
+use ventriform_service::records::{Timestamp, parse_rfc3339};
 
 /// A page of the audit trail.
 #[derive(Serialize, ToSchema)]
@@ -50,8 +50,8 @@ pub async fn list_audit_events(
         until: until.map(|text| time("until", &text)).transpose()?,
     };
     // What was noted within the last second belongs to the answer.
-    app.guard.recorder.flush().await;
-    let page = app.access.audit(&filter, page).await?;
+    app.service.recorder.flush().await;
+    let page = app.service.access.audit(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let events = page.items.iter().map(fhir).collect();
     Ok(Json(AuditPage {

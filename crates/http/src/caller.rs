@@ -6,7 +6,7 @@ use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use ventriform_service::access::{Identity, Quota, Scope};
-use ventriform_service::jobs::{Tenant, Timestamp};
+use ventriform_service::records::{Tenant, Timestamp};
 
 /// Who sent the request.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub struct Caller {
     pub tenant: Tenant,
     /// Its name, for people who read the log.
     pub name: String,
-    /// What it may do.
+    /// Its scope.
     pub scope: Scope,
     /// What its tenant may store and queue by its requests; those of its key, or the general limits.
     pub quota: Quota,

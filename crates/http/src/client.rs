@@ -12,71 +12,27 @@
 //! [`ClientAddress::current`] without being handed the request.
 
 use axum::http::{HeaderMap, HeaderName, header};
-use std::fmt;
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
+pub use ventriform_service::client::ClientAddress;
 use ventriform_service::config::Networks;
 
 const X_FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-tokio::task_local! {
-    static CURRENT: ClientAddress;
-}
-
-/// The address of a client, or its network where a host can take any address of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ClientAddress(IpAddr);
-
-impl ClientAddress {
-    /// The unspecified address, of work that belongs to no request.
-    pub const NONE: Self = Self(IpAddr::V4(Ipv4Addr::UNSPECIFIED));
-
-    /// The address of the other end of a connection.
-    pub fn of_peer(peer: IpAddr) -> Self {
-        Self(match peer.to_canonical() {
-            IpAddr::V6(address) => {
-                let network = u128::from(address) & !u128::from(u64::MAX);
-                IpAddr::V6(Ipv6Addr::from(network))
-            }
-            v4 => v4,
-        })
+/// The address from which a request came that arrived from `peer`.
+pub fn client_of(peer: IpAddr, headers: &HeaderMap, trusted: &Networks) -> ClientAddress {
+    if !trusted.contain(peer.to_canonical()) {
+        return ClientAddress::of_peer(peer);
     }
-
-    /// The address from which a request came that arrived from `peer`.
-    pub fn of_request(peer: IpAddr, headers: &HeaderMap, trusted: &Networks) -> Self {
-        if !trusted.contain(peer.to_canonical()) {
-            return Self::of_peer(peer);
-        }
-        let hops = forwarded_for(headers);
-        let known = hops.iter().rev().map_while(|hop| *hop);
-        let mut nearest = peer;
-        for hop in known {
-            nearest = hop;
-            if !trusted.contain(hop.to_canonical()) {
-                break;
-            }
-        }
-        Self::of_peer(nearest)
-    }
-
-    /// The client of the request that the current task answers. Work that belongs to no request
-    /// counts as that of the unspecified address.
-    pub fn current() -> Self {
-        CURRENT.try_with(|client| *client).unwrap_or(Self::NONE)
-    }
-
-    /// Runs the answering of a request of this client.
-    pub async fn scope<T>(self, answer: impl Future<Output = T>) -> T {
-        CURRENT.scope(self, answer).await
-    }
-}
-
-impl fmt::Display for ClientAddress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            IpAddr::V4(address) => address.fmt(f),
-            IpAddr::V6(network) => write!(f, "{network}/64"),
+    let hops = forwarded_for(headers);
+    let known = hops.iter().rev().map_while(|hop| *hop);
+    let mut nearest = peer;
+    for hop in known {
+        nearest = hop;
+        if !trusted.contain(hop.to_canonical()) {
+            break;
         }
     }
+    ClientAddress::of_peer(nearest)
 }
 
 /// The addresses through which a request came, the nearest last; `None` for one that is hidden or
@@ -117,7 +73,7 @@ mod tests {
         let mut headers = HeaderMap::new();
         headers.insert(name, HeaderValue::from_static(value));
         let trusted = "127.0.0.1, 10.0.0.0/8".parse().unwrap();
-        ClientAddress::of_request(peer.parse().unwrap(), &headers, &trusted).to_string()
+        client_of(peer.parse().unwrap(), &headers, &trusted).to_string()
     }
 
     #[test]

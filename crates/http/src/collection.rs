@@ -1,4 +1,4 @@
-//! What volumes, models, segmentations and templates have in common: they are listed in pages,
+//! The common routes of volumes, models, segmentations and templates: they are listed in pages,
 //! shown one by one, and erased.
 //!
 //! [`Collection`] says how one kind of thing is read from the catalogue and shown;
@@ -33,7 +33,7 @@ use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Resource, ScanFilter, StoreError,
     TagFilter, Tenant,
 };
@@ -138,10 +138,11 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
-    let catalogue = &*app.queue.catalogue;
-    let found = match Resource::of(id) == Some(C::RESOURCE) {
-        true => C::row(catalogue, tenant, id).await?,
-        false => None,
+    let catalogue = app.service.items().catalogue();
+    let found = if Resource::of(id) == Some(C::RESOURCE) {
+        C::row(catalogue, tenant, id).await?
+    } else {
+        None
     };
     match found {
         Some(row) => Ok(row),
@@ -159,17 +160,25 @@ async fn list<C: Collection>(
     RawQuery(query): RawQuery,
 ) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
     let pairs = query_pairs(query.as_deref());
-    let (tags, pairs) = match C::TAGGED {
-        true => tags::take_filter(&app, pairs)?,
-        false => (TagFilter::default(), pairs),
+    let (tags, pairs) = if C::TAGGED {
+        tags::take_filter(&app, pairs)?
+    } else {
+        (TagFilter::default(), pairs)
     };
-    let (scan, pairs) = match C::SCANNED {
-        true => scans::take_filter(pairs)?,
-        false => (ScanFilter::default(), pairs),
+    let (scan, pairs) = if C::SCANNED {
+        scans::take_filter(pairs)?
+    } else {
+        (ScanFilter::default(), pairs)
     };
     let filter = ItemFilter { tags, scan };
     let (page, []) = page_of(pairs, []).await?;
-    let page = C::rows(&*app.queue.catalogue, &caller.tenant, &filter, page).await?;
+    let page = C::rows(
+        app.service.items().catalogue(),
+        &caller.tenant,
+        &filter,
+        page,
+    )
+    .await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items
@@ -178,7 +187,7 @@ async fn list<C: Collection>(
         .collect::<Result<_, _>>()?;
     let mut headers = HeaderMap::new();
     if C::RESOURCE == Resource::Volume {
-        let limit = HeaderValue::from(app.settings.body_limit.0);
+        let limit = HeaderValue::from(app.service.settings.body_limit.0);
         let limit = [b"max-size=", limit.as_bytes()].concat();
         headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
     }
@@ -201,7 +210,7 @@ async fn show<C: Collection>(
             row,
         )?)?))
     };
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
     let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;

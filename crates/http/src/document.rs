@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
-use ventriform_service::jobs::hex;
+use ventriform_service::records::hex;
 
 /// Another version of the program may publish another document.
 const CACHE_CONTROL: HeaderValue = HeaderValue::from_static("public, max-age=300");
@@ -105,25 +105,25 @@ impl PublishedDocument {
 
     /// The document, or 304 if the client has it.
     pub fn answer(&self, request: &HeaderMap) -> Response {
-        let variant = match takes_gzip(request) {
-            true => &self.gzip,
-            false => &self.plain,
+        let variant = if takes_gzip(request) {
+            &self.gzip
+        } else {
+            &self.plain
         };
         let known = matches_any(request, &header::IF_NONE_MATCH, &variant.etag);
-        let mut response = match known {
-            true => StatusCode::NOT_MODIFIED.into_response(),
-            false => {
-                let json = HeaderValue::from_static("application/json");
-                let mut response = variant.bytes.clone().into_response();
-                response.headers_mut().insert(header::CONTENT_TYPE, json);
-                if let Some(encoding) = &variant.encoding {
-                    let encoding = encoding.clone();
-                    response
-                        .headers_mut()
-                        .insert(header::CONTENT_ENCODING, encoding);
-                }
+        let mut response = if known {
+            StatusCode::NOT_MODIFIED.into_response()
+        } else {
+            let json = HeaderValue::from_static("application/json");
+            let mut response = variant.bytes.clone().into_response();
+            response.headers_mut().insert(header::CONTENT_TYPE, json);
+            if let Some(encoding) = &variant.encoding {
+                let encoding = encoding.clone();
                 response
+                    .headers_mut()
+                    .insert(header::CONTENT_ENCODING, encoding);
             }
+            response
         };
         let headers = response.headers_mut();
         headers.insert(header::CACHE_CONTROL, CACHE_CONTROL);

@@ -17,7 +17,7 @@ use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
+use ventriform_service::records::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
 
 /// The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
 /// to an item.
@@ -190,9 +190,10 @@ pub async fn erase(
         by: agent.of_erasure(),
         reason: ErasureReason::Request,
     };
-    let erased = match Resource::of(&id) == Some(kind) {
-        true => app.queue.erase(order).await?,
-        false => Erased::Unknown,
+    let erased = if Resource::of(&id) == Some(kind) {
+        app.service.items().erase(order).await?
+    } else {
+        Erased::Unknown
     };
     match erased {
         Erased::Done(receipt) => {
@@ -205,7 +206,9 @@ pub async fn erase(
             let body = Json(ReceiptBody::from(*receipt));
             Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
         }
-        Erased::Unknown => Err(missing(&*app.queue.catalogue, &caller.tenant, kind, &id).await),
+        Erased::Unknown => {
+            Err(missing(app.service.items().catalogue(), &caller.tenant, kind, &id).await)
+        }
         Erased::InUse => Err(Problem::new(
             StatusCode::CONFLICT,
             "in-use",
@@ -241,7 +244,7 @@ pub async fn list_erasures(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<ReceiptList>> {
     let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
-    let catalogue = &app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     let page = catalogue
         .receipts(&caller.tenant, item.as_deref(), page)
         .await?;
@@ -264,7 +267,13 @@ pub async fn get_erasure(
     headers: HeaderMap,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    match app.queue.catalogue.receipt(&caller.tenant, &id).await? {
+    match app
+        .service
+        .items()
+        .catalogue()
+        .receipt(&caller.tenant, &id)
+        .await?
+    {
         Some(receipt) => validators::json(&headers, &ReceiptBody::from(receipt)),
         None => Err(no_receipt(&id)),
     }

@@ -11,7 +11,8 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;
 use sha2::{Digest, Sha256};
 use std::ops::Range;
-use ventriform_service::jobs::{FileRecord, OutputFile, Product, ProductFile, hex};
+use ventriform_service::items::OutputFile;
+use ventriform_service::records::{FileRecord, Product, ProductFile, hex};
 
 /// The report as an HTML page. It is made on request, of the other files.
 pub const PAGE: &str = "report.html";
@@ -63,7 +64,11 @@ pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &He
 pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> Answer {
     let read = async |span: Range<u64>| {
         charge(SENT_MEMORY.min(span.end - span.start)).await?;
-        let content = app.queue.read(file.id, &file.record, span).await?;
+        let content = app
+            .service
+            .items()
+            .read(file.id, &file.record, span)
+            .await?;
         Ok(Body::from_stream(content))
     };
     respond(file, headers, CACHE_CONTROL, read).await
@@ -131,9 +136,10 @@ async fn respond(
         None => (StatusCode::OK, 0..file.record.bytes),
     };
     let length = span.end - span.start;
-    let disposition = match file.attached {
-        true => "attachment",
-        false => "inline",
+    let disposition = if file.attached {
+        "attachment"
+    } else {
+        "inline"
     };
     let content = read(span.clone()).await?;
     let mut response = (

@@ -18,25 +18,25 @@ use include_dir::{Dir, include_dir};
 
 static BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
 
-const INDEX: &str = "index.html";
+const INDEX_FILE: &str = "index.html";
 
-const HTML: &str = "text/html; charset=utf-8";
+const HTML_TYPE: &str = "text/html; charset=utf-8";
 
-/// What the names of its files begin with in the page.
-const ROOT: &str = "./";
+/// The beginning of the names of its files in the page.
+const PAGE_ROOT: &str = "./";
 
-/// What the page may do: run the programs and styles that are files of this service, show pictures that
+/// Content security policy of the page: run the programs and styles that are files of this service, show pictures that
 /// it fetched or drew itself, and call its own service. Nothing comes from elsewhere.
-const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
+const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
     connect-src 'self'; form-action 'none'; base-uri 'none'; frame-ancestors 'none'";
 
-/// What may be kept for ever.
+/// Cache control of files that never change.
 const FOR_EVER: &str = "public, max-age=31536000, immutable";
 
-/// What is asked for again each time.
-const CURRENT: &str = "no-cache";
+/// Cache control of files that are asked for again each time.
+const REVALIDATE: &str = "no-cache";
 
-/// The page if the client prefers HTML, else text.
+/// The page if the client prefers HTML_TYPE, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
     let html = negotiate::best_offer(&headers, &["text/plain", "text/html"]) == Some(1);
     let page = html.then(|| index("./", &headers));
@@ -51,9 +51,10 @@ pub async fn welcome(headers: HeaderMap) -> Response {
 
 /// The documentation of the API: the same page, which reads `/openapi.json`.
 pub async fn documentation(uri: Uri, headers: HeaderMap) -> Response {
-    let root = match uri.path().ends_with('/') {
-        true => "../",
-        false => "./",
+    let root = if uri.path().ends_with('/') {
+        "../"
+    } else {
+        "./"
     };
     match index(root, &headers) {
         Some(page) => page,
@@ -68,12 +69,12 @@ fn index(root: &str, headers: &HeaderMap) -> Option<Response> {
         None | Some("") => root.to_owned(),
         Some(prefix) => format!("{prefix}/"),
     };
-    if root == ROOT {
-        return file(INDEX, HTML, CURRENT, headers);
+    if root == PAGE_ROOT {
+        return file(INDEX_FILE, HTML_TYPE, REVALIDATE, headers);
     }
-    let page = BUNDLE.get_file(INDEX)?.contents_utf8()?;
-    let page = page.replace(&format!("\"{ROOT}"), &format!("\"{root}"));
-    Some(described(page.into_response(), HTML, CURRENT))
+    let page = BUNDLE.get_file(INDEX_FILE)?.contents_utf8()?;
+    let page = page.replace(&format!("\"{PAGE_ROOT}"), &format!("\"{root}"));
+    Some(described(page.into_response(), HTML_TYPE, REVALIDATE))
 }
 
 /// A program, style or picture of the page.
@@ -95,7 +96,7 @@ pub async fn icon(headers: HeaderMap) -> Response {
     let assets = BUNDLE.get_dir("assets").into_iter().flat_map(Dir::files);
     let mut names = assets.filter_map(|file| file.path().to_str());
     let name = names.find(|name| name.contains("/icon-") && name.ends_with(".svg"));
-    match name.and_then(|name| file(name, "image/svg+xml", CURRENT, &headers)) {
+    match name.and_then(|name| file(name, "image/svg+xml", REVALIDATE, &headers)) {
         Some(response) => response,
         None => no_such_path().await.into_response(),
     }
@@ -131,7 +132,7 @@ fn described(mut response: Response, media_type: &'static str, kept: &'static st
         (header::CONTENT_TYPE, media_type),
         (header::CACHE_CONTROL, kept),
         (header::VARY, "accept-encoding"),
-        (header::CONTENT_SECURITY_POLICY, POLICY),
+        (header::CONTENT_SECURITY_POLICY, PAGE_POLICY),
     ] {
         response
             .headers_mut()
@@ -175,7 +176,7 @@ The jobs and their progress:
   curl -fsS '{url}/v1/jobs'
 Stored models and segmentations:
   curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'
-The report on a model (or a segmentation) as an HTML page:
+The report on a model (or a segmentation) as an HTML_TYPE page:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 
 All paths: {url}/docs, {url}/openapi.json

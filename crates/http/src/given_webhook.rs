@@ -6,7 +6,7 @@ use super::request::{text, unknown};
 use axum::http::{HeaderMap, HeaderName};
 use serde_json::{Map, Value};
 use ventriform_service::hooks::{HookEvent, SigningSecret, UrlGuard};
-use ventriform_service::jobs::JobWebhook;
+use ventriform_service::records::JobWebhook;
 
 /// The header with the signing secret of a job's webhook.
 pub const SECRET_HEADER: HeaderName = HeaderName::from_static("webhook-secret");
@@ -103,7 +103,7 @@ impl GivenWebhook {
     /// # Errors
     /// 422 that names the part of `webhook` which cannot be used.
     pub async fn of_job(self, app: &App) -> Answer<JobWebhook> {
-        let checked = self.check(&app.hooks.guard).await;
+        let checked = self.check(&app.service.hooks.guard).await;
         let checked = checked.map_err(|problem| problem.within("webhook"))?;
         let names = checked.events.iter().map(|event| event.as_str().to_owned());
         Ok(JobWebhook {
@@ -123,7 +123,7 @@ pub struct CheckedWebhook {
     pub destination: String,
     /// What to tell.
     pub events: Vec<HookEvent>,
-    /// What signs the deliveries.
+    /// The secret that signs the deliveries.
     pub secret: Option<SigningSecret>,
 }
 
@@ -146,9 +146,10 @@ fn events_of(names: &[String]) -> Answer<Vec<HookEvent>> {
             events.push(event);
         }
     }
-    match events.is_empty() {
-        true => Err(wrong("The webhook would be told nothing.".into())),
-        false => Ok(events),
+    if events.is_empty() {
+        Err(wrong("The webhook would be told nothing.".into()))
+    } else {
+        Ok(events)
     }
 }
 

@@ -1,10 +1,8 @@
 //! `/healthz`, `/readyz` and `/metrics`, for operators.
 
 use super::app::App;
-use super::metrics::MetricReadings;
 use super::openapi::ListProblems;
 use super::problem::{Answer, MEDIA_TYPE, Problem, ProblemBody};
-use super::readiness::{Check, why_unready};
 use super::request::{query_pairs, refuse_unknown};
 use axum::Json;
 use axum::extract::{RawQuery, State};
@@ -12,6 +10,8 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
+use ventriform_service::telemetry::MetricReadings;
+use ventriform_service::telemetry::{Check, why_unready};
 
 /// The state of the service.
 #[derive(Serialize, ToSchema)]
@@ -101,9 +101,9 @@ pub async fn alive(RawQuery(query): RawQuery) -> Answer<Json<Health>> {
         ListProblems))]
 pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let found = app.readiness.check(&app.queue).await;
+    let found = app.service.readiness.check(app.service.queue()).await;
     let checks = found.iter().map(Dependency::from).collect();
-    let closing = app.closing.is_cancelled();
+    let closing = app.service.closing.is_cancelled();
     let why = closing.then_some("The service is shutting down.");
     if let Some(why) = why.or_else(|| why_unready(&found)) {
         return Ok(unready(why, checks));
@@ -134,18 +134,18 @@ fn unready(why: &str, checks: Vec<Dependency>) -> Response {
 pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let reading = MetricReadings {
-        load: app.queue.jobs.load().await?,
-        figures: app.figures.queue_figures().await?,
-        received: app.intake.store.waiting().await?,
-        backlog: app.hooks.store.backlog().await?,
-        sent: app.hooks.dispatcher.counts(),
-        archives: app.archives.read().await?,
-        ready: app.readiness.is_ready(&app.queue).await,
-        space: app.queue.blobs.space(),
-        settings: &app.settings,
-        now: app.queue.clock.now(),
+        load: app.service.queue().table().load().await?,
+        figures: app.service.figures.queue_figures().await?,
+        received: app.service.intake.store.waiting().await?,
+        backlog: app.service.hooks.store.backlog().await?,
+        sent: app.service.hooks.dispatcher.counts(),
+        archives: app.service.archives.read().await?,
+        ready: app.service.readiness.is_ready(app.service.queue()).await,
+        space: app.service.items().blobs().space(),
+        settings: &app.service.settings,
+        now: app.service.now(),
     };
-    let text = app.metrics.text(&reading);
+    let text = app.service.metrics.text(&reading);
     let media_type = format!("{}; charset=utf-8", prometheus::TEXT_FORMAT);
     Ok(([(header::CONTENT_TYPE, media_type)], text).into_response())
 }

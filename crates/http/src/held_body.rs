@@ -17,7 +17,7 @@ const PIECE_BYTES: usize = 64 << 10;
 /// `body`, and a value that is dropped with it.
 pub struct HeldBody<T> {
     body: Body,
-    /// What is left of a frame.
+    /// The rest of a frame.
     rest: Bytes,
     _held: T,
 }

@@ -9,14 +9,13 @@ use super::erasures::on_hold;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
-use super::scans;
 use super::validators::json;
 use super::volumes::Volumes;
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use serde_json::{Map, Value};
-use ventriform_service::jobs::ScanFields;
+use ventriform_service::records::ScanFields;
 use ventriform_service::work::dicom;
 
 /// Whose scan a volume is
@@ -61,20 +60,16 @@ pub async fn state_identity(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let stated = json_object(request).await?;
-    let catalogue = &app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     if catalogue.scan(&caller.tenant, &id).await?.is_none() {
-        let found = scans::read(&app, &id, &volume.files).await?;
-        let noted = catalogue.note_scan(&caller.tenant, &id, found.as_ref());
+        let noted = app.service.note_scan(&caller.tenant, &id, &volume.files);
         noted.await?;
     }
     let scan = catalogue.scan(&caller.tenant, &id).await?;
     dicom::check_stated(&scan.unwrap_or_default(), &stated).map_err(|failure| {
         let differs = failure.code == "identity-differs";
         let problem = Problem::from(failure);
-        match differs {
-            true => problem.conflict(),
-            false => problem,
-        }
+        if differs { problem.conflict() } else { problem }
     })?;
     catalogue
         .state_scan(&caller.tenant, &id, &ScanFields(stated))
@@ -101,7 +96,7 @@ pub async fn erase_identity(
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    if app.queue.erase_scan(&caller.tenant, &id).await? {
+    if app.service.items().erase_scan(&caller.tenant, &id).await? {
         return Ok(StatusCode::NO_CONTENT);
     }
     // It was erased after it was looked up, or it is on hold.

@@ -22,7 +22,7 @@ use utoipa::ToSchema;
 use ventriform_service::access::{
     Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
 };
-use ventriform_service::jobs::{Timestamp, parse_rfc3339};
+use ventriform_service::records::{Timestamp, parse_rfc3339};
 
 /// A key. Its secret is shown once, when it is made.
 #[derive(Serialize, ToSchema)]
@@ -125,7 +125,7 @@ pub struct NewKey {
     queued_jobs: Option<u64>,
 }
 
-const FIELDS: [&str; 6] = [
+const KEY_FIELDS: [&str; 6] = [
     "name",
     "scope",
     "expires_at",
@@ -152,11 +152,11 @@ pub async fn create_key(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
+    let now = app.service.now();
     let wanted = read(&json_object(request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
     let event = by.event(Activity::KeyCreated, now).on(&key.id);
-    app.access.add_key(&key, &event).await?;
+    app.service.access.add_key(&key, &event).await?;
     app.guard.gate.refresh();
     let location = public_path(&format!("/v1/keys/{}", key.id));
     let body = KeyBody {
@@ -188,8 +188,8 @@ pub async fn list_keys(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<KeyList>> {
     let (page, []) = list_query(query.as_deref(), []).await?;
-    let now = app.queue.clock.now();
-    let page = app.access.keys(Some(&caller.tenant), page).await?;
+    let now = app.service.now();
+    let page = app.service.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
     let keys = page.items.into_iter().map(|key| KeyBody::of(key, now));
     Ok(Json(KeyList {
@@ -212,7 +212,7 @@ pub async fn revoke_key(
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let key = app.access.key(&id).await?;
+    let key = app.service.access.key(&id).await?;
     if key.is_none_or(|key| key.tenant != caller.tenant) {
         return Err(Problem::new(
             StatusCode::NOT_FOUND,
@@ -221,16 +221,19 @@ pub async fn revoke_key(
         )
         .fix("Take an id from the list at GET /v1/keys."));
     }
-    let now = app.queue.clock.now();
+    let now = app.service.now();
     let event = by.event(Activity::KeyRevoked, now).on(&id);
-    app.access.revoke_key(&id, now, &event).await?;
+    app.service.access.revoke_key(&id, now, &event).await?;
     app.guard.gate.refresh();
     Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())
 }
 
 fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = object
+        .keys()
+        .find(|name| !KEY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &KEY_FIELDS));
     }
     for required in ["name", "scope"] {
         if !object.contains_key(required) {

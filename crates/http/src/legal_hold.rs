@@ -13,7 +13,7 @@ use axum::extract::{RawQuery, Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 use ventriform::text::is_printable;
-use ventriform_service::jobs::LegalHold;
+use ventriform_service::records::LegalHold;
 
 /// Put a volume on legal hold
 ///
@@ -39,7 +39,7 @@ pub async fn hold_volume(
     }
     let hold = LegalHold {
         reason: reason(object.get("reason"))?,
-        since: app.queue.clock.now(),
+        since: app.service.now(),
         by: caller.name.clone(),
     };
     set(&app, &caller, &id, Some(&hold)).await?;
@@ -67,27 +67,27 @@ pub async fn release_volume(
 }
 
 async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> Answer<()> {
-    let catalogue = &app.queue.catalogue;
-    match catalogue.set_legal_hold(&caller.tenant, id, hold).await? {
-        true => Ok(()),
-        // It was erased after it was looked up.
-        false => find::<Volumes>(app, &caller.tenant, id).await.map(|_| ()),
+    let catalogue = app.service.items().catalogue();
+    if catalogue.set_legal_hold(&caller.tenant, id, hold).await? {
+        Ok(())
+    } else {
+        find::<Volumes>(app, &caller.tenant, id).await.map(|_| ())
     }
 }
 
 fn reason(value: Option<&Value>) -> Answer<String> {
     let text = value.and_then(Value::as_str).unwrap_or_default().trim();
     let control = |c: char| !is_printable(c) && c != '\n';
-    match (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control)
-    {
-        true => Ok(text.to_owned()),
-        false => Err(Problem::invalid_field(
+    if (1..=LegalHold::REASON_LENGTH).contains(&text.chars().count()) && !text.contains(control) {
+        Ok(text.to_owned())
+    } else {
+        Err(Problem::invalid_field(
             "reason",
             format!(
                 "`reason` must be a text of 1 to {} printable characters.",
                 LegalHold::REASON_LENGTH
             ),
         )
-        .fix("Say why the volume must be kept, such as the number of a case.")),
+        .fix("Say why the volume must be kept, such as the number of a case."))
     }
 }

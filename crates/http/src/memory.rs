@@ -1,334 +1,54 @@
-//! The memory that requests hold, shared out between clients.
+//! The memory of answers: an answer holds its own size until it has been read.
 //!
-//! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`PATIENCE`], or a 503.
-//!
-//! Whatever a client can make the service keep for it is charged here before it is taken: the part of a body
-//! that is gathered, what is made of it, the rows of a page, the answer until it is read. What is decoded has a
-//! budget of its own ([`super::decoding`]).
-//!
-//! **Shares.** Of the budget (setting `request_memory`), a client gets no more than it leaves free. So one client
-//! alone has at most half of it, two have a third each, and there is always something left for a client
-//! that holds little. (The rule is that of dynamic thresholds for shared buffers: A. K. Choudhury and
-//! E. L. Hahne, IEEE/ACM Transactions on Networking 6, 1998.)
-//!
-//! A request charges by [`charge`], which notes what it holds in a [`Ledger`] of the request. When the handler
-//! has ended, the ledger goes with the body of the answer ([`Ledger::answered`]), and ends with it.
+//! What a request holds before is charged by [`charge`]; see [`ventriform_service::memory`].
 
-use super::client::ClientAddress;
 use super::held_body::HeldBody;
-use super::problem::{Answer, Problem};
+use super::problem::Answer;
 use axum::body::{Body, HttpBody};
-use axum::http::{StatusCode, header};
 use axum::response::Response;
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use tokio::sync::Notify;
-use tokio::time::{Instant, timeout_at};
-
-/// Longest time for which a request waits for memory.
-const PATIENCE: Duration = Duration::from_secs(2);
+pub use ventriform_service::memory::{Ledger, charge};
 
 /// Bytes of an answer that are not charged: the system's buffers hold as many.
-const SMALL_ANSWER: u64 = 16 << 10;
+const SMALL_ANSWER_BYTES: u64 = 16 << 10;
 
-/// The budget that all requests share.
-#[derive(Clone)]
-pub struct MemoryBudget(Arc<Shared>);
-
-struct Shared {
-    limit: u64,
-    used: Mutex<Used>,
-    freed: Notify,
-}
-
-#[derive(Default)]
-struct Used {
-    total: u64,
-    by_client: BTreeMap<ClientAddress, u64>,
-}
-
-/// Memory that a client holds until this is dropped.
-pub struct HeldMemory {
-    budget: MemoryBudget,
-    client: ClientAddress,
-    bytes: u64,
-}
-
-impl MemoryBudget {
-    /// A budget of `limit` bytes.
-    pub fn new(limit: u64) -> Self {
-        Self(Arc::new(Shared {
-            limit,
-            used: Mutex::default(),
-            freed: Notify::new(),
-        }))
-    }
-
-    /// Nothing yet, for the client of the current request.
-    pub fn hold(&self) -> HeldMemory {
-        HeldMemory {
-            budget: self.clone(),
-            client: ClientAddress::current(),
-            bytes: 0,
-        }
-    }
-
-    fn used(&self) -> MutexGuard<'_, Used> {
-        // A panic cannot leave it half changed: each change is a few plain statements.
-        self.0.used.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Takes `bytes` for a client if it leaves `share` times as much free as it then has.
-    fn take(&self, client: ClientAddress, bytes: u64, share: u64) -> bool {
-        let mut used = self.used();
-        let free = self.0.limit.saturating_sub(used.total);
-        let own = used.by_client.get(&client).copied().unwrap_or(0);
-        let all = own.saturating_add(bytes);
-        if all.saturating_mul(share) > free.saturating_sub(bytes) {
-            return false;
-        }
-        used.total += bytes;
-        used.by_client.insert(client, all);
-        true
-    }
-
-    fn give_back(&self, client: ClientAddress, bytes: u64) {
-        if bytes == 0 {
-            return;
-        }
-        let mut used = self.used();
-        used.total = used.total.saturating_sub(bytes);
-        if let Some(own) = used.by_client.get_mut(&client) {
-            *own = own.saturating_sub(bytes);
-            if *own == 0 {
-                used.by_client.remove(&client);
-            }
-        }
-        drop(used);
-        self.0.freed.notify_waiters();
-    }
-}
-
-impl HeldMemory {
-    /// Holds `bytes` more, if the client's share has them now.
-    pub fn try_grow(&mut self, bytes: u64) -> bool {
-        // What is larger than any share takes the largest one.
-        let bytes = bytes.min((self.budget.0.limit / 2).saturating_sub(self.bytes));
-        self.take(bytes, 1)
-    }
-
-    /// Holds `bytes` more, if that leaves something of the client's share to what cannot do without.
-    pub fn try_extend(&mut self, bytes: u64) -> bool {
-        self.take(bytes, 2)
-    }
-
-    fn take(&mut self, bytes: u64, share: u64) -> bool {
-        let taken = self.budget.take(self.client, bytes, share);
-        if taken {
-            self.bytes += bytes;
-        }
-        taken
-    }
-
-    /// Holds `bytes` more, as soon as the client's share has them.
-    ///
-    /// # Errors
-    /// 503 if it has not within [`PATIENCE`].
-    pub async fn grow(&mut self, bytes: u64) -> Answer<()> {
-        let late = Instant::now() + PATIENCE;
-        loop {
-            // Before looking, so that nothing is missed in between.
-            let budget = self.budget.clone();
-            let freed = budget.0.freed.notified();
-            tokio::pin!(freed);
-            freed.as_mut().enable();
-            if self.try_grow(bytes) {
-                return Ok(());
-            }
-            if timeout_at(late, freed).await.is_err() {
-                return Err(busy());
-            }
-        }
-    }
-
-    /// Holds no more than `bytes`.
-    fn shrink(&mut self, bytes: u64) {
-        let surplus = self.bytes.saturating_sub(bytes);
-        self.bytes -= surplus;
-        self.budget.give_back(self.client, surplus);
-    }
-
-    /// Bytes that are held.
-    pub fn bytes(&self) -> u64 {
-        self.bytes
-    }
-}
-
-impl Drop for HeldMemory {
-    fn drop(&mut self) {
-        self.budget.give_back(self.client, self.bytes);
-    }
-}
-
-fn busy() -> Problem {
-    Problem::new(
-        StatusCode::SERVICE_UNAVAILABLE,
-        "busy",
-        "The requests of this client hold as much memory as one client may.",
-    )
-    .header(header::RETRY_AFTER, "1")
-    .fix("Send fewer requests at the same time, and read their answers.")
-}
-
-/// What a request holds.
-#[derive(Clone)]
-pub struct Ledger(Arc<tokio::sync::Mutex<HeldMemory>>);
-
-tokio::task_local! {
-    static LEDGER: Ledger;
-}
-
-impl Ledger {
-    /// An empty ledger for the current request.
-    pub fn new(budget: &MemoryBudget) -> Self {
-        Self(Arc::new(tokio::sync::Mutex::new(budget.hold())))
-    }
-
-    /// Runs the answering of the request.
-    pub async fn scope<T>(self, answer: impl Future<Output = T>) -> T {
-        LEDGER.scope(self, answer).await
-    }
-
-    /// The answer, which holds its own size until it is read; one that is not in memory as a whole holds what the
-    /// request holds.
-    ///
-    /// # Errors
-    /// 503 if there is no memory for it.
-    pub async fn answered(self, response: Response) -> Answer<Response> {
-        let held = &mut *self.0.lock().await;
-        // What was needed to make an answer that is in memory as a whole is no longer needed.
-        if let Some(size) = response.body().size_hint().exact() {
-            let size = match size <= SMALL_ANSWER {
-                true => 0,
-                false => size,
-            };
-            held.shrink(size);
-            held.grow(size - held.bytes.min(size)).await?;
-        }
-        if held.bytes == 0 {
-            return Ok(response);
-        }
-        let ledger = self.clone();
-        Ok(response.map(|body| Body::new(HeldBody::new(body, ledger))))
-    }
-}
-
-/// Charges the current request for memory that it is about to hold. Work that belongs to no request holds
-/// what it needs.
+/// The answer, which holds its own size until it is read; one that is not in memory as a whole holds what the
+/// request holds.
 ///
 /// # Errors
-/// 503 if the client's share has not as much within two seconds.
-pub async fn charge(bytes: u64) -> Answer<()> {
-    match LEDGER.try_with(Ledger::clone) {
-        Ok(ledger) => ledger.0.lock().await.grow(bytes).await,
-        Err(_) => Ok(()),
+/// 503 if there is no memory for it.
+pub async fn answered(ledger: &Ledger, response: Response) -> Answer<Response> {
+    // What was needed to make an answer that is in memory as a whole is no longer needed.
+    if let Some(size) = response.body().size_hint().exact() {
+        let charged = if size <= SMALL_ANSWER_BYTES { 0 } else { size };
+        ledger.settle(charged).await?;
     }
+    if ledger.bytes().await == 0 {
+        return Ok(response);
+    }
+    let ledger = ledger.clone();
+    Ok(response.map(|body| Body::new(HeldBody::new(body, ledger))))
 }
 
 #[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    reason = "tests state their expectations by panicking"
+)]
 mod tests {
     use super::*;
-    use std::net::IpAddr;
-
-    fn client(n: u8) -> ClientAddress {
-        ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]))
-    }
-
-    /// Takes as much as it can for a client, in pieces.
-    fn greedy(budget: &MemoryBudget, n: u8) -> Vec<HeldMemory> {
-        let mut all = Vec::new();
-        loop {
-            let mut held = HeldMemory {
-                budget: budget.clone(),
-                client: client(n),
-                bytes: 0,
-            };
-            if !held.try_grow(10) {
-                return all;
-            }
-            all.push(held);
-        }
-    }
-
-    #[test]
-    fn however_many_are_greedy_another_client_gets_something() {
-        let budget = MemoryBudget::new(100_000);
-        let mut greedy_ones = Vec::new();
-        for n in 1..20_u8 {
-            let own = greedy(&budget, n);
-            let got: u64 = own.iter().map(HeldMemory::bytes).sum();
-            assert!(got > 0, "client {n} got nothing");
-            if n == 1 {
-                assert!((49_000..=50_000).contains(&got), "{got}");
-            }
-            assert!(greedy(&budget, n).is_empty());
-            if n < 8 {
-                greedy_ones.push(own);
-            }
-        }
-        assert!(budget.used().total < 100_000);
-        drop(greedy_ones);
-        assert_eq!(budget.used().total, 0);
-        // What is only faster with memory leaves some of the share to what needs it.
-        let mut fast = greedy(&budget, 1);
-        fast.truncate(1);
-        while fast[0].try_extend(10) {}
-        assert!((33_000..=33_400).contains(&fast[0].bytes()));
-        assert!(fast[0].try_grow(10_000));
-        drop(fast);
-        assert!(budget.used().by_client.is_empty());
-    }
-
-    #[tokio::test]
-    async fn what_waits_gets_what_is_freed_and_does_not_wait_for_ever() {
-        let budget = MemoryBudget::new(1000);
-        let mut first = client(1).scope(async { budget.hold() }).await;
-        first.grow(500).await.unwrap();
-        let mut second = client(1).scope(async { budget.hold() }).await;
-        let waits = second.grow(100);
-        let frees = async {
-            tokio::time::sleep(Duration::from_millis(50)).await;
-            drop(first);
-        };
-        let (got, ()) = tokio::join!(waits, frees);
-        got.unwrap();
-        assert_eq!(budget.used().total, 100);
-        // More than any share is the whole share.
-        let mut large = client(2).scope(async { budget.hold() }).await;
-        let began = Instant::now();
-        let late = large.grow(10_000).await;
-        assert!(late.is_err() && began.elapsed() >= PATIENCE);
-        drop(second);
-        large.grow(10_000).await.unwrap();
-        assert_eq!(large.bytes(), 500);
-    }
+    use ventriform_service::memory::MemoryBudget;
 
     #[tokio::test]
     async fn an_answer_holds_its_memory_until_it_is_gone() {
-        let budget = MemoryBudget::new(1 << 20);
-        let ledger = Ledger::new(&budget);
+        let ledger = Ledger::new(&MemoryBudget::new(1 << 20));
         let answer = ledger.clone().scope(async {
             charge(300_000).await.unwrap();
             Response::new(Body::from(vec![0; 200_000]))
         });
         let answer = answer.await;
-        assert_eq!(budget.used().total, 300_000);
-        let answer = ledger.answered(answer).await.unwrap();
-        assert_eq!(budget.used().total, 200_000);
-        let length = answer.body().size_hint().exact();
-        assert_eq!(length, Some(200_000));
-        drop(answer);
-        assert_eq!(budget.used().total, 0);
+        assert_eq!(ledger.bytes().await, 300_000);
+        let answer = answered(&ledger, answer).await.unwrap();
+        assert_eq!(ledger.bytes().await, 200_000);
+        assert_eq!(answer.body().size_hint().exact(), Some(200_000));
     }
 }

@@ -11,7 +11,7 @@ use super::wire::path_of;
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{Product, Resource};
+use ventriform_service::records::{Product, Resource};
 
 /// The collection of models.
 pub struct Models;

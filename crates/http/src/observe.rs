@@ -1,10 +1,9 @@
-//! What operators see of a request: its id and trace, one line in the log, and the count of
+//! The trace of a request for operators: its id and trace, one line in the log, and the count of
 //! answers. The functions here are called by the layers that [`super::router`] lists.
 //!
 //! The log shows the pattern of a path and never the path itself, because ids lead to patients.
 
 use super::app::App;
-use super::metrics::RequestMetrics;
 use axum::body::{Body, Bytes, HttpBody};
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Response, StatusCode};
@@ -18,6 +17,7 @@ use std::time::{Duration, Instant};
 use tower_http::request_id::{MakeRequestId, RequestId};
 use tower_http::trace::{MakeSpan, OnResponse};
 use tracing::Span;
+use ventriform_service::telemetry::RequestMetrics;
 
 /// The header with the id of a request, and of its answer.
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -58,7 +58,7 @@ pub async fn continue_trace(
 ) -> AxumResponse {
     let given = Trace::of(request.headers());
     let route = request.extensions().get::<MatchedPath>();
-    let span = app.spans.request(
+    let span = app.service.spans.request(
         method_of(&request),
         route.map_or(NO_ROUTE, MatchedPath::as_str),
         given
@@ -189,7 +189,7 @@ fn method_of(request: &Request) -> &'static str {
 /// Counts a request, its answer and their bodies, and times the answer.
 pub async fn measure(State(app): State<App>, request: Request, next: Next) -> AxumResponse {
     let method = method_of(&request);
-    let metrics = &app.metrics.requests;
+    let metrics = &app.service.metrics.requests;
     let waiting = Waiting {
         metrics: metrics.clone(),
         since: Instant::now(),

@@ -7,7 +7,6 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::find;
-use super::decoding::LITTLE_MEMORY;
 use super::files::{self, Download};
 use super::openapi::{self, ConditionalHeaders, DownloadAnswers, LookupProblems};
 use super::problem::not_found::no_such_file;
@@ -19,7 +18,8 @@ use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, StatusCode};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{FileRecord, Resource, StoredVolume};
+use ventriform_service::decoding::LITTLE_MEMORY;
+use ventriform_service::records::{FileRecord, Resource, StoredVolume};
 
 /// Download an upload
 ///
@@ -83,12 +83,12 @@ async fn is_bare(app: &App, volume: &StoredVolume, file: &FileRecord) -> Answer<
     if volume.files.len() > 1 {
         return Ok(false);
     }
-    let Some(local) = app.queue.blobs.local(&volume.id, file).await? else {
+    let Some(local) = app.service.items().blobs().local(&volume.id, file).await? else {
         return Ok(false);
     };
-    let reader = app.engine.reader.clone();
+    let reader = app.service.engine.reader.clone();
     let look = move |monitor: &Monitor<'_>| reader.is_bare(&local, monitor);
-    Ok(app.decoding.run(LITTLE_MEMORY, look).await??)
+    Ok(app.service.decoding.run(LITTLE_MEMORY, look).await??)
 }
 
 async fn send(

@@ -3,12 +3,12 @@
 use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::request::{query_pairs, refuse_unknown};
-use ventriform_service::jobs::{ListPage, ListRequest};
+use ventriform_service::records::{ListPage, ListRequest};
 
 /// Entries of a page unless `limit` says otherwise.
-const USUAL: u32 = 20;
+const DEFAULT_PAGE_ITEMS: u32 = 20;
 /// Greatest `limit`.
-const MOST: u32 = 100;
+const MAX_PAGE_ITEMS: u32 = 100;
 
 /// Memory for one entry of a page: its row, what is made of it, and its JSON. Labels of 16 KiB are the largest part.
 const ENTRY_MEMORY: u64 = 64 << 10;
@@ -37,7 +37,7 @@ pub async fn page_of<const N: usize>(
     };
     let page = ListRequest {
         before: value("cursor").map(|c| parse_cursor(&c)).transpose()?,
-        limit: value("limit").map_or(Ok(USUAL), |l| parse_limit(&l))?,
+        limit: value("limit").map_or(Ok(DEFAULT_PAGE_ITEMS), |l| parse_limit(&l))?,
     };
     charge(ENTRY_MEMORY * u64::from(page.limit)).await?;
     Ok((page, own.map(value)))
@@ -45,14 +45,14 @@ pub async fn page_of<const N: usize>(
 
 fn parse_limit(text: &str) -> Answer<u32> {
     match text.parse() {
-        Ok(limit @ 1..=MOST) => Ok(limit),
+        Ok(limit @ 1..=MAX_PAGE_ITEMS) => Ok(limit),
         _ => Err(Problem::bad_request(
             "invalid-parameter",
-            format!("`limit` must be a whole number from 1 to {MOST}."),
+            format!("`limit` must be a whole number from 1 to {MAX_PAGE_ITEMS}."),
         )
         .at("limit")
         .fix(format!(
-            "Give a whole number from 1 to {MOST}, or leave `limit` out for {USUAL}."
+            "Give a whole number from 1 to {MAX_PAGE_ITEMS}, or leave `limit` out for {DEFAULT_PAGE_ITEMS}."
         ))),
     }
 }

@@ -1,4 +1,4 @@
-//! What models, segmentations and templates have in common beside being [`Collection`]s: a mesh
+//! The common routes of models, segmentations and templates beside being [`Collection`]s: a mesh
 //! in several formats, files that can be downloaded, and perhaps a report.
 //!
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
@@ -6,9 +6,7 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::{Collection, find};
-use super::decoding::LITTLE_MEMORY;
 use super::files;
-use super::kept::Keep;
 use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
@@ -18,6 +16,7 @@ use super::openapi::{
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
 use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
+use super::response_cache::Keep;
 use super::scans::{self, ScanUidsBody};
 use super::wire::path_of;
 use axum::extract::{RawQuery, State};
@@ -39,7 +38,8 @@ use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::decoding::LITTLE_MEMORY;
+use ventriform_service::records::{
     Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
 };
 use ventriform_service::work::{UploadFacts, dicom, part};
@@ -168,7 +168,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     if !P::MESHES.is_empty() {
         routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
     }
-    if P::FILES.contains(&REPORT) {
+    if P::FILES.contains(&REPORT_FILE) {
         let report = download(
             "report",
             &format!("get_{noun}_report"),
@@ -186,38 +186,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
 const PAGE_MEMORY_PER_BYTE: u64 = 8;
 
 /// The file that holds the report.
-const REPORT: &str = "report.json";
-
-/// 409 where the tenant has as many products of that kind as the setting of that name allows.
-pub async fn refuse_when_full<P: ProductCollection>(
-    app: &App,
-    tenant: &Tenant,
-    limit: u32,
-    setting: &str,
-) -> Answer<()> {
-    let page = ListRequest {
-        before: None,
-        limit,
-    };
-    let filter = ItemFilter::default();
-    let page = app
-        .queue
-        .catalogue
-        .products(tenant, P::RESOURCE, &filter, page)
-        .await?;
-    if page.items.len() < limit as usize {
-        return Ok(());
-    }
-    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
-    Err(Problem::new(
-        StatusCode::CONFLICT,
-        "library-full",
-        format!("There are {limit} {plural} already, the most that this service allows."),
-    )
-    .fix(format!(
-        "DELETE a {noun} first, or ask the operator to raise `{setting}`."
-    )))
-}
+const REPORT_FILE: &str = "report.json";
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]
@@ -357,7 +326,7 @@ impl Offer {
 
     fn reports() -> [Self; 2] {
         [
-            Self::new("application/json", REPORT),
+            Self::new("application/json", REPORT_FILE),
             Self::new("text/html", files::PAGE),
         ]
     }
@@ -375,7 +344,7 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
 
 /// The tenant's product of that id, or the 404 or 410 that says why there is none.
 pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     match catalogue.product(tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
@@ -388,11 +357,12 @@ pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
 impl Keep for Arc<Product> {
     fn bytes(&self) -> usize {
         /// Of a file's record, and of an item beside its maps.
-        const RECORD: usize = 400;
+        const RECORD_BYTES: usize = 400;
         /// By how much a JSON object in memory is larger than its text.
         const IN_MEMORY: usize = 4;
         let text = |map| serde_json::to_string(map).map_or(0, |text: String| text.len());
-        IN_MEMORY * (text(&self.parameters) + text(&self.summary)) + RECORD * (self.files.len() + 1)
+        IN_MEMORY * (text(&self.parameters) + text(&self.summary))
+            + RECORD_BYTES * (self.files.len() + 1)
     }
 }
 
@@ -404,9 +374,13 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
     };
     // What is used of it tells nobody whose scan it is.
     let asker = (tenant, false);
-    let kept = app
-        .products
-        .get(&*app.queue.catalogue, asker, P::RESOURCE, id, read);
+    let kept = app.products.get(
+        app.service.items().catalogue(),
+        asker,
+        P::RESOURCE,
+        id,
+        read,
+    );
     let ControlFlow::<Infallible, _>::Continue(product) = kept.await?;
     Ok(product)
 }
@@ -440,7 +414,7 @@ async fn get_mesh<P: ProductCollection>(
     let Some(part) = wanted_part(&pairs)? else {
         return get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await;
     };
-    refuse_unknown(&pairs, &[PART])?;
+    refuse_unknown(&pairs, &[PART_PARAMETER])?;
     let State(app) = &state;
     let product = kept::<P>(app, &caller.tenant, id_text).await?;
     let offers = Offer::meshes();
@@ -453,11 +427,11 @@ async fn get_mesh<P: ProductCollection>(
 }
 
 /// The query parameter that asks for one part of a mesh.
-const PART: &str = "part";
+const PART_PARAMETER: &str = "part";
 
 /// The part that a request asks for.
 fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
-    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART) else {
+    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART_PARAMETER) else {
         return Ok(None);
     };
     let part = Part::named(name).ok_or_else(|| {
@@ -466,7 +440,7 @@ fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
             "invalid-parameter",
             "`part` names no part of a ventricle's wall.",
         )
-        .at(PART)
+        .at(PART_PARAMETER)
         .fix(format!(
             "Give one of {names}, or leave it out for the closed mesh."
         ))
@@ -492,19 +466,20 @@ async fn send_part(
     };
     charge(size).await?;
     let stored = app
-        .queue
+        .service
+        .items()
         .with_files(product.clone(), &[source.as_str()])
         .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
     let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
-    match app.decoding.run(memory, make).await?? {
+    match app.service.decoding.run(memory, make).await?? {
         Some(file) => files::send_derived(product, file, headers).await,
         None => Err(Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
             format!("The triangles of this mesh do not say which are {}.", part.as_str()),
         )
-        .at(PART)
+        .at(PART_PARAMETER)
         .fix(
             "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
              job is started again.",
@@ -556,7 +531,7 @@ async fn get_file<P: ProductCollection>(
     let mesh = mesh_names::<P>().any(|mesh| mesh == name);
     let known: &[&str] = match object.is_some() || name == files::PAGE {
         true => &["deidentify"],
-        false if mesh => &[PART],
+        false if mesh => &[PART_PARAMETER],
         false => &[],
     };
     refuse_unknown(&pairs, known)?;
@@ -597,23 +572,32 @@ async fn send_object(
     let id = &product.id;
     let size: u64 = product.files.iter().map(|file| file.bytes).sum();
     charge(size).await?;
-    let result = app.queue.result(tenant, id, dicom::FILES).await?;
+    let result = app.service.items().result(tenant, id, dicom::FILES).await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
-    let secret = match deidentify {
-        true => Some(app.queue.catalogue.deidentification_secret(tenant).await?),
-        false => None,
+    let secret = if deidentify {
+        Some(
+            app.service
+                .items()
+                .catalogue()
+                .deidentification_secret(tenant)
+                .await?,
+        )
+    } else {
+        None
     };
     let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
-    let limits = app.engine.limits;
+    let limits = app.service.engine.limits;
     let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
-    let made = app.decoding.run(memory, make).await?.map_err(|failure| {
-        let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
-        let problem = Problem::from(failure);
-        match unknown {
-            true => problem.conflict(),
-            false => problem,
-        }
-    })?;
+    let made = app
+        .service
+        .decoding
+        .run(memory, make)
+        .await?
+        .map_err(|failure| {
+            let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
+            let problem = Problem::from(failure);
+            if unknown { problem.conflict() } else { problem }
+        })?;
     match made {
         Some(file) => files::send_object(product, file, headers).await,
         None => {
@@ -676,7 +660,12 @@ impl<'a> Asker<'a> {
         let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
             return Ok(Map::new());
         };
-        let scan = app.queue.catalogue.scan(self.tenant, volume).await?;
+        let scan = app
+            .service
+            .items()
+            .catalogue()
+            .scan(self.tenant, volume)
+            .await?;
         let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
         Ok(shown.unwrap_or_default())
     }
@@ -692,7 +681,7 @@ async fn send_named(
     if let Some(file) = product.file(name) {
         return files::send(app, product, file, headers).await;
     }
-    let work = app.engine.work(product.resource().noun());
+    let work = app.service.engine.work(product.resource().noun());
     match work.filter(|_| name == files::PAGE).cloned() {
         Some(work) => {
             let files = product.files.iter();
@@ -700,12 +689,13 @@ async fn send_named(
             let size: u64 = needed.map(|file| file.bytes).sum();
             charge(PAGE_MEMORY_PER_BYTE * size).await?;
             let stored = app
-                .queue
+                .service
+                .items()
                 .with_files(product.clone(), work.page_files())
                 .await?;
             let scan = asker.sees(app, product).await?;
             let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
-            let page = app.decoding.run(LITTLE_MEMORY, draw).await??;
+            let page = app.service.decoding.run(LITTLE_MEMORY, draw).await??;
             files::send_page(product, page, headers).await
         }
         None => {

@@ -17,10 +17,10 @@ use std::net::IpAddr;
 use std::sync::Arc;
 use ventriform_service::config::{BasePath, Networks};
 
-const PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
-const HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
-const PORT: HeaderName = HeaderName::from_static("x-forwarded-port");
-const PREFIX: HeaderName = HeaderName::from_static("x-forwarded-prefix");
+const X_FORWARDED_PROTO: HeaderName = HeaderName::from_static("x-forwarded-proto");
+const X_FORWARDED_HOST: HeaderName = HeaderName::from_static("x-forwarded-host");
+const X_FORWARDED_PORT: HeaderName = HeaderName::from_static("x-forwarded-port");
+const X_FORWARDED_PREFIX: HeaderName = HeaderName::from_static("x-forwarded-prefix");
 
 /// Longest name of a host that is used, with its port.
 const LONGEST_HOST: usize = 260;
@@ -29,7 +29,7 @@ tokio::task_local! {
     static CURRENT: Arc<PublicBase>;
 }
 
-/// What is known beforehand.
+/// The parts that are known beforehand.
 #[derive(Debug, Clone, Default)]
 pub struct ProxyPolicy {
     /// The proxies whose word is taken.
@@ -57,9 +57,10 @@ impl PublicBase {
             host: first(headers, &header::HOST).filter(|host| is_host(host)),
             prefix: policy.base_path.clone(),
         };
-        Arc::new(match policy.trusted.contain(peer.to_canonical()) {
-            true => own.forwarded(headers, policy),
-            false => own,
+        Arc::new(if policy.trusted.contain(peer.to_canonical()) {
+            own.forwarded(headers, policy)
+        } else {
+            own
         })
     }
 
@@ -69,19 +70,19 @@ impl PublicBase {
         let stated = |name: HeaderName, parameter: &str| {
             first(headers, &name).or_else(|| pair(&element, parameter))
         };
-        let https = match stated(PROTO, "proto") {
+        let https = match stated(X_FORWARDED_PROTO, "proto") {
             Some(scheme) if scheme.eq_ignore_ascii_case("https") => true,
             Some(scheme) if scheme.eq_ignore_ascii_case("http") => false,
             _ => self.https,
         };
-        let port = first(headers, &PORT).and_then(|port| port.parse::<u16>().ok());
+        let port = first(headers, &X_FORWARDED_PORT).and_then(|port| port.parse::<u16>().ok());
         let usual = if https { 443 } else { 80 };
-        let host = stated(HOST, "host").filter(|host| is_host(host));
+        let host = stated(X_FORWARDED_HOST, "host").filter(|host| is_host(host));
         let host = host.map(|host| match port.filter(|port| *port != usual) {
             Some(port) if !has_port(&host) => format!("{host}:{port}"),
             _ => host,
         });
-        let prefixes = headers.get_all(PREFIX).iter();
+        let prefixes = headers.get_all(X_FORWARDED_PREFIX).iter();
         let prefixes = prefixes.flat_map(|value| value.to_str().unwrap_or("?").split(','));
         let joined: String = prefixes
             .map(|prefix| prefix.trim().trim_end_matches('/'))

@@ -2,25 +2,26 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::decoding::LITTLE_MEMORY;
 use super::openapi::{self, UploadProblems};
 use super::problem::{Answer, ProblemBody};
-use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::quota::reserve_item;
 use super::request::{json_bytes, query_pairs, refuse_unknown};
 use super::wire::{added, path_of, rfc3339};
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
-use ventriform::progress::Monitor;
 use ventriform_service::config::Size;
-use ventriform_service::jobs::{ProductRoom, Resource, check_name};
+use ventriform_service::error::ServiceError;
+use ventriform_service::items::check_name;
+use ventriform_service::records::Resource;
 
 /// Largest profile: 5000 masks with two hashes each.
 pub const PROFILE_SIZE: Size = Size(1 << 20);
 
 /// The file of a profile.
-const PROFILE: &str = "profile.json";
+const PROFILE_FILE: &str = "profile.json";
 
 /// The collection of readers.
 pub struct Readers;
@@ -30,7 +31,7 @@ impl ProductCollection for Readers {
     const SCANNED: bool = false;
     type Body = ReaderBody;
     const MESHES: &'static [&'static str] = &[];
-    const FILES: &'static [&'static str] = &[PROFILE];
+    const FILES: &'static [&'static str] = &[PROFILE_FILE];
     const FILE_SCHEMA: &'static str = "ReaderFileName";
     const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
     type FileAnswer = openapi::ReaderFileAnswer;
@@ -80,7 +81,7 @@ impl From<Presented> for ReaderBody {
             files: DownloadBody::all(&product),
             software: SoftwareBody::of(&product),
             links: ReaderLinks {
-                profile: format!("{itself}/{PROFILE}"),
+                profile: format!("{itself}/{PROFILE_FILE}"),
                 itself,
             },
             id: product.id,
@@ -112,21 +113,19 @@ pub async fn create_reader(
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let pairs = query_pairs(query.as_deref());
     refuse_unknown(&pairs, &["name"])?;
     let name = pairs.first().map_or("reader", |(_, value)| value.as_str());
-    check_name(name)?;
+    check_name(name).map_err(ServiceError::from)?;
     let tenant = &caller.tenant;
-    let room = ProductRoom {
-        count: app.settings.reader_limit,
-        bytes: caller.quota.bytes,
-    };
-    refuse_when_full::<Readers>(&app, tenant, room.count, "reader_limit").await?;
+    let service = &app.service;
+    service
+        .require_product_room(tenant, Resource::Reader)
+        .await?;
     let profile = json_bytes(request).await?;
-    let reader = app.engine.reader.clone();
-    let check = move |_: &Monitor<'_>| reader.profile(&profile);
-    let output = app.decoding.run(LITTLE_MEMORY, check).await??;
-    let (stored, new) = app.queue.add_reader(tenant, name, output, room).await?;
+    let added_reader = service.add_reader(tenant, name, profile, caller.quota, &counting);
+    let (stored, new) = added_reader.await?;
     let body = ReaderBody::from(Presented::of(&app, stored));
     Ok(added(new, &body.id, &body))
 }

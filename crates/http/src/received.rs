@@ -150,7 +150,12 @@ pub async fn list_received(
 ) -> Answer<Json<ReceivedList>> {
     let (page, [state]) = list_query(query.as_deref(), ["state"]).await?;
     let state = state.map(|name| parse_state(&name)).transpose()?;
-    let page = app.intake.store.groups(&caller.tenant, state, page).await?;
+    let page = app
+        .service
+        .intake
+        .store
+        .groups(&caller.tenant, state, page)
+        .await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceivedList {
         intake: page.items.into_iter().map(ReceivedBody::from).collect(),
@@ -177,7 +182,7 @@ pub async fn forget_received(
     RawQuery(query): RawQuery,
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let removed = app.intake.store.remove(&caller.tenant, &id).await?;
+    let removed = app.service.intake.store.remove(&caller.tenant, &id).await?;
     let files = removed.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,
@@ -186,6 +191,6 @@ pub async fn forget_received(
         )
         .fix("List what was received by GET /v1/intake.")
     })?;
-    app.intake.files.discard(&files).await?;
+    app.service.intake.files.discard(&files).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -159,7 +159,7 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
     }
     let limits = BodyLimits::of(&request)?;
     let mut pieces = request.into_body().into_data_stream();
-    let (mut bytes, mut charged) = (Vec::new(), UNCHARGED);
+    let (mut bytes, mut charged) = (Vec::new(), UNCHARGED_BYTES);
     while let Some(piece) = pieces.next().await {
         let piece = piece.map_err(|error| body::interrupted(&error, limits.size))?;
         while bytes.len() + piece.len() > charged {
@@ -173,7 +173,7 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
 }
 
 /// Bytes of a body in memory that are not charged, and that are charged at once beyond these.
-const UNCHARGED: usize = 8 << 10;
+const UNCHARGED_BYTES: usize = 8 << 10;
 const CHARGED_AT_ONCE: usize = 64 << 10;
 
 /// Memory for a byte of JSON that is parsed: `[0,0]` takes a value and its place for two.
@@ -184,10 +184,10 @@ const PARSED_MEMORY: u64 = 40;
 /// # Errors
 /// 503 if there is no memory for it.
 pub async fn charge_parsed(bytes: &[u8]) -> Answer<()> {
-    match bytes.len() <= UNCHARGED {
-        true => Ok(()),
-        false => charge(PARSED_MEMORY * bytes.len() as u64).await,
+    if bytes.len() > UNCHARGED_BYTES {
+        charge(PARSED_MEMORY * bytes.len() as u64).await?;
     }
+    Ok(())
 }
 
 /// The JSON object in a request's body.

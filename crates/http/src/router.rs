@@ -123,7 +123,7 @@ pub fn document() -> serde_json::Value {
     openapi::publish(routes(&Settings::default()).split_for_parts().1)
 }
 
-/// What operators ask for, which every process answers.
+/// Paths for operators, which every process answers.
 fn operations() -> OpenApiRouter<App> {
     OpenApiRouter::new()
         .routes(routes!(health::alive))
@@ -133,9 +133,10 @@ fn operations() -> OpenApiRouter<App> {
 
 /// The whole service, or what a worker serves of it.
 pub fn router(app: App) -> Router {
-    let api = match app.settings.role.serves() {
-        true => public(&app.settings),
-        false => operations().split_for_parts().0,
+    let api = if app.service.settings.role.serves() {
+        public(&app.service.settings)
+    } else {
+        operations().split_for_parts().0
     };
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()
@@ -167,7 +168,7 @@ pub fn router(app: App) -> Router {
         )
         .layer(CatchPanicLayer::custom(from_panic))
         .layer(middleware::from_fn_with_state(
-            app.settings.tls_cert.0.is_some(),
+            app.service.settings.tls_cert.0.is_some(),
             pages::protect,
         ))
         .layer(middleware::from_fn_with_state(
@@ -181,7 +182,7 @@ pub fn router(app: App) -> Router {
         .method_not_allowed_fallback(method_not_allowed)
         .layer(middleware::from_fn_with_state(app.clone(), guard::guard));
     // Browsers send preflights without credentials, so this stands before the guard.
-    let api = match pages::cors(&app.settings) {
+    let api = match pages::cors(&app.service.settings) {
         Some(cors) => api.layer(cors),
         None => api,
     };

@@ -1,25 +1,18 @@
 //! Whose scan a volume is: read when the volume is stored, shown in answers as `dicom`, and searched
 //! by `study`, `series` and `accession`.
 //!
-//! What names a patient (name, ID, dates, accession number, free texts) is shown to callers of the
+//! Fields that name a patient (name, ID, dates, accession number, free texts) are shown to callers of the
 //! scope `submit` and `admin`; `read` sees identifiers of DICOM, the acquisition and the equipment.
 //! None of it gets into a path, a header or the log.
 
-use super::app::App;
 use super::problem::{Answer, Problem};
 use super::request::refuse_unknown;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use std::time::Duration;
-use tokio_util::sync::CancellationToken;
 use utoipa::ToSchema;
-use ventriform::progress::Monitor;
 use ventriform::text::is_printable;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
-    BlobError, FileRecord, ScanFields, ScanFilter, ScanIdentity, StoreFault, Tenant,
-};
-use ventriform_service::work::INSPECTION_MEMORY;
+use ventriform_service::records::{ScanFilter, ScanIdentity};
 
 /// The parameters of a search by scan.
 pub const FIELDS: [&str; 3] = ["study", "series", "accession"];
@@ -29,7 +22,7 @@ const VALUE_LENGTH: usize = 64;
 
 /// The fields that callers of the scope `read` see: identifiers that DICOM systems exchange, the
 /// acquisition and the equipment.
-const READABLE: [&str; 17] = [
+const READABLE_FIELDS: [&str; 17] = [
     "study_uid",
     "series_uid",
     "series_number",
@@ -50,7 +43,7 @@ const READABLE: [&str; 17] = [
 ];
 
 /// Shown by `/identity` only: a series may have hundreds.
-const INSTANCES: &str = "instance_uids";
+const INSTANCES_FIELD: &str = "instance_uids";
 
 /// Study, series and Frame of Reference of a scan.
 #[derive(Serialize, ToSchema)]
@@ -79,15 +72,15 @@ impl ScanUidsBody {
     }
 }
 
-/// What a caller of that scope sees of a scan, without its instances; `None` if nothing is known.
+/// The fields of a scan that a caller of that scope sees, without its instances; `None` if nothing is known.
 pub fn shown(scan: &ScanIdentity, scope: Scope) -> Option<Map<String, Value>> {
     if scan.is_empty() {
         return None;
     }
     let mut shown = scan.whole();
-    shown.remove(INSTANCES);
+    shown.remove(INSTANCES_FIELD);
     if !sees_patients(scope) {
-        shown.retain(|name, _| READABLE.contains(&name.as_str()));
+        shown.retain(|name, _| READABLE_FIELDS.contains(&name.as_str()));
     }
     Some(shown)
 }
@@ -124,73 +117,4 @@ pub fn take_filter(pairs: Vec<(String, String)>) -> Answer<(ScanFilter, Vec<(Str
         *field = Some(value);
     }
     Ok((filter, others))
-}
-
-/// What the files of a stored volume say of its scan, unless the tenant knows it already. To be
-/// noted when the tenant uploads the volume again.
-///
-/// # Errors
-/// If the storage fails.
-pub async fn to_note(
-    app: &App,
-    tenant: &Tenant,
-    volume: &str,
-    files: &[FileRecord],
-) -> Answer<Option<ScanFields>> {
-    match app.queue.catalogue.scan(tenant, volume).await? {
-        Some(known) if known.erased_at.is_none() => Ok(None),
-        _ => read(app, volume, files).await,
-    }
-}
-
-/// What the files of a stored volume say of its scan.
-///
-/// # Errors
-/// If the storage fails.
-pub async fn read(app: &App, volume: &str, files: &[FileRecord]) -> Answer<Option<ScanFields>> {
-    let files = app.queue.volume_files(volume, files).await?;
-    let files = files.ok_or_else(|| {
-        let which = format!("a file of {volume} is missing");
-        BlobError::new(StoreFault::DamagedFile, which)
-    })?;
-    let reader = app.engine.reader.clone();
-    let scan = move |monitor: &Monitor<'_>| reader.scan(&files, monitor);
-    let found = app.decoding.run(INSPECTION_MEMORY, scan).await?;
-    // The volume was read when it was uploaded. A program that reads less of it now leaves it
-    // without identity.
-    Ok(found.unwrap_or_default())
-}
-
-/// How long the reading of old volumes waits after a failure.
-const PAUSE: Duration = Duration::from_secs(30);
-
-/// Reads whose scans those volumes are that older versions have stored. Ends when all are read.
-pub async fn read_old(app: App, end: CancellationToken) {
-    end.run_until_cancelled(async {
-        let mut after = 0;
-        loop {
-            let next = app.queue.catalogue.unread_scans(after, 1).await;
-            let Some(unread) = (match next {
-                Ok(page) => page.into_iter().next(),
-                Err(error) => {
-                    tracing::warn!(%error, "whose scans old volumes are could not be read; again soon");
-                    tokio::time::sleep(PAUSE).await;
-                    continue;
-                }
-            }) else {
-                return;
-            };
-            after = unread.sequence;
-            let (tenant, volume) = (&unread.tenant, &unread.volume);
-            let noted = async {
-                let found = read(&app, volume, &unread.files).await?;
-                let catalogue = &app.queue.catalogue;
-                Ok::<(), Problem>(catalogue.note_scan(tenant, volume, found.as_ref()).await?)
-            };
-            if noted.await.is_err() {
-                tracing::warn!(volume, "whose scan this is could not be read; the next start tries again");
-            }
-        }
-    })
-    .await;
 }

@@ -12,9 +12,9 @@ use super::wire::path_of;
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{Product, Resource};
+use ventriform_service::records::{Product, Resource};
 
-const MASK: &str = "mask.nii.gz";
+const MASK_FILE: &str = "mask.nii.gz";
 
 /// The collection of segmentations.
 pub struct Segmentations;
@@ -24,7 +24,7 @@ impl ProductCollection for Segmentations {
     type Body = SegmentationBody;
     const MESHES: &'static [&'static str] = &["mesh", "mesh_anatomical", "mesh_apparent"];
     const FILES: &'static [&'static str] = &[
-        MASK,
+        MASK_FILE,
         "mask_anatomical.nii.gz",
         "mask_apparent.nii.gz",
         "labels.nii.gz",
@@ -89,7 +89,7 @@ impl SegmentationLinks {
         let itself = path_of(&segmentation.id);
         let polar = segmentation.file("polar.svg");
         Self {
-            mask: format!("{itself}/{MASK}"),
+            mask: format!("{itself}/{MASK_FILE}"),
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
             page: format!("{itself}/{}", files::PAGE),
@@ -101,7 +101,7 @@ impl SegmentationLinks {
     }
 }
 
-/// What a client that waits for a segmentation may ask for: the mask, the mesh or the report.
+/// The answers that a client which waits for a segmentation may ask for: the mask, the mesh or the report.
 fn offers() -> Vec<Offer> {
     let masks = [
         "application/gzip",
@@ -110,7 +110,7 @@ fn offers() -> Vec<Offer> {
     ];
     let meshes = Offer::meshes().into_iter();
     masks
-        .map(|media_type| Offer::new(media_type, MASK))
+        .map(|media_type| Offer::new(media_type, MASK_FILE))
         .into_iter()
         .chain(meshes.filter(|offer| offer.file != "mesh.json"))
         .chain([Offer::new("application/json", "report.json")])

@@ -1,38 +1,23 @@
-//! Starting the service from its settings, and shutting it down.
+//! Starting the HTTP interface on a service, and shutting both down.
 
-use super::app::{App, Watching};
-use super::archives::ArchiveDesk;
+use super::app::App;
 use super::connections::tls::{Tls, TlsError};
 use super::connections::{self, ConnectionLimits, Linger};
 use super::cryptography::install_cryptography;
-use super::duties::{self, UPKEEP_EVERY};
 use super::guard::hosts::HostPolicy;
 use super::guard::state::Guard;
-use super::hooks::Hooks;
-use super::intake::{self, Intake};
-use super::job_watch::JobWatch;
-use super::metrics::Metrics;
 use super::router::router;
-use super::spans::{OtlpError, Spans};
-use super::volume_maker::check_rules;
-use futures::future::BoxFuture;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::num::NonZeroUsize;
 use std::sync::Arc;
-use std::time::Duration;
 use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
-use ventriform_service::access::{
-    AccessStore, Gate, Issuer, IssuerError, IssuerSettings, Recorder, Scope,
-};
+use ventriform_service::access::{Gate, Issuer, IssuerError, IssuerSettings, Scope};
 use ventriform_service::config::{Role, Settings};
-use ventriform_service::hooks::{Dispatcher, HookSettings, RetrySchedule, UrlGuard};
-use ventriform_service::intake::{Listener, Receiver, ScpSettings, Sessions, TlsConfiguration};
-use ventriform_service::jobs::{
-    DeathLimit, Failure, Fault, Queue, QueueSettings, RetentionAges, SteadyClock, StoreError,
-    SystemClock, Upkeep, WorkerSettings, Workers, recover_after_crash,
-};
+use ventriform_service::intake::{Listener, ScpSettings, TlsConfiguration};
+use ventriform_service::jobs::Queue;
+use ventriform_service::records::{StoreError, SystemClock};
+use ventriform_service::service::Service;
+use ventriform_service::start::{OpenError, RunningService, open, scp_settings};
 use ventriform_service::stores::Stores;
 use ventriform_service::work::Engine;
 
@@ -42,7 +27,10 @@ pub enum ServeError {
     /// The data folder cannot be used.
     #[error(transparent)]
     Store(Box<dyn std::error::Error + Send + Sync>),
-    /// The database in the data folder cannot be used.
+    /// The service cannot be opened on its stores.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The database cannot be used.
     #[error(transparent)]
     Rows(#[from] StoreError),
     /// Callers without credentials would be served on an address that others can reach.
@@ -51,7 +39,7 @@ pub enum ServeError {
          issuer. Make a key by `ventriform keys create --name NAME --scope submit --data-dir DIR`, \
          or set `oidc_issuer`, or serve everybody by `--allow-anonymous`"
     )]
-    Open(SocketAddr),
+    OpenHttp(SocketAddr),
     /// Everybody who can reach the address could send objects by DICOM.
     #[error(
         "{0} can be reached from other machines, but no system is listed that may send images there. \
@@ -67,18 +55,12 @@ pub enum ServeError {
         /// The system's message.
         reason: io::Error,
     },
-    /// A rule of the settings cannot be used.
-    #[error("{0}")]
-    Rules(String),
     /// The settings of the OpenID Connect issuer cannot be used.
     #[error("the OpenID Connect issuer: {0}")]
     Issuer(#[from] IssuerError),
     /// TLS cannot be used as the settings ask for it.
     #[error(transparent)]
     Tls(#[from] TlsError),
-    /// Traces cannot be sent as the settings ask for it.
-    #[error(transparent)]
-    Traces(#[from] OtlpError),
     /// The role needs other processes, which could not reach what this one stores.
     #[error(
         "role = {role} is for several processes on one store, but {lacking}. Give every process the same \
@@ -87,7 +69,7 @@ pub enum ServeError {
     Role {
         /// The role.
         role: Role,
-        /// What only this process can reach.
+        /// The part that only this process can reach.
         lacking: &'static str,
     },
     /// The system refused threads or sockets.
@@ -98,22 +80,13 @@ pub enum ServeError {
 /// A running service.
 pub struct Running {
     address: SocketAddr,
-    app: App,
-    queue: Arc<Queue>,
+    service: RunningService,
     server: JoinHandle<()>,
     dicom: Option<JoinHandle<()>>,
     dicom_address: Option<SocketAddr>,
-    workers: Workers,
-    duties: Option<JoinHandle<()>>,
-    alive: JoinHandle<()>,
-    spans: Spans,
-    closing: CancellationToken,
-    grace: Duration,
-    // Dropping it unlocks the data folder, so it is kept to the end.
-    close_stores: Box<dyn FnOnce() -> BoxFuture<'static, ()> + Send + Sync>,
 }
 
-/// Starts the service on a bound listener. `open` opens its stores, once the settings are known to be usable.
+/// Starts the service on a bound listener. `stores` opens its stores, once the settings are known to be usable.
 ///
 /// # Errors
 /// If the stores are in use or unusable, or the system refuses threads or sockets.
@@ -121,7 +94,7 @@ pub async fn start<E>(
     settings: Settings,
     engine: Engine,
     listener: TcpListener,
-    open: impl Future<Output = Result<Stores, E>>,
+    stores: impl Future<Output = Result<Stores, E>>,
 ) -> Result<Running, ServeError>
 where
     E: Into<Box<dyn std::error::Error + Send + Sync>>,
@@ -131,48 +104,39 @@ where
     let dicom = dicom_listener(&settings)?;
     let tls = Tls::of(&settings)?;
     let dicom_tls = Tls::of_dicom(&settings)?;
-    let workers = worker_settings(&settings);
-    let stores = open
-        .await
-        .map_err(|error| ServeError::Store(error.into()))?;
-    let queue = Queue::new(
-        stores.jobs.clone(),
-        stores.catalogue.clone(),
-        stores.blobs.clone(),
-        Arc::new(SteadyClock::default()),
-        QueueSettings {
-            limit: settings.queue_limit,
-            workers: workers.workers,
-        },
-    );
-    let queue = Arc::new(queue.among(stores.peers.clone()));
-    queue.join().await?;
-    let limit = death_limit(&settings);
-    let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
-    recover_after_crash(&queue, limit).await?;
-    let closing = CancellationToken::new();
+    let stores = stores.await;
+    let stores = stores.map_err(|error| ServeError::Store(error.into()))?;
+    let opened = open(settings, engine, stores).await?;
+    let service = opened.service.clone();
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
-    let guard = guard(&settings, stores.access.clone(), address).await?;
-    let watching = watching(&settings, &stores, &queue)?;
-    let spans = watching.spans.clone();
-    let hooks = hooks(&settings, &stores, &queue);
-    let intake = receiving(&settings, &stores, &queue, &watching);
-    let app = App::new(
-        queue.clone(),
-        engine.clone(),
-        (stores.access.clone(), stores.worklist.clone(), guard),
-        settings.clone(),
-        (
-            hooks,
-            ArchiveDesk::new(&settings, stores.archives.clone()),
-            intake,
-        ),
-        watching,
-        closing.clone(),
-    );
-    check_rules(&app).map_err(ServeError::Rules)?;
-    let limits = ConnectionLimits {
+    let guard = guard(&service, address).await?;
+    let listener = tokio::net::TcpListener::from_std(listener)?;
+    let closing = &service.closing;
+    for tls in [&tls, &dicom_tls].into_iter().flatten() {
+        tokio::spawn(tls.clone().follow_changes(closing.clone()));
+    }
+    let open = service.metrics.requests.connections.clone();
+    let router = router(App::new(service.clone(), guard));
+    let limits = connection_limits(&service.settings);
+    let server = connections::serve(listener, router, tls, limits, open, closing.clone());
+    let server = tokio::spawn(server);
+    let running = RunningService::start(opened)?;
+    let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
+    let dicom = dicom.map(|dicom| serve_dicom(&service, dicom, dicom_tls));
+    let dicom = dicom.transpose()?;
+    tracing::info!(%address, "listening");
+    Ok(Running {
+        address,
+        service: running,
+        server,
+        dicom,
+        dicom_address,
+    })
+}
+
+fn connection_limits(settings: &Settings) -> ConnectionLimits {
+    ConnectionLimits {
         connections: settings.connection_limit,
         of_one_client: settings.client_connection_limit,
         trusted_proxies: settings.trusted_proxies.clone(),
@@ -186,53 +150,7 @@ where
             bytes: settings.linger_bytes.0,
         },
         grace: settings.shutdown_grace.0,
-    };
-    let listener = tokio::net::TcpListener::from_std(listener)?;
-    for tls in [&tls, &dicom_tls].into_iter().flatten() {
-        tokio::spawn(tls.clone().follow_changes(closing.clone()));
     }
-    let open = app.metrics.requests.connections.clone();
-    let router = router(app.clone());
-    let server = connections::serve(listener, router, tls, limits, open, closing.clone());
-    let server = tokio::spawn(server);
-    let alive = tokio::spawn(queue.clone().stay());
-    let scheduled = {
-        let app = app.clone();
-        move || app.scheduled.notify_one()
-    };
-    tokio::spawn(queue.clone().follow_peers(scheduled, closing.clone()));
-    if queue.is_shared() {
-        // Each process looks after its own items, and finds the dead as soon as their leases expire.
-        let upkeep = Upkeep {
-            queue: queue.clone(),
-            retention: RetentionAges::default(),
-            every: UPKEEP_EVERY.min(settings.lease.0),
-        };
-        tokio::spawn(upkeep.run(closing.clone()));
-    }
-    tokio::spawn(duties::gatherer(&app).run(closing.clone()));
-    let works = settings.role.works();
-    let duties = works.then(|| tokio::spawn(duties::run(app.clone(), closing.clone())));
-    let dicom_address = dicom.as_ref().map(|dicom| dicom.address);
-    let dicom = dicom.map(|dicom| serve_dicom(&app, dicom, dicom_tls));
-    let dicom = dicom.transpose()?;
-    let workers = Workers::start(&queue, &engine.works, workers)?;
-    tracing::info!(%address, "listening");
-    Ok(Running {
-        address,
-        app,
-        queue,
-        server,
-        dicom,
-        dicom_address,
-        workers,
-        duties,
-        alive,
-        spans,
-        closing,
-        grace: settings.shutdown_grace.0,
-        close_stores: stores.close,
-    })
 }
 
 impl Running {
@@ -248,7 +166,7 @@ impl Running {
 
     /// Its queue of jobs.
     pub fn queue(&self) -> &Arc<Queue> {
-        &self.queue
+        self.service.service.queue()
     }
 
     /// Shuts the service down in order: no new connections are accepted, running jobs get `shutdown_grace` to
@@ -258,25 +176,20 @@ impl Running {
     /// If the task that serves connections has panicked.
     pub async fn stop(self) -> Result<(), ServeError> {
         tracing::info!("shutting down");
-        self.closing.cancel();
-        let ended = |task: Option<JoinHandle<()>>| async move {
-            match task {
-                Some(task) => task.await,
-                None => Ok(()),
-            }
+        let answers = async {
+            let dicom = async {
+                match self.dicom {
+                    Some(task) => task.await,
+                    None => Ok(()),
+                }
+            };
+            let (server, dicom) = tokio::join!(self.server, dicom);
+            server.and(dicom)
         };
-        let (server, dicom, (), duties) = tokio::join!(
-            self.server,
-            ended(self.dicom),
-            self.workers.stop(self.grace),
-            ended(self.duties),
-        );
-        self.app.guard.recorder.flush().await;
-        self.spans.flush().await;
-        self.alive.abort();
-        self.queue.leave_peers().await;
-        (self.close_stores)().await;
-        server.and(dicom).and(duties).map_err(io::Error::other)?;
+        let answered = self.service.stop(answers).await;
+        answered
+            .and_then(|answered| answered)
+            .map_err(io::Error::other)?;
         Ok(())
     }
 }
@@ -314,7 +227,7 @@ fn dicom_listener(settings: &Settings) -> Result<Option<DicomListener>, ServeErr
     };
     let unusable = |reason| ServeError::Dicom { address, reason };
     let loopback = address.ip().to_canonical().is_loopback();
-    let scp = intake::scp_settings(settings, loopback).ok_or(ServeError::OpenDicom(address))?;
+    let scp = scp_settings(settings, loopback).ok_or(ServeError::OpenDicom(address))?;
     if scp.senders.others && !loopback {
         tracing::warn!(%address, "every system may send images by DICOM (allow_anonymous)");
     }
@@ -329,20 +242,20 @@ fn dicom_listener(settings: &Settings) -> Result<Option<DicomListener>, ServeErr
 
 /// Serves DICOM until the service shuts down.
 fn serve_dicom(
-    app: &App,
+    service: &Service,
     dicom: DicomListener,
     tls: Option<Arc<Tls>>,
 ) -> io::Result<JoinHandle<()>> {
     let scp = Listener::new(
         dicom.settings,
-        app.intake.receiver.clone(),
-        app.intake.sessions.clone(),
-        app.guard.recorder.clone(),
+        service.intake.receiver.clone(),
+        service.intake.sessions.clone(),
+        service.recorder.clone(),
         (
-            app.queue.clock.clone(),
-            Arc::new(app.metrics.intake.clone()),
+            service.clock().clone(),
+            Arc::new(service.metrics.intake.clone()),
         ),
-        app.closing.clone(),
+        service.closing.clone(),
     );
     let listener = tokio::net::TcpListener::from_std(dicom.listener)?;
     tracing::info!(address = %dicom.address, "listening for DICOM");
@@ -350,32 +263,12 @@ fn serve_dicom(
     Ok(tokio::spawn(scp.run(listener, tls)))
 }
 
-/// What receives objects.
-fn receiving(settings: &Settings, stores: &Stores, queue: &Queue, watching: &Watching) -> Intake {
-    let receiver = Receiver::new(
-        stores.intake.clone(),
-        stores.received.clone(),
-        queue.clock.clone(),
-        Arc::new(watching.metrics.intake.clone()),
-        intake::receiver_settings(settings),
-    );
-    Intake {
-        receiver: Arc::new(receiver),
-        sessions: Sessions::new(intake::waits(settings)),
-        store: stores.intake.clone(),
-        files: stores.received.clone(),
-    }
-}
-
 /// Tells callers as the settings say.
 ///
 /// # Errors
 /// If the service could be used by strangers and the settings do not say that it shall.
-async fn guard(
-    settings: &Settings,
-    store: Arc<dyn AccessStore>,
-    address: SocketAddr,
-) -> Result<Guard, ServeError> {
+async fn guard(service: &Service, address: SocketAddr) -> Result<Guard, ServeError> {
+    let settings = &service.settings;
     let clock = Arc::new(SystemClock);
     let loopback = address.ip().to_canonical().is_loopback();
     let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
@@ -390,13 +283,13 @@ async fn guard(
         })
     });
     // Whoever can reach a loopback address can usually read the data folder too.
-    let anonymous = match loopback {
-        true => Scope::Admin,
-        false => Scope::Submit,
+    let anonymous = if loopback {
+        Scope::Admin
+    } else {
+        Scope::Submit
     };
-    let recorder = Recorder::start(store.clone(), clock.clone());
     let gate = Gate::new(
-        store,
+        service.access.clone(),
         clock,
         issuer.transpose()?,
         anonymous,
@@ -404,7 +297,7 @@ async fn guard(
     );
     let open = gate.is_open().await?;
     if open && !loopback && !settings.allow_anonymous {
-        return Err(ServeError::Open(address));
+        return Err(ServeError::OpenHttp(address));
     }
     if open && !loopback {
         tracing::warn!(%address, "callers without credentials are served (allow_anonymous)");
@@ -415,70 +308,5 @@ async fn guard(
         loopback,
         open,
     };
-    Ok(Guard::new(gate, recorder, hosts, settings, !loopback))
-}
-
-/// Metrics and traces, which from now on follow the queue's jobs.
-fn watching(settings: &Settings, stores: &Stores, queue: &Queue) -> Result<Watching, OtlpError> {
-    let metrics = Metrics::new();
-    let spans = Spans::new(settings.otlp_endpoint.0.as_deref())?;
-    queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
-    Ok(Watching {
-        metrics,
-        figures: stores.figures.clone(),
-        spans,
-    })
-}
-
-fn hooks(settings: &Settings, stores: &Stores, queue: &Queue) -> Hooks {
-    let guard = UrlGuard::new(settings.webhook_allow.clone());
-    let sending = HookSettings {
-        retries: RetrySchedule {
-            first: settings.webhook_backoff.0,
-            attempts: settings.webhook_attempts,
-            age: settings.webhook_age.0,
-        },
-        attempt_limit: settings.webhook_timeout.0,
-        places: settings.webhook_concurrency,
-        per_destination: settings.webhook_destination_concurrency,
-        backlog: settings.webhook_backlog,
-        history: settings.webhook_history.0,
-        base_path: settings.base_path.as_str().to_owned(),
-    };
-    let dispatcher = Dispatcher::new(
-        stores.deliveries.clone(),
-        queue.clock.clone(),
-        guard.clone(),
-        sending,
-    );
-    Hooks {
-        store: stores.deliveries.clone(),
-        guard,
-        dispatcher: Arc::new(dispatcher),
-    }
-}
-
-/// When a job is failed by a program that cannot compute it in a process of its own.
-fn death_limit(settings: &Settings) -> DeathLimit {
-    let deaths = settings.attempt_limit;
-    let reason = format!("The service died {deaths} times while the job was running.");
-    DeathLimit {
-        deaths,
-        reason: Failure::new(Fault::Service, "attempt-limit", reason)
-            .fix("Report it with the job's id. Other parameters may work."),
-    }
-}
-
-fn worker_settings(settings: &Settings) -> WorkerSettings {
-    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    WorkerSettings {
-        workers: match settings.role.works() {
-            true => settings.workers.or(cores),
-            false => 0,
-        },
-        threads: settings.threads.or(1),
-        lease: settings.lease.0,
-        attempt_limit: settings.attempt_limit,
-        time_limit: settings.job_time_limit.0,
-    }
+    Ok(Guard::new(gate, hosts, settings, !loopback))
 }

@@ -7,12 +7,13 @@
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
-use super::guard::{Agent, AlreadyRecorded, Counting};
+use super::guard::{Agent, AlreadyRecorded};
 use super::limits::BodyLimits;
 use super::memory::charge;
 use super::negotiate::require_offer;
 use super::openapi::{StowAnswers, UploadProblems};
 use super::problem::{Answer, Problem, body};
+use super::quota::reserve_upload;
 use super::request::{
     PathSegments, media_type, query_pairs, refuse_content_encoding, refuse_unknown,
 };
@@ -30,13 +31,14 @@ use ventriform_service::archive::{RelatedType, Unparsed};
 use ventriform_service::intake::{
     Incoming, Origin, Protocol, ReceiveError, Refused, Session, Stated,
 };
+use ventriform_service::quotas::Counting;
 
 /// The media types of the answer.
-const OFFERS: [&str; 2] = ["application/dicom+json", "application/json"];
+const ANSWER_TYPES: [&str; 2] = ["application/dicom+json", "application/json"];
 /// The media type of an object.
-const OBJECT: &str = "application/dicom";
+const OBJECT_TYPE: &str = "application/dicom";
 /// The media type of several.
-const RELATED: &str = "multipart/related";
+const RELATED_TYPE: &str = "multipart/related";
 /// Memory of a request: what is gathered for a write, here and in the file's writer; and of what is answered about
 /// one object.
 const REQUEST_MEMORY: u64 = 1 << 20;
@@ -87,7 +89,7 @@ pub async fn store_study_instances(
     store(&app, &caller, &agent, Some(study), request).await
 }
 
-/// What became of the objects of a request.
+/// The outcome of the objects of a request.
 #[derive(Default)]
 struct Outcome {
     /// SOP Class and Instance UIDs of those that are stored.
@@ -178,7 +180,7 @@ impl Storing<'_> {
     /// # Errors
     /// The problem in the body; objects that are not stored are no error.
     async fn object(&mut self, pieces: impl Stream<Item = Answer<Bytes>>) -> Answer<()> {
-        let receiver = &self.app.intake.receiver;
+        let receiver = &self.app.service.intake.receiver;
         let mut pieces = std::pin::pin!(pieces);
         let mut object: Result<Incoming, ReceiveError> = receiver.begin().await;
         while let Some(piece) = pieces.next().await {
@@ -231,13 +233,13 @@ impl Storing<'_> {
             unparsed.reset();
             charge(OBJECT_MEMORY).await?;
             count += 1;
-            if count > self.app.settings.parts_limit {
-                return Err(body::too_many_files(self.app.settings.parts_limit));
+            if count > self.app.service.settings.parts_limit {
+                return Err(body::too_many_files(self.app.service.settings.parts_limit));
             }
             let essence = part
                 .content_type()
                 .map(|kind| kind.essence_str().to_owned());
-            let is_object = essence.is_none_or(|kind| kind == OBJECT);
+            let is_object = essence.is_none_or(|kind| kind == OBJECT_TYPE);
             let pieces = part.inspect_ok(|_| unparsed.reset()).map_err(interrupted);
             if is_object {
                 self.object(pieces).await?;
@@ -257,7 +259,7 @@ async fn store(
     study: Option<String>,
     request: Request,
 ) -> Answer {
-    require_offer(request.headers(), &OFFERS)?;
+    require_offer(request.headers(), &ANSWER_TYPES)?;
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::of(&request)?;
     let boundary = boundary(request.headers())?;
@@ -271,8 +273,8 @@ async fn store(
             sender: caller.name.clone(),
             address: ClientAddress::current().to_string(),
         },
-        session: app.intake.sessions.begin(),
-        counting: Counting::of(&request),
+        session: app.service.intake.sessions.begin(),
+        counting: reserve_upload(app, caller, request.headers(), 0).await?,
         outcome: Outcome::default(),
     };
     match boundary {
@@ -291,14 +293,14 @@ async fn store(
     if outcome.stored.is_empty() && outcome.failed.is_empty() && outcome.others.is_empty() {
         return Err(body::malformed_related("it has no part"));
     }
-    let now = app.queue.clock.now();
+    let now = app.service.now();
     for group in &outcome.groups {
         let event = agent.event(Activity::Create, now).on(group);
-        let recorded = app.guard.recorder.record(event).await;
+        let recorded = app.service.recorder.record(event).await;
         recorded.map_err(|NotRecorded| not_recorded())?;
     }
     let headers = [
-        (header::CONTENT_TYPE, OFFERS[0]),
+        (header::CONTENT_TYPE, ANSWER_TYPES[0]),
         (header::CACHE_CONTROL, "no-store"),
     ];
     let module = outcome.module().to_string();
@@ -310,7 +312,7 @@ async fn store(
 fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     let wanted = "multipart/related; type=\"application/dicom\", or application/dicom";
     let given = media_type(headers).unwrap_or_default();
-    if given == OBJECT {
+    if given == OBJECT_TYPE {
         return Ok(None);
     }
     let text = headers.get(header::CONTENT_TYPE);
@@ -320,7 +322,7 @@ fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     };
     if !related.is_dicom() {
         let found = related.parts.unwrap_or_default();
-        let found = format!("{RELATED}; type=\"{found}\"");
+        let found = format!("{RELATED_TYPE}; type=\"{found}\"");
         return Err(body::unsupported_type(&found, wanted));
     }
     let boundary = related.boundary;

@@ -11,7 +11,7 @@ use axum::extract::Request;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use ventriform::text::is_printable;
-use ventriform_service::jobs::{TagFilter, Tags, Tenant};
+use ventriform_service::records::{TagFilter, Tags, Tenant};
 
 /// Longest external id, characters.
 pub const EXTERNAL_ID_LENGTH: usize = 128;
@@ -93,7 +93,11 @@ pub async fn change(
     request: Request,
 ) -> Answer<()> {
     let tags = merged(app, tags, &merge_patch(request).await?)?;
-    app.queue.catalogue.set_tags(tenant, id, &tags).await?;
+    app.service
+        .items()
+        .catalogue()
+        .set_tags(tenant, id, &tags)
+        .await?;
     Ok(())
 }
 
@@ -169,15 +173,16 @@ fn label(text: &str) -> Answer<(String, String)> {
 
 fn label_name(text: &str) -> Answer<String> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
-    match (1..=LABEL_NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) {
-        true => Ok(text.to_owned()),
-        false => Err(Problem::invalid_field(
+    if (1..=LABEL_NAME_LENGTH).contains(&text.len()) && text.chars().all(allowed) {
+        Ok(text.to_owned())
+    } else {
+        Err(Problem::invalid_field(
             "labels",
             format!("`{}` is not the name of a label.", shorten(text)),
         )
         .fix(format!(
             "Give 1 to {LABEL_NAME_LENGTH} characters of A-Z, a-z, 0-9, `_`, `-`, `.` and `/`."
-        ))),
+        )))
     }
 }
 
@@ -187,24 +192,25 @@ fn label_value(text: &str) -> Answer<String> {
 
 fn printable(field: &str, what: &str, text: &str, longest: usize) -> Answer<String> {
     let length = text.chars().count();
-    match (1..=longest).contains(&length) && text.chars().all(is_printable) {
-        true => Ok(text.to_owned()),
-        false => Err(Problem::invalid_field(
+    if (1..=longest).contains(&length) && text.chars().all(is_printable) {
+        Ok(text.to_owned())
+    } else {
+        Err(Problem::invalid_field(
             field,
             format!("{what} must have 1 to {longest} printable characters."),
         )
-        .fix("Give a shorter text without control characters.")),
+        .fix("Give a shorter text without control characters."))
     }
 }
 
 fn limit_labels(app: &App, labels: &BTreeMap<String, String>) -> Answer<()> {
-    let limit = app.settings.label_limit;
-    match labels.len() <= limit {
-        true => Ok(()),
-        false => Err(Problem::invalid_field(
-            "labels",
-            format!("There are more than {limit} labels."),
+    let limit = app.service.settings.label_limit;
+    if labels.len() <= limit {
+        Ok(())
+    } else {
+        Err(
+            Problem::invalid_field("labels", format!("There are more than {limit} labels."))
+                .fix("Give fewer labels, or ask the operator to raise `label_limit`."),
         )
-        .fix("Give fewer labels, or ask the operator to raise `label_limit`.")),
     }
 }

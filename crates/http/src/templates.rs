@@ -3,11 +3,10 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::find;
-use super::decoding::LITTLE_MEMORY;
 use super::openapi::{self, LookupProblems, UploadProblems};
-use super::problem::not_found::field_names_nothing;
 use super::problem::{Answer, Problem, ProblemBody};
-use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, refuse_when_full};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::quota::reserve_item;
 use super::request::{
     PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
 };
@@ -21,16 +20,14 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
-use ventriform::progress::Monitor;
 use ventriform_service::config::Size;
-use ventriform_service::jobs::{ProductRoom, Resource, TemplateSource, Tenant, check_name};
+use ventriform_service::error::ServiceError;
+use ventriform_service::items::{TemplateSource, check_name};
+use ventriform_service::records::{Resource, Tenant};
 use ventriform_service::work::TEMPLATE_BYTES;
 
 /// Largest mesh.
 pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
-
-/// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
-const MEMORY_PER_BYTE: u64 = 16;
 
 /// The collection of templates.
 pub struct Templates;
@@ -134,8 +131,16 @@ pub async fn create_template(
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let pairs = query_pairs(query.as_deref());
-    let known = ["name", "organ", "model", "mesh_unit", "mesh_frame", LIBRARY];
+    let known = [
+        "name",
+        "organ",
+        "model",
+        "mesh_unit",
+        "mesh_frame",
+        LIBRARY_FIELD,
+    ];
     refuse_unknown(&pairs, &known)?;
     let value = |name: &str| {
         let found = pairs.iter().find(|(n, _)| n == name);
@@ -143,8 +148,8 @@ pub async fn create_template(
     };
     let organ = value("organ").unwrap_or("left_ventricle").to_owned();
     let name = value("name").or(value("model")).unwrap_or("template");
-    check_name(name)?;
-    let library = match value(LIBRARY) {
+    check_name(name).map_err(ServiceError::from)?;
+    let library = match value(LIBRARY_FIELD) {
         None => None,
         Some("true") => Some(true),
         Some("false") => Some(false),
@@ -165,25 +170,20 @@ pub async fn create_template(
         )?,
     };
     let tenant = &caller.tenant;
-    let room = ProductRoom {
-        count: app.settings.template_limit,
-        bytes: caller.quota.bytes,
-    };
-    refuse_when_full::<Templates>(&app, tenant, room.count, "template_limit").await?;
+    let service = &app.service;
+    service
+        .require_product_room(tenant, Resource::Template)
+        .await?;
     let body = bytes_of(request, &MESH_TYPES).await?;
     let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
-    let reader = app.engine.reader.clone();
-    let shows = organ.clone();
-    let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
-    let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
-    let output = app.decoding.run(memory, make).await??;
     let source = TemplateSource {
         tenant,
         name,
         volume: volume.as_deref(),
         library,
     };
-    let added_template = app.queue.add_template(source, &organ, output, room);
+    let added_template =
+        service.add_template(source, &organ, mesh, stated, caller.quota, &counting);
     let (template, new) = added_template.await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))
@@ -213,13 +213,14 @@ pub async fn update_template(
     find::<Templates>(&app, tenant, &id).await?;
     for (field, value) in &merge_patch(request).await? {
         let library = match (field.as_str(), value) {
-            (LIBRARY, Value::Bool(library)) => *library,
-            (LIBRARY, Value::Null) => false,
-            (LIBRARY, _) => return Err(not_a_flag()),
-            (other, _) => return Err(unknown("field", other, &[LIBRARY])),
+            (LIBRARY_FIELD, Value::Bool(library)) => *library,
+            (LIBRARY_FIELD, Value::Null) => false,
+            (LIBRARY_FIELD, _) => return Err(not_a_flag()),
+            (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
-        app.queue
-            .catalogue
+        app.service
+            .items()
+            .catalogue()
             .set_library(tenant, &id, library)
             .await?;
     }
@@ -228,10 +229,10 @@ pub async fn update_template(
 }
 
 /// The setting that [`TemplateBody`] shows.
-const LIBRARY: &str = "library";
+const LIBRARY_FIELD: &str = "library";
 
 fn not_a_flag() -> Problem {
-    Problem::invalid_field(LIBRARY, "`library` must be true or false.")
+    Problem::invalid_field(LIBRARY_FIELD, "`library` must be true or false.")
         .fix("Give true if every `model=auto` is to fit the template.")
 }
 
@@ -256,19 +257,20 @@ async fn given_mesh(
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.
 async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     let product = match Resource::of(id) {
         Some(Resource::Model | Resource::Segmentation) => catalogue.product(tenant, id).await?,
         _ => None,
     };
     let Some(product) = product else {
-        return Err(field_names_nothing(catalogue, tenant, "model", id).await?);
+        return Err(app.service.names_nothing(tenant, "model", id).await?.into());
     };
     match product.file("mesh.json") {
         Some(file) if file.bytes <= MESH_SIZE.0 => {
             let pieces = app
-                .queue
-                .blobs
+                .service
+                .items()
+                .blobs()
                 .read(id, &file.record(), 0..file.bytes)
                 .await?;
             let pieces: Vec<Bytes> = pieces.try_collect().await?;

@@ -1,14 +1,14 @@
 //! Validators: what `If-None-Match` names is not sent again (RFC 9110, sections 8.8.3 and 13.1.2).
 //! That of a JSON answer is strong: the SHA-256 of its bytes.
 
-use super::kept::Keep;
 use super::problem::{Answer, Problem};
+use super::response_cache::Keep;
 use axum::body::Bytes;
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use ventriform_service::jobs::hex;
+use ventriform_service::records::hex;
 
 /// Only the client that asked may keep it, and asks each time whether it is still current.
 const CACHE_CONTROL: &str = "private, no-cache";

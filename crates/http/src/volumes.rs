@@ -5,6 +5,7 @@ use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
+use super::quota::reserve_upload;
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::validators::not_modified;
 use super::wire::{added, path_of, rfc3339};
@@ -19,7 +20,7 @@ use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest,
     LocalFile, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
@@ -298,16 +299,20 @@ pub async fn create_volume(
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Answer {
+    let counting = reserve_upload(&app, &caller, request.headers(), 0).await?;
     let mut pairs = query_pairs(query.as_deref());
     let (_, others) = tags::take(&app, pairs.clone())?;
     refuse_unknown(&others, &tags::FIELDS)?;
-    let upload = upload::receive(&app, request, &[]).await?;
+    let upload = upload::receive(&app, counting, request, &[]).await?;
     pairs.extend(upload.fields);
     let (tags, others) = tags::take(&app, pairs)?;
     if let Some((name, _)) = others.first() {
         return Err(unknown("form field", name, &tags::FIELDS));
     }
-    let stored = upload.volume.store(&app, &caller.tenant, &tags).await?;
+    let stored = app
+        .service
+        .store_volume(&caller.tenant, upload.volume, &tags);
+    let stored = stored.await?;
     let volume = stored.volume;
     let body = VolumeBody::of(&app, caller.scope, volume)?;
     Ok(added(stored.new, &body.id, &body))
@@ -362,10 +367,10 @@ pub async fn preview_volume(
         return Ok(unchanged);
     }
     let files = files_of(&app, &volume).await?;
-    let reader = app.engine.reader.clone();
+    let reader = app.service.engine.reader.clone();
     let memory = preview_memory(UploadFacts::of(&volume)?.shape);
     let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
-    let preview = app.decoding.run(memory, draw).await?;
+    let preview = app.service.decoding.run(memory, draw).await?;
     let png = preview.map_err(Problem::internal)?;
     let headers = [
         (header::CONTENT_TYPE, "image/png"),
@@ -381,12 +386,12 @@ pub async fn preview_volume(
 /// If one of them is missing or the store fails.
 pub async fn files_of(app: &App, volume: &StoredVolume) -> Answer<Vec<LocalFile>> {
     let id = &volume.id;
-    if let Some(files) = app.queue.volume_files(id, &volume.files).await? {
+    if let Some(files) = app.service.items().volume_files(id, &volume.files).await? {
         return Ok(files);
     }
     let missing = BlobError::new(
         StoreFault::DamagedFile,
         format!("a file of {id} is missing"),
     );
-    Err(app.queue.unless_erased(id, missing).await.into())
+    Err(app.service.items().unless_erased(id, missing).await.into())
 }

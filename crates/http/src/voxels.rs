@@ -15,7 +15,7 @@ use axum::response::IntoResponse;
 use ventriform::mesh_files::{MeshFrame, MeshUnit};
 use ventriform::progress::Monitor;
 use ventriform::volume::given_mask::MaskChoice;
-use ventriform_service::jobs::content_id;
+use ventriform_service::records::content_id;
 use ventriform_service::work::{UploadFacts, voxels_memory};
 
 /// A later version of the program may read a file differently.
@@ -78,13 +78,13 @@ pub async fn download_voxels(
         return Ok(unchanged);
     }
     let files = files_of(&app, &volume).await?;
-    let reader = app.engine.reader.clone();
+    let reader = app.service.engine.reader.clone();
     let memory = voxels_memory(UploadFacts::of(&volume)?.shape);
     let read = move |monitor: &Monitor<'_>| match &mask {
         Some(choice) => reader.mask(&files, choice, monitor),
         None => reader.voxels(&files, frame, monitor),
     };
-    let bytes = app.decoding.run(memory, read).await??;
+    let bytes = app.service.decoding.run(memory, read).await??;
     let headers = [
         (header::CONTENT_TYPE, "application/gzip"),
         (header::ETAG, etag.as_str()),

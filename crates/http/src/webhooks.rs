@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::time::Duration;
 use utoipa::ToSchema;
 use ventriform_service::hooks::{Delivery, HookEndpoint, SigningSecret};
-use ventriform_service::jobs::{Timestamp, random_id};
+use ventriform_service::records::{Timestamp, random_id};
 
 /// How long the former signing secret signs too.
 const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
@@ -108,20 +108,21 @@ pub async fn create_webhook(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let object = json_object(request).await?;
     let checked = GivenWebhook::from_json(&object)?
-        .check(&app.hooks.guard)
+        .check(&app.service.hooks.guard)
         .await?;
     let secret = checked.secret.unwrap_or_else(SigningSecret::random);
     let endpoint = HookEndpoint {
         id: random_id("whk_"),
         tenant: caller.tenant,
-        created_at: app.queue.clock.now(),
+        created_at: app.service.now(),
         url: checked.url,
         destination: checked.destination,
         events: checked.events,
         gone_at: None,
     };
-    let limit = app.settings.webhook_endpoint_limit;
+    let limit = app.service.settings.webhook_endpoint_limit;
     if !app
+        .service
         .hooks
         .store
         .add_endpoint(&endpoint, &secret, limit)
@@ -148,7 +149,7 @@ pub async fn list_webhooks(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<WebhookList>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let endpoints = app.hooks.store.endpoints(&caller.tenant).await?;
+    let endpoints = app.service.hooks.store.endpoints(&caller.tenant).await?;
     let webhooks = endpoints.into_iter().map(|e| WebhookBody::of(e, None));
     Ok(Json(WebhookList {
         webhooks: webhooks.collect(),
@@ -168,15 +169,17 @@ pub async fn delete_webhook(
     RawQuery(query): RawQuery,
 ) -> Answer<StatusCode> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
-    match app
+    let now = app.service.now();
+    if app
+        .service
         .hooks
         .store
         .remove_endpoint(&caller.tenant, &id, now)
         .await?
     {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(nothing_here("webhook", &id, "GET /v1/webhooks")),
+        Ok(StatusCode::NO_CONTENT)
+    } else {
+        Err(nothing_here("webhook", &id, "GET /v1/webhooks"))
     }
 }
 
@@ -193,8 +196,9 @@ pub async fn create_webhook_secret(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let secret = SigningSecret::random();
-    let until = app.queue.clock.now() + SECRET_OVERLAP.as_millis() as i64;
-    app.hooks
+    let until = app.service.now() + SECRET_OVERLAP.as_millis() as i64;
+    app.service
+        .hooks
         .store
         .replace_secret(&caller.tenant, &secret, until)
         .await?;
@@ -280,7 +284,7 @@ pub async fn list_deliveries(
     RawQuery(query): RawQuery,
 ) -> Answer<Json<DeliveryList>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let store = &app.hooks.store;
+    let store = &app.service.hooks.store;
     let found = store
         .deliveries(&caller.tenant, &id, MOST_DELIVERIES)
         .await?;
@@ -319,15 +323,15 @@ pub async fn redeliver(
     RawQuery(query): RawQuery,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let now = app.queue.clock.now();
+    let now = app.service.now();
     if delivery.starts_with(OBJECT_PREFIX) {
         return redeliver_object(&app, &caller, &id, &delivery, now).await;
     }
-    let store = &app.hooks.store;
+    let store = &app.service.hooks.store;
     let found = store.redeliver(&caller.tenant, &id, &delivery, now).await?;
     let list = format!("GET /v1/jobs/{}/deliveries", shorten(&id));
     let found = found.ok_or_else(|| nothing_here("delivery", &delivery, &list))?;
-    app.hooks.dispatcher.wake();
+    app.service.hooks.dispatcher.wake();
     Ok((
         StatusCode::ACCEPTED,
         Json(RedeliveredBody::Message(found.into())),
@@ -343,11 +347,11 @@ async fn redeliver_object(
     id: &str,
     now: Timestamp,
 ) -> Answer {
-    let store = &app.archives.store;
+    let store = &app.service.archives.store;
     let found = store.redeliver_object(&caller.tenant, job, id, now).await?;
     let list = format!("GET /v1/jobs/{}", shorten(job));
     let found = found.ok_or_else(|| nothing_here("delivery", id, &list))?;
-    app.archives.woken.notify_one();
+    app.service.archives.woken.notify_one();
     let body = RedeliveredBody::Object(found.into());
     Ok((StatusCode::ACCEPTED, Json(body)).into_response())
 }

@@ -5,8 +5,8 @@ use axum::Json;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
-use ventriform_service::jobs::Resource;
-pub use ventriform_service::jobs::rfc3339;
+use ventriform_service::records::Resource;
+pub use ventriform_service::records::rfc3339;
 
 /// The path of the thing that has that id.
 pub fn path_of(id: &str) -> String {
@@ -16,9 +16,10 @@ pub fn path_of(id: &str) -> String {
 
 /// 201 if the thing of that id is new, 200 if it was there already; with its path.
 pub fn added(new: bool, id: &str, body: impl Serialize) -> Response {
-    let status = match new {
-        true => StatusCode::CREATED,
-        false => StatusCode::OK,
+    let status = if new {
+        StatusCode::CREATED
+    } else {
+        StatusCode::OK
     };
     (status, [(header::LOCATION, path_of(id))], Json(body)).into_response()
 }

@@ -7,10 +7,10 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::guard::Counting;
 use super::memory::charge;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
+use super::quota::reserve_item;
 use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
 use crate::public_base::public_path;
 use axum::Json;
@@ -21,15 +21,16 @@ use serde_json::{Map, Value};
 use std::time::{Duration, Instant};
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
-use ventriform_service::jobs::{Timestamp, random_id, rfc3339};
+use ventriform_service::records::Timestamp;
 use ventriform_service::worklist::{
-    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState,
+    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
+    new_uid,
 };
 
 const MEDIA_TYPE: &str = "application/dicom+json";
 
 /// Media types of DICOM JSON.
-const TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
+const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
 
 const TRANSACTION: &str = "00081195";
 const STATE: &str = "00741000";
@@ -39,13 +40,13 @@ const SOP_INSTANCE: &str = "00080018";
 const TRANSACTION_NAMES: [&str; 2] = ["transaction-uid", "transaction"];
 
 /// Most items of a tenant.
-const MOST: u64 = 100_000;
+const MAX_WORKITEMS: u64 = 100_000;
 
 /// Items of a page, unless the client asks for fewer, and at most.
-const PAGE: (usize, usize) = (100, 1000);
+const PAGE_ITEMS: (usize, usize) = (100, 1000);
 
 /// Items read from the table at a time.
-const BATCH: u32 = 200;
+const BATCH_ITEMS: u32 = 200;
 
 /// Bytes of a page of items, unless one alone has more.
 const ANSWER_BYTES: usize = 2 << 20;
@@ -57,7 +58,7 @@ const SEARCH_MEMORY: u64 = 20 << 20;
 const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 
 /// How often a change is tried again that another one came before.
-const TRIES: usize = 20;
+const CHANGE_TRIES: usize = 20;
 
 /// Create a work item
 ///
@@ -89,7 +90,7 @@ pub async fn create_workitem(
             pairs.into_iter().next().map(|(_, uid)| uid)
         }
     };
-    let counting = Counting::of(&request);
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let attributes = data_set(request).await?;
     let named = named.or_else(|| attributes.text(SOP_INSTANCE).map(str::to_owned));
     let uid = named.unwrap_or_else(new_uid);
@@ -99,7 +100,12 @@ pub async fn create_workitem(
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
-    match app.worklist.add_workitem(&item, MOST).await? {
+    match app
+        .service
+        .worklist
+        .add_workitem(&item, MAX_WORKITEMS)
+        .await?
+    {
         AddedWorkitem::Done => {}
         AddedWorkitem::Exists => {
             return Err(Problem::new(
@@ -113,12 +119,12 @@ pub async fn create_workitem(
             return Err(Problem::new(
                 StatusCode::INSUFFICIENT_STORAGE,
                 "too-many-workitems",
-                format!("There are {MOST} work items."),
+                format!("There are {MAX_WORKITEMS} work items."),
             )
             .fix("Set `job_retention`, so that ended items are deleted."));
         }
     }
-    app.scheduled.notify_one();
+    app.service.scheduled.notify_one();
     let location = [(header::LOCATION, path(&uid))];
     let warning = completed.then(|| {
         let text = "The Workitem was created with modifications.";
@@ -173,11 +179,11 @@ pub async fn search_workitems(
     caller: Caller,
     RawQuery(query): RawQuery,
 ) -> Answer {
-    let (mut limit, mut skip) = (PAGE.0, 0);
+    let (mut limit, mut skip) = (PAGE_ITEMS.0, 0);
     let mut matching = Matching::default();
     for (name, value) in query_pairs(query.as_deref()) {
         match name.as_str() {
-            "limit" => limit = number(&name, &value)?.min(PAGE.1),
+            "limit" => limit = number(&name, &value)?.min(PAGE_ITEMS.1),
             "offset" => skip = number(&name, &value)?,
             // All attributes are answered, and names are compared without regard to case.
             "includefield" | "fuzzymatching" => {}
@@ -197,7 +203,10 @@ pub async fn search_workitems(
         if Instant::now() > late {
             return Err(too_broad());
         }
-        let page = app.worklist.workitems(&caller.tenant, state, after, BATCH);
+        let page = app
+            .service
+            .worklist
+            .workitems(&caller.tenant, state, after, BATCH_ITEMS);
         let page = page.await?;
         let Some(last) = page.last() else { break };
         after = last.sequence;
@@ -259,7 +268,7 @@ async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer
         }
         matched
     };
-    app.decoding.run(1, search).await
+    Ok(app.service.decoding.run(1, search).await?)
 }
 
 /// 413: PS3.18, table 8.3.4-1.
@@ -291,7 +300,7 @@ pub async fn update_workitem(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let counting = Counting::of(&request);
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
     let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
     counting.arrived(text_of(&changes)?.len() as u64).await?;
     change(&app, &caller, &uid, |item, now| {
@@ -300,7 +309,7 @@ pub async fn update_workitem(
     })
     .await?;
     // It may be ready now.
-    app.scheduled.notify_one();
+    app.service.scheduled.notify_one();
     Ok(StatusCode::OK.into_response())
 }
 
@@ -366,10 +375,11 @@ pub async fn cancel_workitem(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let bytes = bytes_of(request, &TYPES).await?;
-    let details = match bytes.is_empty() {
-        true => DataSetJson::default(),
-        false => parse(&bytes).await?,
+    let bytes = bytes_of(request, &JSON_TYPES).await?;
+    let details = if bytes.is_empty() {
+        DataSetJson::default()
+    } else {
+        parse(&bytes).await?
     };
     let done = change(&app, &caller, &uid, |item, now| {
         item.request_cancel(&details, now)
@@ -389,17 +399,17 @@ async fn change(
     uid: &str,
     how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
 ) -> Answer<Change> {
-    for _ in 0..TRIES {
+    for _ in 0..CHANGE_TRIES {
         let mut item = find(app, caller, uid).await?;
         let moment = now(app);
         let before = text_of(&item.attributes)?.len();
         let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
         let size = text_of(&item.attributes)?.len();
-        let limit = app.settings.json_limit;
+        let limit = app.service.settings.json_limit;
         if size > before && size as u64 > limit.0 {
             return Err(body::too_large(limit));
         }
-        if done == Change::Already || app.worklist.change_workitem(&item).await? {
+        if done == Change::Already || app.service.worklist.change_workitem(&item).await? {
             return Ok(done);
         }
     }
@@ -412,7 +422,7 @@ fn text_of(attributes: &DataSetJson) -> Answer<String> {
 }
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
-    let item = app.worklist.workitem(&caller.tenant, uid).await?;
+    let item = app.service.worklist.workitem(&caller.tenant, uid).await?;
     item.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,
@@ -425,21 +435,8 @@ async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
 
 /// The time, also as DICOM writes it.
 fn now(app: &App) -> (Timestamp, String) {
-    let now = app.queue.clock.now();
+    let now = app.service.now();
     (now, dicom_time(now))
-}
-
-/// A moment as DICOM writes it (DT, UTC).
-pub fn dicom_time(moment: Timestamp) -> String {
-    let text = rfc3339(moment);
-    let digits = text.chars().take(19).filter(char::is_ascii_digit);
-    digits.collect::<String>() + "+0000"
-}
-
-/// A new UID: a UUID under 2.25 (PS3.5 B.2).
-pub fn new_uid() -> String {
-    let number = u128::from_str_radix(&random_id(""), 16).unwrap_or_default();
-    format!("2.25.{number}")
 }
 
 fn path(uid: &str) -> String {
@@ -447,13 +444,14 @@ fn path(uid: &str) -> String {
 }
 
 fn require_uid(field: &str, uid: &str) -> Answer<()> {
-    match is_uid(uid) {
-        true => Ok(()),
-        false => Err(
+    if is_uid(uid) {
+        Ok(())
+    } else {
+        Err(
             Problem::bad_request("invalid-parameter", format!("`{field}` is not a UID."))
                 .at(field)
                 .fix("Give numbers separated by dots, at most 64 characters."),
-        ),
+        )
     }
 }
 
@@ -495,7 +493,7 @@ async fn claimed_data_set(
 }
 
 async fn data_set(request: Request) -> Answer<DataSetJson> {
-    parse(&bytes_of(request, &TYPES).await?).await
+    parse(&bytes_of(request, &JSON_TYPES).await?).await
 }
 
 /// The data set in an array with one, or alone.

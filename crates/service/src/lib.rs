@@ -1,16 +1,38 @@
-//! The work of the ventriform service, whoever asks for it: the queue of jobs and its workers, what is stored
-//! and for whom, objects received from other systems, archives, webhooks, worklists, settings.
+//! The work of the ventriform service, whoever asks for it: volumes are stored, jobs are filed and computed, results
+//! are delivered.
 //!
-//! It knows no HTTP and no database: [`stores::Stores`] holds the traits of what stores, and the crate
-//! `ventriform-http` answers requests with it.
+//! In: [`config::Settings`], the [`stores::Stores`], a [`work::Engine`]. Out: a running [`service::Service`], one method
+//! for each use case. Quotas and limits are checked inside; a [`error::ServiceError`] says whether trying again helps.
+//!
+//! It knows no HTTP interface and no database: the crate `ventriform-http` answers requests with it, `ventriform-store`
+//! implements the traits of [`records`].
 
 pub mod access;
 pub mod archive;
+pub mod background;
+pub mod client;
 pub mod config;
+pub mod decoding;
+pub mod error;
+pub mod filing;
 pub mod hooks;
 pub mod intake;
+pub mod items;
 pub mod jobs;
+pub mod library;
+pub mod memory;
 pub mod pem;
+mod procedures;
+pub mod quotas;
+pub mod records;
+mod reservations;
+mod rules;
+mod scans;
+pub mod series;
+pub mod service;
+pub mod start;
 pub mod stores;
+pub mod telemetry;
+pub mod uploads;
 pub mod work;
 pub mod worklist;

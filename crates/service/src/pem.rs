@@ -22,7 +22,7 @@ pub fn provider() -> Arc<CryptoProvider> {
 /// The certificates in a file, at least one.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The faults of the file.
 pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, String> {
     let all: Result<Vec<_>, _> = CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
     match all {
@@ -35,7 +35,7 @@ pub fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, String>
 /// The certificates in a file as authorities that others must come from.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The faults of the file.
 pub fn authorities(path: &Path) -> Result<RootCertStore, String> {
     let mut authorities = RootCertStore::empty();
     for certificate in certificates(path)? {
@@ -48,7 +48,7 @@ pub fn authorities(path: &Path) -> Result<RootCertStore, String> {
 /// The private key in a file.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The faults of the file.
 pub fn private_key(path: &Path) -> Result<PrivateKeyDer<'static>, String> {
     PrivateKeyDer::from_pem_file(path).map_err(|error| error.to_string())
 }

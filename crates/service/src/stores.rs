@@ -1,10 +1,10 @@
-//! What the service stores into: one value for each kind of record, made once by the program.
+//! The stores of a service: one value for each kind of record, made once by the program.
 
 use crate::access::AccessStore;
 use crate::archive::ArchiveStore;
 use crate::hooks::DeliveryStore;
 use crate::intake::{IntakeStore, ReceivedFiles};
-use crate::jobs::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
+use crate::records::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
 use crate::worklist::Worklist;
 use futures::future::BoxFuture;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ pub struct Stores {
     pub worklist: Arc<dyn Worklist>,
     /// Deliveries of webhooks.
     pub deliveries: Arc<dyn DeliveryStore>,
-    /// What is sent to archives.
+    /// Deliveries to archives.
     pub archives: Arc<dyn ArchiveStore>,
     /// Objects received by DICOM.
     pub intake: Arc<dyn IntakeStore>,

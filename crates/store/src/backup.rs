@@ -16,19 +16,20 @@ use super::database::SqlStore;
 use super::doctor::{DoctorError, names};
 use super::sqlite;
 use super::{
-    CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place, require_file,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
+    require_file,
 };
 use crate::faults;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
-use ventriform_service::jobs::{ItemRecord, RecordPages, Resource};
+use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 
 /// Rows read at a time.
-const PAGE: u32 = 200;
+const PAGE_ROWS: u32 = 200;
 
-/// What a backup holds.
+/// The content of a backup.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Backup {
     /// Number of volumes and products.
@@ -51,11 +52,11 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
         Ok(lock) if lock.log_is_missing(folder) => {
             return Err(OpenError::LogMissing(folder.to_owned()).into());
         }
-        Ok(mut lock) => lock.mark(CLOSED)?,
+        Ok(mut lock) => lock.mark(CLOSED_MARK)?,
         Err(OpenError::InUse(_)) => {}
         Err(error) => return Err(error.into()),
     }
-    let source = folder.join(DATABASE);
+    let source = folder.join(DATABASE_FILE);
     if !sqlite::has_tables(&source).await {
         return Err(OpenError::Unusable {
             path: source,
@@ -72,7 +73,7 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     let _ = fs::remove_dir_all(target.join(STAGING));
     fs::create_dir_all(target.join(STAGING))?;
 
-    let snapshot = target.join(STAGING).join(DATABASE);
+    let snapshot = target.join(STAGING).join(DATABASE_FILE);
     SqlStore::snapshot(&source, &snapshot).await?;
     let gauge = DiskGauge::new(target, Some(0));
     let rows = SqlStore::open(&snapshot, StoreSettings::default().write_wait, gauge)
@@ -85,9 +86,9 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
 
     blobs::sync(&snapshot)?;
     for end in ["-wal", "-shm"] {
-        let _ = fs::remove_file(target.join(format!("{DATABASE}{end}")));
+        let _ = fs::remove_file(target.join(format!("{DATABASE_FILE}{end}")));
     }
-    fs::rename(&snapshot, target.join(DATABASE))?;
+    fs::rename(&snapshot, target.join(DATABASE_FILE))?;
     blobs::sync(target)?;
     keep_only(target, |name| {
         kept.contains(name) || received.contains(name)
@@ -119,7 +120,7 @@ async fn copy_items(
     rows: &SqlStore,
 ) -> Result<(Backup, BTreeSet<String>), DoctorError> {
     let (mut done, mut kept) = (Backup::default(), BTreeSet::new());
-    let mut pages = RecordPages::new(rows, PAGE);
+    let mut pages = RecordPages::new(rows, PAGE_ROWS);
     while let Some(page) = pages.next().await? {
         for record in page {
             let id = record.id();

@@ -23,7 +23,7 @@ use time::format_description::StaticFormatDescription;
 use time::macros::format_description;
 use time::{Date, OffsetDateTime};
 use tokio::io::AsyncWrite;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
     Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };
@@ -35,12 +35,12 @@ pub(super) const RECORD: &str = "record.json";
 pub(super) const STAGING: &str = "staging";
 /// Received objects, which are not volumes yet.
 pub(super) const RECEIVED: &str = "received";
-/// What is to be deleted.
+/// The folder of files that are to be deleted.
 pub(super) const DISCARDED: &str = "discarded";
-/// What was found without a row, by day.
+/// The folder of files without a row, by day.
 pub(super) const QUARANTINE: &str = "quarantine";
 
-const DAY: StaticFormatDescription = format_description!("[year]-[month]-[day]");
+const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-[day]");
 
 /// What [`BlobStore::check`] writes: more than the free rest of a block.
 pub(super) const CHECK: &[u8] = &[b'v'; 8192];
@@ -447,12 +447,13 @@ impl BlobStore for FileBlobs {
             fs::write(&path, CHECK)?;
             let read = fs::read(&path);
             fs::remove_file(&path)?;
-            match read? == CHECK {
-                true => Ok(()),
-                false => Err(BlobError::new(
+            if read? == CHECK {
+                Ok(())
+            } else {
+                Err(BlobError::new(
                     StoreFault::Disk,
                     "a file was read back with another content",
-                )),
+                ))
             }
         });
         checked.await
@@ -490,13 +491,13 @@ fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
 
 /// The name of the quarantine of the day.
 pub(super) fn shelf_name(now: Timestamp) -> String {
-    let day = day(now).and_then(|day| day.format(&DAY).ok());
+    let day = day(now).and_then(|day| day.format(&DAY_FORMAT).ok());
     day.unwrap_or_else(|| "unknown".into())
 }
 
 /// Whether a folder in the quarantine is of an earlier day.
 pub(super) fn is_of_shelf_before(name: &str, first_kept: Timestamp) -> bool {
-    let of = Date::parse(name, &DAY).ok();
+    let of = Date::parse(name, &DAY_FORMAT).ok();
     of.zip(day(first_kept)).is_some_and(|(of, kept)| of < kept)
 }
 

@@ -16,10 +16,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::SystemTime;
-use ventriform_service::jobs::{BlobError, FileRecord, LocalFile, StoreFault, random_id};
+use ventriform_service::records::{BlobError, FileRecord, LocalFile, StoreFault, random_id};
 
 /// Downloads that have not ended.
-const ARRIVING: &str = "arriving";
+const ARRIVING_FOLDER: &str = "arriving";
 
 /// The folder of copies.
 pub(super) struct LocalCache {
@@ -145,7 +145,7 @@ impl LocalCache {
     /// # Errors
     /// If the folder cannot be read or written.
     pub fn open(folder: &Path, limit: u64) -> io::Result<Self> {
-        let arriving = folder.join(ARRIVING);
+        let arriving = folder.join(ARRIVING_FOLDER);
         match fs::remove_dir_all(&arriving) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -175,7 +175,7 @@ impl LocalCache {
         for place in fs::read_dir(&self.folder)? {
             let place = place?;
             let name = place.file_name().to_string_lossy().into_owned();
-            if name == ARRIVING || !place.file_type()?.is_dir() {
+            if name == ARRIVING_FOLDER || !place.file_type()?.is_dir() {
                 continue;
             }
             for file in fs::read_dir(place.path())? {
@@ -243,8 +243,8 @@ impl LocalCache {
         if let Some(found) = self.look_up(&path, record).await? {
             return Ok(Some(found));
         }
-        let draft = Draft(self.folder.join(ARRIVING).join(random_id("")));
-        fs::create_dir_all(self.folder.join(ARRIVING))?;
+        let draft = Draft(self.folder.join(ARRIVING_FOLDER).join(random_id("")));
+        fs::create_dir_all(self.folder.join(ARRIVING_FOLDER))?;
         let Some((bytes, sha256)) = download(draft.0.clone()).await? else {
             return Ok(None);
         };
@@ -378,7 +378,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use ventriform_service::jobs::hex;
+    use ventriform_service::records::hex;
 
     fn record(content: &[u8]) -> FileRecord {
         FileRecord {

@@ -6,7 +6,7 @@
 //! costs one `fstat`.
 //!
 //! Not found: content that changes on the disk below the file system after it was verified. The
-//! slow check of all files ([`ventriform_service::jobs::Upkeep`]) reads every file anew.
+//! slow check of all files ([`ventriform_service::background::Upkeep`]) reads every file anew.
 
 use bytes::Bytes;
 use futures::{StreamExt, stream};
@@ -16,18 +16,18 @@ use std::fs::{File, Metadata};
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
-use ventriform_service::jobs::{BlobError, BlobStream, FileRecord, StoreFault, hex};
+use ventriform_service::records::{BlobError, BlobStream, FileRecord, StoreFault, hex};
 
 /// Files remembered at most, twice: when there are more, the older half is forgotten.
-const REMEMBERED: usize = 8192;
+const REMEMBERED_FILES: usize = 8192;
 
 /// Bytes of a file that are read at a time for a client, and held in memory for each slow one.
 const SENT_CHUNK: u64 = 256 << 10;
 
 /// Bytes read at a time.
-const CHUNK: usize = 128 << 10;
+const CHUNK_BYTES: usize = 128 << 10;
 
-/// What changes when a file's content does.
+/// The properties of a file that change with its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Stamp {
     bytes: u64,
@@ -78,7 +78,7 @@ impl Verified {
     /// Remembers the hash of the file at `path`.
     pub fn remember(&self, path: String, stamp: Stamp, sha256: String) {
         let mut generations = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if generations.young.len() >= REMEMBERED {
+        if generations.young.len() >= REMEMBERED_FILES {
             generations.old = std::mem::take(&mut generations.young);
         }
         generations.young.insert(path, (stamp, sha256));
@@ -126,7 +126,7 @@ pub(super) fn damaged(path: &str, how: &str) -> BlobError {
 /// SHA-256 of a file from its current position on, hexadecimal.
 pub(super) fn hash(mut file: &File) -> std::io::Result<String> {
     let mut hash = Sha256::new();
-    let mut chunk = vec![0; CHUNK];
+    let mut chunk = vec![0; CHUNK_BYTES];
     loop {
         match file.read(&mut chunk)? {
             0 => return Ok(hex(&hash.finalize())),

@@ -1,6 +1,6 @@
 //! The outcome of copying an item.
 
-/// What became of an item, or of a received object.
+/// The outcome of an item, or of a received object.
 pub(super) enum Copied {
     /// It was copied.
     Now,

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, StoreFault, StoreResult, random_id};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
@@ -36,7 +36,7 @@ impl<'a> From<&'a Readers> for Target<'a> {
     }
 }
 
-/// What writes.
+/// The connection that writes.
 pub(super) enum Writing {
     /// The one connection that writes to the file.
     Sqlite(Box<Writer>),
@@ -147,9 +147,9 @@ impl Query {
 }
 
 /// The prefix of the names of runs.
-const RUN: &str = "run_";
+const RUN_PREFIX: &str = "run_";
 
-/// The database. Implements [`ventriform_service::jobs::JobStore`] and [`ventriform_service::jobs::Catalogue`], and the traits
+/// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`], and the traits
 /// of `access`, `hooks`, `archive`, `intake` and `worklist`.
 pub struct SqlStore {
     pub(super) writer: Writing,
@@ -173,7 +173,7 @@ impl SqlStore {
         Ok(Self {
             writer: Writing::Sqlite(Box::new(writer)),
             readers: Readers::Sqlite(readers),
-            run: random_id(RUN),
+            run: random_id(RUN_PREFIX),
             gauge,
             damaged: AtomicBool::new(false),
         })
@@ -188,7 +188,7 @@ impl SqlStore {
         wait: Duration,
         gauge: DiskGauge,
     ) -> Result<Self, postgres::PostgresError> {
-        let run = random_id(RUN);
+        let run = random_id(RUN_PREFIX);
         let (writer, readers) = postgres::open(settings, wait, &run).await?;
         Ok(Self {
             writer: Writing::Postgres(writer),

@@ -29,20 +29,21 @@ use super::received;
 use super::s3::{BucketDoctor, S3Blobs, S3Location};
 use super::sqlite;
 use super::{
-    CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place, require_file,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
+    require_file,
 };
 use crate::faults;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
     random_id, volume_id,
 };
 
 /// Rows read at a time.
-const PAGE: u32 = 200;
+const PAGE_ROWS: u32 = 200;
 
 /// Why a data folder cannot be examined.
 #[derive(Debug, thiserror::Error)]
@@ -102,7 +103,7 @@ pub async fn examine(
     rows.close().await;
     examined?;
     if heirs.is_some() {
-        lock.mark(CLOSED)?;
+        lock.mark(CLOSED_MARK)?;
     }
     Ok(doctor.found)
 }
@@ -121,17 +122,17 @@ impl Doctor<'_> {
 
     /// Checks the database. `None` if there is none that can be read and none may be made.
     async fn database(&mut self, lock: &mut FolderLock) -> Result<Option<SqlStore>, DoctorError> {
-        let path = self.folder.join(DATABASE);
+        let path = self.folder.join(DATABASE_FILE);
         // Opening and closing the database moves the log into it.
         let log_missing = lock.log_is_missing(self.folder);
         if !log_missing {
-            lock.mark(CLOSED)?;
+            lock.mark(CLOSED_MARK)?;
         }
         let made_anew = self.if_repairing("a new database was made");
         if !sqlite::has_tables(&path).await {
             self.found.note(
                 "database-missing",
-                DATABASE,
+                DATABASE_FILE,
                 "It is missing or empty.",
                 made_anew,
             );
@@ -140,7 +141,7 @@ impl Doctor<'_> {
         if log_missing {
             self.found.note(
                 "log-missing",
-                format!("{DATABASE}-wal"),
+                format!("{DATABASE_FILE}-wal"),
                 "The service did not stop in order, and the last changes to the database are \
                  missing.",
                 self.if_repairing("accepted"),
@@ -159,7 +160,7 @@ impl Doctor<'_> {
         };
         self.found.note(
             "database-damaged",
-            DATABASE,
+            DATABASE_FILE,
             defects.join("; "),
             self.if_repairing("a new database was made of the rows that can be read"),
         );
@@ -169,7 +170,7 @@ impl Doctor<'_> {
     async fn open_database(&self) -> Result<SqlStore, sqlx::Error> {
         let settings = StoreSettings::default();
         let gauge = DiskGauge::new(self.folder, Some(0));
-        SqlStore::open(&self.folder.join(DATABASE), settings.write_wait, gauge).await
+        SqlStore::open(&self.folder.join(DATABASE_FILE), settings.write_wait, gauge).await
     }
 
     /// Makes a new database, with the rows of the old one that can be read.
@@ -180,7 +181,7 @@ impl Doctor<'_> {
         let aside = self.folder.join(QUARANTINE).join(random_id("database-"));
         fs::create_dir_all(&aside)?;
         for end in ["", "-wal", "-shm"] {
-            let name = format!("{DATABASE}{end}");
+            let name = format!("{DATABASE_FILE}{end}");
             match fs::rename(self.folder.join(&name), aside.join(&name)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
                 _ => {}
@@ -188,7 +189,7 @@ impl Doctor<'_> {
         }
         let rows = self.open_database().await.map_err(faults::of_sqlite)?;
         if old.is_some() {
-            rows.salvage(&aside.join(DATABASE)).await?;
+            rows.salvage(&aside.join(DATABASE_FILE)).await?;
         }
         Ok(Some(rows))
     }
@@ -238,7 +239,7 @@ impl Doctor<'_> {
     /// Checks the files of every row. Returns the ids that have a row.
     async fn rows(&mut self, rows: &SqlStore) -> Result<BTreeSet<String>, DoctorError> {
         let mut known = BTreeSet::new();
-        let mut pages = RecordPages::new(rows, PAGE);
+        let mut pages = RecordPages::new(rows, PAGE_ROWS);
         while let Some(page) = pages.next().await? {
             for record in page {
                 self.row(rows, &record).await?;
@@ -310,7 +311,7 @@ impl Doctor<'_> {
         Ok(())
     }
 
-    /// What is wrong with the files of an item.
+    /// The faults of the files of an item.
     fn wrong_files(&mut self, place: &Path, record: &ItemRecord) -> io::Result<Vec<String>> {
         let mut wrong = Vec::new();
         let mut found = Vec::new();
@@ -428,9 +429,10 @@ impl Doctor<'_> {
             for name in names(&self.folder.join(shelf))? {
                 let place = self.folder.join(shelf).join(&name);
                 if self.heirs.is_some() {
-                    match place.is_dir() {
-                        true => fs::remove_dir_all(&place)?,
-                        false => fs::remove_file(&place)?,
+                    if place.is_dir() {
+                        fs::remove_dir_all(&place)?
+                    } else {
+                        fs::remove_file(&place)?
                     }
                 }
                 let detail = "It is left over from a write or a deletion that did not end.";

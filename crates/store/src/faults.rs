@@ -1,15 +1,15 @@
 //! Errors of SQLite and of PostgreSQL as kinds of failures of the storage.
 
 use sqlx::postgres::PgPool;
-use ventriform_service::jobs::{StoreError, StoreFault};
+use ventriform_service::records::{StoreError, StoreFault};
 
 /// Primary result codes of SQLite (<https://sqlite.org/rescode.html>).
-const BUSY: i32 = 5;
-const LOCKED: i32 = 6;
+const SQLITE_BUSY: i32 = 5;
+const SQLITE_LOCKED: i32 = 6;
 const READ_ONLY: i32 = 8;
 const IO_ERROR: i32 = 10;
-const CORRUPT: i32 = 11;
-const FULL: i32 = 13;
+const SQLITE_CORRUPT: i32 = 11;
+const SQLITE_FULL: i32 = 13;
 const CANNOT_OPEN: i32 = 14;
 const NOT_A_DATABASE: i32 = 26;
 
@@ -26,10 +26,10 @@ fn cause(error: &sqlx::Error) -> StoreFault {
         sqlx::Error::Database(error) => {
             let extended: i32 = error.code().and_then(|c| c.parse().ok()).unwrap_or(0);
             match extended & 0xff {
-                FULL => StoreFault::Full,
-                BUSY | LOCKED => StoreFault::Busy,
+                SQLITE_FULL => StoreFault::Full,
+                SQLITE_BUSY | SQLITE_LOCKED => StoreFault::Busy,
                 IO_ERROR | READ_ONLY | CANNOT_OPEN => StoreFault::Disk,
-                CORRUPT | NOT_A_DATABASE => StoreFault::DamagedDatabase,
+                SQLITE_CORRUPT | NOT_A_DATABASE => StoreFault::DamagedDatabase,
                 _ => StoreFault::Other,
             }
         }

@@ -1,4 +1,4 @@
-//! What a check of the storage found, and what was done about it.
+//! Findings of a check of the storage, and their repair.
 
 use serde::Serialize;
 
@@ -9,11 +9,11 @@ pub struct Finding {
     pub kind: &'static str,
     /// The id or file concerned.
     pub subject: String,
-    /// What was found, as a sentence.
+    /// The finding, as a sentence.
     pub detail: String,
     /// Whether the service works without a repair.
     pub harmless: bool,
-    /// What was done about it.
+    /// The repair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub repair: Option<&'static str>,
 }
@@ -25,7 +25,7 @@ pub struct Examination {
     pub items: u64,
     /// Number of files that were read and verified.
     pub files: u64,
-    /// What was found.
+    /// The finding.
     pub findings: Vec<Finding>,
 }
 

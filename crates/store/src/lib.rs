@@ -62,7 +62,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
 use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::jobs::{BlobError, BlobStore, Peers, Resource, random_id};
+use ventriform_service::records::{BlobError, BlobStore, Peers, Resource, random_id};
 use ventriform_service::stores::Stores;
 
 /// Limits of a store.
@@ -119,14 +119,14 @@ pub enum OpenError {
          together with its -wal file, or make a new one from what lies beside the files: \
          ventriform doctor --data-dir {folder} --repair",
         folder = .0.display(),
-        database = .0.join(DATABASE).display(),
+        database = .0.join(DATABASE_FILE).display(),
     )]
     DatabaseMissing(PathBuf),
     /// The last process did not end in order, and the changes it had not yet moved into the
     /// database are missing.
     #[error(
-        "{folder}: the service did not stop in order, and {DATABASE}-wal, which holds the last \
-         changes to the database, is missing. Restore it together with {DATABASE}; if it is \
+        "{folder}: the service did not stop in order, and {DATABASE_FILE}-wal, which holds the last \
+         changes to the database, is missing. Restore it together with {DATABASE_FILE}; if it is \
          lost, accept that and check the rest: ventriform doctor --data-dir {folder} --repair",
         folder = .0.display(),
     )]
@@ -203,7 +203,7 @@ pub enum OpenError {
         "the records of {folder} are kept in {url}. Give that database by --database or \
          VENTRIFORM_DATABASE; it is checked and copied by the tools of PostgreSQL, such as pg_dump. If \
          the folder does not belong to it any more, delete {marker}",
-        folder = .folder.display(), marker = .folder.join(MARKER).display(),
+        folder = .folder.display(), marker = .folder.join(MARKER_FILE).display(),
     )]
     OnServer {
         /// The folder.
@@ -224,7 +224,7 @@ pub enum OpenError {
     },
     /// Its records are in a file.
     #[error(
-        "the records of {folder} are kept in its file {DATABASE}. Start without --database, or give \
+        "the records of {folder} are kept in its file {DATABASE_FILE}. Start without --database, or give \
          another folder (data_dir)", folder = .0.display(),
     )]
     InFile(PathBuf),
@@ -270,7 +270,7 @@ impl Store {
                     let blobs =
                         S3Blobs::open(location, folder, gauge.clone(), settings.cache).await?;
                     let empty = !blobs.has_items().await?;
-                    let database = folder.join(DATABASE);
+                    let database = folder.join(DATABASE_FILE);
                     let made = settings.database.is_some() || sqlite::has_tables(&database).await;
                     if !made && !empty {
                         let blobs = location.to_string();
@@ -335,9 +335,9 @@ async fn on_server(
     write_wait: Duration,
     gauge: DiskGauge,
 ) -> Result<SqlStore, OpenError> {
-    let marker = folder.join(MARKER);
+    let marker = folder.join(MARKER_FILE);
     require_finished(folder)?;
-    if folder.join(DATABASE).exists() {
+    if folder.join(DATABASE_FILE).exists() {
         return Err(OpenError::InFile(folder.to_owned()));
     }
     let rows = SqlStore::connect(server, write_wait, gauge).await?;
@@ -353,7 +353,7 @@ async fn on_server(
     };
     let place = rows.note_place(&own).await;
     let place = place.map_err(|e| unusable(folder, &e))?;
-    if place.starts_with(MIGRATION) {
+    if place.starts_with(MIGRATION_MARK) {
         return Err(OpenError::Unfinished {
             place: server.url.to_string(),
             note: place,
@@ -383,7 +383,7 @@ fn name_of(marker: &Path) -> Option<String> {
 
 /// Refuses a folder to which another one is being moved.
 fn require_finished(folder: &Path) -> Result<(), OpenError> {
-    match std::fs::read_to_string(folder.join(UNFINISHED)) {
+    match std::fs::read_to_string(folder.join(UNFINISHED_MIGRATION_FILE)) {
         Ok(note) => Err(OpenError::Unfinished {
             place: folder.display().to_string(),
             note,
@@ -395,7 +395,7 @@ fn require_finished(folder: &Path) -> Result<(), OpenError> {
 /// Refuses a folder whose records are on a server.
 fn require_file(folder: &Path) -> Result<(), OpenError> {
     require_finished(folder)?;
-    match std::fs::read_to_string(folder.join(MARKER)) {
+    match std::fs::read_to_string(folder.join(MARKER_FILE)) {
         Ok(url) => Err(OpenError::OnServer {
             folder: folder.to_owned(),
             url: url.lines().next().unwrap_or_default().to_owned(),
@@ -437,7 +437,7 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqlStore>, OpenError> {
     let wait = StoreSettings::default().write_wait;
     let gauge = DiskGauge::new(folder, None);
     let deadline = Instant::now() + FIRST_START;
-    let database = folder.join(DATABASE);
+    let database = folder.join(DATABASE_FILE);
     loop {
         match locked(folder) {
             Ok(mut lock) => {
@@ -477,9 +477,10 @@ fn unusable(path: &Path, error: &dyn std::fmt::Display) -> OpenError {
 fn locked(folder: &Path) -> Result<FolderLock, OpenError> {
     std::fs::create_dir_all(folder).map_err(|e| unusable(folder, &e))?;
     let lock = FolderLock::take(folder)?;
-    match lock.log_is_missing(folder) {
-        true => Err(OpenError::LogMissing(folder.to_owned())),
-        false => Ok(lock),
+    if lock.log_is_missing(folder) {
+        Err(OpenError::LogMissing(folder.to_owned()))
+    } else {
+        Ok(lock)
     }
 }
 
@@ -490,7 +491,7 @@ async fn in_file(
     write_wait: Duration,
     gauge: DiskGauge,
 ) -> Result<SqlStore, OpenError> {
-    let database = folder.join(DATABASE);
+    let database = folder.join(DATABASE_FILE);
     require_file(folder)?;
     let empty = !has_items(folder).map_err(|e| unusable(folder, &e))?;
     if !empty && !sqlite::has_tables(&database).await {
@@ -499,20 +500,20 @@ async fn in_file(
     let rows = SqlStore::open(&database, write_wait, gauge).await;
     let rows = rows.map_err(|e| unusable(&database, &e))?;
     if log_of(folder).exists() {
-        lock.mark(OPEN).map_err(|e| unusable(folder, &e))?;
+        lock.mark(OPEN_MARK).map_err(|e| unusable(folder, &e))?;
     }
     Ok(rows)
 }
 
 /// The file of a data folder that says where its files are, if not in the folder.
-const PLACE: &str = "blobs";
+const BLOB_PLACE_FILE: &str = "blobs";
 
 /// Where the files of a data folder are, if not in the folder.
 fn noted_place(folder: &Path) -> Result<Option<String>, OpenError> {
-    match std::fs::read_to_string(folder.join(PLACE)) {
+    match std::fs::read_to_string(folder.join(BLOB_PLACE_FILE)) {
         Ok(text) => Ok(Some(text.trim().to_owned())),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(unusable(&folder.join(PLACE), &error)),
+        Err(error) => Err(unusable(&folder.join(BLOB_PLACE_FILE), &error)),
     }
 }
 
@@ -524,17 +525,20 @@ fn check_place(folder: &Path, location: Option<&S3Location>) -> Result<(), OpenE
         (Some(blobs), given) if given.as_ref() != Some(&blobs) => {
             Err(OpenError::FilesElsewhere { folder, blobs })
         }
-        (None, Some(blobs)) => match has_items(&folder).map_err(|e| unusable(&folder, &e))? {
-            true => Err(OpenError::FilesHere { folder, blobs }),
-            false => Ok(()),
-        },
+        (None, Some(blobs)) => {
+            if has_items(&folder).map_err(|e| unusable(&folder, &e))? {
+                Err(OpenError::FilesHere { folder, blobs })
+            } else {
+                Ok(())
+            }
+        }
         _ => Ok(()),
     }
 }
 
 /// Notes where the files of a data folder are.
 fn note_place(folder: &Path, location: &S3Location) -> std::io::Result<()> {
-    let path = folder.join(PLACE);
+    let path = folder.join(BLOB_PLACE_FILE);
     if !path.exists() {
         std::fs::write(&path, format!("{location}\n"))?;
         blobs::sync(&path)?;
@@ -573,27 +577,27 @@ fn has_items(folder: &Path) -> std::io::Result<bool> {
 }
 
 /// The name of the database.
-const DATABASE: &str = "ventriform.db";
+const DATABASE_FILE: &str = "ventriform.db";
 
 /// The file that says which database on a server holds the records of the folder.
-const MARKER: &str = "database";
+const MARKER_FILE: &str = "database";
 
 /// The file that says that another folder is being moved to this one, and which.
-const UNFINISHED: &str = "migration";
+const UNFINISHED_MIGRATION_FILE: &str = "migration";
 
-/// What the note of an unfinished migration begins with.
-const MIGRATION: &str = "migration from ";
+/// The beginning of the note of an unfinished migration.
+const MIGRATION_MARK: &str = "migration from ";
 
 /// The database's write-ahead log.
 fn log_of(folder: &Path) -> PathBuf {
-    folder.join(format!("{DATABASE}-wal"))
+    folder.join(format!("{DATABASE_FILE}-wal"))
 }
 
-/// What the lock file says while a process has the database open. If that process is killed, its
+/// The content of the lock file while a process has the database open. If that process is killed, its
 /// successor finds this, and knows that there must be a write-ahead log.
-const OPEN: &[u8] = b"open\n";
-/// What the lock file says before the database is closed.
-const CLOSED: &[u8] = b"closed\n";
+const OPEN_MARK: &[u8] = b"open\n";
+/// The content of the lock file before the database is closed.
+const CLOSED_MARK: &[u8] = b"closed\n";
 
 /// The locked file `lock` of a data folder. Dropping it unlocks the folder.
 struct FolderLock {
@@ -641,18 +645,18 @@ impl FolderLock {
         file.read_to_end(&mut said).map_err(unusable)?;
         Ok(Self {
             file,
-            was_open: said == OPEN,
+            was_open: said == OPEN_MARK,
             marked: false,
         })
     }
 
     /// Whether the write-ahead log is gone without the database having been closed in order.
     fn log_is_missing(&self, folder: &Path) -> bool {
-        self.was_open && folder.join(DATABASE).exists() && !log_of(folder).exists()
+        self.was_open && folder.join(DATABASE_FILE).exists() && !log_of(folder).exists()
     }
 
     fn mark(&mut self, state: &[u8]) -> std::io::Result<()> {
-        self.marked = state == OPEN;
+        self.marked = state == OPEN_MARK;
         self.file.set_len(0)?;
         self.file.rewind()?;
         self.file.write_all(state)?;
@@ -662,7 +666,7 @@ impl FolderLock {
     /// To be called before the database is closed, which deletes the write-ahead log.
     fn release(&mut self) {
         if self.marked
-            && let Err(error) = self.mark(CLOSED)
+            && let Err(error) = self.mark(CLOSED_MARK)
         {
             tracing::warn!(%error, "the lock file could not be written");
         }

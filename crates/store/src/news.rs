@@ -1,4 +1,4 @@
-//! What other processes on the same PostgreSQL tables tell (`NOTIFY`).
+//! News of other processes on the same PostgreSQL tables (`NOTIFY`).
 //!
 //! A task takes the notifications off a connection of its own as soon as they come, and leaves them in an
 //! [`Inbox`] for whoever follows them at the speed of its own reads. If they stayed on the connection, the
@@ -16,14 +16,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::Notify;
 use tokio::task::JoinHandle;
-use ventriform_service::jobs::{News, NewsFeed};
+use ventriform_service::records::{News, NewsFeed};
 
 /// Pause between two attempts to listen.
-const AGAIN: Duration = Duration::from_secs(1);
+const LISTEN_RETRY: Duration = Duration::from_secs(1);
 /// Number of different news that wait to be followed.
-const WAITING: usize = 10_000;
+const QUEUED_NEWS: usize = 10_000;
 /// The channel of the notifications of migration 2.
-const CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
+const SELECT_CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
 
 /// News that wait to be followed, in the order in which they came.
 struct Inbox {
@@ -48,7 +48,7 @@ impl Inbox {
     /// Adds news, unless the same is waiting already.
     fn put(&self, news: News) {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        let news = if waiting.order.len() < WAITING {
+        let news = if waiting.order.len() < QUEUED_NEWS {
             news
         } else {
             *waiting = Waiting::default();
@@ -115,7 +115,7 @@ async fn listen(pool: PgPool, run: String, inbox: Arc<Inbox>) {
             Ok(listener) => listener,
             Err(error) => {
                 tracing::debug!(%error, "other processes cannot be listened to");
-                tokio::time::sleep(jitter(AGAIN)).await;
+                tokio::time::sleep(jitter(LISTEN_RETRY)).await;
                 continue;
             }
         };
@@ -140,12 +140,14 @@ async fn listen(pool: PgPool, run: String, inbox: Arc<Inbox>) {
 
 async fn listener(pool: &PgPool) -> Result<PgListener, sqlx::Error> {
     let mut listener = PgListener::connect_with(pool).await?;
-    let channel: String = sqlx::query_scalar(CHANNEL).fetch_one(&mut listener).await?;
+    let channel: String = sqlx::query_scalar(SELECT_CHANNEL)
+        .fetch_one(&mut listener)
+        .await?;
     listener.listen(&channel).await?;
     Ok(listener)
 }
 
-/// What a notification tells; `None` if it is of `run` itself, or of a newer version.
+/// The content of a notification; `None` if it is of `run` itself, or of a newer version.
 fn told(payload: &str, run: &str) -> Option<News> {
     let mut words = payload.splitn(3, ' ');
     let (kind, by, what) = (words.next()?, words.next()?, words.next()?);
@@ -184,7 +186,7 @@ mod tests {
     #[test]
     fn more_than_it_holds_is_missed_and_what_comes_later_is_not() {
         let inbox = Inbox::new();
-        for number in 0..=WAITING {
+        for number in 0..=QUEUED_NEWS {
             inbox.put(job(number));
         }
         inbox.put(job(1));

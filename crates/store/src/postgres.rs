@@ -33,26 +33,26 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
-use ventriform_service::jobs::{StoreError, StoreFault, StoreResult};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// Pause between two attempts to reach the server at the start.
-const AGAIN: Duration = Duration::from_secs(1);
+const RECONNECT_PAUSE: Duration = Duration::from_secs(1);
 /// Longest time of one attempt to reach the server.
-const CONNECT: Duration = Duration::from_secs(5);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time of one statement.
-const STATEMENT: Duration = Duration::from_secs(30);
+const STATEMENT_TIMEOUT: Duration = Duration::from_secs(30);
 /// The parameter of a session that names the process.
-const RUN: &str = "ventriform.run";
-/// What is wrong with a pooler that hands out sessions for transactions.
+const RUN_SETTING: &str = "ventriform.run";
+/// The faults of a pooler that hands out sessions for transactions.
 const SHARED_SESSION: &str =
     "a pooler between this program and PostgreSQL lets several connections share one session";
-/// What to do about it.
+/// Advice.
 const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of PostgreSQL itself";
-/// What to do about a user or a password that is not accepted.
+/// Advice about a user or a password that is not accepted.
 const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf (by auth_file, if a \
      pooler says so)";
 /// Oldest version of the server that is tested.
-const OLDEST: i32 = 150_000;
+const OLDEST_SERVER_VERSION: i32 = 150_000;
 
 /// The key of the lock for writing, in any schema of its own.
 pub(super) const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
@@ -88,7 +88,7 @@ pub enum PostgresError {
         url: PostgresUrl,
         /// The message of the server.
         reason: String,
-        /// What to do.
+        /// Advice.
         fix: &'static str,
     },
     /// A newer program has changed its tables.
@@ -106,7 +106,7 @@ pub enum PostgresError {
     Tables {
         /// The database.
         url: PostgresUrl,
-        /// What failed.
+        /// The failure.
         reason: String,
     },
 }
@@ -182,11 +182,11 @@ fn with_few_parameters(options: PgConnectOptions) -> PgConnectOptions {
         .extra_float_digits(None)
 }
 
-/// What a session is told besides its limits. `run` names this process.
+/// Settings of a session besides its limits. `run` names this process.
 fn session_names(run: &str) -> Vec<(&'static str, String)> {
     vec![
         ("client_min_messages", "warning".into()),
-        (RUN, run.to_owned()),
+        (RUN_SETTING, run.to_owned()),
     ]
 }
 
@@ -212,13 +212,14 @@ async fn set_session(
     .bind(&values)
     .execute(&mut *connection)
     .await?;
-    let Some((name, value)) = parameters.iter().find(|(name, _)| *name == RUN) else {
+    let Some((name, value)) = parameters.iter().find(|(name, _)| *name == RUN_SETTING) else {
         return Ok(());
     };
     let kept = sqlx::query_scalar("SELECT current_setting($1, true) IS NOT DISTINCT FROM $2");
-    match kept.bind(name).bind(value).fetch_one(connection).await? {
-        true => Ok(()),
-        false => Err(sqlx::Error::Configuration(SHARED_SESSION.into())),
+    if kept.bind(name).bind(value).fetch_one(connection).await? {
+        Ok(())
+    } else {
+        Err(sqlx::Error::Configuration(SHARED_SESSION.into()))
     }
 }
 
@@ -234,15 +235,15 @@ async fn check_sessions(
     run: &str,
 ) -> Result<(), PostgresError> {
     let refused = |error| refusal(url, &error);
-    let Ok(Ok(mut second)) = tokio::time::timeout(CONNECT, options.connect()).await else {
+    let Ok(Ok(mut second)) = tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await else {
         // The server has no room for another connection now.
         return Ok(());
     };
     let mark = format!("probe {run}").replace('\'', "");
     // Simple statements: prepared ones would fail for a reason of their own.
-    let show = format!("SELECT coalesce(current_setting('{RUN}', true), '')");
+    let show = format!("SELECT coalesce(current_setting('{RUN_SETTING}', true), '')");
     let shared = async {
-        let set = format!("SELECT set_config('{RUN}', '{mark}', false)");
+        let set = format!("SELECT set_config('{RUN_SETTING}', '{mark}', false)");
         sqlx::raw_sql(AssertSqlSafe(set))
             .execute(&mut *first)
             .await?;
@@ -256,13 +257,14 @@ async fn check_sessions(
     };
     let shared = shared.await.map_err(refused)?;
     let _ = second.close().await;
-    match shared {
-        false => Ok(()),
-        true => Err(PostgresError::Refused {
+    if !shared {
+        Ok(())
+    } else {
+        Err(PostgresError::Refused {
             url: url.clone(),
             reason: SHARED_SESSION.into(),
             fix: USE_SESSIONS,
-        }),
+        })
     }
 }
 
@@ -272,7 +274,7 @@ fn session_limits(wait: Duration) -> [(&'static str, String); 7] {
     let ms = |time: Duration| time.as_millis().to_string();
     [
         ("lock_timeout", ms(wait.max(Duration::from_millis(1)))),
-        ("statement_timeout", ms(STATEMENT)),
+        ("statement_timeout", ms(STATEMENT_TIMEOUT)),
         (
             "idle_in_transaction_session_timeout",
             ms(wait.max(Duration::from_secs(5))),
@@ -293,7 +295,7 @@ async fn reach(
     let started = Instant::now();
     let mut said = false;
     loop {
-        let reason = match tokio::time::timeout(CONNECT, options.connect()).await {
+        let reason = match tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await {
             Ok(Ok(connection)) => return Ok(connection),
             Ok(Err(error)) if faults::connection_was_lost(&error) && !is_final(&error) => {
                 said_by_server(&error)
@@ -313,7 +315,7 @@ async fn reach(
             said = true;
         }
         let left = settings.patience.saturating_sub(started.elapsed());
-        tokio::time::sleep(jitter(AGAIN).min(left)).await;
+        tokio::time::sleep(jitter(RECONNECT_PAUSE).min(left)).await;
     }
 }
 
@@ -337,7 +339,7 @@ async fn check_server(
     let encoding: String = row.get(1);
     let fsync: String = row.get(2);
     let (standby, schema): (bool, bool) = (row.get(3), row.get(4));
-    if version < OLDEST {
+    if version < OLDEST_SERVER_VERSION {
         let reason = format!("the server has version {}", version / 10_000);
         return refused(reason, "ventriform needs PostgreSQL 15 or newer");
     }
@@ -387,12 +389,12 @@ fn is_final(error: &sqlx::Error) -> bool {
         "no such user",
     ]
     .iter()
-    .chain(&AUTHENTICATION)
+    .chain(&AUTHENTICATION_CODES)
     .any(refused)
 }
 
 /// Beginnings of what PgBouncer says of a user or a password that it does not accept, under a code of its own.
-const AUTHENTICATION: [&str; 4] = [
+const AUTHENTICATION_CODES: [&str; 4] = [
     "password authentication failed",
     "SASL authentication failed",
     "client password check failed",
@@ -405,7 +407,12 @@ fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
     let fix = match error {
         // Statement mode refuses every transaction.
         _ if said.contains("pooling mode") => USE_SESSIONS,
-        _ if AUTHENTICATION.iter().any(|text| said.starts_with(text)) => WRONG_PASSWORD,
+        _ if AUTHENTICATION_CODES
+            .iter()
+            .any(|text| said.starts_with(text)) =>
+        {
+            WRONG_PASSWORD
+        }
         error if is_final(error) => {
             "A pooler says so: name database and user in its configuration, and leave parameters that it does not \
              know out of the URL or list them in `ignore_startup_parameters`"
@@ -480,12 +487,13 @@ impl PgWriter {
         .fetch_one(&mut *connection)
         .await
         .map_err(faults::of_postgres)?;
-        match row.get(0) {
-            true => Err(StoreError::Database {
+        if row.get(0) {
+            Err(StoreError::Database {
                 cause: StoreFault::Away,
                 message: "the server cannot be written".into(),
-            }),
-            false => Ok(()),
+            })
+        } else {
+            Ok(())
         }
     }
 }

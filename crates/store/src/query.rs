@@ -12,7 +12,7 @@ use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
 use std::borrow::Cow;
 use std::time::Duration;
-use ventriform_service::jobs::StoreResult;
+use ventriform_service::records::StoreResult;
 
 /// How often a read is tried again on another connection after its connection was lost.
 const READ_RETRIES: u32 = 3;
@@ -27,7 +27,7 @@ pub(super) enum Value {
     Bytes(Option<Vec<u8>>),
 }
 
-/// What can be bound to a placeholder.
+/// Values that can be bound to a placeholder.
 pub(super) trait Bound {
     /// NULL of the same type.
     const NULL: Value;
@@ -145,9 +145,12 @@ impl Query {
         let query = sqlx::query(AssertSqlSafe(text)).persistent(!self.anew);
         self.values.into_iter().fold(query, |query, v| match v {
             // PostgreSQL has no NUL in a text.
-            Value::Text(value) => query.bind(value.map(|text| match text.contains('\0') {
-                true => text.replace('\0', "\u{fffd}"),
-                false => text,
+            Value::Text(value) => query.bind(value.map(|text| {
+                if text.contains('\0') {
+                    text.replace('\0', "\u{fffd}")
+                } else {
+                    text
+                }
             })),
             Value::Integer(value) => query.bind(value),
             Value::Real(value) => query.bind(value),

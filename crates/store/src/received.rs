@@ -9,7 +9,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use ventriform_service::intake::{IncomingFile, ReceivedFiles};
-use ventriform_service::jobs::{BlobError, BlobWriter, LocalFile, Timestamp, random_id};
+use ventriform_service::records::{BlobError, BlobWriter, LocalFile, Timestamp, random_id};
 
 /// A file on the local disk into which an object is received; deleted on drop.
 pub(super) struct Receiving {

@@ -1,10 +1,10 @@
 //! The space of the disk that holds a data folder.
 
 use std::path::{Path, PathBuf};
-use ventriform_service::jobs::DiskSpace;
+use ventriform_service::records::DiskSpace;
 
 /// Most that is kept free unless the operator sets a size.
-const RESERVE: u64 = 256 << 20;
+const DISK_RESERVE_BYTES: u64 = 256 << 20;
 /// On small disks, the reserve is the total divided by this.
 const RESERVE_SHARE: u64 = 20;
 
@@ -28,7 +28,9 @@ impl DiskGauge {
     /// The space now; `None` if the system does not tell.
     pub fn space(&self) -> Option<DiskSpace> {
         let (free, total) = free_and_total(&self.folder)?;
-        let reserve = self.reserve.unwrap_or(RESERVE.min(total / RESERVE_SHARE));
+        let reserve = self
+            .reserve
+            .unwrap_or(DISK_RESERVE_BYTES.min(total / RESERVE_SHARE));
         Some(DiskSpace {
             free,
             total,

@@ -8,7 +8,7 @@ use sqlx::{ConnectOptions, Connection};
 use std::path::Path;
 use std::time::Duration;
 
-const READERS: u32 = 4;
+const READ_CONNECTIONS: u32 = 4;
 
 /// Opens the file, or creates it, and migrates its tables to the current version. `wait` is the longest
 /// time that a write waits for its turn.
@@ -25,7 +25,7 @@ pub(super) async fn open(path: &Path, wait: Duration) -> Result<(Writer, SqliteP
         .pragma("secure_delete", "ON")
         .busy_timeout(wait);
     let readers = SqlitePoolOptions::new()
-        .max_connections(READERS)
+        .max_connections(READ_CONNECTIONS)
         .acquire_timeout(wait)
         // A file does not hang up. Asking doubles the time of a small query.
         .test_before_acquire(false)

@@ -7,10 +7,10 @@ use crate::faults;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
 use std::path::Path;
-use ventriform_service::jobs::{ItemRecord, StoreResult, Tenant};
+use ventriform_service::records::{ItemRecord, StoreResult, Tenant};
 
 impl SqlStore {
-    /// What is wrong with the database's structure: `PRAGMA integrity_check` and
+    /// The faults of the database's structure: `PRAGMA integrity_check` and
     /// `foreign_key_check`.
     pub(super) async fn all_defects(&self) -> StoreResult<Vec<String>> {
         let checked = query("PRAGMA integrity_check(20)");

@@ -29,7 +29,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::{Mutex, MutexGuard};
 use tokio::time::{Instant, timeout_at};
-use ventriform_service::jobs::{StoreError, StoreFault, StoreResult};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// How long SQLite itself waits for the database's lock before [`Writer::begin`] looks at the
 /// time and asks again.

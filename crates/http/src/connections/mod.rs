@@ -57,7 +57,7 @@ use tokio_util::sync::CancellationToken;
 use ventriform_service::config::{BasePath, Networks};
 
 /// Pause after a connection could not be accepted, which happens when file descriptors run out.
-const PAUSE: Duration = Duration::from_millis(20);
+const ACCEPT_PAUSE: Duration = Duration::from_millis(20);
 
 /// Bytes of an answer that the system holds for one client (Linux allows twice as many). Without
 /// this limit it holds up to 4 MiB, and a client would have to read a third of that within the
@@ -69,7 +69,7 @@ const SEND_BUFFER: usize = 128 << 10;
 const READ_BUFFER: usize = 32 << 10;
 
 /// When a silent connection is asked whether its other end still exists.
-const KEEPALIVE: Duration = Duration::from_secs(60);
+const TCP_KEEPALIVE: Duration = Duration::from_secs(60);
 
 /// Longest life of a connection of the reserve.
 const RESERVE_LIFE: Duration = Duration::from_secs(2);
@@ -97,7 +97,7 @@ pub struct ConnectionLimits {
     pub grace: Duration,
 }
 
-/// What all connections share.
+/// The state that all connections share.
 struct Server {
     router: Router,
     limits: ConnectionLimits,
@@ -138,7 +138,7 @@ pub async fn serve(
             Err(error) => {
                 tracing::warn!(%error, "a connection could not be accepted");
                 registry.close_stalled();
-                tokio::time::sleep(PAUSE).await;
+                tokio::time::sleep(ACCEPT_PAUSE).await;
                 continue;
             }
         };
@@ -163,7 +163,7 @@ async fn accept(listener: &TcpListener) -> io::Result<(TcpStream, IpAddr)> {
     stream.set_nodelay(true)?;
     let socket = SockRef::from(&stream);
     socket.set_send_buffer_size(SEND_BUFFER)?;
-    socket.set_tcp_keepalive(&TcpKeepalive::new().with_time(KEEPALIVE))?;
+    socket.set_tcp_keepalive(&TcpKeepalive::new().with_time(TCP_KEEPALIVE))?;
     Ok((stream, peer.ip().to_canonical()))
 }
 
@@ -172,14 +172,13 @@ impl Server {
     async fn serve(self: Arc<Self>, stream: TcpStream, peer: IpAddr, ticket: Ticket, end: Watcher) {
         let closed = ticket.connection.closed.clone();
         let ended = async {
-            match ticket.reserve {
-                true => {
-                    let served = self.serve_stream(stream, peer, &ticket, end);
-                    let late = |_| Err(Refused::Reserve.into());
-                    let served = tokio::time::timeout(RESERVE_LIFE, served).await;
-                    served.unwrap_or_else(late)
-                }
-                false => self.serve_stream(stream, peer, &ticket, end).await,
+            if ticket.reserve {
+                let served = self.serve_stream(stream, peer, &ticket, end);
+                let late = |_| Err(Refused::Reserve.into());
+                let served = tokio::time::timeout(RESERVE_LIFE, served).await;
+                served.unwrap_or_else(late)
+            } else {
+                self.serve_stream(stream, peer, &ticket, end).await
             }
         };
         tokio::select! {

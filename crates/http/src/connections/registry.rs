@@ -2,7 +2,7 @@
 //!
 //! A new connection is admitted if there are fewer than allowed, in all and of its client. Else
 //! the connection that has stalled the longest, of all or of its client, is closed in its place,
-//! if it has stalled for at least [`PATIENCE`]. If there is none, the new connection belongs to
+//! if it has stalled for at least [`EVICTION_PATIENCE`]. If there is none, the new connection belongs to
 //! the reserve: a small number beyond the limits, which live for seconds and on which only
 //! `/healthz` and `/readyz` are answered, so that a full service can still be watched. When the
 //! reserve is full, its oldest connection makes room.
@@ -18,10 +18,10 @@ use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// How long a connection may stall before another may take its place.
-const PATIENCE: Duration = Duration::from_millis(500);
+const EVICTION_PATIENCE: Duration = Duration::from_millis(500);
 
 /// Connections beyond the limits.
-const RESERVE: usize = 64;
+const RESERVED_CONNECTIONS: usize = 64;
 
 /// File descriptors that are kept for the database, stored files and connections to others: one
 /// in this many.
@@ -111,7 +111,7 @@ impl Registry {
             }
         } else {
             table.reserve.insert(number, connection.clone());
-            if table.reserve.len() > RESERVE
+            if table.reserve.len() > RESERVED_CONNECTIONS
                 && let Some((_, oldest)) = table.reserve.pop_first()
             {
                 oldest.closed.cancel();
@@ -145,7 +145,7 @@ impl Table {
     fn close_longest_stalled(&mut self, numbers: Vec<u64>) -> bool {
         let stalled = |number: &u64| self.ordinary.get(number)?.stalled_for();
         let stalls = numbers.iter().filter_map(|n| Some((stalled(n)?, *n)));
-        match stalls.filter(|(time, _)| *time >= PATIENCE).max() {
+        match stalls.filter(|(time, _)| *time >= EVICTION_PATIENCE).max() {
             Some((_, number)) => {
                 if let Some(connection) = self.remove(number) {
                     connection.closed.cancel();
@@ -171,7 +171,7 @@ impl Table {
     }
 }
 
-/// What a connection waits for.
+/// The reason for which a connection waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
@@ -337,15 +337,15 @@ mod tests {
             of_one_client,
             trusted_proxies: Default::default(),
             base_path: Default::default(),
-            head: PATIENCE,
-            idle: PATIENCE,
-            write: PATIENCE,
+            head: EVICTION_PATIENCE,
+            idle: EVICTION_PATIENCE,
+            write: EVICTION_PATIENCE,
             linger: super::super::Linger {
-                total: PATIENCE,
-                pause: PATIENCE,
+                total: EVICTION_PATIENCE,
+                pause: EVICTION_PATIENCE,
                 bytes: 0,
             },
-            grace: PATIENCE,
+            grace: EVICTION_PATIENCE,
         };
         Registry::new(&limits, IntGauge::new("open", "Open connections.").unwrap())
     }
@@ -387,7 +387,7 @@ mod tests {
         let registry = registry(2, 10);
         let busy = [stalled(&registry, 1, 90), stalled(&registry, 2, 90)];
         busy.iter().for_each(|b| b.connection.enter(Phase::Answer));
-        let mut reserve: Vec<_> = (0..RESERVE)
+        let mut reserve: Vec<_> = (0..RESERVED_CONNECTIONS)
             .map(|_| registry.admit(peer(3), false))
             .collect();
         assert!(reserve.iter().all(|ticket| ticket.reserve));

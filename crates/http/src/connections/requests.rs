@@ -2,7 +2,7 @@
 
 use super::registry::{OpenConnection, Phase};
 use super::tls::ClientCertificate;
-use crate::client::ClientAddress;
+use crate::client::client_of;
 use crate::held_body::HeldBody;
 use crate::problem::Problem;
 use crate::public_base::{ProxyPolicy, PublicBase};
@@ -50,7 +50,7 @@ impl Service<Request<Incoming>> for RequestService {
         let answering = Answering(self.connection.clone());
         self.connection.begin(request.body().is_end_stream());
         let trusted = &self.proxies.trusted;
-        let client = ClientAddress::of_request(self.peer, request.headers(), trusted);
+        let client = client_of(self.peer, request.headers(), trusted);
         let base = PublicBase::of_request(self.peer, request.headers(), &self.proxies);
         if let Some(rest) = self.proxies.base_path.rest_of(request.uri().path()) {
             let rest = with_path(request.uri(), rest);
@@ -76,9 +76,10 @@ impl Service<Request<Incoming>> for RequestService {
                 body,
                 connection: self.connection.clone(),
             };
-            self.connection.enter(match body.is_end_stream() {
-                true => Phase::Answer,
-                false => Phase::Body,
+            self.connection.enter(if body.is_end_stream() {
+                Phase::Answer
+            } else {
+                Phase::Body
             });
             Body::new(body)
         });

@@ -31,7 +31,7 @@ const LEAST_RATE: f64 = 1024.0;
 const LINGER_PIECE: usize = 64 << 10;
 
 /// Stands for the number of a wait while no head is awaited.
-const UNAWAITED: u64 = u64::MAX;
+const NOT_AWAITED: u64 = u64::MAX;
 
 /// The head of a request did not come in time.
 #[derive(Debug, Clone, Copy, thiserror::Error)]
@@ -213,7 +213,7 @@ impl<S> WatchedStream<S> {
                 Some((number, since)) => (number, TimerInstant::from_std(since) + self.limits.idle),
                 // The answer may end without another look at the stream, so this is looked at again
                 // before a head that is awaited from now on could be late.
-                None => (UNAWAITED, TimerInstant::now() + self.limits.idle),
+                None => (NOT_AWAITED, TimerInstant::now() + self.limits.idle),
             };
             let wait = self.head_wait(number, end);
             ready!(wait.timer.as_mut().poll(context));
@@ -329,9 +329,9 @@ mod tests {
     use super::*;
     use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 
-    const LIMIT: Duration = Duration::from_millis(600);
-    const LIMITS: StreamLimits = StreamLimits {
-        write: LIMIT,
+    const TEST_LIMIT: Duration = Duration::from_millis(600);
+    const TEST_LIMITS: StreamLimits = StreamLimits {
+        write: TEST_LIMIT,
         head: Duration::from_millis(300),
         idle: Duration::from_secs(2),
         linger: Linger {
@@ -345,7 +345,8 @@ mod tests {
     /// `pause`.
     async fn write_to_a_reader_of(step: usize, pause: Duration) -> io::Result<()> {
         let (service, mut client): (_, DuplexStream) = duplex(64);
-        let mut service = WatchedStream::new(service, Arc::new(OpenConnection::new(None)), LIMITS);
+        let mut service =
+            WatchedStream::new(service, Arc::new(OpenConnection::new(None)), TEST_LIMITS);
         let reader = tokio::spawn(async move {
             let mut buffer = vec![0; step];
             while matches!(client.read(&mut buffer).await, Ok(1..)) {
@@ -378,7 +379,7 @@ mod tests {
     /// that it took.
     async fn waits_in_vain(connection: Arc<OpenConnection>, sent: usize) -> Duration {
         let (service, mut client) = duplex(64);
-        let mut service = WatchedStream::new(service, connection, LIMITS);
+        let mut service = WatchedStream::new(service, connection, TEST_LIMITS);
         let sender = tokio::spawn(async move {
             for _ in 0..sent {
                 client.write_all(b"G").await.unwrap();
@@ -408,33 +409,37 @@ mod tests {
             used.answered();
             used
         };
-        assert!(waits_in_vain(used(), 0).await >= LIMITS.idle);
+        assert!(waits_in_vain(used(), 0).await >= TEST_LIMITS.idle);
         // An answer that ends while the stream is being waited for is not looked at again by hyper.
         let busy = Arc::new(OpenConnection::new(None));
         busy.begin(true);
         busy.enter(Phase::Answer);
         let ending = busy.clone();
         let answer = tokio::spawn(async move {
-            tokio::time::sleep(LIMITS.head).await;
+            tokio::time::sleep(TEST_LIMITS.head).await;
             ending.answered();
         });
         let waited = waits_in_vain(busy, 0).await;
-        assert!(waited >= LIMITS.head + LIMITS.idle, "{waited:?}");
+        assert!(waited >= TEST_LIMITS.head + TEST_LIMITS.idle, "{waited:?}");
         answer.await.unwrap();
         // Connections are made as they are needed, since their wait begins then.
         for (before, sent) in [(false, 0), (false, 9), (true, 9)] {
-            let connection = match before {
-                true => used(),
-                false => Arc::new(OpenConnection::new(None)),
+            let connection = if before {
+                used()
+            } else {
+                Arc::new(OpenConnection::new(None))
             };
             let waited = waits_in_vain(connection, sent).await;
-            assert!((LIMITS.head..LIMITS.idle).contains(&waited), "{waited:?}");
+            assert!(
+                (TEST_LIMITS.head..TEST_LIMITS.idle).contains(&waited),
+                "{waited:?}"
+            );
         }
     }
 
     #[tokio::test]
     async fn who_still_sends_when_the_answer_is_written_is_read_for_a_limited_time() {
-        let Linger { total, pause, .. } = LIMITS.linger;
+        let Linger { total, pause, .. } = TEST_LIMITS.linger;
         for (whole, every, expected) in [
             (false, Duration::from_secs(60), pause..total),
             (false, pause / 8, total..Duration::MAX),
@@ -443,7 +448,7 @@ mod tests {
             let connection = Arc::new(OpenConnection::new(None));
             connection.begin(whole);
             let (service, mut client) = duplex(64);
-            let mut service = WatchedStream::new(service, connection.clone(), LIMITS);
+            let mut service = WatchedStream::new(service, connection.clone(), TEST_LIMITS);
             client.write_all(b"POST").await.unwrap();
             service.read_exact(&mut [0; 4]).await.unwrap();
             connection.answered();
@@ -468,9 +473,9 @@ mod tests {
         let connection = Arc::new(OpenConnection::new(None));
         connection.begin(false);
         // As much as is thrown away at most, and more than the pipe holds.
-        for bytes in [1 << 10, LIMITS.linger.bytes as usize / 2] {
+        for bytes in [1 << 10, TEST_LIMITS.linger.bytes as usize / 2] {
             let (service, client) = duplex(4096);
-            let mut service = WatchedStream::new(service, connection.clone(), LIMITS);
+            let mut service = WatchedStream::new(service, connection.clone(), TEST_LIMITS);
             let (mut answer, mut request) = tokio::io::split(client);
             let sender = tokio::spawn(async move {
                 request.write_all(&vec![0; bytes]).await.unwrap();

@@ -27,14 +27,14 @@ use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 use tokio_util::sync::CancellationToken;
 use ventriform_service::config::{OptionalPath, Settings};
-use ventriform_service::jobs::hex;
 use ventriform_service::pem;
+use ventriform_service::records::hex;
 
 /// How often the files are looked at.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 
 /// The first byte of a TLS handshake (RFC 8446, section 5.1).
-const HANDSHAKE: u8 = 22;
+const TLS_HANDSHAKE: u8 = 22;
 
 /// The body of the answer to plain HTTP.
 const PLAIN_HTTP: &str = "{\"type\":\"urn:ventriform:problem:tls-required\",\
@@ -64,7 +64,7 @@ pub enum TlsError {
         setting: &'static str,
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The faults of it.
         reason: String,
     },
     /// The certificate and the key cannot be used together.
@@ -188,7 +188,7 @@ impl Tls {
         mut stream: WatchedStream<TcpStream>,
     ) -> io::Result<Option<TlsStream<WatchedStream<TcpStream>>>> {
         let mut first = [0];
-        if stream.get_ref().peek(&mut first).await? == 1 && first[0] != HANDSHAKE {
+        if stream.get_ref().peek(&mut first).await? == 1 && first[0] != TLS_HANDSHAKE {
             stream.write_all(plain_http().as_bytes()).await?;
             stream.shutdown().await?;
             // Unread bytes would make the system reset the connection before the client has read

@@ -1,16 +1,16 @@
-//! What stands before every handler: a request passes only with credentials that allow it.
+//! The layer before every handler: a request passes only with credentials that allow it.
 //!
 //! 1. [`hosts`]: the `Host` header must name this service (against DNS rebinding), and a page of
 //!    another site cannot change anything on a service that asks nobody who they are.
-//!    Headers that a request has at most once are refused if it has two ([`SINGLE`]): one part of the way
+//!    Headers that a request has at most once are refused if it has two ([`SINGLE_HEADERS`]): one part of the way
 //!    may have looked at the first, another at the last.
 //! 2. The `Authorization` header tells the caller, see [`ventriform_service::access::Gate`]; without a valid one the answer is
 //!    401. [`is_open_path`] names the paths that everybody may read.
 //! 3. The caller's requests are counted, also as those of the keys that have made its key: 429 beyond the quota. Every answer carries `RateLimit` and
 //!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
 //! 4. The scope must include what method and path need: 403 if not.
-//! 5. What the request may add is held against the tenant's quotas, see [`reserve`]. From here on, its memory
-//!    is charged to its client ([`super::memory`]).
+//! 5. From here on, its memory is charged to its client ([`super::memory`]). Handlers that add something reserve it
+//!    under the tenant's quotas ([`super::quota`]).
 //! 6. After the handler, [`trail`] writes what was done to the audit trail. An act that changed
 //!    something is answered when its event is on disk.
 //!
@@ -20,24 +20,20 @@ pub mod hosts;
 pub mod pages;
 pub mod state;
 
-mod reservations;
-mod reserve;
 mod trail;
 
-pub use reserve::Counting;
 pub use trail::{Agent, AlreadyRecorded};
 
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
-use super::memory::Ledger;
+use super::memory::{Ledger, answered};
 use super::problem::{Answer, Problem};
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use state::Guard;
 use std::time::Instant;
 use ventriform_service::access::{Allowance, Identity, Refusal, Scope};
 use ventriform_service::config::Settings;
@@ -46,7 +42,7 @@ const RATE_LIMIT: HeaderName = HeaderName::from_static("ratelimit");
 const RATE_LIMIT_POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 
 /// The headers that a request has at most once.
-const SINGLE: [HeaderName; 9] = [
+const SINGLE_HEADERS: [HeaderName; 9] = [
     header::AUTHORIZATION,
     header::CONTENT_TYPE,
     header::CONTENT_ENCODING,
@@ -58,10 +54,10 @@ const SINGLE: [HeaderName; 9] = [
     HeaderName::from_static("webhook-secret"),
 ];
 
-/// Refuses a request that has one of [`SINGLE`] twice.
+/// Refuses a request that has one of [`SINGLE_HEADERS`] twice.
 fn check_single(headers: &HeaderMap) -> Answer<()> {
     let repeated = |name: &&HeaderName| headers.get_all(*name).iter().nth(1).is_some();
-    match SINGLE.iter().find(repeated) {
+    match SINGLE_HEADERS.iter().find(repeated) {
         None => Ok(()),
         Some(name) => Err(Problem::bad_request(
             "repeated-header",
@@ -95,7 +91,7 @@ fn is_open_path(path: &str, settings: &Settings) -> bool {
         || (settings.open_metrics && path == "/metrics")
 }
 
-/// What a caller needs for this method on this path. `route` is the pattern of the path.
+/// The scope needed for this method on this path. `route` is the pattern of the path.
 fn needed(method: &Method, route: Option<&str>) -> Scope {
     let below = |path: &&str| {
         let rest = route.and_then(|route| route.strip_prefix(*path));
@@ -104,9 +100,10 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
     if ADMIN_PATHS.iter().any(below) {
         return Scope::Admin;
     }
-    match method.is_safe() && !PATIENT_PATHS.iter().any(below) {
-        true => Scope::Read,
-        false => Scope::Submit,
+    if method.is_safe() && !PATIENT_PATHS.iter().any(below) {
+        Scope::Read
+    } else {
+        Scope::Submit
     }
 }
 
@@ -115,7 +112,7 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
     if let Err(problem) = check_single(request.headers()) {
         return problem.into_response();
     }
-    if is_open_path(request.uri().path(), &app.settings) && request.method().is_safe() {
+    if is_open_path(request.uri().path(), &app.service.settings) && request.method().is_safe() {
         return next.run(request).await;
     }
     // A body cannot be shared between threads, so only the head is lent to what waits.
@@ -125,20 +122,19 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
         Ok(identity) => identity,
         Err(problem) => return problem.into_response(),
     };
-    let allowance = count(&app.guard, &identity, &address);
+    let allowance = count(&app, &identity, &address);
     let answer = match allowance.filter(|allowance| !allowance.allowed) {
         Some(refused) => Err(too_many_requests(&refused)),
         None => admit(&app, &identity, &address, &mut request).await,
     };
     let mut response = match answer {
-        Ok(reservation) => {
+        Ok(()) => {
             let act = trail::Act::of(&request, &identity, address);
             request.extensions.insert(act.agent());
-            let ledger = Ledger::new(&app.memory);
+            let ledger = Ledger::new(&app.service.memory);
             let answer = next.run(Request::from_parts(request, body));
             let response = ledger.clone().scope(answer).await;
-            drop(reservation);
-            match ledger.answered(response).await {
+            match answered(&ledger, response).await {
                 Ok(response) => act.record(&app, response).await,
                 Err(problem) => problem.into_response(),
             }
@@ -178,13 +174,8 @@ async fn identify(app: &App, request: &Parts, address: &str) -> Answer<Identity>
 }
 
 /// Refuses what the caller may not do, and tells the handlers who it is.
-async fn admit(
-    app: &App,
-    identity: &Identity,
-    address: &str,
-    request: &mut Parts,
-) -> Answer<Counting> {
-    let quota = identity.limits(app.guard.quota);
+async fn admit(app: &App, identity: &Identity, address: &str, request: &mut Parts) -> Answer<()> {
+    let quota = identity.limits(app.service.quotas.general);
     let caller = Caller::of(identity, quota);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
@@ -195,20 +186,19 @@ async fn admit(
         trail::access_refused(app, request, identity, address).await;
         return Err(problem);
     }
-    let counting = reserve::reserve(app, request, &caller).await?;
-    request.extensions.insert(counting.clone());
     request.extensions.insert(caller);
-    Ok(counting)
+    Ok(())
 }
 
 /// Counts a request for its caller and for the keys that have made the caller's key. Returns what is left where the
 /// least is left.
-fn count(guard: &Guard, identity: &Identity, address: &str) -> Option<Allowance> {
+fn count(app: &App, identity: &Identity, address: &str) -> Option<Allowance> {
+    let (guard, general) = (&app.guard, app.service.quotas.general);
     let own = match &identity.account {
         Some(account) => Some(account.clone()),
         None => guard.count_anonymous.then(|| format!("address {address}")),
     };
-    let own = own.zip(identity.limits(guard.quota).requests);
+    let own = own.zip(identity.limits(general).requests);
     let shared = identity.shared_accounts();
     let shared = shared.map(|(account, quota)| (account.to_owned(), quota));
     let accounts: Vec<(String, u64)> = own.into_iter().chain(shared).collect();

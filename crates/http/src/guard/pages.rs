@@ -11,19 +11,19 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 use ventriform_service::config::{Settings, Words};
 
 /// The policy of answers that have none of their own: they are data, so nothing in them may run.
-const DATA: &str =
+const DATA_POLICY: &str =
     "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 /// Reports carry a policy of their own, with the hashes of their style and script; they are files
 /// that also work without the service. What a file cannot say of itself is who may frame it.
-const REPORT: &str = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+const REPORT_POLICY: &str = "frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
 /// Pictures have styles and nothing else.
-const PICTURE: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; \
+const PICTURE_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'; \
     base-uri 'none'; form-action 'none'";
 
-/// What browsers are told where TLS is spoken: for a year, ask by https only.
-const TRANSPORT: &str = "max-age=31536000";
+/// Instruction to browsers where TLS is spoken: for a year, ask by https only.
+const STRICT_TRANSPORT: &str = "max-age=31536000";
 
 /// The headers of requests that a page of another site may set: all that the service reads.
 pub const ACCEPTED: [&str; 16] = [
@@ -69,7 +69,7 @@ pub const EXPOSED: [&str; 19] = [
 ];
 
 /// How long browsers may remember the answer to a preflight.
-const PREFLIGHT: Duration = Duration::from_secs(600);
+const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
 /// The layer that adds the headers; `tls` says whether the service speaks TLS.
 pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> Response {
@@ -79,9 +79,9 @@ pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> R
         let media_type = headers.get(header::CONTENT_TYPE);
         let media_type = media_type.and_then(|value| value.to_str().ok());
         let policy = match media_type.unwrap_or_default() {
-            kind if kind.starts_with("text/html") => REPORT,
-            kind if kind.starts_with("image/svg") => PICTURE,
-            _ => DATA,
+            kind if kind.starts_with("text/html") => REPORT_POLICY,
+            kind if kind.starts_with("image/svg") => PICTURE_POLICY,
+            _ => DATA_POLICY,
         };
         let policy = HeaderValue::from_static(policy);
         headers.insert(header::CONTENT_SECURITY_POLICY, policy);
@@ -104,7 +104,7 @@ pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> R
         "camera=(), geolocation=(), microphone=()",
     );
     if tls {
-        add(header::STRICT_TRANSPORT_SECURITY, TRANSPORT);
+        add(header::STRICT_TRANSPORT_SECURITY, STRICT_TRANSPORT);
     }
     response
 }
@@ -125,7 +125,7 @@ pub fn cors(settings: &Settings) -> Option<CorsLayer> {
             ])
             .allow_headers(ACCEPTED.map(HeaderName::from_static))
             .expose_headers(EXPOSED.map(HeaderName::from_static))
-            .max_age(PREFLIGHT),
+            .max_age(PREFLIGHT_AGE),
     )
 }
 

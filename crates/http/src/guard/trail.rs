@@ -16,7 +16,7 @@ use axum::response::{IntoResponse, Response};
 use tower_http::request_id::RequestId;
 use ventriform::export::dicom::is_uid;
 use ventriform_service::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
-use ventriform_service::jobs::{ErasureAgent, Tenant, Timestamp};
+use ventriform_service::records::{ErasureAgent, Tenant, Timestamp};
 
 /// Longest id that is recorded; others are no ids of this service.
 const LONGEST_ID: usize = 80;
@@ -41,7 +41,7 @@ impl Agent {
         }
     }
 
-    /// What the agent did at that time.
+    /// The act of the agent at that time.
     pub fn event(&self, activity: Activity, now: Timestamp) -> AuditEvent {
         AuditEvent {
             activity,
@@ -94,7 +94,7 @@ impl Act {
         let Some(activity) = self.activity(status) else {
             return response;
         };
-        self.event.recorded = app.queue.clock.now();
+        self.event.recorded = app.service.now();
         self.event.activity = activity;
         self.event.object = match activity {
             Activity::Create | Activity::Execute => location(&response).or(self.object),
@@ -103,10 +103,10 @@ impl Act {
         let place = || place_of(&self.route);
         self.event.object = self.event.object.take().or_else(place);
         if self.method.is_safe() {
-            app.guard.recorder.note(self.event).await;
+            app.service.recorder.note(self.event).await;
             return response;
         }
-        match app.guard.recorder.record(self.event).await {
+        match app.service.recorder.record(self.event).await {
             Ok(()) => response,
             Err(_) => not_recorded().into_response(),
         }
@@ -176,8 +176,8 @@ pub async fn access_refused(app: &App, request: &Parts, identity: &Identity, add
 
 async fn note_refusal(app: &App, mut event: AuditEvent) {
     event.outcome = Outcome::Refused;
-    event.recorded = app.queue.clock.now();
-    app.guard.recorder.note(event).await;
+    event.recorded = app.service.now();
+    app.service.recorder.note(event).await;
 }
 
 fn event(request: &Parts, identity: &Identity, address: String, activity: Activity) -> AuditEvent {
@@ -214,7 +214,7 @@ fn item_of(path: &str) -> Option<String> {
     (formed && number.bytes().all(|b| b.is_ascii_hexdigit())).then(|| id.to_owned())
 }
 
-/// What a route without an id stands for: `webhooks/secret`.
+/// The object of a route without an id: `webhooks/secret`.
 fn place_of(route: &str) -> Option<String> {
     let rest = route.split('/').skip(2).collect::<Vec<_>>().join("/");
     (!rest.is_empty() && !rest.contains('{')).then_some(rest)

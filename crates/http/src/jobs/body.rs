@@ -11,9 +11,8 @@ use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform_service::archive::{ObjectDelivery, Pull};
 use ventriform_service::hooks::DeliveryState;
-use ventriform_service::jobs::{
-    Job, JobState, QueuePosition, Resource, SendOrder, SeriesSource, Timestamp,
-};
+use ventriform_service::jobs::QueuePosition;
+use ventriform_service::records::{Job, JobState, Resource, SendOrder, SeriesSource, Timestamp};
 
 /// An accepted job.
 #[derive(Serialize, ToSchema)]
@@ -182,9 +181,10 @@ fn deliveries(
         return made.iter().cloned().map(Into::into).collect();
     }
     // A job that failed or was cancelled has nothing to send.
-    let state = match job.is_final() && job != JobState::Succeeded {
-        true => DeliveryState::Dead,
-        false => DeliveryState::Pending,
+    let state = if job.is_final() && job != JobState::Succeeded {
+        DeliveryState::Dead
+    } else {
+        DeliveryState::Pending
     };
     let ordered = order.names.into_iter().map(|name| ObjectDeliveryBody {
         id: None,
@@ -265,7 +265,7 @@ pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
     Ok(body(job, &context))
 }
 
-/// What is to be told of jobs beside their rows.
+/// Facts about jobs beside their rows.
 struct Context {
     positions: BTreeMap<i64, QueuePosition>,
     pulls: BTreeMap<String, Pull>,
@@ -279,20 +279,22 @@ impl Context {
             let those = jobs.iter().filter(|job| with(job));
             those.map(|job| job.id.as_str()).collect()
         };
-        let store = &app.archives.store;
+        let store = &app.service.archives.store;
         let sourced = ids(|job| job.source.is_some());
         let sent = ids(|job| job.send.is_some() && job.state == JobState::Succeeded);
         Ok(Self {
-            positions: app.queue.positions(jobs).await?,
-            pulls: match sourced.is_empty() {
-                true => BTreeMap::new(),
-                false => store.pulls(&sourced).await?,
+            positions: app.service.queue().positions(jobs).await?,
+            pulls: if sourced.is_empty() {
+                BTreeMap::new()
+            } else {
+                store.pulls(&sourced).await?
             },
-            deliveries: match sent.is_empty() {
-                true => BTreeMap::new(),
-                false => store.sends(&sent).await?,
+            deliveries: if sent.is_empty() {
+                BTreeMap::new()
+            } else {
+                store.sends(&sent).await?
             },
-            now: app.queue.clock.now(),
+            now: app.service.now(),
         })
     }
 }

@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
-use ventriform_service::jobs::Job;
+use ventriform_service::records::Job;
 
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
@@ -50,7 +50,7 @@ pub async fn follow_job(
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let seen = last_event_id(&headers)?;
     // Subscribing comes before reading, so that no change is missed in between.
-    let changes = app.queue.changes();
+    let changes = app.service.queue().changes();
     let job = find(&app, &caller.tenant, &id).await?;
     if job.state.is_final() && job.revision <= seen {
         return Ok(StatusCode::NO_CONTENT.into_response());
@@ -128,8 +128,8 @@ impl Follower {
     /// The next state that is newer than the last one sent; `None` if the job is gone or the
     /// service shuts down.
     async fn newer(&mut self) -> Option<Job> {
-        let queue = self.app.queue.clone();
-        let look = queue.time_to_look();
+        let queue = self.app.service.queue().clone();
+        let look = queue.next_poll();
         tokio::pin!(look);
         loop {
             if let Some(job) = self.next.take()
@@ -146,15 +146,22 @@ impl Follower {
                     Err(RecvError::Closed) => return None,
                 },
                 () = &mut look => {
-                    look.set(queue.time_to_look());
+                    look.set(queue.next_poll());
                     Some(self.look().await?)
                 }
-                () = self.app.closing.cancelled() => return None,
+                () = self.app.service.closing.cancelled() => return None,
             };
         }
     }
 
     async fn look(&self) -> Option<Job> {
-        self.app.queue.jobs.job(&self.id).await.ok().flatten()
+        self.app
+            .service
+            .queue()
+            .table()
+            .job(&self.id)
+            .await
+            .ok()
+            .flatten()
     }
 }

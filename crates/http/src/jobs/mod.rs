@@ -8,7 +8,6 @@ mod body;
 mod priority;
 
 pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
-pub use filing::Filing;
 pub use priority::PriorityName;
 
 use super::app::App;
@@ -19,7 +18,8 @@ use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{next_cursor, page_of};
 use super::problem::not_found::missing;
-use super::problem::{Answer, Problem, ProblemBody, shorten};
+use super::problem::{Answer, Problem, ProblemBody};
+use super::quota::reserve_job;
 use super::request::{
     PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown, unknown_state,
 };
@@ -34,9 +34,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::ops::ControlFlow;
 use utoipa::ToSchema;
-use ventriform_service::jobs::{
-    Deleted, Interrupted, Job, JobFilter, JobState, NewJob, Resource, Tenant, Timestamp,
-    parse_rfc3339,
+use ventriform_service::filing::JobOrder;
+use ventriform_service::jobs::Work;
+use ventriform_service::records::{
+    Deleted, Interrupted, Job, JobFilter, JobState, Resource, Tenant, Timestamp, parse_rfc3339,
 };
 
 /// A page of jobs.
@@ -69,26 +70,25 @@ pub async fn create_job(
     request: Request,
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+    let counting = reserve_job(&app, &caller, request.headers()).await?;
     let key = idempotency::key(request.headers())?;
     let trace_parent = observe::trace_parent(&request);
     let object = json_object(request).await?;
-    let filing = Filing {
-        tenant: caller.tenant,
+    let mut order = JobOrder {
         tags: tags::of_object(&app, &object)?,
         priority: priority::of_object(&object)?,
         key,
-        webhook: None,
-        source: None,
-        send: None,
         trace_parent,
-        storage_limit: caller.quota.bytes,
+        ..JobOrder::new(caller.tenant, caller.quota)
     };
-    let job = read_job(&app, &object, filing).await?;
-    let job = filing::file(&app, &job).await?;
-    filing::accepted(&app, job).await
+    let (work, volume, parameters) = read_job(&app, &object, &mut order).await?;
+    let filed = app
+        .service
+        .file_job(work, volume, parameters, order, &counting);
+    filing::accepted(&app, filed.await?).await
 }
 
-const FIELDS: [&str; 10] = [
+const JOB_FIELDS: [&str; 10] = [
     "kind",
     priority::FIELD,
     "volume",
@@ -101,22 +101,23 @@ const FIELDS: [&str; 10] = [
     "to",
 ];
 
-async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) -> Answer<NewJob> {
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+/// The work, the volume and the parameters of a job; the rest goes into `order`.
+async fn read_job<'a>(
+    app: &'a App,
+    object: &Map<String, Value>,
+    order: &mut JobOrder,
+) -> Answer<(&'a dyn Work, Option<String>, Map<String, Value>)> {
+    if let Some(name) = object
+        .keys()
+        .find(|name| !JOB_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &JOB_FIELDS));
     }
     let kind = text(object, "kind")?.unwrap_or("model");
-    let Some(work) = app.engine.work(kind) else {
-        let kinds: Vec<_> = app.engine.works.iter().map(|w| w.makes().noun()).collect();
-        return Err(Problem::invalid_field(
-            "kind",
-            format!("There is no kind of job `{}`.", shorten(kind)),
-        )
-        .fix(format!("Known kinds: {}.", kinds.join(", "))));
-    };
-    filing.source = archives::source_of(app, &filing.tenant, object).await?;
-    filing.send = archives::send_of(app, &filing.tenant, object, kind, filing.source.as_ref())?;
-    let volume = match (text(object, "volume")?, &filing.source) {
+    let work = app.service.work_of(kind)?;
+    order.source = archives::source_of(app, &order.tenant, object).await?;
+    order.send = archives::send_of(app, &order.tenant, object, kind, order.source.as_ref())?;
+    let volume = match (text(object, "volume")?, &order.source) {
         (None, None) => {
             return Err(Problem::invalid_field("volume", "`volume` is missing.")
                 .fix("Give the id of a stored volume, or in `source` a series of an archive."));
@@ -141,8 +142,8 @@ async fn read_job(app: &App, object: &Map<String, Value>, mut filing: Filing) ->
     };
     let parameters = work.parameters_from_json(parameters)?;
     // Last, since looking up the name of its host may take seconds.
-    filing.webhook = webhook_of(app, object).await?;
-    Ok(filing::new_job(&**work, volume, parameters, filing))
+    order.webhook = webhook_of(app, object).await?;
+    Ok((work, volume, parameters))
 }
 
 /// List jobs
@@ -175,7 +176,7 @@ pub async fn list_jobs(
         scan,
         created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
     };
-    let page = app.queue.jobs.jobs(&filter, page).await?;
+    let page = app.service.queue().table().jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
@@ -216,18 +217,17 @@ pub async fn get_job(
         let job = find(&app, &caller.tenant, &id).await?;
         let ended = job.state.is_final();
         let body = describe(&app, job).await?;
-        Ok(match ended {
-            true => ControlFlow::Continue(ValidatedJson::of(&body)?),
-            false => {
-                let ask_again = [
-                    (header::CACHE_CONTROL, "no-store"),
-                    (header::RETRY_AFTER, "1"),
-                ];
-                ControlFlow::Break((ask_again, Json(body)).into_response())
-            }
+        Ok(if ended {
+            ControlFlow::Continue(ValidatedJson::of(&body)?)
+        } else {
+            let ask_again = [
+                (header::CACHE_CONTROL, "no-store"),
+                (header::RETRY_AFTER, "1"),
+            ];
+            ControlFlow::Break((ask_again, Json(body)).into_response())
         })
     };
-    let catalogue = &*app.queue.catalogue;
+    let catalogue = app.service.items().catalogue();
     // A job says the same to all callers of its tenant.
     let asker = (&caller.tenant, false);
     let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
@@ -301,17 +301,19 @@ pub async fn delete_job(
         )
         .fix("DELETE it without `erase` to cancel it, wait for its end, then erase it."));
     }
-    let (status, job) = match app.queue.interrupt(&id).await? {
+    let (status, job) = match app.service.queue().interrupt(&id).await? {
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
-            return Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await);
+            return Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await);
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
-            return match app.queue.delete_job(&id).await? {
+            return match app.service.queue().delete_job(&id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
-                _ => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, &id).await),
+                _ => {
+                    Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await)
+                }
             };
         }
     };
@@ -320,9 +322,9 @@ pub async fn delete_job(
 
 /// The tenant's job of that id, or the 404 or 410 that says why there is none.
 pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
-    let job = app.queue.jobs.job(id).await?;
+    let job = app.service.queue().table().job(id).await?;
     match job.filter(|job| job.tenant == *tenant) {
         Some(job) => Ok(job),
-        None => Err(missing(&*app.queue.catalogue, tenant, Resource::Job, id).await),
+        None => Err(missing(app.service.items().catalogue(), tenant, Resource::Job, id).await),
     }
 }

@@ -5,7 +5,7 @@ use crate::request::text;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
-use ventriform_service::jobs::Priority;
+use ventriform_service::records::Priority;
 
 /// The parameter of a query string or form, and the field of a JSON object.
 pub const FIELD: &str = "priority";

@@ -6,16 +6,16 @@ use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement
 use utoipa::openapi::{Components, OpenApi};
 
 /// The name of the scheme.
-const BEARER: &str = "bearer";
+const BEARER_SCHEME: &str = "bearer";
 
 /// The paths of the document that need no credentials.
-const OPEN: [&str; 2] = ["/healthz", "/readyz"];
+const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
 
 /// Answers of every operation.
-const ALWAYS: [(u16, &str); 1] = [(421, "The Host header names another service")];
+const COMMON_ANSWERS: [(u16, &str); 1] = [(421, "The Host header names another service")];
 
 /// Answers of operations that need credentials.
-const GUARDED: [(u16, &str); 4] = [
+const GUARDED_ANSWERS: [(u16, &str); 4] = [
     (401, "The credentials are missing or wrong"),
     (
         403,
@@ -44,17 +44,17 @@ pub fn add_access(document: &mut OpenApi) {
     document
         .components
         .get_or_insert_with(Components::new)
-        .add_security_scheme(BEARER, SecurityScheme::Http(scheme));
+        .add_security_scheme(BEARER_SCHEME, SecurityScheme::Http(scheme));
     for (path, item) in &mut document.paths.paths {
-        let open = OPEN.contains(&path.as_str());
+        let open = OPEN_PATHS.contains(&path.as_str());
         for operation in operations(item) {
-            refuse(operation, &ALWAYS);
+            refuse(operation, &COMMON_ANSWERS);
             if open {
                 operation.security = Some(Vec::new());
                 continue;
             }
-            refuse(operation, &GUARDED);
-            let requirement = SecurityRequirement::new(BEARER, [] as [String; 0]);
+            refuse(operation, &GUARDED_ANSWERS);
+            let requirement = SecurityRequirement::new(BEARER_SCHEME, [] as [String; 0]);
             operation.security = Some(vec![requirement]);
             let uploads = operation.responses.responses.contains_key("413");
             if uploads {

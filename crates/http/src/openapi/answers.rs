@@ -11,7 +11,7 @@ use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, seg_nrrd};
 
 /// The schema of a job, which the handlers register.
-const JOB: &str = "Job";
+const JOB_SCHEMA: &str = "Job";
 /// The schema of a segmentation's report, which the document's frame registers.
 const SEGMENTATION_REPORT: &str = "SegmentationReport";
 
@@ -159,7 +159,7 @@ impl IntoResponses for DownloadAnswers {
     }
 }
 
-/// What became of objects that came by STOW-RS, and 406.
+/// The outcome of objects that came by STOW-RS, and 406.
 pub struct StowAnswers;
 
 impl IntoResponses for StowAnswers {
@@ -196,7 +196,7 @@ impl IntoResponses for WaitAnswers {
             .description("Accepted")
             .content(
                 "application/json",
-                Content::new(Some(Ref::from_schema_name(JOB))),
+                Content::new(Some(Ref::from_schema_name(JOB_SCHEMA))),
             )
             .header("Location", header(String::schema(), "The job's path"))
             .header(
@@ -253,7 +253,7 @@ impl IntoResponses for EventsAnswer {
         let text = || ObjectBuilder::new().schema_type(Type::String);
         let job = text()
             .content_media_type("application/json")
-            .content_schema(Some(Ref::from_schema_name(JOB)));
+            .content_schema(Some(Ref::from_schema_name(JOB_SCHEMA)));
         let event = ObjectBuilder::new()
             .property("id", text())
             .property("event", text().enum_values(Some(["job"])))

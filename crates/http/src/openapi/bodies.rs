@@ -13,7 +13,7 @@ use utoipa::{PartialSchema, ToSchema};
 use ventriform::export::dicom::DicomObject;
 use ventriform::parameters::{FitParameters, ModelParameters};
 use ventriform_service::hooks::HookEvent;
-use ventriform_service::jobs::LegalHold;
+use ventriform_service::records::LegalHold;
 
 /// A job to be filed; `create_job` reads it field by field.
 pub struct JobRequest;
@@ -286,9 +286,10 @@ impl PartialSchema for JobParameters {
 /// `external_id` and `labels`. In a patch, `null` removes them.
 fn tag_fields(patch: bool) -> (Schema, Schema) {
     let text = |longest: usize| {
-        let kinds = match patch {
-            true => SchemaType::from_iter([Type::String, Type::Null]),
-            false => Type::String.into(),
+        let kinds = if patch {
+            SchemaType::from_iter([Type::String, Type::Null])
+        } else {
+            Type::String.into()
         };
         ObjectBuilder::new()
             .schema_type(kinds)
@@ -296,9 +297,10 @@ fn tag_fields(patch: bool) -> (Schema, Schema) {
             .max_length(Some(longest))
     };
     let labels = ObjectBuilder::new()
-        .schema_type(match patch {
-            true => SchemaType::from_iter([Type::Object, Type::Null]),
-            false => Type::Object.into(),
+        .schema_type(if patch {
+            SchemaType::from_iter([Type::Object, Type::Null])
+        } else {
+            Type::Object.into()
         })
         .description(Some("The caller's own names and values"))
         .additional_properties(Some(Schema::from(text(tags::LABEL_VALUE_LENGTH))))

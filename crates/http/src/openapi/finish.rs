@@ -18,14 +18,14 @@ use serde_json::{Map, Value, json};
 use ventriform::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
-const RECORDED: &str = include_str!("examples.json");
+const RECORDED_EXAMPLES: &str = include_str!("examples.json");
 
 /// Completes `document`.
 pub fn finish(document: &mut Value) {
     flatten(&mut document["components"]["schemas"]);
     with_width(&mut document["components"]["schemas"]);
     one_path_per_file(document);
-    let recorded = serde_json::from_str(RECORDED).expect("examples.json is an object");
+    let recorded = serde_json::from_str(RECORDED_EXAMPLES).expect("examples.json is an object");
     let problems = problem_examples(&recorded);
     for (path, method, operation) in operations(document) {
         bytes_as_binary(operation);
@@ -233,9 +233,10 @@ fn reference(schema: &str) -> Value {
 
 /// The schema of the reports below `path`.
 fn report_of(path: &str) -> Value {
-    match path.starts_with("/v1/segmentations") {
-        true => reference("SegmentationReport"),
-        false => reference("ModelReport"),
+    if path.starts_with("/v1/segmentations") {
+        reference("SegmentationReport")
+    } else {
+        reference("ModelReport")
     }
 }
 

@@ -9,7 +9,7 @@ use ventriform::export::Part;
 use ventriform::parameters::{
     FIT_SPECS, FitParameters, Kind, ModelParameters, Parameters, schema_of,
 };
-use ventriform_service::jobs::Priority;
+use ventriform_service::records::Priority;
 
 /// Parameters of a model as query parameters.
 pub struct ModelQuery;

@@ -10,7 +10,7 @@ use utoipa::openapi::{Content, Ref, RefOr, Required, ResponseBuilder};
 use utoipa::{IntoParams, IntoResponses, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 
-/// What the document says about one method of one path.
+/// The description of one method of one path.
 pub struct Documented {
     path: String,
     method: HttpMethod,

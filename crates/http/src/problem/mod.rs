@@ -70,7 +70,7 @@ pub struct Problem {
     headers: Vec<(HeaderName, HeaderValue)>,
 }
 
-/// What a handler returns.
+/// The result of a handler.
 pub type Answer<T = Response> = Result<T, Problem>;
 
 impl Problem {

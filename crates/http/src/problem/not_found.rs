@@ -1,10 +1,10 @@
-//! What is not there: 404 for what never was, 410 for what was erased, and 422 when a field of
+//! Answers about missing things: 404 for what never was, 410 for what was erased, and 422 when a field of
 //! an otherwise good request names such a thing.
 
-use super::{Answer, Problem, shorten};
+use super::{Problem, shorten};
 use crate::wire::rfc3339;
 use axum::http::StatusCode;
-use ventriform_service::jobs::{Catalogue, Resource, Tenant, Timestamp};
+use ventriform_service::records::{Catalogue, Resource, Tenant, Timestamp};
 
 /// 410 if the tenant erased `id`, else 404.
 pub async fn missing(
@@ -82,33 +82,4 @@ pub async fn no_such_path() -> Problem {
         "The API has no such path.",
     )
     .fix("GET /openapi.json lists all paths; /docs shows them in a browser.")
-}
-
-/// 422: the value of `field` is the id of something that does not exist (any more).
-///
-/// # Errors
-/// A problem with status 500 if the catalogue cannot be read.
-pub async fn field_names_nothing(
-    catalogue: &dyn Catalogue,
-    tenant: &Tenant,
-    field: &str,
-    id: &str,
-) -> Answer<Problem> {
-    let resource = Resource::of(id).unwrap_or(match field {
-        "model" => Resource::Model,
-        _ => Resource::Volume,
-    });
-    let (noun, short) = (resource.noun(), shorten(id));
-    let detail = match catalogue.erased_at(tenant, id).await? {
-        Some(at) => format!("The {noun} `{short}` was erased at {}.", rfc3339(at)),
-        None => format!("There is no {noun} `{short}`."),
-    };
-    let fix = match resource {
-        Resource::Volume => "POST the file to /v1/volumes first.".to_owned(),
-        _ => format!(
-            "Take an id from the list at GET /v1/{}, or leave the choice to `auto`.",
-            resource.plural()
-        ),
-    };
-    Ok(Problem::invalid_field(field, detail).fix(fix))
 }

@@ -2,7 +2,7 @@
 //! the number of files and of text fields, the length of a text field, and the length of headers
 //! and boundaries, which the parser gathers in memory ([`Unparsed`]).
 
-use super::{Bundle, Upload};
+use super::Upload;
 use crate::app::App;
 use crate::memory::charge;
 use crate::problem::{Answer, body, shorten};
@@ -13,11 +13,12 @@ use multer::{Field, Multipart};
 use std::error::Error;
 use ventriform_service::archive::{RelatedType, Unparsed};
 use ventriform_service::config::Size;
+use ventriform_service::uploads::VolumeUpload;
 
 /// Longest text field, bytes.
 const FIELD_BYTES: usize = 4096;
 /// Most text fields.
-const FIELDS: usize = 100;
+const TEXT_FIELDS: usize = 100;
 
 /// Memory of a form beside the parts' contents: what the parser has read and not handed out.
 const FORM_MEMORY: u64 = 128 << 10;
@@ -89,41 +90,41 @@ async fn receive_parts(
         if is_text && apart.is_some() {
             let text = text_field(field, &name, &unparsed, interrupted).await?;
             upload.fields.push((name, text));
-            if upload.fields.len() > FIELDS {
-                let reason = format!("it has more than {FIELDS} text fields");
+            if upload.fields.len() > TEXT_FIELDS {
+                let reason = format!("it has more than {TEXT_FIELDS} text fields");
                 return Err(body::malformed_form(&reason));
             }
             continue;
         }
         charge(PART_MEMORY).await?;
         files += 1;
-        if files > app.settings.parts_limit {
-            return Err(body::too_many_files(app.settings.parts_limit));
+        if files > app.service.settings.parts_limit {
+            return Err(body::too_many_files(app.service.settings.parts_limit));
         }
         let file_name = field.file_name().unwrap_or_default().to_ascii_lowercase();
         let pieces = field
             .inspect_ok(|_| unparsed.reset())
             .map_err(|error| interrupted(&error));
-        let bundle = bundle_of(upload, app, apart.unwrap_or_default(), &name);
-        bundle.write(pieces).await?.known_as(&file_name);
+        let files = files_of(upload, app, apart.unwrap_or_default(), &name);
+        files.write(pieces).await?.known_as(&file_name);
     }
     Ok(())
 }
 
-/// The bundle to which the files of that name belong.
-fn bundle_of<'a>(
+/// The upload to which the files of that name belong.
+fn files_of<'a>(
     upload: &'a mut Upload,
     app: &App,
     apart: &[&'static str],
     name: &str,
-) -> &'a mut Bundle {
+) -> &'a mut VolumeUpload {
     match apart.iter().find(|own| **own == name) {
         None => &mut upload.volume,
         Some(own) => {
             let (others, counting) = (&mut upload.others, &upload.counting);
             others
                 .entry(own)
-                .or_insert_with(|| Bundle::new(app, counting))
+                .or_insert_with(|| VolumeUpload::new(&app.service, counting))
         }
     }
 }

@@ -7,14 +7,10 @@
 //! and time are layers of the route ([`crate::limits`]); [`form`] adds those that only a
 //! form needs.
 
-mod bundle;
 mod form;
 pub mod media_types;
 
-pub use bundle::Bundle;
-
 use super::app::App;
-use super::guard::Counting;
 use super::limits::BodyLimits;
 use super::problem::{Answer, body};
 use super::request::{media_type, refuse_content_encoding};
@@ -22,13 +18,15 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, header};
 use futures::TryStreamExt;
 use std::collections::BTreeMap;
+use ventriform_service::quotas::Counting;
+use ventriform_service::uploads::VolumeUpload;
 
 /// A received body: files that are not published yet, and the text fields of the form.
 pub struct Upload {
     /// The volume: the body, or the form's files.
-    pub volume: Bundle,
+    pub volume: VolumeUpload,
     /// The files that were to be kept apart, by name.
-    pub others: BTreeMap<&'static str, Bundle>,
+    pub others: BTreeMap<&'static str, VolumeUpload>,
     /// Counts what comes against the tenant's quota.
     counting: Counting,
     /// The form's text fields: name and value.
@@ -46,15 +44,20 @@ fn announced_length(headers: &HeaderMap) -> u64 {
 ///
 /// # Errors
 /// 400 empty or malformed, 408 too slow, 413 too large, 415 of another type or encoding.
-pub async fn receive(app: &App, request: Request, apart: &[&'static str]) -> Answer<Upload> {
+pub async fn receive(
+    app: &App,
+    counting: Counting,
+    request: Request,
+    apart: &[&'static str],
+) -> Answer<Upload> {
     refuse_content_encoding(request.headers())?;
-    let counting = Counting::of(&request);
     let limits = BodyLimits::of(&request)?;
-    app.queue
-        .blobs
+    app.service
+        .items()
+        .blobs()
         .require_room(announced_length(request.headers()))?;
     let mut upload = Upload {
-        volume: Bundle::new(app, &counting),
+        volume: VolumeUpload::new(&app.service, &counting),
         others: BTreeMap::new(),
         counting,
         fields: Vec::new(),

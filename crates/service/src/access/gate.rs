@@ -4,7 +4,7 @@ use super::{
     AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, Maker, Makers, PresentedKey,
     Quota, Scope,
 };
-use crate::jobs::{Clock, StoreError, Tenant};
+use crate::records::{Clock, StoreError, Tenant};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +21,7 @@ const MOST_KEPT: usize = 1024;
 pub const MOST_MAKERS: usize = 8;
 
 /// Longest credentials, bytes. Tokens with many groups have a few thousand.
-const LONGEST: usize = 16 * 1024;
+const AUTHORIZATION_BYTES: usize = 16 * 1024;
 
 /// Why a request was not admitted.
 #[derive(Debug, thiserror::Error)]
@@ -100,9 +100,10 @@ impl Gate {
     /// If the credentials are missing or wrong, or cannot be checked.
     pub async fn identify(&self, authorization: Option<&[u8]>) -> Result<Identity, Refusal> {
         let Some(authorization) = authorization else {
-            return match self.is_open().await? {
-                true => Ok(self.anonymous()),
-                false => Err(Refusal::Missing),
+            return if self.is_open().await? {
+                Ok(self.anonymous())
+            } else {
+                Err(Refusal::Missing)
             };
         };
         let credential = bearer(authorization).ok_or(Refusal::NotBearer)?;
@@ -247,7 +248,7 @@ fn bearer(authorization: &[u8]) -> Option<&str> {
     let credential = credential.trim();
     let usable = scheme.eq_ignore_ascii_case("bearer")
         && !credential.is_empty()
-        && credential.len() <= LONGEST;
+        && credential.len() <= AUTHORIZATION_BYTES;
     usable.then_some(credential)
 }
 
@@ -273,7 +274,7 @@ mod tests {
         ] {
             assert_eq!(bearer(wrong), None);
         }
-        let long = format!("Bearer {}", "x".repeat(LONGEST + 1));
+        let long = format!("Bearer {}", "x".repeat(AUTHORIZATION_BYTES + 1));
         assert_eq!(bearer(long.as_bytes()), None);
     }
 }

@@ -1,7 +1,7 @@
 //! Who sends a request.
 
 use super::{Quota, Scope};
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 
 /// Who sends a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub struct Identity {
     pub tenant: Tenant,
     /// The name of its key, the subject of its token, or `anonymous`.
     pub name: String,
-    /// What it may do.
+    /// Its scope.
     pub scope: Scope,
     /// Id of its key.
     pub key: Option<String>,
@@ -38,12 +38,11 @@ impl Identity {
     /// them; a key that a caller has made has no more than the operator allowed the first in the row.
     pub fn limits(&self, general: Quota) -> Quota {
         let own = self.quota.or(general);
-        match self.makers.any {
-            false => own,
-            true => {
-                let first = self.makers.keys.last().map(|(_, quota)| *quota);
-                own.within(first.unwrap_or_default().or(general))
-            }
+        if !self.makers.any {
+            own
+        } else {
+            let first = self.makers.keys.last().map(|(_, quota)| *quota);
+            own.within(first.unwrap_or_default().or(general))
         }
     }
 

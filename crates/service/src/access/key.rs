@@ -6,15 +6,15 @@
 //! let strangers keep the processor busy.
 
 use super::{Quota, Scope};
-use crate::jobs::{Tenant, Timestamp, hex};
+use crate::records::{Tenant, Timestamp, hex};
 use base64::Engine;
 use base64::prelude::BASE64_URL_SAFE_NO_PAD;
 use sha2::{Digest, Sha256};
 use subtle::ConstantTimeEq;
 use ventriform::text::is_printable;
 
-/// What every key begins with, so that scanners for leaked secrets find it.
-const PREFIX: &str = "vf_";
+/// The beginning of every key, so that scanners for leaked secrets find it.
+const KEY_PREFIX: &str = "vf_";
 /// Bytes of an id.
 const ID_BYTES: usize = 8;
 /// Bytes of a secret.
@@ -38,11 +38,11 @@ pub struct ApiKey {
     pub id: String,
     /// Its position in the order of making.
     pub sequence: i64,
-    /// What it is for, in the operator's words.
+    /// Its purpose, in the operator's words.
     pub name: String,
     /// Whose items and jobs it opens.
     pub tenant: Tenant,
-    /// What it allows.
+    /// Its scope.
     pub scope: Scope,
     /// Limits that replace the general ones.
     pub quota: Quota,
@@ -58,7 +58,7 @@ pub struct ApiKey {
     pub digest: Vec<u8>,
 }
 
-/// What a new key shall be.
+/// The properties of a new key.
 #[derive(Debug, Clone)]
 pub struct KeyRequest {
     /// See [`ApiKey::name`].
@@ -141,7 +141,7 @@ impl ApiKey {
             revoked_at: None,
             digest: digest(&secret),
         };
-        let text = format!("{PREFIX}{}_{secret}", key.id);
+        let text = format!("{KEY_PREFIX}{}_{secret}", key.id);
         Ok((key, text))
     }
 
@@ -172,7 +172,7 @@ pub struct PresentedKey<'a> {
 impl<'a> PresentedKey<'a> {
     /// Takes a text apart. `None` if it is no key by its form.
     pub fn parse(text: &'a str) -> Option<Self> {
-        let (id, secret) = text.strip_prefix(PREFIX)?.split_once('_')?;
+        let (id, secret) = text.strip_prefix(KEY_PREFIX)?.split_once('_')?;
         let digit = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
         let letter = |b: u8| b.is_ascii_alphanumeric() || b == b'-' || b == b'_';
         let formed = id.len() == 2 * ID_BYTES

@@ -14,7 +14,7 @@
 //! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
 use super::{Identity, Makers, Quota, Scope};
-use crate::jobs::{Tenant, content_id};
+use crate::records::{Tenant, content_id};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};
@@ -31,14 +31,14 @@ const RETRY_AFTER: Duration = Duration::from_secs(30);
 /// How long it is used if it cannot be read again.
 const STALE_AFTER: Duration = Duration::from_secs(24 * 3600);
 /// Longest time for the issuer to answer.
-const TIMEOUT: Duration = Duration::from_secs(5);
+const ISSUER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Largest document of the issuer, bytes.
-const LARGEST: usize = 1 << 20;
+const ANSWER_BYTES: usize = 1 << 20;
 /// Most keys of a JWKS.
 const MOST_KEYS: usize = 100;
 /// Longest subject that is kept as a name, characters.
 const LONGEST_NAME: usize = 128;
-/// What may stand before the name of a scope.
+/// The prefix of the name of a scope.
 const SCOPE_PREFIX: &str = "ventriform:";
 
 /// Which tokens are accepted.
@@ -103,7 +103,7 @@ impl Issuer {
             check_address(address)?;
         }
         let client = reqwest::Client::builder()
-            .timeout(TIMEOUT)
+            .timeout(ISSUER_TIMEOUT)
             .redirect(reqwest::redirect::Policy::none())
             .build()
             .map_err(|error| IssuerError::Unavailable(error.to_string()))?;
@@ -281,8 +281,8 @@ impl Known {
         let mut answer = answer.error_for_status().map_err(told)?;
         let mut body = Vec::new();
         while let Some(piece) = answer.chunk().await.map_err(told)? {
-            if body.len() + piece.len() > LARGEST {
-                return Err(format!("{address} is larger than {LARGEST} bytes"));
+            if body.len() + piece.len() > ANSWER_BYTES {
+                return Err(format!("{address} is larger than {ANSWER_BYTES} bytes"));
             }
             body.extend_from_slice(&piece);
         }
@@ -404,11 +404,12 @@ fn check_address(address: &str) -> Result<(), IssuerError> {
                 .is_ok_and(|ip| ip.is_loopback());
         url.scheme() == "https" || (url.scheme() == "http" && here)
     });
-    match usable {
-        true => Ok(()),
-        false => Err(IssuerError::Unavailable(format!(
+    if usable {
+        Ok(())
+    } else {
+        Err(IssuerError::Unavailable(format!(
             "{address} is not an https address"
-        ))),
+        )))
     }
 }
 
@@ -586,9 +587,9 @@ mod tests {
         for _ in 0..20 {
             assert_eq!(issuer.subject(&token).await.unwrap().name, "me");
         }
-        assert!(begun.elapsed() < TIMEOUT, "{:?}", begun.elapsed());
+        assert!(begun.elapsed() < ISSUER_TIMEOUT, "{:?}", begun.elapsed());
         // One of them made the service ask.
-        let asked = tokio::time::timeout(TIMEOUT, silent.accept()).await;
+        let asked = tokio::time::timeout(ISSUER_TIMEOUT, silent.accept()).await;
         asked.unwrap().unwrap();
         let again = tokio::time::timeout(Duration::from_millis(200), silent.accept()).await;
         assert!(again.is_err(), "asked twice");

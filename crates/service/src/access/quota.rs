@@ -54,7 +54,7 @@ impl Quota {
     }
 }
 
-/// What a tenant uses.
+/// Use of the service by a tenant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Usage {
     /// Bytes of everything that it stores.
@@ -63,7 +63,7 @@ pub struct Usage {
     pub jobs: u64,
 }
 
-/// What is left of a caller's window.
+/// The rest of a caller's window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Allowance {
     /// Requests of a whole window.

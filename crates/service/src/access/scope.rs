@@ -1,9 +1,9 @@
-//! What a caller may do.
+//! Scopes of callers.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What a caller may do. Each scope includes those before it.
+/// The scope of a caller. Each scope includes those before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Scope {
     /// Read everything of its tenant: `GET` and `HEAD`.

@@ -2,7 +2,7 @@
 
 use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord};
 use super::{ApiKey, Usage};
-use crate::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use crate::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Keys and audit trail. Every method is one transaction and fails only if the database does.
@@ -29,7 +29,7 @@ pub trait AccessStore: Send + Sync + 'static {
     /// whether there is such a key.
     async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
 
-    /// What a tenant uses.
+    /// Use of the service by a tenant.
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage>;
 
     /// Whether a job of this tenant was filed under this idempotency key.

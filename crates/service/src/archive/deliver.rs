@@ -10,7 +10,7 @@ use super::trouble::Trouble;
 use super::web::Stored;
 use super::{DueSend, SendSettlement, dimse};
 use crate::hooks::{AttemptEnd, DeliveryState, Errands, Rounds};
-use crate::jobs::{Job, JobState, StoreResult, Timestamp};
+use crate::records::{Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! An archive as the operator describes it.
 
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use reqwest::Url;
 use std::fmt;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 const NAME_LENGTH: usize = 64;
 
 /// The application entity title by which this service calls archives unless told otherwise.
-const CALLING: &str = "VENTRIFORM";
+const CALLING_AE_TITLE: &str = "VENTRIFORM";
 
 /// Whether `text` can name an archive: 1 to 64 letters, digits, dots, dashes and underscores.
 fn is_name(text: &str) -> bool {
@@ -20,7 +20,7 @@ fn is_name(text: &str) -> bool {
 /// An archive (PACS). Its address was given by the operator, so it may be private.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Archive {
-    /// What jobs call it.
+    /// The name by which jobs know it.
     pub name: String,
     /// Base URL of its DICOMweb service, without a slash at the end.
     pub dicomweb: Option<String>,
@@ -39,7 +39,7 @@ pub struct Archive {
     pub credentials: Credentials,
 }
 
-/// What an archive wants to see of those who use it. `Debug` does not show it.
+/// Credentials for an archive. `Debug` does not show it.
 #[derive(Clone, Default, PartialEq, Eq)]
 pub enum Credentials {
     /// Nothing.
@@ -94,7 +94,7 @@ pub struct DicomTls {
 pub struct ArchiveFault {
     /// The key at fault.
     pub field: &'static str,
-    /// What is wrong with it, and what to write.
+    /// The faults of it, and what to write.
     pub reason: String,
 }
 
@@ -269,12 +269,13 @@ fn variable(field: &'static str, given: Given<'_>) -> Result<Option<String>, Arc
     let Some(name) = given else { return Ok(None) };
     let letter = |b: u8| b.is_ascii_alphanumeric() || b == b'_';
     let digit = name.bytes().next().is_none_or(|b| b.is_ascii_digit());
-    match !digit && name.bytes().all(letter) {
-        true => Ok(Some(name.to_owned())),
-        false => Err(fault(
+    if !digit && name.bytes().all(letter) {
+        Ok(Some(name.to_owned()))
+    } else {
+        Err(fault(
             field,
             "give the name of an environment variable, not its value",
-        )),
+        ))
     }
 }
 
@@ -318,17 +319,18 @@ fn peer<'a>(given: &impl Fn(&str) -> Given<'a>) -> Result<Option<DicomPeer>, Arc
         let plain = |b: u8| (b' '..=b'~').contains(&b) && b != b'\\';
         let usable =
             (1..=16).contains(&title.len()) && title.trim() == title && title.bytes().all(plain);
-        match usable {
-            true => Ok(title.to_owned()),
-            false => Err(fault(
+        if usable {
+            Ok(title.to_owned())
+        } else {
+            Err(fault(
                 field,
                 "give an application entity title: 1 to 16 characters",
-            )),
+            ))
         }
     };
     let called = given("ae_title");
     let called = called.ok_or_else(|| fault("ae_title", "it is missing beside `dicom`"))?;
-    let calling = given("calling_ae_title").unwrap_or(CALLING);
+    let calling = given("calling_ae_title").unwrap_or(CALLING_AE_TITLE);
     Ok(Some(DicomPeer {
         address: address.to_owned(),
         called: title("ae_title", called)?,

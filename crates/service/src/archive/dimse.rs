@@ -4,8 +4,8 @@
 use super::trouble::Trouble;
 use super::web::{Stored, store_failure};
 use super::{ArchiveObject, DicomPeer, DicomTls};
-use crate::jobs::Fault;
 use crate::pem;
+use crate::records::Fault;
 use dicom_core::{PrimitiveValue, VR, dicom_value};
 use dicom_dictionary_std::{tags, uids};
 use dicom_encoding::TransferSyntaxIndex;
@@ -21,10 +21,10 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Longest time to connect.
-const CONNECT: Duration = Duration::from_secs(10);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Longest response that is read, bytes.
-const RESPONSE: usize = 64 << 10;
+const RESPONSE_BYTES: usize = 64 << 10;
 
 const STORE_REQUEST: u16 = 0x0001;
 const MESSAGE: u16 = 1;
@@ -46,7 +46,7 @@ pub(super) fn store(
         .calling_ae_title(peer.calling.as_str())
         .called_ae_title(peer.called.as_str())
         .with_presentation_context(object.class.as_str(), syntaxes.to_vec())
-        .connection_timeout(CONNECT.min(timeout))
+        .connection_timeout(CONNECT_TIMEOUT.min(timeout))
         .read_timeout(timeout)
         .write_timeout(timeout);
     let address = peer.address.as_str();
@@ -103,7 +103,7 @@ fn send<S: CloseSocket + Read + Write>(
             response.extend_from_slice(&value.data);
             last |= value.is_last;
         }
-        if response.len() > RESPONSE {
+        if response.len() > RESPONSE_BYTES {
             return Err(Trouble::passing("The archive's response has no end."));
         }
         if last {

@@ -1,10 +1,11 @@
-//! What fetching and delivering have in common.
+//! The common parts of fetching and delivering.
 
 use super::trouble::Trouble;
 use super::web::WebClients;
 use super::{Archive, ArchiveStore, Archives, ExchangeHost};
 use crate::hooks::{AttemptEnd, Lanes, RetrySchedule, UrlGuard, random_share};
-use crate::jobs::{Clock, Queue, Tenant, Timestamp};
+use crate::jobs::Queue;
+use crate::records::{Clock, Tenant, Timestamp};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -55,7 +56,7 @@ impl Exchange {
     }
 
     pub(super) fn clock(&self) -> &Arc<dyn Clock> {
-        &self.queue.clock
+        self.queue.clock()
     }
 
     pub(super) fn lanes(&self) -> Lanes {
@@ -93,7 +94,7 @@ impl Exchange {
     }
 }
 
-/// What an attempt that failed so means for others to the same archive.
+/// Consequences of an attempt that failed so for others to the same archive.
 pub(super) fn means(trouble: &Trouble) -> AttemptEnd {
     match trouble {
         Trouble::Passing { asked, .. } => AttemptEnd::Failing(*asked),

@@ -1,9 +1,10 @@
-//! What the exchange with archives needs of the service around it.
+//! The interface that the exchange with archives needs of the service around it.
 
 use super::parts::SeriesParts;
 use super::trouble::Trouble;
 use super::{ArchiveObject, DuePull, DueSend, ExchangeEnd};
-use crate::jobs::{Hold, Tenant};
+use crate::items::Pin;
+use crate::records::Tenant;
 use async_trait::async_trait;
 
 /// A stored volume, which is not deleted while this exists.
@@ -11,7 +12,7 @@ pub struct StoredSeries {
     /// Its id.
     pub volume: String,
     /// Keeps it from being deleted.
-    pub hold: Hold,
+    pub pin: Pin,
 }
 
 /// Stores volumes, makes objects, keeps the audit trail.

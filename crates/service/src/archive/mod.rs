@@ -4,12 +4,12 @@
 //! In: the archives of the settings ([`Archive`]), and jobs that name one. Out: a stored volume for
 //! each job with a source, and the objects of its result in the archive.
 //!
-//! 1. A job with a [`source`](crate::jobs::Job::source) waits without a volume, beside a row that says
+//! 1. A job with a [`source`](crate::records::Job::source) waits without a volume, beside a row that says
 //!    what is to be fetched. [`Puller`] asks the archive which instances the series has (QIDO-RS). If
 //!    the tenant holds them already, the job gets that volume. Else the series is fetched (WADO-RS,
 //!    [`SeriesParts`]), streamed to the disk, and stored as an upload is ([`ExchangeHost::store`]).
 //!    Then a worker can take the job.
-//! 2. When a job with a [`send`](crate::jobs::Job::send) succeeds, the same transaction writes a row
+//! 2. When a job with a [`send`](crate::records::Job::send) succeeds, the same transaction writes a row
 //!    for each object (the outbox). [`Deliverer`] makes the object from the stored result, asks the
 //!    archive whether it has it, and sends it: by STOW-RS, or by C-STORE to an archive with `dicom`.
 //! 3. What may pass ([`Trouble::Passing`]) is tried again later and later, across restarts; the rest
@@ -33,6 +33,7 @@
 
 mod deliver;
 mod description;
+mod desk;
 mod dimse;
 mod end;
 mod exchange;
@@ -48,6 +49,7 @@ mod web;
 
 pub use deliver::Deliverer;
 pub use description::{Archive, ArchiveFault, Archives, Credentials, DicomPeer, DicomTls};
+pub use desk::{ArchiveDesk, ArchiveReadings};
 pub use end::{ExchangeCounts, ExchangeEnd};
 pub use exchange::{Exchange, ExchangeSettings};
 pub use host::{ExchangeHost, StoredSeries};

@@ -4,7 +4,7 @@
 use super::pieces::{EndlessHeader, Unparsed};
 use super::related::RelatedType;
 use super::trouble::{Trouble, odd_answer};
-use crate::jobs::Fault;
+use crate::records::Fault;
 use futures::stream::BoxStream;
 use futures::{Stream, StreamExt};
 use multer::{Constraints, Multipart, SizeLimit};
@@ -136,7 +136,7 @@ mod tests {
     use bytes::Bytes;
     use futures::stream;
 
-    const LIMITS: PartLimits = PartLimits {
+    const PART_LIMITS: PartLimits = PartLimits {
         bytes: 1 << 20,
         parts: 2,
     };
@@ -148,7 +148,7 @@ mod tests {
             .map(Bytes::copy_from_slice)
             .collect();
         let pieces = stream::iter(pieces.into_iter().map(Ok)).boxed();
-        let mut parts = SeriesParts::new(content_type, pieces, LIMITS)?;
+        let mut parts = SeriesParts::new(content_type, pieces, PART_LIMITS)?;
         let mut files = Vec::new();
         while let Some(mut part) = parts.next().await? {
             let mut file = Vec::new();
@@ -160,13 +160,16 @@ mod tests {
         Ok(files)
     }
 
-    const TYPE: &str = "multipart/related; type=\"application/dicom\"; boundary=\"b:1\"";
+    const RELATED_TYPE: &str = "multipart/related; type=\"application/dicom\"; boundary=\"b:1\"";
 
     #[tokio::test]
     async fn parts_are_read_as_they_come() {
         let body = "--b:1\r\nContent-Type: application/dicom\r\n\r\none\r\n--b:1\r\n\
                     Content-Type: application/dicom\r\n\r\ntwo --b:1\r\n--b:1--\r\n";
-        assert_eq!(read(TYPE, body).await.unwrap(), ["one", "two --b:1"]);
+        assert_eq!(
+            read(RELATED_TYPE, body).await.unwrap(),
+            ["one", "two --b:1"]
+        );
     }
 
     #[tokio::test]
@@ -176,15 +179,19 @@ mod tests {
             ("text/html", "<html>".to_owned(), "archive-answer"),
             ("multipart/related", part.to_owned(), "archive-answer"),
             (
-                TYPE,
+                RELATED_TYPE,
                 "--other\r\n\r\nx\r\n--other--".to_owned(),
                 "archive-answer",
             ),
-            (TYPE, "--b:1--\r\n".to_owned(), "archive-answer"),
-            (TYPE, part.to_owned(), "archive-answer"),
-            (TYPE, format!("{}--b:1--", part.repeat(3)), "too-large"),
+            (RELATED_TYPE, "--b:1--\r\n".to_owned(), "archive-answer"),
+            (RELATED_TYPE, part.to_owned(), "archive-answer"),
             (
-                TYPE,
+                RELATED_TYPE,
+                format!("{}--b:1--", part.repeat(3)),
+                "too-large",
+            ),
+            (
+                RELATED_TYPE,
                 format!("--b:1\r\nA: {}", "a".repeat(600_000)),
                 "archive-answer",
             ),

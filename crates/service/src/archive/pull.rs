@@ -8,7 +8,7 @@ use super::trouble::Trouble;
 use super::web::DicomWeb;
 use super::{DuePull, HeldSeries, SeriesKey};
 use crate::hooks::{AttemptEnd, Errands, Rounds};
-use crate::jobs::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
+use crate::records::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::time::Duration;
@@ -96,7 +96,7 @@ impl Puller {
             Ok((stored, end)) => {
                 // The volume is held until the job has it.
                 let job = store.pulled(&due.job, &stored.volume, now).await?;
-                drop(stored.hold);
+                drop(stored.pin);
                 if let Some(job) = job {
                     exchange.queue.supplied(&job);
                 }
@@ -133,7 +133,7 @@ impl Puller {
                 Ok(_) => {}
                 Err(RecvError::Closed) => std::future::pending().await,
                 Err(RecvError::Lagged(_)) => {
-                    let job = self.exchange.queue.jobs.job(id).await;
+                    let job = self.exchange.queue.table().job(id).await;
                     if job.is_ok_and(|job| job.is_none_or(|job| job.state.is_final())) {
                         return;
                     }

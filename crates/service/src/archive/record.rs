@@ -1,7 +1,7 @@
 //! Fetches and deliveries, and the trait that a database implements.
 
 use crate::hooks::{Backlog, DeliveryState};
-use crate::jobs::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
+use crate::records::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 
@@ -99,7 +99,7 @@ pub struct ObjectDelivery {
     pub last_error: Option<String>,
 }
 
-/// What to write down after an attempt to deliver.
+/// The record of an attempt to deliver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SendSettlement {
     /// How far it has come.
@@ -146,7 +146,7 @@ pub trait ArchiveStore: Send + Sync + 'static {
         now: Timestamp,
     ) -> StoreResult<Option<Job>>;
 
-    /// What became of the fetches of those jobs.
+    /// The outcome of the fetches of those jobs.
     async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>>;
 
     /// The volume as which a series is held.
@@ -174,7 +174,7 @@ pub trait ArchiveStore: Send + Sync + 'static {
         now: Timestamp,
     ) -> StoreResult<()>;
 
-    /// What became of the deliveries of those jobs, in the order of the job's list.
+    /// The outcome of the deliveries of those jobs, in the order of the job's list.
     async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>>;
 
     /// Makes an ended delivery pending again, due at once. Returns it as it is then; `None` if

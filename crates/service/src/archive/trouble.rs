@@ -1,6 +1,7 @@
 //! Why an attempt failed, and whether another one may succeed.
 
-use crate::jobs::{Failure, Fault, StoreError};
+use crate::error::ServiceError;
+use crate::records::{Failure, Fault, StoreError};
 use std::time::Duration;
 
 /// Why an attempt did not succeed.
@@ -8,7 +9,7 @@ use std::time::Duration;
 pub enum Trouble {
     /// It may pass: the archive does not answer, or is busy.
     Passing {
-        /// What happened, as a sentence without patient data.
+        /// The cause, as a sentence without patient data.
         what: String,
         /// How long the archive asks to wait.
         asked: Option<Duration>,
@@ -36,6 +37,16 @@ impl Trouble {
         match self {
             Trouble::Passing { what, .. } => what,
             Trouble::Final(failure) => &failure.detail,
+        }
+    }
+}
+
+impl From<ServiceError> for Trouble {
+    fn from(error: ServiceError) -> Self {
+        if error.may_pass() {
+            Self::passing(error.failure.detail)
+        } else {
+            Self::Final(*error.failure)
         }
     }
 }

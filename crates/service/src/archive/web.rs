@@ -7,7 +7,7 @@ use super::parts::{PartLimits, SeriesParts};
 use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
 use crate::hooks::{Pin, PinnedNames, UrlGuard, retry_after};
-use crate::jobs::{Failure, Fault, Timestamp};
+use crate::records::{Failure, Fault, Timestamp};
 use futures::StreamExt;
 use reqwest::header::{ACCEPT, CONTENT_TYPE, HeaderMap};
 use reqwest::redirect::{Attempt, Policy};
@@ -22,13 +22,13 @@ use std::time::Duration;
 const JSON_BYTES: usize = 16 << 20;
 
 /// Longest time to connect.
-const CONNECT: Duration = Duration::from_secs(10);
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Most redirects within an archive.
-const REDIRECTS: usize = 3;
+const MAX_REDIRECTS: usize = 3;
 
 const DICOM_JSON: &str = "application/dicom+json";
-const BOUNDARY: &str = "ventriform-dicom-object";
+const PART_BOUNDARY: &str = "ventriform-dicom-object";
 
 /// SOP Instance UID, as DICOM JSON names it.
 const SOP_INSTANCE_UID: &str = "00080018";
@@ -56,7 +56,7 @@ pub struct DicomWeb {
     _pin: Option<Pin>,
 }
 
-/// What became of an object that was sent.
+/// The outcome of an object that was sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stored {
     /// It was stored now.
@@ -147,7 +147,7 @@ impl WebClients {
             .no_proxy()
             .referer(false)
             .pool_idle_timeout(Duration::from_secs(10))
-            .connect_timeout(CONNECT.min(self.timeout))
+            .connect_timeout(CONNECT_TIMEOUT.min(self.timeout))
             .read_timeout(self.timeout)
             .user_agent(concat!("ventriform/", env!("CARGO_PKG_VERSION")))
     }
@@ -174,9 +174,10 @@ impl WebClients {
 /// Follows redirects to the same scheme, host and port.
 fn within_origin(attempt: Attempt<'_>) -> reqwest::redirect::Action {
     let known = attempt.previous().first().map(reqwest::Url::origin);
-    match known == Some(attempt.url().origin()) && attempt.previous().len() <= REDIRECTS {
-        true => attempt.follow(),
-        false => attempt.stop(),
+    if known == Some(attempt.url().origin()) && attempt.previous().len() <= MAX_REDIRECTS {
+        attempt.follow()
+    } else {
+        attempt.stop()
     }
 }
 
@@ -284,11 +285,11 @@ impl DicomWeb {
     /// # Errors
     /// If the archive does not take it, or does not answer.
     pub async fn store(&self, object: &[u8]) -> Result<Stored, Trouble> {
-        let head = format!("--{BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
-        let tail = format!("\r\n--{BOUNDARY}--\r\n");
+        let head = format!("--{PART_BOUNDARY}\r\nContent-Type: application/dicom\r\n\r\n");
+        let tail = format!("\r\n--{PART_BOUNDARY}--\r\n");
         let body = [head.as_bytes(), object, tail.as_bytes()].concat();
         let content_type =
-            format!("multipart/related; type=\"application/dicom\"; boundary={BOUNDARY}");
+            format!("multipart/related; type=\"application/dicom\"; boundary={PART_BOUNDARY}");
         let request = self
             .client
             .post(format!("{}/studies", self.base))
@@ -313,15 +314,16 @@ impl DicomWeb {
             Credentials::Bearer(token) => request.bearer_auth(token),
         };
         request.send().await.map_err(|error| {
-            Trouble::passing(match error.is_timeout() {
-                true => "The archive did not answer in time.",
-                false => "The archive could not be reached, or broke the connection off.",
+            Trouble::passing(if error.is_timeout() {
+                "The archive did not answer in time."
+            } else {
+                "The archive could not be reached, or broke the connection off."
             })
         })
     }
 }
 
-/// What an answer to STOW-RS says of the only object (PS3.18, 10.5.3; Store Instances Response
+/// The outcome for the only object in an answer to STOW-RS (PS3.18, 10.5.3; Store Instances Response
 /// Module, PS3.18 annex I).
 fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
     let json: Option<Value> = serde_json::from_slice(answer).ok();
@@ -334,12 +336,12 @@ fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
             StatusCode::ACCEPTED => json.is_some(),
             _ => false,
         };
-        return match said {
-            true => Ok(Stored::Now),
-            // The page of a proxy, for instance. The next attempt asks whether it is stored.
-            false => Err(Trouble::passing(
+        return if said {
+            Ok(Stored::Now)
+        } else {
+            Err(Trouble::passing(
                 "The archive did not say whether it has stored the object.",
-            )),
+            ))
         };
     };
     let reason = failed

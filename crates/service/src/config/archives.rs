@@ -2,14 +2,14 @@
 
 use super::ConfigError;
 use crate::archive::{Archive, Archives};
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use std::path::Path;
 
 /// The key of the file.
 pub(super) const KEY: &str = "archives";
 
 /// The key of an entry that holds a list.
-const TENANTS: &str = "tenants";
+const TENANTS_KEY: &str = "tenants";
 
 /// Reads the entries.
 ///
@@ -34,7 +34,7 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
         let mut tenants = Vec::new();
         for (key, value) in entry {
             match value {
-                toml::Value::Array(names) if key == TENANTS => {
+                toml::Value::Array(names) if key == TENANTS_KEY => {
                     for name in names {
                         let name = name.as_str().unwrap_or_default().parse::<Tenant>();
                         tenants.push(name.map_err(|e| at(key, e.to_string()))?);
@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
                         return Err(at(key, "leave it out to serve every tenant".into()));
                     }
                 }
-                _ if key == TENANTS => {
+                _ if key == TENANTS_KEY => {
                     return Err(at(key, "it must be a list of names".into()));
                 }
                 toml::Value::String(_) if Archive::KEYS.contains(&key.as_str()) => {}
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
                 }
                 _ => {
                     let known = Archive::KEYS.join(", ");
-                    let reason = format!("there is no such key; known are {known}, {TENANTS}");
+                    let reason = format!("there is no such key; known are {known}, {TENANTS_KEY}");
                     return Err(at(key, reason));
                 }
             }
@@ -79,7 +79,7 @@ pub(super) fn print(archives: &Archives) -> String {
         }
         if !archive.tenants.is_empty() {
             let names: Vec<&str> = archive.tenants.iter().map(Tenant::as_str).collect();
-            text += &format!("{TENANTS} = {names:?}\n");
+            text += &format!("{TENANTS_KEY} = {names:?}\n");
         }
     }
     text

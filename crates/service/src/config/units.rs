@@ -88,7 +88,7 @@ pub enum BlobPlace {
     S3 {
         /// The bucket's name.
         bucket: String,
-        /// What the keys of all files begin with, without a slash at its ends; may be empty.
+        /// The beginning of the keys of all files, without a slash at its ends; may be empty.
         prefix: String,
     },
 }
@@ -188,7 +188,7 @@ impl fmt::Debug for AwsVariables {
 pub trait Keyword {
     /// The word.
     const WORD: &'static str;
-    /// What may be written, for error messages.
+    /// The permitted texts, for error messages.
     const EXPECTED: &'static str;
 }
 
@@ -342,7 +342,7 @@ impl fmt::Display for LogFormat {
     }
 }
 
-/// What a process does of the service.
+/// The role of a process in the service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Everything.
@@ -530,9 +530,10 @@ impl FromStr for BasePath {
                 && path
                     .strip_prefix('/')
                     .is_some_and(|rest| rest.split('/').all(plain));
-        match usable {
-            true => Ok(Self(path.to_owned())),
-            false => Err("give a path such as /heart, with letters, digits, points, `-` and `_`"),
+        if usable {
+            Ok(Self(path.to_owned()))
+        } else {
+            Err("give a path such as /heart, with letters, digits, points, `-` and `_`")
         }
     }
 }

@@ -6,7 +6,7 @@ use super::{
     AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lanes,
     RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
 };
-use crate::jobs::{Clock, Job, JobState, StoreResult, Timestamp};
+use crate::records::{Clock, Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -29,7 +29,7 @@ pub struct HookSettings {
     pub backlog: u32,
     /// How long ended deliveries are kept.
     pub history: Duration,
-    /// What the paths in messages begin with.
+    /// The beginning of the paths in messages.
     pub base_path: String,
 }
 
@@ -84,7 +84,7 @@ impl Dispatcher {
         }
     }
 
-    /// What was done since the start.
+    /// Counts since the start.
     pub fn counts(&self) -> &DeliveryCounts {
         &self.counts
     }

@@ -1,8 +1,8 @@
-//! What is told of jobs.
+//! The events of jobs that webhooks tell.
 
-use crate::jobs::JobState;
+use crate::records::JobState;
 
-/// What happened to a job.
+/// An event in the life of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum HookEvent {
     /// A worker started it; once for each attempt.

@@ -252,9 +252,10 @@ async fn resolve_host(host: &str, port: u16) -> Result<Vec<SocketAddr>, UrlRefus
         Ok(Ok(addresses)) => addresses.collect(),
         Ok(Err(_)) | Err(_) => Vec::new(),
     };
-    match found.is_empty() {
-        true => Err(UrlRefusal("The host's name cannot be resolved.")),
-        false => Ok(found),
+    if found.is_empty() {
+        Err(UrlRefusal("The host's name cannot be resolved."))
+    } else {
+        Ok(found)
     }
 }
 

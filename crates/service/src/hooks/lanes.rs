@@ -7,7 +7,7 @@
 
 use super::RetrySchedule;
 use super::schedule::milliseconds;
-use crate::jobs::Timestamp;
+use crate::records::Timestamp;
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 

@@ -1,7 +1,7 @@
 //! The body of a delivery.
 
 use super::DueDelivery;
-use crate::jobs::{Resource, rfc3339};
+use crate::records::{Resource, rfc3339};
 use serde_json::{Map, Value, json};
 
 /// The body of a delivery, the same in every attempt: `type`, `timestamp`, and `data` with the
@@ -47,7 +47,7 @@ mod tests {
     fn a_body_names_the_job_its_state_and_its_result() {
         let delivery = DueDelivery {
             id: "msg_1".into(),
-            tenant: crate::jobs::Tenant::default(),
+            tenant: crate::records::Tenant::default(),
             job: "job_1".into(),
             url: "https://example.org/".into(),
             secrets: Vec::new(),

@@ -30,6 +30,7 @@
 //! | `sender`, `outcome`, `dispatcher` | one attempt and how it ends; all of them |
 //! | `rounds` | the loop over a table of what is due; that of [`crate::archive`] too |
 
+mod desk;
 mod dispatcher;
 mod event;
 mod guard;
@@ -42,6 +43,7 @@ mod schedule;
 mod secret;
 mod sender;
 
+pub use desk::Hooks;
 pub use dispatcher::{DeliveryCounts, Dispatcher, HookSettings};
 pub use event::HookEvent;
 pub use guard::{AllowList, CheckedUrl, Pin, PinnedNames, UrlGuard, UrlRefusal};

@@ -1,7 +1,7 @@
 //! Deliveries and endpoints, and the trait that a database implements.
 
 use super::{AttemptOutcome, HookEvent, SigningSecret};
-use crate::jobs::{StoreResult, Tenant, Timestamp};
+use crate::records::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// How far a delivery has come.
@@ -49,7 +49,7 @@ pub struct Delivery {
     pub endpoint: Option<String>,
     /// Where it goes.
     pub url: String,
-    /// What it tells.
+    /// The event that it tells.
     pub event: HookEvent,
     /// How far it has come.
     pub state: DeliveryState,
@@ -78,7 +78,7 @@ pub struct DueDelivery {
     pub job: String,
     /// See [`Delivery::url`].
     pub url: String,
-    /// What signs it: its own secret, its endpoint's, or its tenant's. Empty if the tenant has none.
+    /// The secret that signs it: its own secret, its endpoint's, or its tenant's. Empty if the tenant has none.
     pub secrets: Vec<SigningSecret>,
     /// See [`Delivery::event`].
     pub event: HookEvent,
@@ -98,7 +98,7 @@ pub struct DueDelivery {
     pub since: Timestamp,
 }
 
-/// What to write down after an attempt.
+/// The record of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settlement {
     /// How the attempt ended.
@@ -120,7 +120,7 @@ pub struct HookEndpoint {
     pub url: String,
     /// Scheme, host and port of the URL: what shares one place in the order of sending.
     pub destination: String,
-    /// What it is told.
+    /// The events that it is told.
     pub events: Vec<HookEvent>,
     /// Since when it answers 410 and is not told any more.
     pub gone_at: Option<Timestamp>,

@@ -5,7 +5,7 @@
 
 use super::Lanes;
 use super::schedule::milliseconds;
-use crate::jobs::{Clock, Job, StoreResult, Timestamp};
+use crate::records::{Clock, Job, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,7 +21,7 @@ pub(super) const IDLE: Duration = Duration::from_secs(5);
 /// How often what is too old is given up or deleted.
 const EXPIRE_EVERY: Duration = Duration::from_secs(30);
 
-/// What is to be done at other machines, as rows of a table.
+/// Tasks at other machines, as rows of a table.
 #[async_trait]
 pub trait Errands: Send + Sync + 'static {
     /// A row whose time has come.
@@ -51,7 +51,7 @@ pub trait Errands: Send + Sync + 'static {
     fn concerns(&self, job: &Job) -> bool;
 }
 
-/// What an attempt means for others to the same destination.
+/// Consequences of an attempt for others to the same destination.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttemptEnd {
     /// The destination works.

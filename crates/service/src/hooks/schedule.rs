@@ -1,13 +1,13 @@
 //! When a failed delivery is tried again.
 
-use crate::jobs::Timestamp;
+use crate::records::Timestamp;
 use std::time::Duration;
 
 /// The longest pause between two attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(6 * 3600);
 
 /// How much longer each pause is than the one before.
-const GROWTH: u32 = 4;
+const PAUSE_GROWTH: u32 = 4;
 
 /// Pauses that grow: the first is `first`, each is four times the one before, at most six hours.
 /// A random part of up to a half is taken off, so that what failed together does not return
@@ -46,7 +46,7 @@ impl RetrySchedule {
 
     /// The full pause after that many attempts, counted from 1.
     pub fn pause(&self, attempts: u32) -> Duration {
-        let factor = GROWTH.saturating_pow(attempts.saturating_sub(1).min(12));
+        let factor = PAUSE_GROWTH.saturating_pow(attempts.saturating_sub(1).min(12));
         self.first.saturating_mul(factor).min(LONGEST_PAUSE)
     }
 }
@@ -60,7 +60,7 @@ pub(super) fn milliseconds(span: Duration) -> i64 {
 mod tests {
     use super::*;
 
-    const SCHEDULE: RetrySchedule = RetrySchedule {
+    const TEST_SCHEDULE: RetrySchedule = RetrySchedule {
         first: Duration::from_secs(5),
         attempts: 4,
         age: Duration::from_secs(1000),
@@ -68,20 +68,20 @@ mod tests {
 
     #[test]
     fn pauses_grow_with_a_random_part_and_end() {
-        let next = |attempts, random| SCHEDULE.next(attempts, 0, 0, None, random);
+        let next = |attempts, random| TEST_SCHEDULE.next(attempts, 0, 0, None, random);
         assert_eq!(next(1, 0.0), Some(5_000));
         assert_eq!(next(1, 1.0), Some(2_500));
         assert_eq!(next(3, 0.0), Some(80_000));
         assert_eq!(next(4, 0.0), None);
-        assert_eq!(SCHEDULE.pause(200), LONGEST_PAUSE);
+        assert_eq!(TEST_SCHEDULE.pause(200), LONGEST_PAUSE);
     }
 
     #[test]
     fn the_receiver_may_ask_for_a_longer_pause_within_the_age() {
-        let asked = |seconds| SCHEDULE.next(1, 0, 0, Some(Duration::from_secs(seconds)), 0.0);
+        let asked = |seconds| TEST_SCHEDULE.next(1, 0, 0, Some(Duration::from_secs(seconds)), 0.0);
         assert_eq!(asked(1), Some(5_000));
         assert_eq!(asked(900), Some(900_000));
         assert_eq!(asked(2_000), None);
-        assert_eq!(SCHEDULE.next(1, 0, 999_000, None, 0.0), None);
+        assert_eq!(TEST_SCHEDULE.next(1, 0, 999_000, None, 0.0), None);
     }
 }

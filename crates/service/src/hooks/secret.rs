@@ -4,7 +4,7 @@
 //! HMAC-SHA256 of `ID.TIMESTAMP.BODY`, written as `v1,` and base64. With two secrets, while one
 //! replaces the other, there are two signatures, separated by a space.
 
-use crate::jobs::random_key;
+use crate::records::random_key;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hmac::{Hmac, KeyInit, Mac};
@@ -12,7 +12,7 @@ use sha2::Sha256;
 use std::fmt;
 use std::str::FromStr;
 
-const PREFIX: &str = "whsec_";
+const SECRET_PREFIX: &str = "whsec_";
 
 /// Lengths of a secret's key, bytes.
 const KEY_BYTES: std::ops::RangeInclusive<usize> = 24..=64;
@@ -23,7 +23,7 @@ pub struct SigningSecret(Vec<u8>);
 
 /// A text is not a signing secret.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a signing secret is `{PREFIX}` and the base64 of 24 to 64 bytes")]
+#[error("a signing secret is `{SECRET_PREFIX}` and the base64 of 24 to 64 bytes")]
 pub struct InvalidSecret;
 
 impl SigningSecret {
@@ -34,7 +34,7 @@ impl SigningSecret {
 
     /// The secret as it is given to receivers.
     pub fn reveal(&self) -> String {
-        format!("{PREFIX}{}", STANDARD.encode(&self.0))
+        format!("{SECRET_PREFIX}{}", STANDARD.encode(&self.0))
     }
 
     /// The signature of one attempt. `seconds` is the time of `webhook-timestamp`, since 1970.
@@ -52,11 +52,12 @@ impl FromStr for SigningSecret {
     type Err = InvalidSecret;
 
     fn from_str(text: &str) -> Result<Self, InvalidSecret> {
-        let encoded = text.strip_prefix(PREFIX).ok_or(InvalidSecret)?;
+        let encoded = text.strip_prefix(SECRET_PREFIX).ok_or(InvalidSecret)?;
         let key = STANDARD.decode(encoded).map_err(|_| InvalidSecret)?;
-        match KEY_BYTES.contains(&key.len()) {
-            true => Ok(Self(key)),
-            false => Err(InvalidSecret),
+        if KEY_BYTES.contains(&key.len()) {
+            Ok(Self(key))
+        } else {
+            Err(InvalidSecret)
         }
     }
 }

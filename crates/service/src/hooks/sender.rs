@@ -2,7 +2,7 @@
 
 use super::guard::PinnedNames;
 use super::{AttemptOutcome, DueDelivery, SigningSecret, UrlGuard, message_body, signature_header};
-use crate::jobs::Timestamp;
+use crate::records::Timestamp;
 use reqwest::header::{CONTENT_TYPE, HeaderMap, RETRY_AFTER};
 use reqwest::redirect::Policy;
 use reqwest::{Client, StatusCode};

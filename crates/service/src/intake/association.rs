@@ -16,7 +16,7 @@ use super::service::{Place, Service};
 use super::session::Session;
 use super::wire::{Wire, WireError};
 use crate::access::{Activity, AuditEvent, Outcome};
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use dicom_ul::pdu::{
     AbortRQServiceProviderReason as AbortReason, AbortRQSource, AssociationRJ, AssociationRJResult,
     AssociationRJServiceProviderASCEReason, AssociationRJServiceProviderPresentationReason,
@@ -35,7 +35,7 @@ pub const REQUEST_WAIT: Duration = Duration::from_secs(10);
 /// Longest time for the last PDU to be sent.
 const LAST_WRITE: Duration = Duration::from_secs(5);
 /// Shortest P-DATA-TF PDU in which a response is sent, whatever the caller says.
-const SHORTEST: usize = 64;
+const SHORTEST_REQUEST_BYTES: usize = 64;
 /// Bytes of a P-DATA-TF PDU beside the value.
 const VALUE_HEADER: usize = 6;
 
@@ -222,7 +222,9 @@ where
         service,
         wire,
         contexts,
-        portion: theirs.map_or(usize::MAX, |length| length.max(SHORTEST) - VALUE_HEADER),
+        portion: theirs.map_or(usize::MAX, |length| {
+            length.max(SHORTEST_REQUEST_BYTES) - VALUE_HEADER
+        }),
         session: service.sessions.begin(),
         origin,
         command: (0, Vec::new()),
@@ -344,9 +346,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
                 if command.len() > LONGEST_COMMAND {
                     return violation(AbortReason::InvalidPduParameter);
                 }
-                match value.is_last {
-                    true => self.begin(id).await,
-                    false => Ok(()),
+                if value.is_last {
+                    self.begin(id).await
+                } else {
+                    Ok(())
                 }
             }
             PDataValueType::Data => {
@@ -391,12 +394,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
             command,
             target,
         };
-        match follows {
-            true => {
-                self.message = Some(message);
-                Ok(())
-            }
-            false => self.end(message).await,
+        if follows {
+            self.message = Some(message);
+            Ok(())
+        } else {
+            self.end(message).await
         }
     }
 

@@ -24,7 +24,7 @@ mod elements {
     pub const SOP_INSTANCE: u16 = 0x1000;
 }
 
-/// What a message asks for.
+/// The request in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Operation {
     /// C-STORE-RQ.
@@ -104,7 +104,7 @@ impl Command {
         })
     }
 
-    /// What it asks for.
+    /// The request.
     pub fn operation(&self) -> Operation {
         match self.field {
             0x0001 => Operation::Store,

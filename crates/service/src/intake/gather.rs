@@ -11,8 +11,10 @@ use super::observer::IntakeObserver;
 use super::record::{GroupState, IntakeGroup, IntakeStore, Origin, ReceivedFiles};
 use super::rules::Rule;
 use super::session::Sessions;
-use crate::jobs::{
-    BlobError, Failure, Fault, LocalFile, Queue, StoreError, StoreFault, StoreResult, Timestamp,
+use crate::error::ServiceError;
+use crate::jobs::Queue;
+use crate::records::{
+    BlobError, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult, Timestamp,
 };
 use async_trait::async_trait;
 use futures::StreamExt;
@@ -26,16 +28,16 @@ use tokio_util::sync::CancellationToken;
 const AT_ONCE: usize = 8;
 const AT_ONCE_OF_SENDER: usize = 2;
 /// Pause before a group is looked at again that changed while it was made.
-const AGAIN: Duration = Duration::from_secs(1);
+const CHANGED_PAUSE: Duration = Duration::from_secs(1);
 /// Pause after a failure that may pass.
-const RETRY: Duration = Duration::from_secs(10);
+const RETRY_PAUSE: Duration = Duration::from_secs(10);
 /// How often a process looks for groups that others have left, and how long these are late then.
 const ADOPT_EVERY: Duration = Duration::from_secs(10);
-const LATE: Duration = Duration::from_secs(30);
+const LATE_AFTER: Duration = Duration::from_secs(30);
 /// Time between two sweeps.
 const SWEEP_EVERY: Duration = Duration::from_secs(600);
 /// A file without a row that was written this long ago will not get one.
-const ABANDONED: Duration = Duration::from_secs(3600);
+const ABANDONED_AFTER: Duration = Duration::from_secs(3600);
 
 /// Why a step could not be done.
 #[derive(Debug)]
@@ -44,6 +46,16 @@ pub enum MakeError {
     Later(String),
     /// It is never possible.
     Never(Failure),
+}
+
+impl From<ServiceError> for MakeError {
+    fn from(error: ServiceError) -> Self {
+        if error.may_pass() {
+            Self::Later(error.failure.detail)
+        } else {
+            Self::Never(*error.failure)
+        }
+    }
 }
 
 impl From<StoreError> for MakeError {
@@ -87,9 +99,10 @@ impl Turns {
     /// Whether a group is being made; `None` if it does not wait either.
     fn knows(&self, group: &str) -> Option<bool> {
         let is = |(_, known): &(String, String)| known == group;
-        match self.making.iter().any(is) {
-            true => Some(true),
-            false => self.waiting.iter().any(is).then_some(false),
+        if self.making.iter().any(is) {
+            Some(true)
+        } else {
+            self.waiting.iter().any(is).then_some(false)
         }
     }
 
@@ -135,7 +148,7 @@ pub trait VolumeMaker: Send + Sync + 'static {
     ) -> Result<String, MakeError>;
 }
 
-/// What is done with complete groups.
+/// Settings for complete groups.
 pub struct GatherSettings {
     /// The rules; the first that matches counts.
     pub rules: Vec<Rule>,
@@ -192,9 +205,9 @@ impl Gatherer {
     async fn adopt(&self) -> StoreResult<()> {
         let files = self.store.releasable().await?;
         self.release(&files).await?;
-        let late = self.sessions.patience() + LATE;
+        let late = self.sessions.patience() + LATE_AFTER;
         let late = Timestamp::try_from(late.as_millis()).unwrap_or(Timestamp::MAX);
-        let before = self.queue.clock.now().saturating_sub(late);
+        let before = self.queue.now().saturating_sub(late);
         for group in self.store.unfinished().await? {
             if group.changed_at < before && !self.sessions.watches(&group.id) {
                 self.sessions.resume(&group.id, true);
@@ -208,7 +221,7 @@ impl Gatherer {
             && let Err(error) = self.resume().await
         {
             tracing::error!(%error, "what was received before the start could not be listed");
-            tokio::time::sleep(RETRY).await;
+            tokio::time::sleep(RETRY_PAUSE).await;
         }
         let mut turns = Turns::default();
         let mut making = FuturesUnordered::new();
@@ -217,7 +230,7 @@ impl Gatherer {
                 making.push(async move {
                     if let Err(error) = self.advance(&group).await {
                         tracing::warn!(group, error, "a received series waits: {error}");
-                        self.sessions.retry(&group, RETRY);
+                        self.sessions.retry(&group, RETRY_PAUSE);
                     }
                     (sender, group)
                 });
@@ -226,14 +239,14 @@ impl Gatherer {
                 Some((_, group)) = making.next() => turns.end(&group),
                 group = self.sessions.next() => match turns.knows(&group) {
                     // Two at a time would file two volumes; one that still waits is made as it is then.
-                    Some(true) => self.sessions.retry(&group, AGAIN),
+                    Some(true) => self.sessions.retry(&group, CHANGED_PAUSE),
                     Some(false) => {}
                     None => match self.store.group(&group).await {
                         Ok(Some(found)) => turns.wait(sender_of(&found.origin), group),
                         Ok(None) => {}
                         Err(error) => {
                             tracing::warn!(group, %error, "a received series waits: {error}");
-                            self.sessions.retry(&group, RETRY);
+                            self.sessions.retry(&group, RETRY_PAUSE);
                         }
                     },
                 },
@@ -280,7 +293,7 @@ impl Gatherer {
                         "received objects make no volume"
                     );
                     self.observer.group(false);
-                    let now = self.queue.clock.now();
+                    let now = self.queue.now();
                     let failed = self.store.failed(id, group.revision, &failure, now);
                     failed.await.map_err(text)?;
                 }
@@ -299,7 +312,7 @@ impl Gatherer {
     async fn make(&self, group: &IntakeGroup) -> Result<(), MakeError> {
         let files = self.local_files(group).await?;
         let volume = self.maker.make(group, &files).await?;
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         self.store
             .made(&group.id, group.revision, &volume, now)
             .await?;
@@ -318,7 +331,7 @@ impl Gatherer {
         let volume = match &group.volume {
             Some(id) => {
                 let tenant = &group.origin.tenant;
-                self.queue.catalogue.volume(tenant, id).await?
+                self.queue.items().catalogue().volume(tenant, id).await?
             }
             None => None,
         };
@@ -329,7 +342,7 @@ impl Gatherer {
                 (None, Some(volume)) => {
                     let mut stored = volume.files.iter();
                     match stored.find(|file| file.sha256 == object.file_sha256) {
-                        Some(file) => self.queue.blobs.local(&volume.id, file).await?,
+                        Some(file) => self.queue.items().blobs().local(&volume.id, file).await?,
                         None => None,
                     }
                 }
@@ -364,7 +377,7 @@ impl Gatherer {
                 }
             }
         };
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         let ended = self
             .store
             .filed(&group.id, job.as_deref(), failure.as_ref(), now);
@@ -388,7 +401,7 @@ impl Gatherer {
 
     /// Forgets failed groups that are too old, and sets files without a row aside.
     async fn sweep(&self) -> StoreResult<()> {
-        let now = self.queue.clock.now();
+        let now = self.queue.now();
         if let Some(age) = self.settings.keep_failed {
             let age = Timestamp::try_from(age.as_millis()).unwrap_or(Timestamp::MAX);
             let failed = self.store.failed_before(now.saturating_sub(age)).await?;
@@ -399,7 +412,7 @@ impl Gatherer {
             }
         }
         // Listed before the rows are: a file that gets its row meanwhile is among the rows.
-        let kept = self.files.kept(ABANDONED).await?;
+        let kept = self.files.kept(ABANDONED_AFTER).await?;
         let known = self.store.files().await?;
         for name in kept.iter().filter(|name| !known.contains(*name)) {
             self.files.quarantine(name, now).await?;

@@ -11,7 +11,7 @@ use super::receive::Receiver;
 use super::service::{Places, ScpSettings, Service};
 use super::session::Sessions;
 use crate::access::Recorder;
-use crate::jobs::Clock;
+use crate::records::Clock;
 use rustls::ServerConfig;
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -26,7 +26,7 @@ use tokio_util::sync::CancellationToken;
 use ventriform::volume::dicom::{storage_classes, transfer_syntaxes};
 
 /// Most connections that have not requested an association yet.
-const UNASSOCIATED: usize = 128;
+const UNASSOCIATED_CONNECTIONS: usize = 128;
 /// Pause after the system refused a connection.
 const REFUSED_PAUSE: Duration = Duration::from_millis(100);
 /// Time at the end of the grace in which callers are told.
@@ -42,7 +42,7 @@ struct Unassociated {
 impl Unassociated {
     /// Enters a connection. Of too many, closes the oldest of the address that has the most.
     fn enter(&mut self, peer: IpAddr) -> (u64, CancellationToken) {
-        if self.open.len() >= UNASSOCIATED {
+        if self.open.len() >= UNASSOCIATED_CONNECTIONS {
             let mut counts: BTreeMap<IpAddr, usize> = BTreeMap::new();
             for (peer, _) in self.open.values() {
                 *counts.entry(*peer).or_default() += 1;

@@ -36,6 +36,7 @@
 
 mod association;
 mod command;
+mod desk;
 mod gather;
 mod listener;
 mod negotiate;
@@ -48,6 +49,7 @@ mod service;
 mod session;
 mod wire;
 
+pub use desk::Intake;
 pub use gather::{GatherSettings, Gatherer, MakeError, VolumeMaker};
 pub use listener::{Listener, TlsConfiguration};
 pub use observer::{AssociationEnd, IntakeObserver};

@@ -15,7 +15,7 @@ pub const APPLICATION_CONTEXT: &str = "1.2.840.10008.3.1.1.1";
 const IMPLICIT_LITTLE: &str = "1.2.840.10008.1.2";
 const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
 
-/// What this side offers.
+/// The offer of this side.
 #[derive(Debug, Clone)]
 pub struct Offer {
     /// SOP classes of objects that are stored.

@@ -9,7 +9,7 @@ use super::record::{
     Added, IncomingFile, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, ReceivedFiles,
 };
 use super::session::Session;
-use crate::jobs::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
+use crate::records::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
 use sha2::{Digest, Sha256};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -82,7 +82,7 @@ impl ReceiveError {
 pub struct Refused {
     /// Why.
     pub error: ReceiveError,
-    /// What it says of itself, if that could be read.
+    /// Its own header, if that could be read.
     pub header: Option<DicomHeader>,
 }
 
@@ -113,7 +113,7 @@ impl From<StoreError> for ReceiveError {
     }
 }
 
-/// What a sender says of an object beside the object itself.
+/// Statements of a sender about an object beside the object itself.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Stated<'a> {
     /// Its SOP Class and SOP Instance UID.
@@ -123,7 +123,7 @@ pub struct Stated<'a> {
 }
 
 impl Stated<'_> {
-    /// What of it the object contradicts.
+    /// The statement that the object contradicts.
     fn contradiction(&self, header: &DicomHeader) -> Option<&'static str> {
         let (class, instance) = self.object.unzip();
         let differs = |stated: Option<&str>, own: &str| stated.is_some_and(|text| text != own);
@@ -194,7 +194,7 @@ impl Incoming {
     }
 }
 
-/// What was found in an object's file.
+/// The findings in an object's file.
 struct Examined {
     header: DicomHeader,
     data_sha256: String,

@@ -1,8 +1,8 @@
-//! What was received: groups of objects that become a volume each, and the interfaces to the database
+//! Received objects: groups of objects that become a volume each, and the interfaces to the database
 //! and the files that keep them.
 
-use crate::jobs::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
-use crate::jobs::{BlobWriter, Timestamp};
+use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
+use crate::records::{BlobWriter, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -53,7 +53,7 @@ pub struct Origin {
     pub address: String,
 }
 
-/// What has become of a group.
+/// The state of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GroupState {
     /// Objects arrive, or wait to be read.
@@ -107,7 +107,7 @@ pub struct IntakeGroup {
     pub image_type: Vec<String>,
     /// Study Description.
     pub study_description: Option<String>,
-    /// What has become of it.
+    /// The state of it.
     pub state: GroupState,
     /// Grows with every object.
     pub revision: i64,
@@ -139,7 +139,7 @@ impl fmt::Debug for IntakeGroup {
 pub struct NewObject {
     /// Who sent it.
     pub origin: Origin,
-    /// What it says of itself.
+    /// Its own header.
     pub header: ventriform::volume::dicom::DicomHeader,
     /// SHA-256 of its data set, hexadecimal.
     pub data_sha256: String,
@@ -281,7 +281,7 @@ pub trait ReceivedFiles: Send + Sync + 'static {
     /// Starts a file.
     ///
     /// # Errors
-    /// [`BlobError`], as of every method here; [`StoreFault::Full`](crate::jobs::StoreFault::Full) if the
+    /// [`BlobError`], as of every method here; [`StoreFault::Full`](crate::records::StoreFault::Full) if the
     /// disk is nearly full.
     async fn begin(&self) -> Result<Box<dyn IncomingFile>, BlobError>;
 

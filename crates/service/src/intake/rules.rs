@@ -63,7 +63,7 @@ impl Rule {
 mod tests {
     use super::*;
     use crate::intake::{GroupState, Origin};
-    use crate::jobs::Tenant;
+    use crate::records::Tenant;
     use serde_json::json;
 
     fn group(protocol: Protocol) -> IntakeGroup {

@@ -1,6 +1,6 @@
 //! The systems that may send, as the operator lists them.
 
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -8,7 +8,7 @@ use std::net::IpAddr;
 use std::str::FromStr;
 
 /// Longest AE title (PS3.5, 6.2).
-const LONGEST: usize = 16;
+const AE_TITLE_LENGTH: usize = 16;
 
 /// An application entity title: 1 to 16 printable ASCII characters without backslash, not only
 /// spaces; spaces at its ends have no meaning.
@@ -39,9 +39,10 @@ impl FromStr for AeTitle {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let title = text.trim_matches(' ');
         let allowed = |b: u8| (b' '..=b'~').contains(&b) && b != b'\\';
-        match (1..=LONGEST).contains(&title.len()) && title.bytes().all(allowed) {
-            true => Ok(Self(title.to_owned())),
-            false => Err("an AE title has 1 to 16 ASCII characters without backslash"),
+        if (1..=AE_TITLE_LENGTH).contains(&title.len()) && title.bytes().all(allowed) {
+            Ok(Self(title.to_owned()))
+        } else {
+            Err("an AE title has 1 to 16 ASCII characters without backslash")
         }
     }
 }

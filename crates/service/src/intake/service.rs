@@ -1,4 +1,4 @@
-//! What all associations share, and how many there are.
+//! The state that all associations share, and their number.
 
 use super::negotiate::Offer;
 use super::observer::IntakeObserver;
@@ -6,7 +6,7 @@ use super::receive::Receiver;
 use super::senders::{AeTitle, Senders};
 use super::session::Sessions;
 use crate::access::Recorder;
-use crate::jobs::Clock;
+use crate::records::Clock;
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -36,11 +36,11 @@ pub struct ScpSettings {
     pub grace: Duration,
 }
 
-/// What all associations share.
+/// The state that all associations share.
 pub struct Service {
     /// The settings.
     pub settings: ScpSettings,
-    /// What is accepted.
+    /// The transfer syntaxes and classes that are accepted.
     pub offer: Offer,
     /// Takes objects.
     pub receiver: Arc<Receiver>,

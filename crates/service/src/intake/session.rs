@@ -161,9 +161,10 @@ impl Session {
         self.sessions.change(group, whole, |watched| {
             watched.last = Instant::now();
             // The group may have been taken off the list since this session brought its last object.
-            watched.open = match first {
-                true => watched.open + 1,
-                false => watched.open.max(1),
+            watched.open = if first {
+                watched.open + 1
+            } else {
+                watched.open.max(1)
             };
         });
     }
@@ -193,13 +194,13 @@ impl Drop for Session {
 mod tests {
     use super::*;
 
-    const QUIET: Duration = Duration::from_secs(5);
-    const PATIENCE: Duration = Duration::from_secs(120);
+    const QUIET_TIME: Duration = Duration::from_secs(5);
+    const SESSION_PATIENCE: Duration = Duration::from_secs(120);
 
     fn sessions() -> Arc<Sessions> {
         Sessions::new(Waits {
-            quiet: QUIET,
-            patience: PATIENCE,
+            quiet: QUIET_TIME,
+            patience: SESSION_PATIENCE,
         })
     }
 
@@ -213,9 +214,9 @@ mod tests {
         let mut session = sessions.begin();
         session.brought("a", false);
         session.brought("a", false);
-        assert_eq!(wait(&sessions, "a"), PATIENCE);
+        assert_eq!(wait(&sessions, "a"), SESSION_PATIENCE);
         session.release();
-        assert_eq!(wait(&sessions, "a"), QUIET);
+        assert_eq!(wait(&sessions, "a"), QUIET_TIME);
     }
 
     #[test]
@@ -225,9 +226,9 @@ mod tests {
         first.brought("a", false);
         second.brought("a", false);
         first.release();
-        assert_eq!(wait(&sessions, "a"), PATIENCE);
+        assert_eq!(wait(&sessions, "a"), SESSION_PATIENCE);
         second.release();
-        assert_eq!(wait(&sessions, "a"), QUIET);
+        assert_eq!(wait(&sessions, "a"), QUIET_TIME);
     }
 
     #[test]
@@ -237,7 +238,7 @@ mod tests {
         session.brought("a", false);
         sessions.resume("a", false);
         session.release();
-        assert_eq!(wait(&sessions, "a"), QUIET);
+        assert_eq!(wait(&sessions, "a"), QUIET_TIME);
     }
 
     #[test]
@@ -246,9 +247,9 @@ mod tests {
         let mut session = sessions.begin();
         session.brought("a", false);
         drop(session);
-        assert_eq!(wait(&sessions, "a"), PATIENCE);
+        assert_eq!(wait(&sessions, "a"), SESSION_PATIENCE);
         sessions.resume("b", false);
-        assert_eq!(wait(&sessions, "b"), PATIENCE);
+        assert_eq!(wait(&sessions, "b"), SESSION_PATIENCE);
     }
 
     #[tokio::test]
@@ -269,8 +270,8 @@ mod tests {
     fn what_failed_for_a_passing_reason_is_tried_again_later() {
         let sessions = sessions();
         let failed = Instant::now();
-        sessions.retry("a", PATIENCE);
+        sessions.retry("a", SESSION_PATIENCE);
         let watched = sessions.groups()["a"];
-        assert!(sessions.due(&watched) >= failed + PATIENCE);
+        assert!(sessions.due(&watched) >= failed + SESSION_PATIENCE);
     }
 }

@@ -16,11 +16,11 @@ const LONGEST_REQUEST: u32 = 512 << 10;
 /// Longest PDU of any kind that has no content, bytes.
 const LONGEST_OTHER: u32 = 1024;
 /// Bytes before the content.
-const HEADER: usize = 6;
+const PDU_HEADER_BYTES: usize = 6;
 /// Memory taken at once for a PDU that is still to come.
-const PORTION: usize = 64 << 10;
+const PORTION_BYTES: usize = 64 << 10;
 /// How long the other side has to take what was last written and to close.
-const CLOSING: Duration = Duration::from_secs(2);
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Bytes that are read and thrown away while the other side closes.
 const CLOSING_BYTES: u64 = 1 << 20;
 
@@ -80,7 +80,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Wire<S> {
     /// # Errors
     /// [`WireError`]; after it, nothing more can be read.
     pub async fn read(&mut self) -> Result<Pdu, WireError> {
-        let mut header = [0; HEADER];
+        let mut header = [0; PDU_HEADER_BYTES];
         if self.stream.read(&mut header[..1]).await? == 0 {
             return Err(WireError::Closed);
         }
@@ -100,10 +100,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Wire<S> {
             });
         }
         let length = length as usize;
-        let mut bytes = Vec::with_capacity(HEADER + length.min(PORTION));
+        let mut bytes = Vec::with_capacity(PDU_HEADER_BYTES + length.min(PORTION_BYTES));
         bytes.extend_from_slice(&header);
         let mut content = (&mut self.stream).take(length as u64);
-        while bytes.len() < HEADER + length {
+        while bytes.len() < PDU_HEADER_BYTES + length {
             if content.read_buf(&mut bytes).await? == 0 {
                 return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
             }
@@ -132,7 +132,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Wire<S> {
                 let _ = tokio::io::copy(&mut rest, &mut tokio::io::sink()).await;
             }
         };
-        let _ = tokio::time::timeout(CLOSING, closing).await;
+        let _ = tokio::time::timeout(CLOSE_TIMEOUT, closing).await;
     }
 }
 

@@ -1,4 +1,4 @@
-//! The job queue: durable jobs, leases, workers, and the interfaces to storage.
+//! The job queue: durable jobs, leases, workers.
 //!
 //! ```text
 //! client ──file──> Queue ──> JobStore      the row is on disk before the call returns
@@ -36,55 +36,15 @@
 //! - what a request stores is stored to the end although its client hangs up.
 //!
 //! Not guaranteed: that a job is computed only once. It is computed at least once.
-//!
-//! | where | what |
-//! |---|---|
-//! | `job`, `resource`, `ids`, `failure`, `tenant` | a job and its states, kinds of ids, reasons for failing, owners |
-//! | `work` | what a kind of job must provide, its input and its output |
-//! | `queue` | filing, waiting for and cancelling jobs; publishing results; recovery, retention |
-//! | `worker` | claiming jobs, renewing leases, reporting progress, committing |
-//! | `storage` | the traits that a database and a file store implement |
 
-mod clock;
-mod failure;
-mod ids;
 mod isolation;
-mod job;
 mod observer;
-mod priority;
 mod queue;
-mod resource;
-mod storage;
-mod tenant;
 mod work;
 mod worker;
 
-pub use clock::{Clock, SteadyClock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
-pub use failure::{Failure, Fault};
-pub use ids::hex;
-pub use ids::{content_id, random_id, random_key, volume_id};
 pub use isolation::Isolation;
-pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, SeriesSource};
 pub use observer::JobObserver;
-pub use priority::Priority;
-pub use queue::{
-    Custodian, Hold, NotAdded, Queue, QueuePosition, QueueSettings, RetentionAges, Swept,
-    TemplateSource, Upkeep, check_name, recover_after_crash,
-};
-pub use resource::Resource;
-pub use storage::{
-    AddedProduct, AuditMark, BlobError, BlobStore, BlobStream, BlobWriter, Catalogue, Claimant,
-    Custody, DeathLimit, Deleted, DiskSpace, Erased, ErasedFile, ErasedItem, ErasureAgent,
-    ErasureOrder, ErasureReason, Expired, FigureStore, FileRecord, Held, Holding, Interrupted,
-    ItemFilter, ItemRecord, JobFilter, JobOutcome, JobStore, Lease, LegalHold, ListPage,
-    ListRequest, LocalFile, News, NewsFeed, Peers, Product, ProductFile, ProductRoom, QueueFigures,
-    QueueLoad, Receipt, RecordPages, ScanFields, ScanFilter, ScanIdentity, Scans, Shelved,
-    StagedFiles, StagedFor, StoreError, StoreFault, StoreResult, StoredVolume, TagFilter, Tags,
-    UnreadScan,
-};
-pub use tenant::{InvalidTenant, Tenant};
-pub use work::{
-    GivenParameters, Needs, OutputFile, StoredItem, StoredResult, Work, WorkError, WorkInput,
-    WorkOutput, Works,
-};
+pub use queue::{Queue, QueuePosition, QueueSettings};
+pub use work::{GivenParameters, Needs, Work, WorkError, WorkInput, Works};
 pub use worker::{WorkerSettings, Workers, serve_isolated};

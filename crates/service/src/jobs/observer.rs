@@ -1,6 +1,6 @@
-//! What the queue tells of its jobs, for metrics and traces.
+//! Reports of the queue about its jobs, for metrics and traces.
 
-use super::Job;
+use crate::records::Job;
 
 /// Is told of each change of a job, in the order of the changes. Its methods are called while jobs
 /// are handled, so they must be quick.

@@ -1,17 +1,16 @@
-//! What a kind of job provides: its parameters, its computation, its input and output.
+//! The interface of a kind of job: its parameters, its computation, its input and output.
 
 use super::isolation::Isolation;
-use super::{Failure, LocalFile, Resource, ScanIdentity, StoredVolume, Timestamp};
+use crate::items::{StoredItem, WorkOutput};
+use crate::records::{Failure, LocalFile, Resource};
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::sync::Arc;
 use ventriform::progress::{Cancelled, Monitor, Plan};
 
 /// One kind of work. Its methods are called on blocking threads.
 pub trait Work: Send + Sync + 'static {
-    /// What it makes. [`Resource::noun`] is the kind's name in jobs.
+    /// The kind of its results. [`Resource::noun`] is the kind's name in jobs.
     fn makes(&self) -> Resource;
 
     /// Its stages, with each stage's share of the time.
@@ -45,7 +44,7 @@ pub trait Work: Send + Sync + 'static {
         self.check_parameters(GivenParameters::Json(object))
     }
 
-    /// What the work needs besides the volume, given these parameters. Nothing by default.
+    /// The needs of the work besides the volume, given these parameters. Nothing by default.
     fn needs(&self, _parameters: &Map<String, Value>) -> Needs {
         Needs::default()
     }
@@ -76,7 +75,7 @@ pub enum GivenParameters<'a> {
     Json(&'a Map<String, Value>),
 }
 
-/// What work needs besides its volume.
+/// Needs of a work besides its volume.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Needs {
     /// Volumes and products named by parameters: parameter name to id.
@@ -88,50 +87,7 @@ pub struct Needs {
     pub files: &'static [&'static str],
 }
 
-/// A stored volume or product, with local copies of its files.
-#[derive(Debug, Clone)]
-pub struct StoredItem {
-    /// Its id.
-    pub id: String,
-    /// The parameters it was made with; empty for a volume.
-    pub parameters: Map<String, Value>,
-    /// The requested files, those that exist.
-    pub files: Vec<LocalFile>,
-}
-
-impl StoredItem {
-    /// The content of the file with that name; `None` if it does not exist or was deleted.
-    ///
-    /// # Errors
-    /// If the file exists but cannot be read.
-    pub fn read(&self, name: &str) -> std::io::Result<Option<Vec<u8>>> {
-        let Some(file) = self.files.iter().find(|file| file.ends_with(name)) else {
-            return Ok(None);
-        };
-        match std::fs::read(file) {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(error),
-        }
-    }
-}
-
-/// A stored result beside the volume that it was made of.
-#[derive(Debug, Clone)]
-pub struct StoredResult {
-    /// When the tenant first had it.
-    pub made_at: Timestamp,
-    /// The result, with the requested files.
-    pub files: StoredItem,
-    /// The volume.
-    pub volume: StoredVolume,
-    /// The volume's files.
-    pub volume_files: Vec<LocalFile>,
-    /// Whose scan the volume is.
-    pub scan: ScanIdentity,
-}
-
-/// What a job works on.
+/// The input of a job.
 #[derive(Debug, Clone)]
 pub struct WorkInput {
     /// Id of the volume.
@@ -153,26 +109,6 @@ impl WorkInput {
         let files = items.flat_map(|item| &item.files);
         self.files.iter().chain(files).cloned().collect()
     }
-}
-
-/// What a job made.
-#[derive(Debug, Clone, Default)]
-pub struct WorkOutput {
-    /// Counts and main figures.
-    pub summary: Map<String, Value>,
-    /// The files.
-    pub files: Vec<OutputFile>,
-}
-
-/// One file of a [`WorkOutput`].
-#[derive(Debug, Clone)]
-pub struct OutputFile {
-    /// Its name: `mesh.glb`, `report.json` ...
-    pub name: String,
-    /// Its media type.
-    pub media_type: Cow<'static, str>,
-    /// Its content.
-    pub bytes: Vec<u8>,
 }
 
 /// Why work made nothing.

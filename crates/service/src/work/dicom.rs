@@ -13,10 +13,8 @@ use super::problems::{
     Explain, broken_result, identity_needed, malformed_identity, not_exportable, unknown_identity,
 };
 use super::upload::UploadFacts;
-use crate::jobs::{
-    Failure, OutputFile, Resource, ScanFields, ScanIdentity, StoredItem, StoredResult, Timestamp,
-    rfc3339,
-};
+use crate::items::{OutputFile, StoredItem, StoredResult};
+use crate::records::{Failure, Resource, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use nalgebra::Matrix3;
 use serde_json::{Map, Value};
 use ventriform::export::dicom::{
@@ -35,9 +33,15 @@ use ventriform::volume::dicom::Provenance;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
 
 /// The files of a result of which objects are made.
-pub const FILES: &[&str] = &[MASK, "mesh.json", "report.json", "slices.png", "polar.png"];
+pub const FILES: &[&str] = &[
+    MASK_FILE,
+    "mesh.json",
+    "report.json",
+    "slices.png",
+    "polar.png",
+];
 
-const MASK: &str = "mask.nii.gz";
+const MASK_FILE: &str = "mask.nii.gz";
 
 /// The objects that are made of results of that kind. Of a segmentation without polar map there is
 /// no [`DicomObject::Polar`].
@@ -167,7 +171,7 @@ fn figures(report: &[u8]) -> Result<SegmentationReport, Failure> {
     serde_json::from_slice(report).map_err(|error| broken_result(&error))
 }
 
-/// What the fields say; those of another type are left out.
+/// The texts of the fields; those of another type are left out.
 fn provenance(fields: &ScanFields) -> Provenance {
     serde_json::from_value(fields.0.clone().into()).unwrap_or_default()
 }
@@ -197,7 +201,7 @@ fn source(
     Ok(SourceScan::new(known, frame, facts.shape, placed, made))
 }
 
-/// What the upload says, with the instances and frames of the volume that the result was made of.
+/// The fields of the upload, with the instances and frames of the volume that the result was made of.
 fn source_frames(
     result: &StoredResult,
     limits: &ReadLimits,
@@ -229,7 +233,7 @@ fn moment(at: Timestamp) -> Moment {
     }
 }
 
-/// What a result shows, by the parameters it was made with.
+/// The content of a result, by the parameters it was made with.
 fn structure(item: &StoredItem, facts: &UploadFacts) -> Structure {
     let parameter = |name: &str| item.parameters.get(name).and_then(Value::as_str);
     match Resource::of(&item.id) {
@@ -256,7 +260,7 @@ fn mesh(item: &StoredItem) -> Result<TriMesh, Failure> {
 }
 
 fn stored_mask(item: &StoredItem, limits: &ReadLimits) -> Result<Mask, Failure> {
-    let file = VolumeFile::in_memory(MASK, required(item, MASK)?);
+    let file = VolumeFile::in_memory(MASK_FILE, required(item, MASK_FILE)?);
     let reading = volume::read(&[file], &ReadOptions::default(), limits, &Monitor::silent());
     let volume = reading.map_err(|error| error.explain())?.volume;
     Ok(Mask {

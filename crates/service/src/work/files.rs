@@ -1,6 +1,7 @@
 //! Files in and out: uploads for the domain's readers, meshes and JSON for downloads.
 
-use crate::jobs::{LocalFile, OutputFile};
+use crate::items::OutputFile;
+use crate::records::LocalFile;
 use ventriform::export::{self, ExportError, Format, Metadata};
 use ventriform::mesh::TriMesh;
 use ventriform::volume::VolumeFile;

@@ -1,4 +1,4 @@
-//! What jobs and uploads do with volumes and models: the bridge from the queue to the domain.
+//! The works: the bridge from the queue to the domain.
 //!
 //! | file | what |
 //! |---|---|

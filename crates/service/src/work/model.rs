@@ -4,10 +4,9 @@ use super::files::{json_file, mesh_file, volume_files};
 use super::page;
 use super::parameters;
 use super::problems::{Explain, not_exportable, work_error};
-use crate::jobs::{
-    Failure, GivenParameters, OutputFile, Resource, StoredItem, Work, WorkError, WorkInput,
-    WorkOutput,
-};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{GivenParameters, Work, WorkError, WorkInput};
+use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::Format;
 use ventriform::parameters::ModelParameters;

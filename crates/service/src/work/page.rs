@@ -112,7 +112,7 @@ pub(super) fn segmentation_page(
     }))
 }
 
-/// What is to be named of a scan; fields of another type are left out.
+/// Fields of a scan that are named; fields of another type are left out.
 fn provenance(scan: &Map<String, Value>) -> Provenance {
     serde_json::from_value(scan.clone().into()).unwrap_or_default()
 }

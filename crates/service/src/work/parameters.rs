@@ -1,7 +1,8 @@
 //! Validating the parameters of a job, the same way for every kind of work.
 
 use super::problems::Explain;
-use crate::jobs::{Failure, GivenParameters};
+use crate::jobs::GivenParameters;
+use crate::records::Failure;
 use serde_json::{Map, Value};
 use ventriform::parameters::Parameters;
 

@@ -4,7 +4,8 @@
 //! says of them.
 
 use super::problems::{broken_result, not_exportable};
-use crate::jobs::{Failure, OutputFile, StoredItem};
+use crate::items::{OutputFile, StoredItem};
+use crate::records::Failure;
 use ventriform::export::open_part::open_part;
 use ventriform::export::{self, Format, Part, read_json};
 use ventriform::{polar, report};

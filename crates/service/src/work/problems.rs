@@ -6,7 +6,8 @@
 //! by their common names and fits both.
 
 use super::page::PageError;
-use crate::jobs::{Failure, Fault, WorkError};
+use crate::jobs::WorkError;
+use crate::records::{Failure, Fault};
 use std::error::Error;
 use std::fmt::Display;
 use ventriform::deform::DeformError;
@@ -28,7 +29,7 @@ use ventriform::volume::given_mask::GivenMaskError;
 const START_AGAIN: &str = "Start again if the result is still needed.";
 
 /// Code of a cancelled operation.
-const CANCELLED: (Fault, &str) = (Fault::Request, "cancelled");
+const CANCELLED_FAILURE: (Fault, &str) = (Fault::Request, "cancelled");
 
 /// An error that can be explained to a client.
 pub trait Explain: Error {
@@ -95,7 +96,7 @@ impl Explain for VolumeError {
             VolumeError::Corrupt { .. } => (Fault::Content, "corrupt-volume"),
             VolumeError::Field { .. } => (Fault::Content, "invalid-header"),
             VolumeError::Io { .. } | VolumeError::Memory { .. } => (Fault::Service, "unreadable"),
-            VolumeError::Cancelled(_) => CANCELLED,
+            VolumeError::Cancelled(_) => CANCELLED_FAILURE,
             _ => (Fault::Content, "unusable-volume"),
         };
         failure(kind, self, self.field(), volume_advice(self))
@@ -110,7 +111,7 @@ impl Explain for SurfaceError {
     fn explain(&self) -> Failure {
         let kind = match self {
             SurfaceError::NoSurface { .. } => (Fault::Content, "no-surface"),
-            SurfaceError::Cancelled(_) => CANCELLED,
+            SurfaceError::Cancelled(_) => CANCELLED_FAILURE,
             _ => (Fault::Content, "unusable-surface"),
         };
         failure(kind, self, self.field(), surface_advice(self))
@@ -124,7 +125,7 @@ impl Explain for SurfaceError {
 impl Explain for RetileError {
     fn explain(&self) -> Failure {
         match self {
-            RetileError::Cancelled(_) => failure(CANCELLED, self, None, START_AGAIN.into()),
+            RetileError::Cancelled(_) => failure(CANCELLED_FAILURE, self, None, START_AGAIN.into()),
             _ => failure(
                 (Fault::Request, "unsuitable-points"),
                 self,
@@ -146,7 +147,7 @@ impl Explain for PipelineError {
             PipelineError::Surface(error) => return error.explain(),
             PipelineError::Retile(error) => return error.explain(),
             PipelineError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
             PipelineError::Optimise(_) => "not-optimised",
             PipelineError::Unsound { .. } => "unsound-model",
@@ -218,7 +219,7 @@ impl Explain for SegmentationError {
                 return if named { failure } else { failure.at("expert") };
             }
             SegmentationError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
         };
         failure(code, self, Some(field), advice)
@@ -276,7 +277,7 @@ impl Explain for GivenMaskError {
                  by `mesh_frame` (lps or ras)."
                     .into(),
             ),
-            GivenMaskError::Cancelled(_) => (CANCELLED, None, START_AGAIN.into()),
+            GivenMaskError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN.into()),
         };
         failure(kind, self, field, advice)
     }
@@ -305,7 +306,7 @@ impl Explain for LocateError {
                 None,
                 "Check that this is the right file and, for a 4-D one, the right `frame`.",
             ),
-            LocateError::Cancelled(_) => (CANCELLED, None, START_AGAIN),
+            LocateError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN),
         };
         failure(kind, self, field, advice.into())
     }
@@ -320,7 +321,7 @@ impl Explain for DeformError {
         let (field, advice) = match self {
             DeformError::Localise(error) => return error.explain(),
             DeformError::Cancelled(_) => {
-                return failure(CANCELLED, self, None, START_AGAIN.into());
+                return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
             DeformError::TooManyNodes { limit, .. } => (
                 Some("model"),
@@ -500,17 +501,18 @@ pub(super) fn broken_result(error: &dyn Display) -> Failure {
     .fix("Start the same job again, which stores the result anew.")
 }
 
-/// What to do about a field of a scan that cannot be decoded.
+/// Advice about a field of a scan that cannot be decoded.
 fn undecoded_advice(field: &str) -> String {
     let correct = "correct Specific Character Set (0008,0005) or the value in the file (its warnings \
                    say what is wrong)";
-    match StatedIdentity::FIELDS.contains(&field) {
-        true => format!(
+    if StatedIdentity::FIELDS.contains(&field) {
+        format!(
             "State `{field}` (PUT .../identity, or --{}), or {correct}, or ask for de-identified \
-             objects.",
+         objects.",
             field.replace('_', "-")
-        ),
-        false => format!("Ask for de-identified objects, or {correct}."),
+        )
+    } else {
+        format!("Ask for de-identified objects, or {correct}.")
     }
 }
 

@@ -1,8 +1,9 @@
 //! From a reader's profile as it was uploaded to one that is stored.
 
 use super::problems::Explain;
-use super::segmentation::PROFILE;
-use crate::jobs::{Failure, OutputFile, WorkOutput};
+use super::segmentation::PROFILE_FILE;
+use crate::items::{OutputFile, WorkOutput};
+use crate::records::Failure;
 use ventriform::reader::ReaderProfile;
 use ventriform::report::{ReaderSummary, object};
 
@@ -16,7 +17,7 @@ pub(super) fn make(text: &[u8]) -> Result<WorkOutput, Failure> {
     Ok(WorkOutput {
         summary: object(&ReaderSummary::of(&profile)),
         files: vec![OutputFile {
-            name: PROFILE.into(),
+            name: PROFILE_FILE.into(),
             media_type: "application/json".into(),
             bytes: profile.to_json().into_bytes(),
         }],

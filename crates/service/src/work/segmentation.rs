@@ -6,10 +6,9 @@ use super::parameters;
 use super::problems::{
     Explain, mesh_missing, not_exportable, profile_missing, unreadable_model, work_error,
 };
-use crate::jobs::{
-    Failure, GivenParameters, Needs, OutputFile, Resource, StoredItem, Work, WorkError, WorkInput,
-    WorkOutput,
-};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::{Format, read_json};
 use ventriform::parameters::{FitParameters, Parameters};
@@ -23,9 +22,9 @@ use ventriform::segmentation::{
 use ventriform::volume::ReadLimits;
 
 /// The file of a reader's profile.
-pub(super) const PROFILE: &str = "profile.json";
+pub(super) const PROFILE_FILE: &str = "profile.json";
 /// The file of a model that is fitted.
-const MESH: &str = "mesh.json";
+const MESH_FILE: &str = "mesh.json";
 
 /// Fits models to volumes.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +46,7 @@ impl Work for SegmentationWork {
         Needs {
             library: !models.iter().any(|(field, _)| field == "model"),
             items: models.into_iter().chain(expert).chain(reader).collect(),
-            files: &[MESH, PROFILE],
+            files: &[MESH_FILE, PROFILE_FILE],
         }
     }
 
@@ -144,7 +143,7 @@ fn reader(input: &WorkInput) -> Result<Option<NamedReader>, WorkError> {
         return Ok(None);
     };
     let name = name_of(item);
-    let bytes = item.read(PROFILE).map_err(|e| unreadable_model(&e))?;
+    let bytes = item.read(PROFILE_FILE).map_err(|e| unreadable_model(&e))?;
     let bytes = bytes.ok_or_else(|| profile_missing(&item.id))?;
     let profile = ReaderProfile::from_json(&bytes).map_err(|error| work_error(&error))?;
     Ok(Some(NamedReader { name, profile }))
@@ -162,7 +161,7 @@ fn name_of(item: &StoredItem) -> String {
 /// does not exist.
 fn mesh(item: &StoredItem, required: bool) -> Result<Option<NamedMesh>, WorkError> {
     let name = name_of(item);
-    let Some(bytes) = item.read(MESH).map_err(|e| unreadable_model(&e))? else {
+    let Some(bytes) = item.read(MESH_FILE).map_err(|e| unreadable_model(&e))? else {
         return Ok(None);
     };
     match read_json::decode(&bytes) {

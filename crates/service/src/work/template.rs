@@ -4,7 +4,8 @@
 
 use super::files::mesh_file;
 use super::problems::{Explain, unknown_organ, unsuitable_mesh};
-use crate::jobs::{Failure, OutputFile, WorkOutput};
+use crate::items::{OutputFile, WorkOutput};
+use crate::records::Failure;
 use ventriform::export::{Format, Metadata};
 use ventriform::mesh_files::{self, MeshStatement};
 use ventriform::model::{Organ, Template, wall_parts};

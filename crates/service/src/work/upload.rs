@@ -3,7 +3,8 @@
 use super::files::volume_files;
 use super::problems::Explain;
 use super::{profile, template};
-use crate::jobs::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume, WorkOutput};
+use crate::items::WorkOutput;
+use crate::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use ventriform::mesh_files::MeshStatement;
@@ -106,7 +107,7 @@ pub trait UploadReader: Send + Sync + 'static {
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure>;
 }
 
-/// What is known of a volume after reading it. Stored as JSON in [`StoredVolume::facts`].
+/// Facts about a volume that was read. Stored as JSON in [`StoredVolume::facts`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UploadFacts {
     /// `NIfTI-1`, `DICOM NM` ...

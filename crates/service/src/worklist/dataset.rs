@@ -4,7 +4,7 @@
 use serde_json::{Map, Value, json};
 
 /// Most nested sequences.
-const DEEPEST: usize = 16;
+const MAX_SEQUENCE_DEPTH: usize = 16;
 
 /// A data set is not DICOM JSON.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -12,7 +12,7 @@ const DEEPEST: usize = 16;
 pub struct Malformed {
     /// The element.
     pub tag: String,
-    /// What is wrong with it.
+    /// The faults of it.
     pub reason: &'static str,
 }
 
@@ -129,7 +129,7 @@ fn check(object: &Map<String, Value>, depth: usize) -> Result<(), Malformed> {
         if vr != Some("SQ") {
             continue;
         }
-        if depth == DEEPEST {
+        if depth == MAX_SEQUENCE_DEPTH {
             return wrong("there are too many nested sequences");
         }
         for item in values(element) {

@@ -23,6 +23,7 @@ mod perform;
 mod procedure;
 mod query;
 mod storage;
+mod time;
 mod workitem;
 
 pub use dataset::{DataSetJson, Malformed};
@@ -30,4 +31,5 @@ pub use perform::WorkOutputObject;
 pub use procedure::Procedure;
 pub use query::{Matching, QueryError};
 pub use storage::{AddedWorkitem, BATCH_BYTES, Worklist};
-pub use workitem::{Change, Refusal, Workitem, WorkitemState};
+pub use time::{dicom_time, new_uid};
+pub use workitem::{Change, Performer, Refusal, Workitem, WorkitemState};

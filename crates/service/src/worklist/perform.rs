@@ -2,8 +2,8 @@
 
 use super::dataset::DataSetJson;
 use super::procedure::WORK;
-use super::workitem::{PERFORMED, PRIORITY, PROGRESS, Refusal, Workitem, WorkitemState};
-use crate::jobs::{Priority, Timestamp};
+use super::workitem::{PERFORMED, PRIORITY, PROGRESS, Performer, Refusal, Workitem, WorkitemState};
+use crate::records::{Priority, Timestamp};
 use serde_json::{Map, Value, json};
 
 const STEP_PROGRESS: &str = "00741004";
@@ -34,7 +34,7 @@ impl Workitem {
     /// [`Refusal::State`] if it is not scheduled.
     pub fn claim(&mut self, transaction: &str, now: (Timestamp, &str)) -> Result<(), Refusal> {
         self.change_state(Some(transaction), WorkitemState::InProgress, now)?;
-        self.performer = Some(String::new());
+        self.performer = Performer::Claimed;
         Ok(())
     }
 
@@ -53,7 +53,12 @@ impl Workitem {
         progress.any(|item| item.contains_key(CANCELLED_AT))
     }
 
-    /// Notes the progress of the work, 0 to 100. Returns whether that is news.
+    /// The progress of the work that was noted last, 0 to 100.
+    pub fn progress_percent(&self) -> Option<u8> {
+        self.progress().text(STEP_PROGRESS)?.parse().ok()
+    }
+
+    /// Notes the progress of the work, 0 to 100. Returns whether that is new.
     pub fn note_progress(&mut self, percent: u8, now: (Timestamp, &str)) -> bool {
         let mut progress = self.progress();
         let percent = percent.to_string();
@@ -158,7 +163,7 @@ fn output(object: &WorkOutputObject) -> Value {
 )]
 mod tests {
     use super::*;
-    use crate::jobs::Tenant;
+    use crate::records::Tenant;
 
     const NOW: (Timestamp, &str) = (7, "20261123050000+0000");
 
@@ -174,7 +179,7 @@ mod tests {
     #[test]
     fn an_item_is_claimed_once_and_completed_with_its_outputs() {
         let mut item = claimed();
-        assert_eq!(item.performer.as_deref(), Some(""));
+        assert_eq!(item.performer, Performer::Claimed);
         assert!(item.claim("9.8", NOW).is_err());
         assert!(item.note_progress(40, NOW));
         assert!(!item.note_progress(40, NOW));

@@ -2,7 +2,7 @@
 
 use super::dataset::text_in;
 use super::workitem::Workitem;
-use crate::jobs::Tenant;
+use crate::records::Tenant;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 

@@ -18,7 +18,7 @@ const LONGEST_PATTERN: usize = 64;
 pub struct QueryError {
     /// The parameter.
     pub name: String,
-    /// What is wrong with it.
+    /// The faults of it.
     pub reason: &'static str,
 }
 

@@ -1,7 +1,7 @@
 //! The interface to the table of work items.
 
 use super::{Workitem, WorkitemState};
-use crate::jobs::{StoreResult, Tenant, Timestamp};
+use crate::records::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Bytes of work items that are read at a time.

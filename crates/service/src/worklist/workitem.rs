@@ -1,7 +1,7 @@
 //! One work item and what may be done to it in each state.
 
 use super::dataset::DataSetJson;
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 use serde_json::{Map, Value};
 
 const SOP_CLASS: &str = "00080016";
@@ -86,7 +86,7 @@ pub enum Refusal {
         tag: &'static str,
         /// Name.
         name: &'static str,
-        /// What is wrong.
+        /// The fault.
         reason: &'static str,
     },
     /// The request names no Transaction UID, and the item is claimed.
@@ -108,13 +108,24 @@ pub enum Refusal {
     Unfinished(&'static str),
 }
 
-/// What a permitted request did.
+/// The effect of a permitted request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
     /// It was carried out.
     Done,
     /// The item was in that state already.
     Already,
+}
+
+/// The work of this service on an item.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Performer {
+    /// This service has not claimed the item.
+    None,
+    /// It has claimed the item; the job is not filed yet.
+    Claimed,
+    /// The job of that id does the work.
+    Job(String),
 }
 
 /// A work item of a tenant.
@@ -132,8 +143,8 @@ pub struct Workitem {
     pub state: WorkitemState,
     /// The Transaction UID under which it was claimed.
     pub transaction: Option<String>,
-    /// If this service has claimed it: the job that does the work, empty until that is filed.
-    pub performer: Option<String>,
+    /// The work of this service on it.
+    pub performer: Performer,
     /// All attributes but the Transaction UID.
     pub attributes: DataSetJson,
     /// When it was last changed.
@@ -213,7 +224,7 @@ impl Workitem {
             revision: 0,
             state: WorkitemState::Scheduled,
             transaction: None,
-            performer: None,
+            performer: Performer::None,
             attributes,
             changed_at: 0,
         };

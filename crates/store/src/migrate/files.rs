@@ -10,12 +10,12 @@ use futures::{StreamExt, TryStreamExt, stream};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use ventriform_service::jobs::{ItemRecord, RecordPages, Resource};
+use ventriform_service::records::{ItemRecord, RecordPages, Resource};
 
 /// Items that are sent to a bucket at the same time.
-const PARALLEL: usize = 8;
+const PARALLEL_COPIES: usize = 8;
 
-/// What was found on the way.
+/// Findings on the way.
 struct Copying<'a> {
     done: &'a mut Migrated,
     of: u64,
@@ -57,9 +57,10 @@ impl<'a> Copying<'a> {
 
     /// The names that the target is to have.
     fn end(self) -> Result<BTreeSet<String>, MigrateError> {
-        match self.damaged.is_empty() {
-            true => Ok(self.kept),
-            false => Err(MigrateError::Damaged(self.damaged)),
+        if self.damaged.is_empty() {
+            Ok(self.kept)
+        } else {
+            Err(MigrateError::Damaged(self.damaged))
         }
     }
 }
@@ -79,7 +80,7 @@ pub(super) async fn to_bucket(
             let copied = bucket.take_in(&record, &from).await?;
             Ok::<_, MigrateError>((record, copied))
         });
-        let mut sent = stream::iter(sent).buffer_unordered(PARALLEL);
+        let mut sent = stream::iter(sent).buffer_unordered(PARALLEL_COPIES);
         while let Some((record, copied)) = sent.try_next().await? {
             copying.note(record.id(), copied, tell);
         }

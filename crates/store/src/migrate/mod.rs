@@ -20,15 +20,15 @@ use super::content;
 use super::database::SqlStore;
 use super::s3::{S3Blobs, S3Location};
 use super::{
-    DATABASE, DiskGauge, FolderLock, MARKER, MIGRATION, OpenError, StoreSettings, UNFINISHED,
-    blobs, name_of, note_place, unusable,
+    DATABASE_FILE, DiskGauge, FolderLock, MARKER_FILE, MIGRATION_MARK, OpenError, StoreSettings,
+    UNFINISHED_MIGRATION_FILE, blobs, name_of, note_place, unusable,
 };
 use source::Source;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, random_id};
+use ventriform_service::records::{StoreError, random_id};
 
 pub use rows::TableCount;
 
@@ -60,7 +60,7 @@ pub enum Progress {
     },
 }
 
-/// What the target has.
+/// The content of the target.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Migrated {
     /// Number of volumes and products with their files.
@@ -98,7 +98,7 @@ pub enum MigrateError {
     Occupied {
         /// The target.
         target: String,
-        /// What it holds.
+        /// Its content.
         found: String,
     },
     /// Items of the folder are damaged.
@@ -116,8 +116,8 @@ pub enum MigrateError {
     Differs(String),
 }
 
-impl From<ventriform_service::jobs::BlobError> for MigrateError {
-    fn from(error: ventriform_service::jobs::BlobError) -> Self {
+impl From<ventriform_service::records::BlobError> for MigrateError {
+    fn from(error: ventriform_service::records::BlobError) -> Self {
         Self::Store(error.into())
     }
 }
@@ -166,7 +166,7 @@ pub async fn migrate(
     to.check()?;
     let source = Source::open(from).await?;
     let moved = Move {
-        note: format!("{MIGRATION}{}", from.canonicalize()?.display()),
+        note: format!("{MIGRATION_MARK}{}", from.canonicalize()?.display()),
         source: &source,
         to,
     };
@@ -178,7 +178,7 @@ pub async fn migrate(
 struct Move<'a> {
     source: &'a Source,
     to: &'a Destination,
-    /// What the target is told while it is unfinished.
+    /// The note in the target while it is unfinished.
     note: String,
 }
 
@@ -214,14 +214,16 @@ impl Move<'_> {
         Ok(done)
     }
 
-    /// What the target notes of itself.
+    /// The note of the target about itself.
     async fn noted(&self, target: Option<&SqlStore>) -> Result<Option<String>, MigrateError> {
         match (target, &self.to.folder) {
             (Some(target), _) => Ok(target.place().await?),
-            (None, Some(folder)) => match fs::read_to_string(folder.join(UNFINISHED)) {
-                Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-                read => Ok(Some(read?)),
-            },
+            (None, Some(folder)) => {
+                match fs::read_to_string(folder.join(UNFINISHED_MIGRATION_FILE)) {
+                    Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+                    read => Ok(Some(read?)),
+                }
+            }
             (None, None) => Ok(None),
         }
     }
@@ -281,9 +283,10 @@ impl Move<'_> {
                 ..Migrated::default()
             });
         }
-        Err(self.occupied(&match place.starts_with(MIGRATION) {
-            true => format!("an unfinished {place}"),
-            false => format!("the records of files in {place}"),
+        Err(self.occupied(&if place.starts_with(MIGRATION_MARK) {
+            format!("an unfinished {place}")
+        } else {
+            format!("the records of files in {place}")
         }))
     }
 
@@ -291,7 +294,7 @@ impl Move<'_> {
     fn final_place(&self) -> Result<String, MigrateError> {
         match (&self.to.s3, &self.to.folder) {
             (Some(bucket), _) => Ok(bucket.to_string()),
-            (None, Some(folder)) => name_of(&folder.join(MARKER))
+            (None, Some(folder)) => name_of(&folder.join(MARKER_FILE))
                 .ok_or_else(|| io::Error::from(ErrorKind::NotFound).into()),
             (None, None) => Ok(String::new()),
         }
@@ -302,7 +305,7 @@ impl Move<'_> {
         let Some(folder) = &self.to.folder else {
             return Ok(());
         };
-        let noted = folder.join(UNFINISHED);
+        let noted = folder.join(UNFINISHED_MIGRATION_FILE);
         match fs::read_to_string(&noted) {
             Ok(text) if text == self.note => return Ok(()),
             Ok(other) => return Err(self.occupied(&format!("an unfinished {other}"))),
@@ -317,7 +320,7 @@ impl Move<'_> {
         }
         if let Some(server) = &self.to.database {
             let text = format!("{}\n{}\n", server.url, random_id("folder "));
-            write(&folder.join(MARKER), &text)?;
+            write(&folder.join(MARKER_FILE), &text)?;
         }
         Ok(write(&noted, &self.note)?)
     }
@@ -340,7 +343,7 @@ impl Move<'_> {
         };
         note_place(folder, bucket)?;
         self.source.rows.close().await;
-        let draft = folder.join(format!("{DATABASE}.new"));
+        let draft = folder.join(format!("{DATABASE_FILE}.new"));
         fs::copy(self.source.snapshot(), &draft)?;
         blobs::sync(&draft)?;
         let (read, written) = (
@@ -350,7 +353,7 @@ impl Move<'_> {
         if content::hash(&read)? != content::hash(&written)? {
             return Err(MigrateError::Differs("all".into()));
         }
-        fs::rename(&draft, folder.join(DATABASE))?;
+        fs::rename(&draft, folder.join(DATABASE_FILE))?;
         Ok(blobs::sync(folder)?)
     }
 
@@ -359,7 +362,7 @@ impl Move<'_> {
         let Some(folder) = &self.to.folder else {
             return Ok(());
         };
-        match fs::remove_file(folder.join(UNFINISHED)) {
+        match fs::remove_file(folder.join(UNFINISHED_MIGRATION_FILE)) {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(error.into()),
             _ => Ok(blobs::sync(folder)?),
         }

@@ -15,22 +15,23 @@ use sqlx::query::Query;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, Postgres, Row};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::jobs::{StoreError, StoreResult};
+use ventriform_service::records::{StoreError, StoreResult};
 
 /// Rows sent at a time.
-const BATCH: usize = 200;
+const BATCH_ROWS: usize = 200;
 
 /// The tables to copy; first those that others refer to.
-const TABLES: &str = "SELECT name FROM sqlite_schema
+const SELECT_TABLES: &str = "SELECT name FROM sqlite_schema
     WHERE type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
       AND name NOT IN ('_sqlx_migrations', 'probe')
     ORDER BY name NOT IN ('holdings', 'intake_groups'), name";
 
 /// The columns of a table of SQLite that are not computed.
-const STORED: &str = "SELECT name FROM pragma_table_xinfo($1) WHERE hidden = 0 ORDER BY cid";
+const SELECT_STORED_COLUMNS: &str =
+    "SELECT name FROM pragma_table_xinfo($1) WHERE hidden = 0 ORDER BY cid";
 
 /// Name, type, and whether it counts by itself, of the columns of a table of PostgreSQL.
-const COLUMNS: &str = "SELECT column_name::text, data_type::text, is_identity = 'YES'
+const SELECT_COLUMNS: &str = "SELECT column_name::text, data_type::text, is_identity = 'YES'
     FROM information_schema.columns
     WHERE table_schema = current_schema() AND table_name = $1 AND is_generated = 'NEVER'";
 
@@ -154,7 +155,7 @@ pub(super) async fn same(
 /// The tables of a file of SQLite.
 pub(super) async fn count(of: &SqlStore) -> Result<Vec<TableCount>, MigrateError> {
     let of = file_of(of)?;
-    let names: Vec<String> = sqlx::query_scalar(TABLES)
+    let names: Vec<String> = sqlx::query_scalar(SELECT_TABLES)
         .fetch_all(of)
         .await
         .map_err(of_sqlite)?;
@@ -182,15 +183,15 @@ async fn run(on: &mut PgConnection, statement: &str) -> StoreResult<()> {
 }
 
 async fn tables(from: &SqlitePool, to: &mut PgConnection) -> StoreResult<Vec<Table>> {
-    let names: Vec<String> = sqlx::query_scalar(TABLES)
+    let names: Vec<String> = sqlx::query_scalar(SELECT_TABLES)
         .fetch_all(from)
         .await
         .map_err(of_sqlite)?;
     let mut tables = Vec::new();
     for name in names {
-        let stored = sqlx::query_scalar(STORED).bind(&name);
+        let stored = sqlx::query_scalar(SELECT_STORED_COLUMNS).bind(&name);
         let stored: Vec<String> = stored.fetch_all(from).await.map_err(of_sqlite)?;
-        let known: Vec<(String, String, bool)> = sqlx::query_as(COLUMNS)
+        let known: Vec<(String, String, bool)> = sqlx::query_as(SELECT_COLUMNS)
             .bind(&name)
             .fetch_all(&mut *to)
             .await
@@ -225,7 +226,7 @@ async fn copy_table(
     let (select, insert) = (table.select(), table.insert());
     let mut rows = sqlx::query(AssertSqlSafe(select))
         .fetch(from)
-        .try_chunks(BATCH);
+        .try_chunks(BATCH_ROWS);
     let mut tally = Tally::default();
     while let Some(chunk) = rows.try_next().await.map_err(|error| of_sqlite(error.1))? {
         let batch: Vec<Vec<Value>> = chunk

@@ -5,13 +5,13 @@ use crate::database::SqlStore;
 use crate::query::query;
 use crate::tables::to_json;
 use crate::{
-    CLOSED, DATABASE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place, require_file,
-    sqlite, unusable,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
+    require_file, sqlite, unusable,
 };
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
-use ventriform_service::jobs::{ItemRecord, RecordPages, StoreResult, hex, random_id};
+use ventriform_service::records::{ItemRecord, RecordPages, StoreResult, hex, random_id};
 
 /// Rows read at a time.
 pub(super) const PAGE: u32 = 200;
@@ -32,7 +32,7 @@ impl Source {
     /// # Errors
     /// If a service uses the folder, or its records or files are elsewhere.
     pub async fn open(folder: &Path) -> Result<Self, OpenError> {
-        let database = folder.join(DATABASE);
+        let database = folder.join(DATABASE_FILE);
         if !database.exists() {
             require_file(folder)?;
             return Err(unusable(&database, &"there is no database to move"));
@@ -44,10 +44,10 @@ impl Source {
             return Err(OpenError::LogMissing(folder.to_owned()));
         }
         // As no service runs, closing the database moves its log into it.
-        lock.mark(CLOSED).map_err(|e| unusable(folder, &e))?;
+        lock.mark(CLOSED_MARK).map_err(|e| unusable(folder, &e))?;
         let scratch = folder.join(STAGING).join(random_id("migrate-"));
         fs::create_dir_all(&scratch).map_err(|e| unusable(&scratch, &e))?;
-        let snapshot = scratch.join(DATABASE);
+        let snapshot = scratch.join(DATABASE_FILE);
         if !sqlite::has_tables(&database).await {
             return Err(unusable(&database, &"there is no database to move"));
         }
@@ -65,7 +65,7 @@ impl Source {
 
     /// The file of the snapshot.
     pub fn snapshot(&self) -> PathBuf {
-        self.scratch.join(DATABASE)
+        self.scratch.join(DATABASE_FILE)
     }
 
     /// Notes in the snapshot where the files of each item will be in a bucket: the same place in each attempt.

@@ -26,22 +26,22 @@ use tokio::fs::File;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
-use ventriform_service::jobs::{BlobError, StoreFault, hex};
+use ventriform_service::records::{BlobError, StoreFault, hex};
 
 /// Bytes of one part.
-const PART: usize = 8 << 20;
+const PART_BYTES: usize = 8 << 20;
 
 /// Greatest file that is sent by one request: most scans are. Parts cost two requests more.
-const WHOLE: usize = 16 << 20;
+const WHOLE_FILE_BYTES: usize = 16 << 20;
 
-/// Bytes of parts that are sent or fetched at the same time, in [`UNIT`]s: they are held in memory.
-const UNITS: u32 = 48;
+/// Bytes of parts that are sent or fetched at the same time, in [`MEMORY_UNIT_BYTES`]s: they are held in memory.
+const MEMORY_UNITS: u32 = 48;
 
 /// Bytes that one permit of [`Bucket::memory`] stands for.
-const UNIT: usize = 1 << 20;
+const MEMORY_UNIT_BYTES: usize = 1 << 20;
 
 /// Parts of one file that are sent or fetched at the same time.
-const PARALLEL: usize = 2;
+const PARALLEL_PARTS: usize = 2;
 
 /// Longest time of one request.
 const REQUEST_LIMIT: Duration = Duration::from_secs(60);
@@ -50,17 +50,17 @@ const REQUEST_LIMIT: Duration = Duration::from_secs(60);
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 
 /// First and longest pause before a request is sent again.
-const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(3));
+const RETRY_PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(3));
 
 /// After that time, a request that failed is not sent again.
-const PATIENCE: Duration = Duration::from_secs(10);
+const RETRY_TIME: Duration = Duration::from_secs(10);
 
 /// Where the files are, and the variables of the environment that say how to get there.
 #[derive(Clone, PartialEq, Eq)]
 pub struct S3Location {
     /// The bucket.
     pub bucket: String,
-    /// What the keys of all files begin with; empty for the whole bucket.
+    /// The beginning of the keys of all files; empty for the whole bucket.
     pub prefix: String,
     /// Names and values of variables as the AWS tools read them: `AWS_ACCESS_KEY_ID` ...
     pub variables: Vec<(String, String)>,
@@ -167,7 +167,7 @@ impl Bucket {
             store,
             prefix: location.prefix.clone(),
             name: location.to_string(),
-            memory: Semaphore::new(UNITS as usize),
+            memory: Semaphore::new(MEMORY_UNITS as usize),
         })
     }
 
@@ -200,16 +200,16 @@ impl Bucket {
         request: impl Fn() -> F,
     ) -> Result<T, Error> {
         let begun = Instant::now();
-        let mut pause = PAUSES.0;
+        let mut pause = RETRY_PAUSES.0;
         loop {
             match request().await {
-                Err(error) if !is_final(&error) && begun.elapsed() < PATIENCE => {
+                Err(error) if !is_final(&error) && begun.elapsed() < RETRY_TIME => {
                     tracing::warn!(
                         error = text(&error),
                         "a request to the S3 store is sent again"
                     );
                     tokio::time::sleep(about(pause)).await;
-                    pause = (2 * pause).min(PAUSES.1);
+                    pause = (2 * pause).min(RETRY_PAUSES.1);
                 }
                 ended => return ended,
             }
@@ -218,8 +218,8 @@ impl Bucket {
 
     /// Waits until that many bytes more may be held in memory.
     async fn room(&self, bytes: usize) -> tokio::sync::SemaphorePermit<'_> {
-        let units = u32::try_from(bytes.div_ceil(UNIT)).unwrap_or(UNITS);
-        let room = self.memory.acquire_many(units.clamp(1, UNITS)).await;
+        let units = u32::try_from(bytes.div_ceil(MEMORY_UNIT_BYTES)).unwrap_or(MEMORY_UNITS);
+        let room = self.memory.acquire_many(units.clamp(1, MEMORY_UNITS)).await;
         room.expect("the semaphore is never closed")
     }
 
@@ -249,9 +249,9 @@ impl Bucket {
         let key = self.key(path);
         let mut file = File::open(from).await?;
         let length = file.metadata().await?.len();
-        if length <= WHOLE as u64 {
+        if length <= WHOLE_FILE_BYTES as u64 {
             let _room = self.room(length as usize).await;
-            let part = read_part(&mut file, WHOLE).await?;
+            let part = read_part(&mut file, WHOLE_FILE_BYTES).await?;
             let content = Content {
                 bytes: part.len() as u64,
                 sha256: hex(&Sha256::digest(&part)),
@@ -289,10 +289,10 @@ impl Bucket {
             let room = loop {
                 tokio::select! {
                     Some(done) = sent.next() => ids.extend([done?]),
-                    room = self.room(PART), if sent.len() < PARALLEL => break room,
+                    room = self.room(PART_BYTES), if sent.len() < PARALLEL_PARTS => break room,
                 }
             };
-            let part = read_part(file, PART).await?;
+            let part = read_part(file, PART_BYTES).await?;
             if part.is_empty() {
                 break;
             }
@@ -337,7 +337,7 @@ impl Bucket {
         let key = self.key(path);
         let mut hash = Sha256::new();
         let first = {
-            let _room = self.room(PART).await;
+            let _room = self.room(PART_BYTES).await;
             match self.insist(|| self.first_part(&key)).await {
                 Err(error) if is_missing(&error) => return Ok(None),
                 Err(error) => return Err(self.fault(path, &error)),
@@ -350,17 +350,17 @@ impl Bucket {
                 }
             }
         };
-        let starts = (PART as u64..first).step_by(PART);
+        let starts = (PART_BYTES as u64..first).step_by(PART_BYTES);
         let fetched = starts.map(|start| {
-            let range = start..first.min(start + PART as u64);
+            let range = start..first.min(start + PART_BYTES as u64);
             let key = &key;
             async move {
-                let room = self.room(PART).await;
+                let room = self.room(PART_BYTES).await;
                 let part = self.insist(|| self.store.get_range(key, range.clone()));
                 Ok::<_, Error>((part.await?, room))
             }
         });
-        let mut fetched = stream::iter(fetched).buffered(PARALLEL);
+        let mut fetched = stream::iter(fetched).buffered(PARALLEL_PARTS);
         while let Some(part) = fetched.next().await {
             let (part, _room) = part.map_err(|error| self.fault(path, &error))?;
             hash.update(&part);
@@ -391,7 +391,7 @@ impl Bucket {
     /// The first part of a file, and the length of all of it.
     async fn first_part(&self, key: &Key) -> Result<(Bytes, u64), Error> {
         let options = GetOptions {
-            range: Some(GetRange::Bounded(0..PART as u64)),
+            range: Some(GetRange::Bounded(0..PART_BYTES as u64)),
             ..GetOptions::default()
         };
         match self.store.get_opts(key, options).await {

@@ -12,15 +12,15 @@ use crate::database::SqlStore;
 use crate::findings::Examination;
 use std::collections::{BTreeMap, BTreeSet};
 use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobStore, Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreResult,
     SystemClock, Tenant,
 };
 
 /// Rows read at a time.
-const PAGE: u32 = 200;
+const PAGE_ROWS: u32 = 200;
 
-/// What a bucket is checked against.
+/// The records that a bucket is checked against.
 pub(crate) struct BucketDoctor<'a> {
     pub blobs: &'a S3Blobs,
     pub rows: &'a SqlStore,
@@ -52,7 +52,7 @@ impl BucketDoctor<'_> {
     /// Checks the files of every row. Returns the places that rows name, by item.
     async fn rows(&mut self) -> StoreResult<BTreeMap<String, BTreeSet<String>>> {
         let mut known = BTreeMap::new();
-        let mut pages = RecordPages::new(self.rows, PAGE);
+        let mut pages = RecordPages::new(self.rows, PAGE_ROWS);
         while let Some(page) = pages.next().await? {
             for record in page {
                 let id = record.id();
@@ -83,7 +83,7 @@ impl BucketDoctor<'_> {
         Ok(known)
     }
 
-    /// What is wrong with the files of an item whose publications lie in the folder `shelf`.
+    /// The faults of the files of an item whose publications lie in the folder `shelf`.
     async fn wrong_files(&mut self, record: &ItemRecord, shelf: &str) -> StoreResult<Vec<String>> {
         let mut wrong = Vec::new();
         for file in record.files() {

@@ -20,21 +20,21 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, DiskSpace, FileRecord, ItemRecord, LocalFile, Resource,
     Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
 };
 
 /// The folder of local copies.
-const CACHE: &str = "cache";
+const CACHE_FOLDER: &str = "cache";
 
 /// Longest time of a readiness check.
 const CHECK_LIMIT: Duration = Duration::from_secs(4);
 
 /// How long the start waits for a store that does not answer, and between two attempts.
-const START: (Duration, Duration) = (Duration::from_secs(20), Duration::from_secs(1));
+const FIRST_REQUEST_TIMES: (Duration, Duration) = (Duration::from_secs(20), Duration::from_secs(1));
 
-/// What became of a file that was sent.
+/// The outcome of a file that was sent.
 enum Sent {
     /// The store has it.
     Whole(Content),
@@ -109,9 +109,9 @@ impl S3Blobs {
         loop {
             match bucket.probe(READY, content.clone()).await {
                 Ok(_) => break,
-                Err(error) if may_pass(&error) && begun.elapsed() < START.0 => {
+                Err(error) if may_pass(&error) && begun.elapsed() < FIRST_REQUEST_TIMES.0 => {
                     tracing::warn!(error = text(&error), %location, "waiting for the S3 store");
-                    tokio::time::sleep(START.1).await;
+                    tokio::time::sleep(FIRST_REQUEST_TIMES.1).await;
                 }
                 Err(error) => return Err(refusal(location, &error)),
             }
@@ -124,7 +124,7 @@ impl S3Blobs {
             _ => {}
         }
         fs::create_dir_all(&staging).map_err(unusable)?;
-        let cache = LocalCache::open(&folder.join(CACHE), cache).map_err(unusable)?;
+        let cache = LocalCache::open(&folder.join(CACHE_FOLDER), cache).map_err(unusable)?;
         Ok(Self {
             shared: Arc::new(Shared { bucket, cache }),
             gauge,

@@ -14,7 +14,7 @@
 //! the row makes all files visible, and no other publication of the same item, by another process
 //! or by one that was thought dead, can change them or be harmed by their deletion.
 //!
-//! What a publication writes is staged on the local disk, where it is inspected, and then sent to the
+//! The content of a publication is staged on the local disk, where it is inspected, and then sent to the
 //! bucket in parts; its SHA-256 is compared with that in the record. Reading goes through a cache on the
 //! local disk ([`super::cache`]), whose copies are verified. Nothing on the local disk is needed again:
 //! all of it can be deleted.
@@ -45,8 +45,8 @@ pub const GRACE: Duration = Duration::from_secs(3600);
 pub struct S3Refusal {
     /// Bucket and prefix.
     pub location: String,
-    /// What the store or the client says.
+    /// The message of the store or the client.
     pub reason: String,
-    /// What to do.
+    /// Advice.
     pub fix: &'static str,
 }

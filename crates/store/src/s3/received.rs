@@ -9,7 +9,7 @@ use object_store::ObjectMeta;
 use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::intake::{IncomingFile, ReceivedFiles};
-use ventriform_service::jobs::{BlobError, BlobWriter, FileRecord, LocalFile, Timestamp};
+use ventriform_service::records::{BlobError, BlobWriter, FileRecord, LocalFile, Timestamp};
 
 /// A file on its way to the bucket.
 struct Incoming {

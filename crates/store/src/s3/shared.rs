@@ -8,9 +8,9 @@ use object_store::ObjectMeta;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
-use ventriform_service::jobs::{BlobError, FileRecord, StoreFault, Timestamp};
+use ventriform_service::records::{BlobError, FileRecord, StoreFault, Timestamp};
 
-/// What checks write.
+/// The content that checks write.
 pub(super) const READY: &str = "ready";
 
 /// The bucket and its local copies.

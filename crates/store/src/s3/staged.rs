@@ -10,12 +10,12 @@ use futures::{StreamExt, TryStreamExt, stream};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     BlobError, BlobWriter, ItemRecord, LocalFile, StagedFiles, StoreFault, random_id,
 };
 
 /// Files of one publication that are sent at the same time.
-const PARALLEL: usize = 8;
+const PARALLEL_COPIES: usize = 8;
 
 /// The files of one publication, in a folder on the local disk.
 pub(super) struct StagedPublication {
@@ -72,7 +72,7 @@ impl StagedPublication {
             }
         });
         let sent: Vec<_> = stream::iter(sending)
-            .buffer_unordered(PARALLEL)
+            .buffer_unordered(PARALLEL_COPIES)
             .try_collect()
             .await?;
         self.sent().hashes.extend(sent);

@@ -9,7 +9,7 @@ use ventriform_service::access::{
     AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord, Maker,
     NO_HASH, Quota, Usage, chain_hash,
 };
-use ventriform_service::jobs::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 
 /// The bytes of everything that tenant `$1` stores: volumes, products (results, templates, readers), received
 /// objects that are not part of a volume, work items, and the records of jobs.

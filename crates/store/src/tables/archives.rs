@@ -12,7 +12,7 @@ use ventriform_service::archive::{
     SendSettlement, SeriesKey,
 };
 use ventriform_service::hooks::DeliveryState;
-use ventriform_service::jobs::{Failure, Job, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{Failure, Job, StoreResult, Tenant, Timestamp};
 
 #[async_trait]
 impl ArchiveStore for SqlStore {

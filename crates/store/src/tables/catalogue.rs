@@ -8,7 +8,7 @@ use super::scans::{note_upload, push_scan};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AddedProduct, Catalogue, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage,
     ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
     Tags, Tenant, Timestamp,
@@ -28,7 +28,7 @@ const HELD_PRODUCT: Select = Select {
     volume: "p.volume",
 };
 
-/// What is read of an item that a tenant has.
+/// The columns of an item that a tenant has.
 struct Select {
     /// The columns of its content.
     columns: &'static str,
@@ -144,9 +144,10 @@ impl Catalogue for SqlStore {
             add_source(&mut transaction, tenant, &product.id, volume).await?;
         }
         transaction.commit().await?;
-        Ok(match new {
-            true => AddedProduct::New,
-            false => AddedProduct::Known,
+        Ok(if new {
+            AddedProduct::New
+        } else {
+            AddedProduct::Known
         })
     }
 
@@ -234,9 +235,10 @@ impl Catalogue for SqlStore {
         now: Timestamp,
     ) -> StoreResult<Erased> {
         let mut transaction = self.writer.begin().await?;
-        let erased = match self.is_held_elsewhere(&mut transaction, expected).await? {
-            true => Erased::InUse,
-            false => super::erasure::erase(&mut transaction, order, expected, now).await?,
+        let erased = if self.is_held_elsewhere(&mut transaction, expected).await? {
+            Erased::InUse
+        } else {
+            super::erasure::erase(&mut transaction, order, expected, now).await?
         };
         // Committed also if nothing was erased, which keeps the connection.
         transaction.commit().await?;

@@ -6,25 +6,29 @@ use crate::query::query;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
-use ventriform_service::jobs::{Custody, ItemRecord, Resource, StoreResult};
+use ventriform_service::records::{Custody, ItemRecord, Resource, StoreResult};
 
 /// Defects named at most.
-const DEFECTS: &str = "PRAGMA quick_check(20)";
+const QUICK_CHECK: &str = "PRAGMA quick_check(20)";
 
 #[async_trait]
 impl Custody for SqlStore {
     async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
         let volume = Resource::of(id) == Some(Resource::Volume);
-        let row = query(match volume {
-            true => "SELECT * FROM volumes WHERE id = $1",
-            false => "SELECT * FROM products WHERE id = $1",
+        let row = query(if volume {
+            "SELECT * FROM volumes WHERE id = $1"
+        } else {
+            "SELECT * FROM products WHERE id = $1"
         })
         .bind(id)
         .fetch_optional(&self.readers)
         .await?;
-        row.map(|row| match volume {
-            true => rows::volume(row).map(ItemRecord::Volume),
-            false => rows::product(row).map(ItemRecord::Product),
+        row.map(|row| {
+            if volume {
+                rows::volume(row).map(ItemRecord::Volume)
+            } else {
+                rows::product(row).map(ItemRecord::Product)
+            }
         })
         .transpose()
     }
@@ -101,7 +105,7 @@ impl Custody for SqlStore {
         if self.on_server() {
             return Ok(Vec::new());
         }
-        let found = query(DEFECTS).fetch_all(&self.readers).await?;
+        let found = query(QUICK_CHECK).fetch_all(&self.readers).await?;
         let lines: Vec<String> = rows::all(found, |row| row.try_get(0))?;
         let defects: Vec<String> = lines.into_iter().filter(|line| line != "ok").collect();
         self.damaged.store(!defects.is_empty(), Ordering::Relaxed);

@@ -12,15 +12,15 @@ use super::rows::{self, to_json};
 use crate::database::Transaction;
 use crate::query::{Target, query};
 use ventriform_service::access::{Activity, AuditEvent};
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
     Tenant, Timestamp, random_id,
 };
 
 /// The prefix of the ids of receipts.
-const PREFIX: &str = "ers_";
+const RECEIPT_PREFIX: &str = "ers_";
 
-/// What was made of a volume.
+/// The products of a volume.
 pub(super) async fn made_of(
     from: impl Into<Target<'_>> + Send,
     tenant: &Tenant,
@@ -65,9 +65,10 @@ pub(super) async fn erase(
     for id in ids.iter().rev() {
         items.insert(0, release(to, tenant, id, now).await?);
     }
-    let jobs = match order.cascade {
-        true => delete_jobs(to, tenant, &order.id, now).await?,
-        false => Vec::new(),
+    let jobs = if order.cascade {
+        delete_jobs(to, tenant, &order.id, now).await?
+    } else {
+        Vec::new()
     };
     let by = order.by.clone();
     let event = AuditEvent {
@@ -78,7 +79,7 @@ pub(super) async fn erase(
     };
     let recorded = append(to, &[event.on(&order.id)]).await?;
     let receipt = Receipt {
-        id: random_id(PREFIX),
+        id: random_id(RECEIPT_PREFIX),
         tenant: tenant.clone(),
         item: order.id.clone(),
         erased_at: now,

@@ -1,4 +1,4 @@
-//! What the tables of errands have in common. An errand is work towards a destination on the network
+//! The common columns of the tables of errands. An errand is work towards a destination on the network
 //! (fetch a series, deliver an object, call a webhook) that waits in a table until it succeeds, is
 //! given up or is taken back. Triggers of the jobs table write the rows; see the migrations.
 
@@ -6,7 +6,7 @@ use super::rows;
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use ventriform_service::hooks::{Backlog, DeliveryState};
-use ventriform_service::jobs::{StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// A table of errands.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use super::rows;
 use crate::database::SqlStore;
 use crate::query::query;
 use async_trait::async_trait;
-use ventriform_service::jobs::{FigureStore, QueueFigures, Resource, StoreResult};
+use ventriform_service::records::{FigureStore, QueueFigures, Resource, StoreResult};
 
 #[async_trait]
 impl FigureStore for SqlStore {
@@ -26,13 +26,12 @@ impl FigureStore for SqlStore {
             let row = counts.iter().find(|(kind, _)| kind == resource.noun());
             (resource, row.map_or(0, |(_, count)| *count))
         };
-        let database_bytes = match self.on_server() {
-            true => {
-                let size = query("SELECT pg_database_size(current_database())");
-                let row = size.fetch_one(&self.readers).await?;
-                Some(rows::unsigned(row.try_get(0)?))
-            }
-            false => None,
+        let database_bytes = if self.on_server() {
+            let size = query("SELECT pg_database_size(current_database())");
+            let row = size.fetch_one(&self.readers).await?;
+            Some(rows::unsigned(row.try_get(0)?))
+        } else {
+            None
         };
         Ok(QueueFigures {
             database_bytes,

@@ -10,7 +10,7 @@ use ventriform_service::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
     HookEndpoint, HookEvent, Settlement, SigningSecret,
 };
-use ventriform_service::jobs::{StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// `last_outcome` of deliveries that were given up without an attempt.
 const TOO_OLD: &str = "too-old";

@@ -11,12 +11,12 @@ use ventriform_service::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
     Protocol, ReceivedObject,
 };
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp, random_id,
 };
 
 /// The columns of a group, with what is counted of its objects.
-const GROUPS: &str = "SELECT g.*,
+const SELECT_GROUPS: &str = "SELECT g.*,
     (SELECT count(*) FROM intake_objects WHERE group_id = g.id) AS objects,
     CAST((SELECT coalesce(sum(bytes), 0) FROM intake_objects
      WHERE group_id = g.id AND file IS NOT NULL) AS BIGINT) AS waiting_bytes
@@ -73,14 +73,14 @@ impl IntakeStore for SqlStore {
     }
 
     async fn unfinished(&self) -> StoreResult<Vec<IntakeGroup>> {
-        let mut query = QueryBuilder::new(GROUPS);
+        let mut query = QueryBuilder::new(SELECT_GROUPS);
         query.push(" WHERE state IN ('gathering', 'filing') ORDER BY sequence");
         let rows = query.build().fetch_all(&self.readers).await?;
         rows::all(rows, group)
     }
 
     async fn group(&self, id: &str) -> StoreResult<Option<IntakeGroup>> {
-        let mut query = QueryBuilder::new(GROUPS);
+        let mut query = QueryBuilder::new(SELECT_GROUPS);
         query.push(" WHERE g.id = ").push_bind(id);
         let row = query.build().fetch_optional(&self.readers).await?;
         row.map(group).transpose()
@@ -287,7 +287,7 @@ pub(super) fn listed(
     state: Option<GroupState>,
     page: ListRequest,
 ) -> QueryBuilder {
-    let mut query = QueryBuilder::new(GROUPS);
+    let mut query = QueryBuilder::new(SELECT_GROUPS);
     query.push(" WHERE tenant = ").push_bind(tenant.as_str());
     if let Some(state) = state {
         query.push(" AND state = ").push_bind(state.as_str());
@@ -386,9 +386,10 @@ async fn open_group(
     now: Timestamp,
 ) -> StoreResult<String> {
     let (header, origin) = (&object.header, &object.origin);
-    let instance = match header.is_slice {
-        true => "",
-        false => header.sop_instance.as_str(),
+    let instance = if header.is_slice {
+        ""
+    } else {
+        header.sop_instance.as_str()
     };
     let row = query(
         "INSERT INTO intake_groups (id, tenant, study, series, instance, modality, image_type,

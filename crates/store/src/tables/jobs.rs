@@ -28,7 +28,7 @@ use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
     JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Priority, Product, QueueLoad,
     Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
@@ -38,7 +38,7 @@ use ventriform_service::jobs::{
 const JOBS_AVERAGED: i64 = 20;
 
 /// The turn of a job of priority `$17` that tenant `$10` files now.
-const TURN: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SELECT
+const TURN_EXPRESSION: &str = "(SELECT CASE WHEN here > own THEN here ELSE own END FROM (SELECT
     coalesce((SELECT min(turn) FROM jobs WHERE state = 'queued' AND volume != '' AND priority = $17),
              (SELECT max(turn) + 1 FROM jobs WHERE state = 'running' AND priority = $17), 0) AS here,
     coalesce((SELECT max(turn) + 1 FROM jobs
@@ -57,7 +57,7 @@ const HAS_ROOM: &str = "((SELECT count(*) FROM jobs WHERE state = 'queued') < $8
 /// SQLite bounds a pair of columns by the first alone, so a part is counted in three: the whole turns from
 /// that of the job before on, the asked job's own turn up to the asked job, and less what the first turn
 /// has before the job before.
-const PLACES: &str = "
+const QUEUE_POSITIONS: &str = "
     WITH asked AS
         (SELECT sequence, priority, turn, lag(turn, 1, -1) OVER place AS turn_before,
                 lag(sequence, 1, -1) OVER place AS sequence_before
@@ -88,7 +88,7 @@ const PLACES: &str = "
                 OVER (PARTITION BY priority ORDER BY turn, sequence) AS BIGINT)
     FROM asked";
 
-/// What every statement sets by which a job leaves its worker without an outcome: `$1` is now, `$2`
+/// The assignments of every statement by which a job leaves its worker without an outcome: `$1` is now, `$2`
 /// the reason for failing it, or null to return it to the queue.
 const LEFT_BY_WORKER: &str = "
     state = CASE WHEN cancel_requested THEN 'cancelled'
@@ -148,7 +148,7 @@ impl JobStore for SqlStore {
             "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key,
                                fingerprint, needs, tenant, external_id, labels, webhook,
                                trace_parent, source, send, priority, storage_limit, turn)
-             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, {TURN}
+             SELECT $1, $2, $3, $4, $5, $6, $7, $9, $10, $11, $12, $13, $14, $15, $16, $17, $18, {TURN_EXPRESSION}
              WHERE {HAS_ROOM}
                AND ($15 IS NOT NULL
                     OR EXISTS (SELECT 1 FROM holdings
@@ -230,7 +230,7 @@ impl JobStore for SqlStore {
     }
 
     async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<BTreeMap<i64, u64>> {
-        let rows = query(PLACES)
+        let rows = query(QUEUE_POSITIONS)
             .bind(to_json(&sequences)?)
             .fetch_all(&self.readers)
             .await?;
@@ -585,9 +585,10 @@ pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
     let mut finds = !narrow;
     let mut compare = |query: &mut QueryBuilder, column: &str| {
         query.push(" AND ");
-        match std::mem::take(&mut finds) {
-            true => query.push(column),
-            false => query.push_unindexed(column),
+        if std::mem::take(&mut finds) {
+            query.push(column)
+        } else {
+            query.push_unindexed(column)
         };
         query.push(" = ");
     };
@@ -608,19 +609,16 @@ pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
         }
     }
     if let Some(moment) = filter.created_after {
-        match narrow {
-            true => {
-                query.push(" AND ").push_unindexed("created_at");
-                query.push(" > ").push_bind(moment);
-            }
-            false => {
-                let times = Times {
-                    table: "jobs",
-                    column: "created_at",
-                    bounds: &[(">", moment)],
-                };
-                push_times(&mut query, &times, &filter.tenant);
-            }
+        if narrow {
+            query.push(" AND ").push_unindexed("created_at");
+            query.push(" > ").push_bind(moment);
+        } else {
+            let times = Times {
+                table: "jobs",
+                column: "created_at",
+                bounds: &[(">", moment)],
+            };
+            push_times(&mut query, &times, &filter.tenant);
         }
     }
     push_tags(&mut query, "", &filter.tenant, Resource::Job, &filter.tags);
@@ -697,7 +695,7 @@ mod tests {
         let path = folder.path().join("jobs.db");
         let store = SqlStore::open(&path, Duration::from_secs(1), gauge).await;
         let store = store.unwrap();
-        let places = plan(&store, PLACES).await;
+        let places = plan(&store, QUEUE_POSITIONS).await;
         for step in [
             "SEARCH turns USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",
             "SEARCH own USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence>? AND sequence<?)",
@@ -706,7 +704,7 @@ mod tests {
         ] {
             assert!(places.iter().any(|found| found == step), "{places:#?}");
         }
-        let turn = plan(&store, &format!("SELECT {TURN}")).await;
+        let turn = plan(&store, &format!("SELECT {TURN_EXPRESSION}")).await;
         for step in [
             "SEARCH jobs USING COVERING INDEX jobs_ready (state=? AND priority=?)",
             "SEARCH jobs USING INDEX jobs_in_turn (tenant=? AND priority=?)",

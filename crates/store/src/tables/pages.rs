@@ -5,7 +5,7 @@
 //! the plan of every combination of filters.
 
 use crate::query::QueryBuilder;
-use ventriform_service::jobs::{ListRequest, Resource, TagFilter, Tenant, Timestamp};
+use ventriform_service::records::{ListRequest, Resource, TagFilter, Tenant, Timestamp};
 
 /// Adds the conditions of a filter to a query whose columns have that prefix.
 pub(super) fn push_tags(
@@ -88,7 +88,7 @@ mod tests {
     use std::time::Duration;
     use ventriform_service::access::AuditFilter;
     use ventriform_service::intake::GroupState;
-    use ventriform_service::jobs::{
+    use ventriform_service::records::{
         Expired, ItemFilter, JobFilter, JobState, Priority, ScanFilter,
     };
 

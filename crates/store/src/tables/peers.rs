@@ -9,11 +9,11 @@ use async_trait::async_trait;
 use sqlx::postgres::PgPool;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::jobs::{NewsFeed, Peers, StoreResult};
+use ventriform_service::records::{NewsFeed, Peers, StoreResult};
 
 /// How long is remembered which places of files were given up: longer than any process may stand still
 /// between writing files and their row.
-const REMEMBERED: Duration = Duration::from_secs(7 * 86_400);
+const DEAD_PEER_TTL: Duration = Duration::from_secs(7 * 86_400);
 
 fn milliseconds(length: Duration) -> i64 {
     i64::try_from(length.as_millis()).unwrap_or(i64::MAX / 2)
@@ -42,7 +42,7 @@ impl Peers for PgPeers {
         &self.store.run
     }
 
-    async fn live(&self, workers: usize, length: Duration) -> StoreResult<()> {
+    async fn heartbeat(&self, workers: usize, length: Duration) -> StoreResult<()> {
         query(
             "INSERT INTO runs (id, workers, expires_at) VALUES ($1, $2, database_now() + $3)
              ON CONFLICT (id) DO UPDATE
@@ -81,7 +81,7 @@ impl Peers for PgPeers {
         Ok(rows::unsigned(row.try_get(0)?))
     }
 
-    async fn hold(&self, token: &str, item: &str) -> StoreResult<()> {
+    async fn pin(&self, token: &str, item: &str) -> StoreResult<()> {
         // Not beside other writers: an erasure looks for holds before it deletes.
         query("INSERT INTO holds (token, run, item) VALUES ($1, $2, $3)")
             .bind(token)
@@ -92,7 +92,7 @@ impl Peers for PgPeers {
         Ok(())
     }
 
-    async fn release(&self, token: &str) -> StoreResult<()> {
+    async fn unpin(&self, token: &str) -> StoreResult<()> {
         query("DELETE FROM holds WHERE token = $1")
             .bind(token)
             .write_beside(&self.store.writer)
@@ -100,12 +100,12 @@ impl Peers for PgPeers {
         Ok(())
     }
 
-    async fn held_by_others(&self, items: &[String]) -> StoreResult<bool> {
+    async fn pinned_by_others(&self, items: &[String]) -> StoreResult<bool> {
         let held = holds_of_others(&self.store.run, items)?;
         Ok(held.fetch_optional(&self.store.readers).await?.is_some())
     }
 
-    async fn take_duty(&self, duty: &str, length: Duration) -> StoreResult<bool> {
+    async fn lead(&self, duty: &str, length: Duration) -> StoreResult<bool> {
         let taken = query(
             "INSERT INTO duties (name, run, expires_at) VALUES ($1, $2, database_now() + $3)
              ON CONFLICT (name) DO UPDATE SET run = excluded.run, expires_at = excluded.expires_at
@@ -129,7 +129,7 @@ impl Peers for PgPeers {
             .execute(&mut transaction)
             .await?;
         query("DELETE FROM given_up_places WHERE given_up_at < database_now() - $1")
-            .bind(milliseconds(REMEMBERED))
+            .bind(milliseconds(DEAD_PEER_TTL))
             .execute(&mut transaction)
             .await?;
         transaction.commit().await

@@ -3,7 +3,7 @@
 use crate::query::DbRow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Priority, Product, Receipt,
     ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };

@@ -4,7 +4,7 @@ use super::rows::{self, SCAN_COLUMNS, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::jobs::{
+use ventriform_service::records::{
     ScanFields, ScanFilter, ScanIdentity, Scans, StoreResult, Tenant, Timestamp, UnreadScan,
     random_key,
 };

@@ -4,9 +4,9 @@ use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::jobs::{StoreError, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{StoreError, StoreResult, Tenant, Timestamp};
 use ventriform_service::worklist::{
-    AddedWorkitem, BATCH_BYTES, DataSetJson, Workitem, WorkitemState, Worklist,
+    AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
 
 #[async_trait]
@@ -53,7 +53,7 @@ impl Worklist for SqlStore {
         )
         .bind(item.state.as_str())
         .bind(&item.transaction)
-        .bind(&item.performer)
+        .bind(performer_column(&item.performer))
         .bind(to_json(item.attributes.object())?)
         .bind(item.changed_at)
         .bind(item.tenant.as_str())
@@ -139,8 +139,25 @@ fn item_of(row: DbRow) -> StoreResult<Workitem> {
         revision: row.try_get("revision")?,
         state: WorkitemState::parse(state).ok_or_else(|| damaged(state.to_owned()))?,
         transaction: row.try_get("transaction_uid")?,
-        performer: row.try_get("performer")?,
+        performer: performer_of(row.try_get("performer")?),
         attributes: attributes.map_err(|error| damaged(error.to_string()))?,
         changed_at: row.try_get("changed_at")?,
     })
+}
+
+/// The column of a performer: the id of its job, empty while the job is not filed.
+fn performer_column(performer: &Performer) -> Option<&str> {
+    match performer {
+        Performer::None => None,
+        Performer::Claimed => Some(""),
+        Performer::Job(id) => Some(id),
+    }
+}
+
+fn performer_of(column: Option<String>) -> Performer {
+    match column {
+        None => Performer::None,
+        Some(id) if id.is_empty() => Performer::Claimed,
+        Some(id) => Performer::Job(id),
+    }
 }

@@ -250,9 +250,12 @@ fn obj(comment: &str, relative: bool) -> Vec<u8> {
     }
     text += "vn 0 0 1\nvt 0.5 0.5\ng all\nusemtl red\ns off\n";
     for face in FACES {
-        let corner = |v: &u32| match relative {
-            true => format!("{}", i64::from(*v) - 6),
-            false => format!("{}/1/1", v + 1),
+        let corner = |v: &u32| {
+            if relative {
+                format!("{}", i64::from(*v) - 6)
+            } else {
+                format!("{}/1/1", v + 1)
+            }
         };
         text += &format!("f {}\n", words(face.iter().map(corner)));
     }
@@ -287,9 +290,10 @@ fn vtk(version: &str, binary: bool, title: &str) -> Vec<u8> {
         b"hello%20world\n".to_vec()
     });
     bytes.extend(b"POINTS 6 float\n");
-    match binary {
-        true => bytes.extend(CORNERS.iter().flatten().flat_map(|x| x.to_be_bytes())),
-        false => bytes.extend(words(CORNERS.iter().flatten()).into_bytes()),
+    if binary {
+        bytes.extend(CORNERS.iter().flatten().flat_map(|x| x.to_be_bytes()))
+    } else {
+        bytes.extend(words(CORNERS.iter().flatten()).into_bytes())
     }
     bytes.extend(b"\nMETADATA\nINFORMATION 0\n\n");
     let corners: Vec<u32> = FACES.concat();
@@ -453,12 +457,13 @@ fn gltf(embedded: bool) -> Vec<u8> {
         .collect();
     let corners = triangles().concat();
     buffer.extend(corners.iter().flat_map(|v| (*v as u16).to_le_bytes()));
-    let uri = match embedded {
-        true => format!(
+    let uri = if embedded {
+        format!(
             ",\"uri\":\"data:application/octet-stream;base64,{}\"",
             STANDARD.encode(&buffer)
-        ),
-        false => String::new(),
+        )
+    } else {
+        String::new()
     };
     let mut json = format!(
         "{{\"asset\":{{\"version\":\"2.0\",\"extras\":{{\"by\":1}}}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\

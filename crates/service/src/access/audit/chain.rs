@@ -2,14 +2,14 @@
 
 use super::event::{Activity, Anchor, AuditEvent};
 use crate::access::AccessStore;
-use crate::jobs::{StoreResult, hex};
+use crate::records::{StoreResult, hex};
 use sha2::{Digest, Sha256};
 
 /// The hash before the first row.
 pub const NO_HASH: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// Rows that the check reads at a time.
-const BATCH: u32 = 1000;
+const BATCH_ROWS: u32 = 1000;
 
 /// SHA-256 of the hash before it, the position and the text of a row, in hexadecimal digits.
 pub fn chain_hash(previous: &str, sequence: i64, event: &str) -> String {
@@ -39,7 +39,7 @@ pub enum BrokenLink {
     UnrecordedRemoval(i64),
 }
 
-/// What the check found.
+/// The result of the check.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditReport {
     /// Rows that were checked.
@@ -66,7 +66,7 @@ pub async fn verify(store: &dyn AccessStore) -> StoreResult<AuditReport> {
     let mut removal_recorded = anchor.is_none();
     let mut rows = 0;
     let broken = 'chain: loop {
-        let links = store.links(sequence, BATCH).await?;
+        let links = store.links(sequence, BATCH_ROWS).await?;
         if links.is_empty() {
             break None;
         }

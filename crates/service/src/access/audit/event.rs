@@ -1,9 +1,9 @@
 //! One event of the audit trail, and the rows that hold events.
 
-use crate::jobs::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
 
-/// What was done.
+/// The act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activity {
@@ -50,7 +50,7 @@ pub enum Outcome {
 pub struct AuditEvent {
     /// When it was recorded.
     pub recorded: Timestamp,
-    /// What was done.
+    /// The act.
     pub activity: Activity,
     /// How it ended.
     pub outcome: Outcome,

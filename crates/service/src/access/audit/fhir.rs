@@ -1,22 +1,22 @@
 //! A row of the trail as an AuditEvent of FHIR R4, in the form of IHE BALP (Basic Audit Log
-//! Patterns): `rest` events with the interaction as the subtype, and DICOM codes for security
+//! Patterns): `rest` events with the interaction as the subtype, and DICOM_SYSTEM codes for security
 //! events.
 
 use super::event::{Activity, AuditRecord, Outcome};
-use crate::jobs::{Resource, rfc3339};
+use crate::records::{Resource, rfc3339};
 use serde_json::{Value, json};
 
-const TYPES: &str = "http://terminology.hl7.org/CodeSystem/audit-event-type";
-const INTERACTIONS: &str = "http://hl7.org/fhir/restful-interaction";
-const DICOM: &str = "http://dicom.nema.org/resources/ontology/DCM";
-const OWN: &str = "urn:ventriform:audit";
-const SOURCES: &str = "http://terminology.hl7.org/CodeSystem/security-source-type";
-const ENTITIES: &str = "http://terminology.hl7.org/CodeSystem/audit-entity-type";
+const EVENT_TYPE_SYSTEM: &str = "http://terminology.hl7.org/CodeSystem/audit-event-type";
+const INTERACTION_SYSTEM: &str = "http://hl7.org/fhir/restful-interaction";
+const DICOM_SYSTEM: &str = "http://dicom.nema.org/resources/ontology/DCM";
+const OWN_SYSTEM: &str = "urn:ventriform:audit";
+const SOURCE_TYPE_SYSTEM: &str = "http://terminology.hl7.org/CodeSystem/security-source-type";
+const ENTITY_SYSTEM: &str = "http://terminology.hl7.org/CodeSystem/audit-entity-type";
 const BALP_ENTITIES: &str = "https://profiles.ihe.net/ITI/BALP/CodeSystem/BasicAuditEntityType";
 /// System of the identifiers of items and keys.
-const IDS: &str = "urn:ventriform:id";
+const ID_SYSTEM: &str = "urn:ventriform:id";
 /// The extension that holds the row's hash.
-const HASH: &str = "urn:ventriform:audit-hash";
+const HASH_EXTENSION: &str = "urn:ventriform:audit-hash";
 
 /// Type, subtype and action of an event.
 struct Codes {
@@ -27,25 +27,25 @@ struct Codes {
 
 impl Codes {
     fn of(activity: Activity) -> Self {
-        let rest = || coding(TYPES, "rest", "RESTful Operation");
+        let rest = || coding(EVENT_TYPE_SYSTEM, "rest", "RESTful Operation");
         let interaction = |code, action| Self {
             kind: rest(),
-            subtype: coding(INTERACTIONS, code, code),
+            subtype: coding(INTERACTION_SYSTEM, code, code),
             action,
         };
         let dicom = |kind: [&str; 2], subtype: [&str; 2], action| Self {
-            kind: coding(DICOM, kind[0], kind[1]),
-            subtype: coding(DICOM, subtype[0], subtype[1]),
+            kind: coding(DICOM_SYSTEM, kind[0], kind[1]),
+            subtype: coding(DICOM_SYSTEM, subtype[0], subtype[1]),
             action,
         };
         let authentication = ["110114", "User Authentication"];
         let alert = ["110113", "Security Alert"];
         let attributes = ["110137", "User Security Attributes Changed"];
         let trail = ["110101", "Audit Log Used"];
-        // DICOM has no codes for these.
+        // DICOM_SYSTEM has no codes for these.
         let own = |code, display| Self {
-            kind: coding(DICOM, alert[0], alert[1]),
-            subtype: coding(OWN, code, display),
+            kind: coding(DICOM_SYSTEM, alert[0], alert[1]),
+            subtype: coding(OWN_SYSTEM, code, display),
             action: "E",
         };
         match activity {
@@ -72,10 +72,10 @@ pub fn fhir(record: &AuditRecord) -> Value {
     let codes = Codes::of(event.activity);
     let mut who = json!({"display": event.agent});
     if let Some(key) = &event.key {
-        who["identifier"] = json!({"system": IDS, "value": key});
+        who["identifier"] = json!({"system": ID_SYSTEM, "value": key});
     }
     let mut client = json!({
-        "type": {"coding": [coding(DICOM, "110153", "Source Role ID")]},
+        "type": {"coding": [coding(DICOM_SYSTEM, "110153", "Source Role ID")]},
         "who": who,
         "requestor": true,
     });
@@ -84,7 +84,7 @@ pub fn fhir(record: &AuditRecord) -> Value {
         client["network"] = json!({"address": address, "type": "2"});
     }
     let service = json!({
-        "type": {"coding": [coding(DICOM, "110152", "Destination Role ID")]},
+        "type": {"coding": [coding(DICOM_SYSTEM, "110152", "Destination Role ID")]},
         "who": {"display": "ventriform"},
         "requestor": false,
     });
@@ -95,7 +95,7 @@ pub fn fhir(record: &AuditRecord) -> Value {
     json!({
         "resourceType": "AuditEvent",
         "id": record.sequence.to_string(),
-        "extension": [{"url": HASH, "valueString": record.hash}],
+        "extension": [{"url": HASH_EXTENSION, "valueString": record.hash}],
         "type": codes.kind,
         "subtype": [codes.subtype],
         "action": codes.action,
@@ -105,7 +105,7 @@ pub fn fhir(record: &AuditRecord) -> Value {
         "source": {
             "site": event.tenant.as_str(),
             "observer": {"display": "ventriform"},
-            "type": [coding(SOURCES, "4", "Application Server")],
+            "type": [coding(SOURCE_TYPE_SYSTEM, "4", "Application Server")],
         },
         "entity": entities(record),
     })
@@ -117,9 +117,9 @@ fn entities(record: &AuditRecord) -> Value {
     if let Some(object) = &event.object {
         let noun = Resource::of(object).map_or("item", Resource::noun);
         entities.push(json!({
-            "what": {"identifier": {"system": IDS, "value": object}},
+            "what": {"identifier": {"system": ID_SYSTEM, "value": object}},
             // 2 stands for a system object.
-            "type": coding(ENTITIES, "2", "System Object"),
+            "type": coding(ENTITY_SYSTEM, "2", "System Object"),
             "description": noun,
         }));
     }
@@ -132,7 +132,7 @@ fn entities(record: &AuditRecord) -> Value {
     if event.count > 1 {
         entities.push(json!({
             "name": "count",
-            "type": coding(ENTITIES, "4", "Other"),
+            "type": coding(ENTITY_SYSTEM, "4", "Other"),
             "detail": [{"type": "count", "valueString": event.count.to_string()}],
         }));
     }

@@ -14,7 +14,7 @@
 
 use super::event::{Activity, AuditEvent};
 use crate::access::AccessStore;
-use crate::jobs::{Clock, Tenant};
+use crate::records::{Clock, Tenant};
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,11 +23,11 @@ use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
 /// How long noted events may wait.
-const LINGER: Duration = Duration::from_secs(1);
+const FLUSH_AFTER: Duration = Duration::from_secs(1);
 /// Events on their way to the task.
-const BUFFERED: usize = 1024;
+const BUFFERED_EVENTS: usize = 1024;
 /// Most events of one transaction that somebody waits for.
-const BATCH: usize = 256;
+const BATCH_EVENTS: usize = 256;
 /// Most kinds of noted events that are kept.
 const MOST_NOTED: usize = 4096;
 
@@ -51,7 +51,7 @@ pub struct Recorder {
 impl Recorder {
     /// Starts the task that writes to `store`.
     pub fn start(store: Arc<dyn AccessStore>, clock: Arc<dyn Clock>) -> Self {
-        let (entries, received) = mpsc::channel(BUFFERED);
+        let (entries, received) = mpsc::channel(BUFFERED_EVENTS);
         let writer = Writer {
             store,
             clock,
@@ -127,7 +127,7 @@ impl Writer {
             let Some(first) = received else { break };
             let (mut awaited, mut flushes) = (Vec::new(), Vec::new());
             self.sort(first, &mut awaited, &mut flushes);
-            while awaited.len() < BATCH {
+            while awaited.len() < BATCH_EVENTS {
                 match entries.try_recv() {
                     Ok(entry) => self.sort(entry, &mut awaited, &mut flushes),
                     Err(_) => break,
@@ -147,7 +147,7 @@ impl Writer {
 
     fn next_due(&self) -> Option<Instant> {
         let waiting = !self.noted.is_empty() || self.lost > 0;
-        waiting.then(|| Instant::now() + LINGER)
+        waiting.then(|| Instant::now() + FLUSH_AFTER)
     }
 
     fn sort(

@@ -1,17 +1,9 @@
 //! Collecting the input of a job from the store.
 
 use super::Queue;
-use crate::jobs::{
-    BlobError, BlobStream, Failure, Fault, FileRecord, ItemFilter, Job, ListRequest, LocalFile,
-    Needs, Product, Resource, StoreError, StoreFault, StoredItem, StoredResult, Tenant, Work,
-    WorkInput,
-};
-use serde_json::Map;
+use crate::jobs::{Needs, Work, WorkInput};
+use crate::records::{Failure, Fault, Job, StoreError, StoreFault};
 use std::collections::BTreeMap;
-use std::ops::Range;
-
-/// Templates read from the catalogue at a time.
-const LIBRARY_PAGE: u32 = 100;
 
 impl Queue {
     /// The input of `job`, or why it cannot be computed. Every file is verified.
@@ -43,12 +35,12 @@ impl Queue {
             files,
         } = work.needs(&job.parameters);
         let id = job.volume.as_deref().unwrap_or_default();
-        let Some(volume) = self.item(&job.tenant, id, files).await? else {
+        let Some(volume) = self.items.item(&job.tenant, id, files).await? else {
             return Ok(Err(volume_missing(id)));
         };
         let mut found = BTreeMap::new();
         for (field, id) in items {
-            if let Some(item) = self.item(&job.tenant, &id, files).await? {
+            if let Some(item) = self.items.item(&job.tenant, &id, files).await? {
                 found.insert(field, item);
             }
         }
@@ -58,167 +50,11 @@ impl Queue {
             parameters: job.parameters.clone(),
             items: found,
             library: if library {
-                self.library(&job.tenant, files).await?
+                self.items.library(&job.tenant, files).await?
             } else {
                 Vec::new()
             },
         }))
-    }
-
-    /// A volume with all its files, or a product with the `wanted` ones. `None` if it does not
-    /// exist, or a file of a volume does not.
-    async fn item(
-        &self,
-        tenant: &Tenant,
-        id: &str,
-        wanted: &[&str],
-    ) -> Result<Option<StoredItem>, StoreError> {
-        if Resource::of(id) != Some(Resource::Volume) {
-            return Ok(match self.catalogue.product(tenant, id).await? {
-                Some(product) => Some(self.with_files(product.item, wanted).await?),
-                None => None,
-            });
-        }
-        let Some(volume) = self.catalogue.volume(tenant, id).await? else {
-            return Ok(None);
-        };
-        let files = self.volume_files(id, &volume.files).await?;
-        Ok(files.map(|files| StoredItem {
-            id: volume.item.id,
-            parameters: Map::new(),
-            files,
-        }))
-    }
-
-    /// The files of a volume on the local disk; `None` if one does not exist.
-    ///
-    /// # Errors
-    /// If the file store fails.
-    pub async fn volume_files(
-        &self,
-        id: &str,
-        records: &[FileRecord],
-    ) -> Result<Option<Vec<LocalFile>>, BlobError> {
-        let mut files = Vec::with_capacity(records.len());
-        for record in records {
-            match self.blobs.local(id, record).await? {
-                Some(file) => files.push(file),
-                None => return Ok(None),
-            }
-        }
-        Ok(Some(files))
-    }
-
-    /// A range of bytes of a file; see [`BlobStore::read`](crate::jobs::BlobStore::read).
-    ///
-    /// # Errors
-    /// If the storage fails; [`StoreFault::Erased`] if the item was erased since its row was read.
-    pub async fn read(
-        &self,
-        id: &str,
-        file: &FileRecord,
-        range: Range<u64>,
-    ) -> Result<BlobStream, StoreError> {
-        match self.blobs.read(id, file, range).await {
-            Err(error) if error.cause == StoreFault::DamagedFile => {
-                Err(self.unless_erased(id, error).await)
-            }
-            read => Ok(read?),
-        }
-    }
-
-    /// The reason why a file could not be read: `error`, unless its item was erased meanwhile.
-    pub async fn unless_erased(&self, id: &str, error: BlobError) -> StoreError {
-        match self.catalogue.record(id).await {
-            Ok(None) => BlobError::new(StoreFault::Erased, error.message).into(),
-            Ok(Some(_)) => error.into(),
-            Err(error) => error,
-        }
-    }
-
-    /// A product with those of its files that are `wanted` and exist.
-    ///
-    /// # Errors
-    /// If the file store fails.
-    pub async fn with_files(
-        &self,
-        product: Product,
-        wanted: &[&str],
-    ) -> Result<StoredItem, BlobError> {
-        let mut files = Vec::new();
-        for file in &product.files {
-            if wanted.contains(&file.name.as_str()) {
-                files.extend(self.blobs.local(&product.id, &file.record()).await?);
-            }
-        }
-        Ok(StoredItem {
-            id: product.id,
-            parameters: product.parameters,
-            files,
-        })
-    }
-
-    /// A tenant's product with those of its files that are `wanted`, and the volume that it was made
-    /// of with its files. `None` if the tenant has one of the two no more, or the product was made of
-    /// no volume.
-    ///
-    /// # Errors
-    /// If the storage fails.
-    pub async fn result(
-        &self,
-        tenant: &Tenant,
-        id: &str,
-        wanted: &[&str],
-    ) -> Result<Option<StoredResult>, StoreError> {
-        let Some(product) = self.catalogue.product(tenant, id).await? else {
-            return Ok(None);
-        };
-        let Some(source) = product.volume.clone() else {
-            return Ok(None);
-        };
-        let Some(volume) = self.catalogue.volume(tenant, &source).await? else {
-            return Ok(None);
-        };
-        let Some(volume_files) = self.volume_files(&source, &volume.files).await? else {
-            return Ok(None);
-        };
-        Ok(Some(StoredResult {
-            made_at: product.holding.created_at,
-            files: self.with_files(product.item, wanted).await?,
-            scan: volume.holding.scan,
-            volume: volume.item,
-            volume_files,
-        }))
-    }
-
-    /// Every template that the tenant flagged for `model=auto`, in the order of ids, which does not
-    /// depend on when they were added.
-    async fn library(
-        &self,
-        tenant: &Tenant,
-        wanted: &[&str],
-    ) -> Result<Vec<StoredItem>, StoreError> {
-        let mut library = Vec::new();
-        let (filter, mut before) = (ItemFilter::default(), None);
-        loop {
-            let request = ListRequest {
-                before,
-                limit: LIBRARY_PAGE,
-            };
-            let page = self
-                .catalogue
-                .products(tenant, Resource::Template, &filter, request)
-                .await?;
-            for product in page.items.into_iter().filter(|p| p.holding.library) {
-                library.push(self.with_files(product.item, wanted).await?);
-            }
-            before = page.next;
-            if before.is_none() {
-                break;
-            }
-        }
-        library.sort_by(|a, b| a.id.cmp(&b.id));
-        Ok(library)
     }
 }
 

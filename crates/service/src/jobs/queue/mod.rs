@@ -1,26 +1,16 @@
 //! The queue: filing, watching and cancelling jobs.
 
-mod erase;
+mod finish;
 mod input;
-mod items;
 mod peers;
-mod publish;
-mod sweep;
-mod upkeep;
 
-pub use erase::RetentionAges;
-pub use items::Hold;
-pub use publish::{NotAdded, TemplateSource, check_name};
-pub use sweep::{Custodian, Swept};
-pub use upkeep::{Upkeep, recover_after_crash};
-
-use super::{
-    BlobStore, Catalogue, Clock, Filed, Interrupted, Job, JobObserver, JobState, JobStore, Lease,
-    NewJob, Peers, QueueLoad, StoreError, Tenant, random_id,
+use super::JobObserver;
+use crate::items::{ExpiredPages, Items, milliseconds};
+use crate::records::{
+    Clock, DeathLimit, Deleted, Filed, Interrupted, Job, JobState, JobStore, Lease, NewJob,
+    QueueLoad, Resource, StoreError, Tenant, Timestamp, random_id,
 };
-use items::Items;
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
@@ -48,19 +38,11 @@ pub struct QueuePosition {
     pub starts_in_ms: Option<f64>,
 }
 
-/// Jobs, volumes and products of one service.
+/// The jobs of one service.
 pub struct Queue {
-    /// The jobs table.
-    pub jobs: Arc<dyn JobStore>,
-    /// The records of volumes and products.
-    pub catalogue: Arc<dyn Catalogue>,
-    /// Their files.
-    pub blobs: Arc<dyn BlobStore>,
-    /// The time of day.
-    pub clock: Arc<dyn Clock>,
-    items: Items,
-    /// Whether deleted rows may still be read in the database's files.
-    overwrite_due: AtomicBool,
+    jobs: Arc<dyn JobStore>,
+    items: Arc<Items>,
+    clock: Arc<dyn Clock>,
     settings: QueueSettings,
     filed: Notify,
     sourced: Arc<Notify>,
@@ -70,35 +52,51 @@ pub struct Queue {
     observer: OnceLock<Arc<dyn JobObserver>>,
     /// Names this run of the service in the leases of its workers.
     pub(super) run: String,
-    /// The other processes on the store, if it can be shared.
-    peers: Option<Arc<dyn Peers>>,
 }
 
 impl Queue {
-    /// A queue over the given stores.
+    /// A queue over a jobs table, whose jobs work on these items.
     pub fn new(
         jobs: Arc<dyn JobStore>,
-        catalogue: Arc<dyn Catalogue>,
-        blobs: Arc<dyn BlobStore>,
+        items: Arc<Items>,
         clock: Arc<dyn Clock>,
         settings: QueueSettings,
     ) -> Self {
+        let run = items
+            .peers()
+            .map_or_else(|| random_id("run_"), |peers| peers.run().to_owned());
         Self {
             jobs,
-            catalogue,
-            blobs,
+            items,
             clock,
-            items: Items::default(),
-            overwrite_due: AtomicBool::new(false),
             settings,
             filed: Notify::new(),
             sourced: Arc::default(),
             changes: broadcast::Sender::new(CHANGES_BUFFERED),
             running: Mutex::default(),
             observer: OnceLock::new(),
-            run: random_id("run_"),
-            peers: None,
+            run,
         }
+    }
+
+    /// The jobs table.
+    pub fn table(&self) -> &dyn JobStore {
+        &*self.jobs
+    }
+
+    /// The items on which its jobs work.
+    pub fn items(&self) -> &Arc<Items> {
+        &self.items
+    }
+
+    /// The time of day.
+    pub fn clock(&self) -> &Arc<dyn Clock> {
+        &self.clock
+    }
+
+    /// The time now.
+    pub fn now(&self) -> Timestamp {
+        self.clock.now()
     }
 
     /// Accepts a job and wakes a worker. See [`JobStore::file`].
@@ -130,17 +128,65 @@ impl Queue {
         Ok(!self.jobs.has_room(tenant, self.settings.limit).await?)
     }
 
-    /// Keeps an item from being deleted, by request or by age, until the hold is dropped. The item
-    /// need not exist yet. To be taken before the item is looked for or added.
+    /// Deletes the record of a job that has ended.
     ///
     /// # Errors
-    /// If other processes share the store, and the database fails.
-    pub async fn hold(&self, id: &str) -> Result<Hold, StoreError> {
-        let hold = self.items.hold(id).await;
-        match &self.peers {
-            Some(peers) => hold.among(peers).await,
-            None => Ok(hold),
+    /// If the database fails.
+    pub async fn delete_job(&self, id: &str) -> Result<Deleted, StoreError> {
+        self.items.note_deleted_rows();
+        self.jobs.delete_job(id, self.clock.now()).await
+    }
+
+    /// Deletes the records of jobs that ended at least `age` ago.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn delete_expired(&self, age: Duration) -> Result<(), StoreError> {
+        let before = self.clock.now().saturating_sub(milliseconds(age));
+        let mut pages = ExpiredPages::new(Resource::Job, before);
+        while let Some(page) = pages.next(self.items.catalogue()).await? {
+            for found in page {
+                self.delete_job(&found.id).await?;
+            }
         }
+        Ok(())
+    }
+
+    /// Makes the table consistent after the previous process ended at any moment: returns its running
+    /// jobs to the queue. To be called before the first worker starts. If other processes may use the store,
+    /// only jobs whose leases have expired are returned. With a `limit`, jobs that were running when that many
+    /// processes died are failed; a program that can compute them in a process of their own needs none. Files
+    /// without a record are left to [`Custodian`](crate::items::Custodian).
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn recover_after_crash(&self, limit: Option<&DeathLimit>) -> Result<(), StoreError> {
+        let alive = Some(self.run.as_str()).filter(|_| self.jobs.is_shared());
+        let released = self
+            .jobs
+            .release_dead(alive, limit, self.clock.now())
+            .await?;
+        if !released.is_empty() {
+            tracing::warn!(
+                released = released.len(),
+                "recovered after the previous process did not stop in order"
+            );
+        }
+        Ok(())
+    }
+
+    /// Returns the jobs of other runs that died to the queue.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn release_dead(&self) -> Result<(), StoreError> {
+        let run = Some(self.run.as_str());
+        let released = self.jobs.release_dead(run, None, self.clock.now());
+        for job in released.await? {
+            tracing::warn!(job = %job.id, "the lease of another run of the service has expired");
+            self.announce(&job);
+        }
+        Ok(())
     }
 
     /// Cancels a waiting job; asks a running one to stop.
@@ -170,7 +216,7 @@ impl Queue {
     }
 
     /// Subscribes to the changes of all jobs. Some of another process may be missed; see
-    /// [`Queue::time_to_look`].
+    /// [`Queue::next_poll`].
     pub fn changes(&self) -> broadcast::Receiver<Arc<Job>> {
         self.changes.subscribe()
     }
@@ -196,7 +242,7 @@ impl Queue {
                 };
                 tokio::select! {
                     () = ended => {}
-                    () = self.time_to_look() => {}
+                    () = self.next_poll() => {}
                 }
             }
         };

@@ -1,85 +1,70 @@
 //! The queue of a process that shares its store with others.
 //!
-//! - **Living.** The process says every [`BEAT`] that it lives.
-//! - **News.** What others change is announced here as if it had happened here: idle workers wake,
+//! - **Heartbeat.** The process writes every [`HEARTBEAT_EVERY`] that it lives.
+//! - **News.** Changes by others are announced here as if they had happened here: idle workers wake,
 //!   streams and waiting requests go on, a running job is told of its cancellation, and local copies
-//!   of erased files are deleted. News can be lost, so all of these look for themselves from time to
-//!   time: workers each second, waiting requests and streams every [`LOOK`], a running job with each
-//!   renewal of its lease, copies every [`FORGET_EVERY`].
-//! - **Duties.** What one process does for all it does under a lease of [`TERM`] by the clock of the
-//!   database, which it renews; see [`Queue::on_duty`].
+//!   of erased files are deleted. News can be lost, so all of these also poll: workers each second,
+//!   waiting requests and streams every [`POLL_EVERY`], a running job with each renewal of its lease,
+//!   copies every [`FORGET_EVERY`].
+//! - **Leader.** Work that one process does for all runs under a lease of [`LEADER_LEASE`] by the clock of the
+//!   database, which the leader renews; see [`Queue::while_leader`].
 //!
-//! A process alone on its store has no peers: it is on duty for ever, and waits for nobody.
+//! A process alone on its store has no peers: it is the leader, and never polls.
 
 use super::Queue;
-use crate::jobs::{JobState, News, Peers, StoreError};
+use crate::records::{JobState, News, Peers, StoreError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
-/// Time between two signs of life.
-const BEAT: Duration = Duration::from_secs(10);
-/// How long a sign of life counts.
-const LIFE: Duration = Duration::from_secs(45);
-/// How long a duty is had without being renewed; it is renewed three times as often.
-const TERM: Duration = Duration::from_secs(15);
-/// How often those look who wait for what another process may do.
-const LOOK: Duration = Duration::from_secs(2);
+/// Time between two heartbeats.
+const HEARTBEAT_EVERY: Duration = Duration::from_secs(10);
+/// A process whose last heartbeat is older is dead.
+const HEARTBEAT_TTL: Duration = Duration::from_secs(45);
+/// Length of the leader's lease; it is renewed three times as often.
+const LEADER_LEASE: Duration = Duration::from_secs(15);
+/// Time between two polls for changes by other processes.
+const POLL_EVERY: Duration = Duration::from_secs(2);
 /// Time between two comparisons of local copies with the records.
 const FORGET_EVERY: Duration = Duration::from_secs(600);
-/// Records looked up at a time.
-const BATCH: usize = 500;
-/// The one duty: all that is done for all.
-const DUTY: &str = "upkeep";
-/// How long an erasure waits for holds of other processes, and between two looks. They release an item
-/// a moment after they have answered.
-const HOLDS_END: (Duration, Duration) = (Duration::from_secs(2), Duration::from_millis(50));
+/// The name of the leader's lease in the database.
+const LEASE_NAME: &str = "upkeep";
 
 impl Queue {
-    /// The same queue in a process that shares its store with these.
-    #[must_use]
-    pub fn among(mut self, peers: Option<Arc<dyn Peers>>) -> Self {
-        if let Some(peers) = &peers {
-            peers.run().clone_into(&mut self.run);
-        }
-        self.peers = peers;
-        self
-    }
-
     /// Whether other processes may use the store.
     pub fn is_shared(&self) -> bool {
-        self.peers.is_some()
+        self.items.is_shared()
     }
 
-    /// Says that this process lives. To be called before it claims jobs or holds items.
+    /// Writes that this process lives. To be called before it claims jobs or pins items.
     ///
     /// # Errors
     /// If the database fails.
-    pub async fn join(&self) -> Result<(), StoreError> {
-        match &self.peers {
-            Some(peers) => peers.live(self.settings.workers, LIFE).await,
+    pub async fn heartbeat(&self) -> Result<(), StoreError> {
+        match self.items.peers() {
+            Some(peers) => peers.heartbeat(self.settings.workers, HEARTBEAT_TTL).await,
             None => Ok(()),
         }
     }
 
-    /// Says so again and again until it is dropped.
-    pub async fn stay(self: Arc<Self>) {
-        if self.peers.is_none() {
+    /// Writes heartbeats until it is dropped.
+    pub async fn run_heartbeat(self: Arc<Self>) {
+        if !self.is_shared() {
             return;
         }
-        let mut beat = tokio::time::interval(BEAT);
+        let mut beat = tokio::time::interval(HEARTBEAT_EVERY);
         loop {
             beat.tick().await;
-            if let Err(error) = self.join().await {
-                tracing::warn!(%error, "a sign of life could not be written");
+            if let Err(error) = self.heartbeat().await {
+                tracing::warn!(%error, "a heartbeat could not be written");
             }
         }
     }
 
-    /// Says that this process ends.
+    /// Writes that this process ends.
     pub async fn leave_peers(&self) {
-        if let Some(peers) = &self.peers
+        if let Some(peers) = self.items.peers()
             && let Err(error) = peers.leave().await
         {
             tracing::warn!(%error, "the others will notice the end of this process in a while");
@@ -91,49 +76,36 @@ impl Queue {
     /// # Errors
     /// If the database fails.
     pub async fn workers(&self) -> Result<u64, StoreError> {
-        match &self.peers {
+        match self.items.peers() {
             Some(peers) => peers.workers().await,
             None => Ok(self.settings.workers as u64),
         }
     }
 
-    /// The same, at least 1.
+    /// [`Queue::workers`], at least 1.
     pub(super) async fn all_workers(&self) -> Result<u64, StoreError> {
         Ok(self.workers().await?.max(1))
     }
 
-    /// Ends when it is time to look for what another process may have done. Never for a process that
-    /// is alone.
-    pub async fn time_to_look(&self) {
-        match &self.peers {
-            Some(_) => tokio::time::sleep(LOOK).await,
+    /// Waits for the next poll for changes by other processes. Never ends for a process that is alone.
+    pub async fn next_poll(&self) {
+        match self.items.peers() {
+            Some(_) => tokio::time::sleep(POLL_EVERY).await,
             None => std::future::pending().await,
         }
     }
 
-    /// Waits a while for other processes that hold one of the items.
-    pub(super) async fn wait_for_holds(&self, items: &[String]) -> Result<(), StoreError> {
-        let Some(peers) = &self.peers else {
-            return Ok(());
-        };
-        let begun = Instant::now();
-        while peers.held_by_others(items).await? && begun.elapsed() < HOLDS_END.0 {
-            tokio::time::sleep(HOLDS_END.1).await;
-        }
-        Ok(())
-    }
-
-    /// Announces here what other processes do, until `end`; calls `scheduled` when a work item was
+    /// Announces changes by other processes until `end`; calls `scheduled` when a work item was
     /// scheduled.
     pub async fn follow_peers(self: Arc<Self>, scheduled: impl Fn(), end: CancellationToken) {
-        let Some(peers) = &self.peers else {
+        let Some(peers) = self.items.peers() else {
             return;
         };
         let follow = async {
             let mut feed = peers.news();
             loop {
                 let news = feed.next().await;
-                if let Err(error) = self.follow(&news, &scheduled).await {
+                if let Err(error) = self.take(&news, &scheduled).await {
                     tracing::warn!(%error, "news of another process could not be followed");
                 }
             }
@@ -142,7 +114,7 @@ impl Queue {
             let mut round = tokio::time::interval(FORGET_EVERY);
             loop {
                 round.tick().await;
-                if let Err(error) = self.forget_erased().await {
+                if let Err(error) = self.items.forget_erased().await {
                     tracing::warn!(%error, "copies of erased files could not be deleted; tried again");
                 }
             }
@@ -154,10 +126,10 @@ impl Queue {
         }
     }
 
-    async fn follow(&self, news: &News, scheduled: &impl Fn()) -> Result<(), StoreError> {
+    async fn take(&self, news: &News, scheduled: &impl Fn()) -> Result<(), StoreError> {
         match news {
-            News::Job(id) => return self.learn(id).await,
-            News::Erased(id) => self.blobs.forget(&BTreeSet::from([id.clone()]))?,
+            News::Job(id) => return self.announce_change(id).await,
+            News::Erased(id) => self.items.blobs().forget(&BTreeSet::from([id.clone()]))?,
             News::Scheduled => scheduled(),
             News::Missed => {
                 scheduled();
@@ -169,7 +141,7 @@ impl Queue {
     }
 
     /// Announces a job that another process has filed or changed.
-    async fn learn(&self, id: &str) -> Result<(), StoreError> {
+    async fn announce_change(&self, id: &str) -> Result<(), StoreError> {
         let Some(job) = self.jobs.job(id).await? else {
             return Ok(());
         };
@@ -184,64 +156,54 @@ impl Queue {
         Ok(())
     }
 
-    /// Deletes the local copies of files whose items are gone.
-    async fn forget_erased(&self) -> Result<(), StoreError> {
-        let copied: Vec<String> = self.blobs.copied().into_iter().collect();
-        for batch in copied.chunks(BATCH) {
-            let known = self.catalogue.known(batch).await?;
-            let gone = batch.iter().filter(|id| !known.contains(*id));
-            let gone: BTreeSet<String> = gone.cloned().collect();
-            if !gone.is_empty() {
-                self.blobs.forget(&gone)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Does `duties` until `end`, in one process on the store at a time. They end when the token is
-    /// cancelled that they are given, which is when this process has lost the duty, or at `end`.
-    pub async fn on_duty<F>(&self, end: CancellationToken, duties: impl Fn(CancellationToken) -> F)
-    where
+    /// Runs `tasks` until `end` while this process is the leader; one process on the store is, at a time.
+    /// The token given to them is cancelled when this process has lost the lease, or at `end`.
+    pub async fn while_leader<F>(
+        &self,
+        end: CancellationToken,
+        tasks: impl Fn(CancellationToken) -> F,
+    ) where
         F: Future<Output = ()>,
     {
-        let Some(peers) = &self.peers else {
-            return duties(end).await;
+        let Some(peers) = self.items.peers() else {
+            return tasks(end).await;
         };
         while !end.is_cancelled() {
             let since = Instant::now();
-            match peers.take_duty(DUTY, TERM).await {
+            match peers.lead(LEASE_NAME, LEADER_LEASE).await {
                 Ok(true) => {
-                    tracing::info!("this process does from now on what one does for all");
+                    tracing::info!("this process is the leader from now on");
                     let term = end.child_token();
-                    let work = duties(term.clone());
+                    let work = tasks(term.clone());
                     tokio::pin!(work);
                     tokio::select! {
                         () = &mut work => {}
-                        () = keep_duty(&**peers, since) => {
-                            tracing::warn!("another process does from now on what one does for all");
+                        () = keep_leadership(&**peers, since) => {
+                            tracing::warn!("another process is the leader from now on");
                             term.cancel();
                             work.await;
                         }
                     }
                 }
                 Ok(false) => {}
-                Err(error) => tracing::warn!(%error, "who is on duty could not be read"),
+                Err(error) => tracing::warn!(%error, "the leader's lease could not be read"),
             }
-            end.run_until_cancelled(tokio::time::sleep(TERM / 3)).await;
+            end.run_until_cancelled(tokio::time::sleep(LEADER_LEASE / 3))
+                .await;
         }
     }
 }
 
-/// Renews the duty; returns when it is lost.
-async fn keep_duty(peers: &dyn Peers, mut since: Instant) {
+/// Renews the leader's lease; returns when it is lost.
+async fn keep_leadership(peers: &dyn Peers, mut since: Instant) {
     loop {
-        tokio::time::sleep(TERM / 3).await;
+        tokio::time::sleep(LEADER_LEASE / 3).await;
         let now = Instant::now();
-        match peers.take_duty(DUTY, TERM).await {
+        match peers.lead(LEASE_NAME, LEADER_LEASE).await {
             Ok(true) => since = now,
             Ok(false) => return,
-            Err(error) if since.elapsed() < TERM => {
-                tracing::warn!(%error, "the duty could not be renewed");
+            Err(error) if since.elapsed() < LEADER_LEASE => {
+                tracing::warn!(%error, "the leader's lease could not be renewed");
             }
             Err(_) => return,
         }

@@ -22,10 +22,9 @@
 //! goes to the service's.
 
 use super::run::Ended;
-use crate::jobs::{
-    Failure, Fault, Isolation, LocalFile, OutputFile, StoredItem, WorkError, WorkInput, WorkOutput,
-    Works,
-};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{Isolation, WorkError, WorkInput, Works};
+use crate::records::{Failure, Fault, LocalFile};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
@@ -43,7 +42,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 /// Longest time until the parent notices that the computation was cancelled.
 const CANCEL_POLL: Duration = Duration::from_millis(20);
 
-/// What the child is to compute.
+/// The order to the child process.
 #[derive(Serialize, Deserialize)]
 struct Order {
     kind: String,
@@ -211,9 +210,10 @@ impl Isolation {
             }
         }
         let status = child.0.wait().map_err(broken_pipe)?;
-        Err(match was_told_to_end(status) {
-            true => Ended::Interrupted,
-            false => Ended::Crashed(status.to_string()),
+        Err(if was_told_to_end(status) {
+            Ended::Interrupted
+        } else {
+            Ended::Crashed(status.to_string())
         })
     }
 }

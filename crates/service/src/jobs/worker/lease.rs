@@ -5,10 +5,11 @@
 //! dead. The expiry is for other runs on the same store.
 
 use super::WorkerSettings;
-use crate::jobs::{Claimant, Lease, Queue, random_id};
+use crate::jobs::Queue;
+use crate::records::{Claimant, Lease, random_id};
 use std::time::Duration;
 
-/// What renewing a lease showed.
+/// The outcome of renewing a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Renewal {
     /// The job is still ours.
@@ -35,8 +36,8 @@ pub(super) fn claimant(queue: &Queue, settings: &WorkerSettings) -> Claimant {
 
 /// Extends the lease by its full length from now.
 pub(super) async fn renew(queue: &Queue, settings: &WorkerSettings, lease: &Lease) -> Renewal {
-    let now = queue.clock.now();
-    match queue.jobs.renew_lease(lease, settings.lease, now).await {
+    let now = queue.now();
+    match queue.table().renew_lease(lease, settings.lease, now).await {
         Ok(Some(false)) => Renewal::Held,
         Ok(Some(true)) => Renewal::CancelRequested,
         Ok(None) => Renewal::Lost,

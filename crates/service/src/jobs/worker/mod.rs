@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 
 /// An idle worker looks for jobs at least this often, because nothing wakes it when another
 /// process files a job.
-const POLL: Duration = Duration::from_secs(1);
+const POLL_EVERY: Duration = Duration::from_secs(1);
 
 /// Stack of the computing threads; recursion over large meshes needs it.
 const STACK_BYTES: usize = 16 << 20;
@@ -90,7 +90,7 @@ async fn run_jobs(runner: JobRunner, drain: CancellationToken) {
         }
         tokio::select! {
             () = runner.queue.woken() => {}
-            () = tokio::time::sleep(POLL) => {}
+            () = tokio::time::sleep(POLL_EVERY) => {}
             () = drain.cancelled() => {}
         }
     }

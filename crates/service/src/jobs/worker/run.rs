@@ -10,9 +10,10 @@
 use super::WorkerSettings;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
-use crate::jobs::{
-    DeathLimit, Failure, Fault, Isolation, Job, JobOutcome, Lease, LocalFile, Queue, StoreError,
-    StoreFault, WorkError, WorkOutput, Works,
+use crate::items::WorkOutput;
+use crate::jobs::{Isolation, Queue, WorkError, Works};
+use crate::records::{
+    DeathLimit, Failure, Fault, Job, JobOutcome, Lease, LocalFile, StoreError, StoreFault,
 };
 use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -31,7 +32,7 @@ const STORAGE_PAUSES: (Duration, Duration) = (Duration::from_secs(1), Duration::
 /// Pause before a job waits again whose files cannot be had because their store is away.
 const AWAY_PAUSE: Duration = Duration::from_secs(10);
 
-/// What one worker needs to run jobs.
+/// The parts that one worker needs to run jobs.
 pub(super) struct JobRunner {
     pub queue: Arc<Queue>,
     pub works: Works,
@@ -40,7 +41,7 @@ pub(super) struct JobRunner {
     pub halt: CancellationToken,
 }
 
-/// What the computation returned; the outer error is a panic.
+/// The result of the computation; the outer error is a panic.
 type Computed = std::thread::Result<Result<WorkOutput, Ended>>;
 
 /// How a computation ended without an output.
@@ -83,7 +84,7 @@ enum Stop {
     LeaseLost,
 }
 
-/// What is written about a job when it leaves its worker.
+/// The record of a job when it leaves its worker.
 enum Resolution {
     /// Nothing: another run of the service has the job.
     Nothing,
@@ -105,13 +106,13 @@ impl JobRunner {
             job: job.to_owned(),
             token: by.token.clone(),
         };
-        let job = match self.queue.jobs.claim(&by, self.queue.clock.now()).await {
+        let job = match self.queue.table().claim(&by, self.queue.now()).await {
             Ok(Some(job)) => job,
             Ok(None) => return Ok(false),
             Err(error) => {
                 // It may have been written all the same; then nobody else will take the job.
                 let unknown = lease("");
-                self.insist(&unknown, || self.queue.jobs.abandon(&unknown.token))
+                self.retry_until_written(&unknown, || self.queue.table().abandon(&unknown.token))
                     .await?;
                 return Err(error);
             }
@@ -137,7 +138,7 @@ impl JobRunner {
         cancel: &CancelToken,
     ) -> Result<Option<Job>, StoreError> {
         // Whoever cancelled the job after it was claimed may not have found its token yet.
-        if let Ok(Some(now)) = self.queue.jobs.job(&job.id).await
+        if let Ok(Some(now)) = self.queue.table().job(&job.id).await
             && now.cancel_requested
         {
             cancel.cancel();
@@ -148,19 +149,17 @@ impl JobRunner {
             Err(error) if error.cause() == StoreFault::Away => {
                 tracing::error!(job = %job.id, %error, "the job waits for the store of its files");
                 self.pause(AWAY_PAUSE).await;
-                let jobs = &self.queue.jobs;
-                let hand_back = || jobs.hand_back(lease, self.queue.clock.now());
-                return self.insist(lease, hand_back).await;
+                let jobs = self.queue.table();
+                let hand_back = || jobs.hand_back(lease, self.queue.now());
+                return self.retry_until_written(lease, hand_back).await;
             }
             Err(error) => {
                 tracing::error!(job = %job.id, %error, "the job's input could not be read");
                 self.pause(STORAGE_PAUSES.0).await;
                 let limit = self.limit(unreadable);
                 return self
-                    .insist(lease, || {
-                        self.queue
-                            .jobs
-                            .crashed(lease, &limit, self.queue.clock.now())
+                    .retry_until_written(lease, || {
+                        self.queue.table().crashed(lease, &limit, self.queue.now())
                     })
                     .await;
             }
@@ -174,7 +173,7 @@ impl JobRunner {
         }
         let resolution = self.resolve(computed, stop);
         let ended = self
-            .insist(lease, || self.commit(job, lease, &resolution))
+            .retry_until_written(lease, || self.commit(job, lease, &resolution))
             .await;
         if abandoned && !computation.result.is_terminated() {
             // The threads are busy until the computation notices the cancel token.
@@ -188,7 +187,7 @@ impl JobRunner {
 
     /// Writes to the storage until that succeeds or the service stops, and renews the lease
     /// meanwhile.
-    async fn insist<F>(
+    async fn retry_until_written<F>(
         &self,
         lease: &Lease,
         write: impl Fn() -> F,
@@ -354,7 +353,7 @@ impl JobRunner {
     async fn write_progress(&self, lease: &Lease, report: &ProgressReport) {
         match self
             .queue
-            .jobs
+            .table()
             .progress(lease, report.stage.as_str(), report.overall)
             .await
         {
@@ -364,7 +363,7 @@ impl JobRunner {
         }
     }
 
-    /// What is to be written about a computation that has ended, or was told to stop.
+    /// The record of a computation that has ended, or was told to stop.
     fn resolve(&self, computed: Option<Computed>, stop: Option<Stop>) -> Resolution {
         match (computed, stop) {
             (_, Some(Stop::LeaseLost)) => Resolution::Nothing,
@@ -390,7 +389,7 @@ impl JobRunner {
         lease: &Lease,
         resolution: &Resolution,
     ) -> Result<Option<Job>, StoreError> {
-        let (jobs, now) = (&self.queue.jobs, self.queue.clock.now());
+        let (jobs, now) = (self.queue.table(), self.queue.now());
         match resolution {
             Resolution::Nothing => Ok(None),
             Resolution::Output(output) => self.commit_output(job, lease, output).await,
@@ -413,8 +412,8 @@ impl JobRunner {
     ) -> Result<Option<Job>, StoreError> {
         let Some(work) = self.works.of_kind(&job.kind) else {
             let outcome = JobOutcome::Failed(unknown_kind());
-            let now = self.queue.clock.now();
-            return self.queue.jobs.finish(lease, &outcome, now).await;
+            let now = self.queue.now();
+            return self.queue.table().finish(lease, &outcome, now).await;
         };
         let made = work.makes();
         self.queue.finish_with(made, job, lease, output).await

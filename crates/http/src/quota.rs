@@ -1,0 +1,59 @@
+//! Reservations of requests under their tenant's quotas, before their bodies are read.
+
+use super::app::App;
+use super::caller::Caller;
+use super::idempotency;
+use super::problem::Answer;
+use axum::http::{HeaderMap, header};
+use ventriform_service::quotas::{Addition, Counting};
+
+/// Reserves a request that stores its body, and files `jobs` jobs.
+///
+/// # Errors
+/// 429 if too many jobs wait, 507 if the announced length of the body has no room.
+pub async fn reserve_upload(
+    app: &App,
+    caller: &Caller,
+    headers: &HeaderMap,
+    jobs: u64,
+) -> Answer<Counting> {
+    let length = headers.get(header::CONTENT_LENGTH);
+    let length: Option<u64> = length.and_then(|length| length.to_str().ok()?.parse().ok());
+    // A longer one is refused anyway.
+    let announced = length.unwrap_or(0).min(app.service.settings.body_limit.0);
+    let addition = Addition {
+        jobs,
+        ..Addition::bytes(announced)
+    };
+    reserve(app, caller, headers, addition).await
+}
+
+/// Reserves a request that stores something of another size than its body.
+///
+/// # Errors
+/// 507 if the tenant's quota is full.
+pub async fn reserve_item(app: &App, caller: &Caller, headers: &HeaderMap) -> Answer<Counting> {
+    reserve(app, caller, headers, Addition::bytes(0)).await
+}
+
+/// Reserves a request that files a job on what is stored.
+///
+/// # Errors
+/// 429 if too many jobs wait, 507 if the tenant's quota of bytes is full.
+pub async fn reserve_job(app: &App, caller: &Caller, headers: &HeaderMap) -> Answer<Counting> {
+    reserve(app, caller, headers, Addition::JOB).await
+}
+
+async fn reserve(
+    app: &App,
+    caller: &Caller,
+    headers: &HeaderMap,
+    addition: Addition,
+) -> Answer<Counting> {
+    let key = idempotency::key(headers)?;
+    let reserved =
+        app.service
+            .quotas
+            .reserve(&caller.tenant, caller.quota, addition, key.as_deref());
+    Ok(reserved.await?)
+}

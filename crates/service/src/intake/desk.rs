@@ -1,0 +1,16 @@
+//! The reception of objects, for those who bring them and those who look after them.
+
+use super::{IntakeStore, ReceivedFiles, Receiver, Sessions};
+use std::sync::Arc;
+
+/// The reception of objects.
+pub struct Intake {
+    /// Takes objects.
+    pub receiver: Arc<Receiver>,
+    /// The groups that wait.
+    pub sessions: Arc<Sessions>,
+    /// The tables.
+    pub store: Arc<dyn IntakeStore>,
+    /// The files.
+    pub files: Arc<dyn ReceivedFiles>,
+}

@@ -1,0 +1,69 @@
+//! Contents of items: files that were made and are to be stored, stored files to be read.
+
+use crate::records::{LocalFile, ScanIdentity, StoredVolume, Timestamp};
+use serde_json::{Map, Value};
+use std::borrow::Cow;
+use std::io::ErrorKind;
+
+/// The output of a job.
+#[derive(Debug, Clone, Default)]
+pub struct WorkOutput {
+    /// Counts and main figures.
+    pub summary: Map<String, Value>,
+    /// The files.
+    pub files: Vec<OutputFile>,
+}
+
+/// One file of a [`WorkOutput`].
+#[derive(Debug, Clone)]
+pub struct OutputFile {
+    /// Its name: `mesh.glb`, `report.json` ...
+    pub name: String,
+    /// Its media type.
+    pub media_type: Cow<'static, str>,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// A stored volume or product, with local copies of its files.
+#[derive(Debug, Clone)]
+pub struct StoredItem {
+    /// Its id.
+    pub id: String,
+    /// The parameters it was made with; empty for a volume.
+    pub parameters: Map<String, Value>,
+    /// The requested files, those that exist.
+    pub files: Vec<LocalFile>,
+}
+
+impl StoredItem {
+    /// The content of the file with that name; `None` if it does not exist or was deleted.
+    ///
+    /// # Errors
+    /// If the file exists but cannot be read.
+    pub fn read(&self, name: &str) -> std::io::Result<Option<Vec<u8>>> {
+        let Some(file) = self.files.iter().find(|file| file.ends_with(name)) else {
+            return Ok(None);
+        };
+        match std::fs::read(file) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// A stored result beside the volume that it was made of.
+#[derive(Debug, Clone)]
+pub struct StoredResult {
+    /// When the tenant first had it.
+    pub made_at: Timestamp,
+    /// The result, with the requested files.
+    pub files: StoredItem,
+    /// The volume.
+    pub volume: StoredVolume,
+    /// The volume's files.
+    pub volume_files: Vec<LocalFile>,
+    /// Whose scan the volume is.
+    pub scan: ScanIdentity,
+}

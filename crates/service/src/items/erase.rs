@@ -1,0 +1,283 @@
+//! Erasing: on request or by age, one item or everything made of a volume.
+//!
+//! The records go first, in one transaction that also writes the receipt; then the files; then the
+//! database's log is moved into the database, whose freed pages are overwritten. A crash in between
+//! leaves files without a record, which the next start deletes. All of it runs in a task of its own,
+//! which goes on if the caller goes away.
+
+use super::{Items, to_its_end};
+use crate::records::{
+    Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, Resource, StoreError,
+    Tenant, Timestamp,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// The name under which the upkeep erases.
+const BY_RETENTION: &str = "retention";
+
+/// Items beyond their age that are read at a time.
+const PAGE_ITEMS: u32 = 500;
+
+/// Longest time that an erasure waits for pins of other processes, and the time between two looks. They unpin an item
+/// a moment after they have answered.
+const PINS_WAIT: Duration = Duration::from_secs(2);
+const PINS_POLL: Duration = Duration::from_millis(50);
+
+/// Local copies looked up at a time.
+const COPIES_BATCH: usize = 500;
+
+/// Ages at which things are erased. `None` keeps them until somebody erases them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RetentionAges {
+    /// Of volumes, counted from their last upload or use.
+    pub volumes: Option<Duration>,
+    /// Of models and segmentations, counted from when they were last computed.
+    pub results: Option<Duration>,
+    /// Of the records of finished jobs, counted from their end.
+    pub jobs: Option<Duration>,
+}
+
+impl RetentionAges {
+    /// When an item of that kind will be erased that was renewed at the moment `renewed`; `None`
+    /// if it is kept.
+    pub fn expires_at(&self, kind: Resource, renewed: Timestamp) -> Option<Timestamp> {
+        let age = self.of(kind);
+        age.map(|age| renewed.saturating_add(milliseconds(age)))
+    }
+
+    /// The age at which what is of that kind is erased.
+    pub(crate) fn of(&self, kind: Resource) -> Option<Duration> {
+        match kind {
+            Resource::Volume => self.volumes,
+            Resource::Model | Resource::Segmentation => self.results,
+            Resource::Job => self.jobs,
+            Resource::Template | Resource::Reader => None,
+        }
+    }
+}
+
+pub(crate) fn milliseconds(age: Duration) -> i64 {
+    i64::try_from(age.as_millis()).unwrap_or(i64::MAX)
+}
+
+impl Items {
+    /// Erases an item that no unfinished job needs and no legal hold keeps.
+    ///
+    /// # Errors
+    /// If the database fails. Files that could not be deleted are deleted by the upkeep, or by the
+    /// next start.
+    pub async fn erase(self: &Arc<Self>, order: ErasureOrder) -> Result<Erased, StoreError> {
+        let items = self.clone();
+        to_its_end(async move {
+            let erased = items.erase_item(&order).await?;
+            items.overwrite_if_due().await?;
+            Ok(erased)
+        })
+        .await
+    }
+
+    /// Waits a while for other processes that have pinned one of the items.
+    async fn wait_for_pins(&self, items: &[String]) -> Result<(), StoreError> {
+        let Some(peers) = &self.peers else {
+            return Ok(());
+        };
+        let begun = Instant::now();
+        while peers.pinned_by_others(items).await? && begun.elapsed() < PINS_WAIT {
+            tokio::time::sleep(PINS_POLL).await;
+        }
+        Ok(())
+    }
+
+    /// Deletes the local copies of files whose items are gone.
+    pub(crate) async fn forget_erased(&self) -> Result<(), StoreError> {
+        let copied: Vec<String> = self.blobs.copied().into_iter().collect();
+        for batch in copied.chunks(COPIES_BATCH) {
+            let known = self.catalogue.known(batch).await?;
+            let gone = batch.iter().filter(|id| !known.contains(*id));
+            let gone: BTreeSet<String> = gone.cloned().collect();
+            if !gone.is_empty() {
+                self.blobs.forget(&gone)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Deletes the files of items that were added or deleted by halves because the storage failed.
+    /// Nobody was told that they are stored, or somebody was told that they are deleted.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn settle_unsettled(&self) -> Result<(), StoreError> {
+        for (id, files) in self.locks.unsettled() {
+            let _lock = self.locks.lock(&id).await;
+            if !self.locks.is_unsettled(&id) {
+                continue;
+            }
+            if self.catalogue.record(&id).await?.is_none() {
+                self.blobs.delete(&id, &files).await?;
+                tracing::info!(id, "deleted files that have no record");
+            }
+            self.locks.settle(&id);
+        }
+        Ok(())
+    }
+
+    /// Notes that rows were deleted, which are to be overwritten in the database's files.
+    pub(crate) fn note_deleted_rows(&self) {
+        self.overwrite_due.store(true, Ordering::Relaxed);
+    }
+
+    /// Erases whose scan a volume is; the volume stays. `false` if there is no such volume, or it is
+    /// on legal hold.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn erase_scan(
+        self: &Arc<Self>,
+        tenant: &Tenant,
+        volume: &str,
+    ) -> Result<bool, StoreError> {
+        let (items, tenant, volume) = (self.clone(), tenant.clone(), volume.to_owned());
+        to_its_end(async move {
+            let now = items.clock.now();
+            let erased = items.catalogue.erase_scan(&tenant, &volume, now).await?;
+            items.overwrite_due.store(true, Ordering::Relaxed);
+            items.overwrite_if_due().await?;
+            Ok(erased)
+        })
+        .await
+    }
+
+    async fn erase_item(&self, order: &ErasureOrder) -> Result<Erased, StoreError> {
+        let mut ids = vec![order.id.clone()];
+        if order.cascade {
+            ids.extend(self.catalogue.made_of(&order.tenant, &order.id).await?);
+        }
+        // Whoever takes several locks takes them in the order of ids.
+        ids.sort();
+        ids.dedup();
+        self.wait_for_pins(&ids).await?;
+        let mut locks = Vec::with_capacity(ids.len());
+        for id in &ids {
+            locks.push(self.locks.lock(id).await);
+        }
+        if ids.iter().any(|id| self.locks.is_pinned(id)) {
+            return Ok(Erased::InUse);
+        }
+        // Unless erased and settled below, the upkeep looks at them.
+        let mut doomed = BTreeMap::new();
+        for id in &ids {
+            let record = self.catalogue.record(id).await?;
+            let files = record.map_or_else(Vec::new, |record| record.files());
+            self.locks.doom(id, files.clone());
+            doomed.insert(id.clone(), files);
+        }
+        let erased = self.catalogue.erase(order, &ids, self.clock.now()).await?;
+        if let Erased::Done(receipt) = &erased {
+            self.overwrite_due.store(true, Ordering::Relaxed);
+            for item in &receipt.items {
+                let files = doomed.get(&item.id).map_or(&[][..], Vec::as_slice);
+                if item.files_erased
+                    && let Err(error) = self.blobs.delete(&item.id, files).await
+                {
+                    let id = &item.id;
+                    tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
+                    continue;
+                }
+                self.locks.settle(&item.id);
+            }
+        }
+        Ok(erased)
+    }
+
+    /// Erases items that are too old, page by page.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
+        for kind in [Resource::Volume, Resource::Model, Resource::Segmentation] {
+            let Some(age) = ages.of(kind) else {
+                continue;
+            };
+            let before = self.clock.now().saturating_sub(milliseconds(age));
+            let mut pages = ExpiredPages::new(kind, before);
+            while let Some(page) = pages.next(self.catalogue()).await? {
+                for found in page {
+                    let order = by_retention(found.tenant, found.id, Some(before));
+                    self.erase_item(&order).await?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Overwrites what was deleted from the database since the last time.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn overwrite_if_due(&self) -> Result<(), StoreError> {
+        if self.overwrite_due.swap(false, Ordering::Relaxed)
+            && !self.catalogue.overwrite_erased().await?
+        {
+            self.overwrite_due.store(true, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+/// Pages of the items or jobs of one kind that are beyond their age. Those that cannot be erased now are seen again
+/// in the next round only.
+pub(crate) struct ExpiredPages {
+    kind: Resource,
+    before: Timestamp,
+    last: Option<Expired>,
+    ended: bool,
+}
+
+impl ExpiredPages {
+    /// Those last renewed before `before`.
+    pub fn new(kind: Resource, before: Timestamp) -> Self {
+        Self {
+            kind,
+            before,
+            last: None,
+            ended: false,
+        }
+    }
+
+    /// The next page; `None` after the last one.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn next(
+        &mut self,
+        catalogue: &dyn Catalogue,
+    ) -> Result<Option<Vec<Expired>>, StoreError> {
+        if self.ended {
+            return Ok(None);
+        }
+        let page = catalogue
+            .expired(self.kind, self.before, self.last.as_ref(), PAGE_ITEMS)
+            .await?;
+        self.ended = page.len() < PAGE_ITEMS as usize;
+        self.last = page.last().cloned();
+        Ok(Some(page))
+    }
+}
+
+fn by_retention(tenant: Tenant, id: String, before: Option<Timestamp>) -> ErasureOrder {
+    ErasureOrder {
+        tenant,
+        id,
+        cascade: false,
+        renewed_before: before,
+        by: ErasureAgent {
+            name: BY_RETENTION.into(),
+            ..ErasureAgent::default()
+        },
+        reason: ErasureReason::Retention,
+    }
+}

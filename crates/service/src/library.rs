@@ -1,0 +1,108 @@
+//! Templates and readers' profiles, added by a tenant.
+//!
+//! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets the
+//! same limits; here they are refused before the body is read, and read under the budget of decoding.
+
+use crate::access::Quota;
+use crate::decoding::LITTLE_MEMORY;
+use crate::error::{Refusal, ServiceError};
+use crate::items::{NotAdded, TemplateSource};
+use crate::quotas::Counting;
+use crate::records::{Held, ItemFilter, ListRequest, Product, ProductRoom, Resource, Tenant};
+use crate::service::Service;
+use bytes::Bytes;
+use ventriform::mesh_files::MeshStatement;
+use ventriform::progress::Monitor;
+
+/// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
+const MEMORY_PER_BYTE: u64 = 16;
+
+/// A product with its owner's record, and whether it is new.
+pub type Added = (Held<Product>, bool);
+
+impl From<NotAdded> for ServiceError {
+    fn from(error: NotAdded) -> Self {
+        match error {
+            NotAdded::Refused(failure) => failure.into(),
+            NotAdded::TooMany(failure) => Self::new(Refusal::Conflict, failure),
+            NotAdded::TooLarge(failure) => Self::new(Refusal::NoRoom, failure),
+            NotAdded::Store(error) => error.into(),
+        }
+    }
+}
+
+impl Service {
+    /// Adds a mesh in any format as a template of that organ.
+    ///
+    /// # Errors
+    /// If the mesh or the name cannot be used, the tenant has no room for it, or the storage fails.
+    pub async fn add_template(
+        &self,
+        source: TemplateSource<'_>,
+        organ: &str,
+        mesh: Bytes,
+        stated: MeshStatement,
+        quota: Quota,
+        _counting: &Counting,
+    ) -> Result<Added, ServiceError> {
+        let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
+        let (reader, shows) = (self.engine.reader.clone(), organ.to_owned());
+        let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
+        let output = self.decoding.run(memory, make).await??;
+        let room = self.product_room(Resource::Template, quota);
+        let added = self.items().add_template(source, organ, output, room);
+        Ok(added.await?)
+    }
+
+    /// Adds a reader's profile.
+    ///
+    /// # Errors
+    /// As [`Service::add_template`].
+    pub async fn add_reader(
+        &self,
+        tenant: &Tenant,
+        name: &str,
+        profile: Bytes,
+        quota: Quota,
+        _counting: &Counting,
+    ) -> Result<Added, ServiceError> {
+        let reader = self.engine.reader.clone();
+        let check = move |_: &Monitor<'_>| reader.profile(&profile);
+        let output = self.decoding.run(LITTLE_MEMORY, check).await??;
+        let room = self.product_room(Resource::Reader, quota);
+        Ok(self.items().add_reader(tenant, name, output, room).await?)
+    }
+
+    /// Refuses another template or reader where the tenant has as many as it may have, before it is sent.
+    ///
+    /// # Errors
+    /// `library-full`.
+    pub async fn require_product_room(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+    ) -> Result<(), ServiceError> {
+        let limit = self.product_room(kind, Quota::default()).count;
+        let page = ListRequest {
+            before: None,
+            limit,
+        };
+        let filter = ItemFilter::default();
+        let catalogue = self.items().catalogue();
+        let page = catalogue.products(tenant, kind, &filter, page).await?;
+        if page.items.len() < limit as usize {
+            return Ok(());
+        }
+        Err(NotAdded::too_many(kind, limit).into())
+    }
+
+    fn product_room(&self, kind: Resource, quota: Quota) -> ProductRoom {
+        ProductRoom {
+            count: match kind {
+                Resource::Reader => self.settings.reader_limit,
+                _ => self.settings.template_limit,
+            },
+            bytes: quota.bytes,
+        }
+    }
+}

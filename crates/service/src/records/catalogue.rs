@@ -1,0 +1,169 @@
+//! The interface to the records of volumes and products.
+//!
+//! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
+
+use super::{
+    Custody, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
+};
+use super::{Resource, Tenant, Timestamp};
+use async_trait::async_trait;
+
+/// The result of a request to delete a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Deleted {
+    /// It is deleted.
+    Done,
+    /// It has not ended.
+    InUse,
+    /// There is no such job.
+    Unknown,
+}
+
+/// Bounds on what a tenant may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ProductRoom {
+    /// Products of the kind.
+    pub count: u32,
+    /// Bytes of everything that it stores; `None` is no bound.
+    pub bytes: Option<u64>,
+}
+
+/// The result of adding a product.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AddedProduct {
+    /// It is new for the tenant.
+    New,
+    /// The tenant has it already.
+    Known,
+    /// The tenant has as many of the kind as it may have.
+    TooMany,
+    /// The tenant stores this many bytes, and the product does not fit.
+    TooLarge {
+        /// The bytes.
+        stored: u64,
+    },
+}
+
+/// The tables of volumes and products. Every method is one transaction and fails only if the
+/// database does.
+#[async_trait]
+pub trait Catalogue: Custody + Scans {
+    /// Adds a volume, unless it is stored already, and gives it to a tenant; see
+    /// [`Catalogue::renew_volume`]. `scan` is what its file says of the scan. Returns whether it is
+    /// new for the tenant.
+    async fn add_volume(
+        &self,
+        volume: &StoredVolume,
+        tenant: &Tenant,
+        tags: &Tags,
+        scan: Option<&ScanFields>,
+    ) -> StoreResult<bool>;
+
+    /// Gives a stored volume to a tenant, or renews it: its age counts from `now` on, and the
+    /// given tags replace those it has, and it is noted what its file says of the scan. Also returns
+    /// whether it is new for the tenant. `None` if it is not stored.
+    async fn renew_volume(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        tags: &Tags,
+        scan: Option<&ScanFields>,
+        now: Timestamp,
+    ) -> StoreResult<Option<(Held<StoredVolume>, bool)>>;
+
+    /// The volume with that id.
+    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>>;
+
+    /// Volumes, newest first.
+    async fn volumes(
+        &self,
+        tenant: &Tenant,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<StoredVolume>>>;
+
+    /// Adds a product that was not made by a job, unless it is stored already, and gives it to a
+    /// tenant that has it already or has room for it. `source` is the volume it was made of.
+    async fn add_product(
+        &self,
+        product: &Product,
+        tenant: &Tenant,
+        source: Option<&str>,
+        room: ProductRoom,
+    ) -> StoreResult<AddedProduct>;
+
+    /// The product with that id.
+    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>>;
+
+    /// Products of one kind, newest first.
+    async fn products(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Held<Product>>>;
+
+    /// Replaces the tags of an item or a job. `false` if there is none with that id.
+    async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool>;
+
+    /// Sets whether every `model=auto` of the tenant fits a template. `false` if it has no such
+    /// template.
+    async fn set_library(&self, tenant: &Tenant, id: &str, library: bool) -> StoreResult<bool>;
+
+    /// Sets or lifts a tenant's legal hold on an item. `false` if it has no such item.
+    async fn set_legal_hold(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        hold: Option<&LegalHold>,
+    ) -> StoreResult<bool>;
+
+    /// The products of a volume: models, segmentations, templates.
+    async fn made_of(&self, tenant: &Tenant, volume: &str) -> StoreResult<Vec<String>>;
+
+    /// Erases an item that no unfinished job needs and no legal hold keeps. The record of its
+    /// content is deleted with the last tenant's holding. Fails with [`Erased::InUse`] if
+    /// something would go with it that is not among `expected`.
+    async fn erase(
+        &self,
+        order: &ErasureOrder,
+        expected: &[String],
+        now: Timestamp,
+    ) -> StoreResult<Erased>;
+
+    /// When the item or job with that id was erased; `None` if the tenant never had it.
+    async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>>;
+
+    /// The receipt with that id.
+    async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>>;
+
+    /// Receipts, newest first: all, or those of one item.
+    async fn receipts(
+        &self,
+        tenant: &Tenant,
+        item: Option<&str>,
+        page: ListRequest,
+    ) -> StoreResult<ListPage<Receipt>>;
+
+    /// At most `limit` items of one kind (or finished jobs) whose age counts from before a moment and that no
+    /// legal hold keeps, oldest first, after the place of `after`. The age of an item counts from its last
+    /// upload or computation, that of a volume also from when a job on it was last filed or computed, that of
+    /// a job from its end.
+    async fn expired(
+        &self,
+        kind: Resource,
+        before: Timestamp,
+        after: Option<&Expired>,
+        limit: u32,
+    ) -> StoreResult<Vec<Expired>>;
+
+    /// A number that every write of this process changes, also of jobs; `None` while there may be a
+    /// write under way. What was read between two equal answers is current until the answer changes.
+    fn version(&self) -> Option<u64>;
+
+    /// Overwrites what was deleted from the database: moves the write-ahead log, which still holds
+    /// it, into the database. `false` if readers were in the way; the next call tries again.
+    async fn overwrite_erased(&self) -> StoreResult<bool>;
+}

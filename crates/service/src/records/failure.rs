@@ -1,0 +1,70 @@
+//! Why a request was rejected or a job failed, in a form that is stored with the job.
+
+use serde::{Deserialize, Serialize};
+
+/// A reason with advice. It is stored with a failed job and becomes a problem object over HTTP.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[error("{detail}")]
+pub struct Failure {
+    /// A stable identifier for programs: `no-surface`, `job-time-limit` ...
+    pub code: String,
+    /// Where the cause lies; this decides the HTTP status.
+    pub fault: Fault,
+    /// The cause, with the values involved, as a sentence. Contains neither patient data nor
+    /// internals of the service.
+    pub detail: String,
+    /// The parameter, or the field of the file, that caused it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
+    /// Advice, as a sentence.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fix: Option<String>,
+}
+
+/// Where the cause of a [`Failure`] lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fault {
+    /// In the request: a parameter, or the form of the call.
+    Request,
+    /// In the uploaded file or its content.
+    Content,
+    /// The file exceeds a limit set by the operator.
+    TooLarge,
+    /// In the service.
+    Service,
+}
+
+impl Failure {
+    /// A failure without field and advice; add them with [`Failure::at`] and [`Failure::fix`].
+    pub fn new(fault: Fault, code: &str, detail: impl Into<String>) -> Self {
+        Self {
+            code: code.into(),
+            fault,
+            detail: detail.into(),
+            field: None,
+            fix: None,
+        }
+    }
+
+    /// Sets the field that caused the failure.
+    #[must_use]
+    pub fn at(mut self, field: impl Into<String>) -> Self {
+        self.field = Some(field.into());
+        self
+    }
+
+    /// Says that the field concerned is inside of the field `outer`.
+    #[must_use]
+    pub fn within(mut self, outer: &str) -> Self {
+        self.field = self.field.map(|field| format!("{outer}.{field}"));
+        self
+    }
+
+    /// Sets the advice.
+    #[must_use]
+    pub fn fix(mut self, fix: impl Into<String>) -> Self {
+        self.fix = Some(fix.into());
+        self
+    }
+}

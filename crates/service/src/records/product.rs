@@ -1,0 +1,67 @@
+//! The record of a product: a model, a segmentation or a template.
+
+use super::FileRecord;
+use super::{Resource, Timestamp};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// One row of the products table. It never changes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Product {
+    /// Derived from the content, with the prefix of its [`Resource`].
+    pub id: String,
+    /// Position in the order of creation; 0 before it is stored.
+    pub sequence: i64,
+    /// When it was made.
+    pub created_at: Timestamp,
+    /// Id of the volume it was made from; `None` for a template.
+    pub volume: Option<String>,
+    /// The parameters used, with every default written out.
+    pub parameters: Map<String, Value>,
+    /// Counts and main figures, as returned by the work.
+    pub summary: Map<String, Value>,
+    /// The version of the program that made it.
+    pub software: String,
+    /// Its files.
+    pub files: Vec<ProductFile>,
+}
+
+/// One file of a product.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ProductFile {
+    /// `mesh.glb`, `report.json` ...
+    pub name: String,
+    /// Its media type.
+    pub media_type: String,
+    /// Its length in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal.
+    pub sha256: String,
+    /// As of [`FileRecord::place`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<String>,
+}
+
+impl ProductFile {
+    /// Its name in the file store, and what it must contain.
+    pub fn record(&self) -> FileRecord {
+        FileRecord {
+            name: self.name.clone(),
+            bytes: self.bytes,
+            sha256: self.sha256.clone(),
+            place: self.place.clone(),
+        }
+    }
+}
+
+impl Product {
+    /// Its kind.
+    pub fn resource(&self) -> Resource {
+        Resource::of(&self.id).unwrap_or(Resource::Model)
+    }
+
+    /// The file with that name.
+    pub fn file(&self, name: &str) -> Option<&ProductFile> {
+        self.files.iter().find(|file| file.name == name)
+    }
+}

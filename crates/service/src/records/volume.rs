@@ -1,0 +1,38 @@
+//! The record of an uploaded volume.
+
+use super::Timestamp;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// A stored file and what it must contain.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileRecord {
+    /// Its name in the file store.
+    pub name: String,
+    /// Its length in bytes.
+    pub bytes: u64,
+    /// SHA-256 of its content, hexadecimal. Volumes stored by older versions have the first half
+    /// of it, or (those of several files, until they are first verified) nothing and no length.
+    pub sha256: String,
+    /// In a store that keeps every publication of an item apart, the one that this file is part of;
+    /// see [`StagedFiles::place`](super::StagedFiles::place).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place: Option<String>,
+}
+
+/// One row of the volumes table.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StoredVolume {
+    /// `vol_...`, derived from the content.
+    pub id: String,
+    /// Position in the order of arrival; 0 before it is stored.
+    pub sequence: i64,
+    /// When it was stored.
+    pub created_at: Timestamp,
+    /// Total length of its files in bytes.
+    pub bytes: u64,
+    /// Its files in the file store. Their names are not those given by the client.
+    pub files: Vec<FileRecord>,
+    /// What was found out about the content when it was uploaded; the queue does not read it.
+    pub facts: Value,
+}

@@ -1,0 +1,136 @@
+//! Rules for received series: their volumes are stored as an upload is, and the jobs that the settings ask for are
+//! filed as a request's are.
+
+use crate::client::ClientAddress;
+use crate::error::ServiceError;
+use crate::filing::UnattendedJob;
+use crate::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
+use crate::records::{LocalFile, Priority, Tags, Tenant};
+use crate::service::Service;
+use crate::uploads::VolumeUpload;
+use async_trait::async_trait;
+use futures::TryStreamExt;
+use serde_json::{Map, Value};
+use tokio_util::io::ReaderStream;
+
+/// Bytes of a file that are read at a time.
+const CHUNK_BYTES: usize = 256 << 10;
+
+#[async_trait]
+impl VolumeMaker for Service {
+    async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError> {
+        // What was received counts already.
+        let mut upload = VolumeUpload::new(self, &self.quotas.counted_before());
+        for file in files {
+            let file = tokio::fs::File::open(file).await;
+            let file = file.map_err(|error| MakeError::Later(error.to_string()))?;
+            let pieces = ReaderStream::with_capacity(file, CHUNK_BYTES);
+            upload.write(pieces.map_err(ServiceError::internal)).await?;
+        }
+        let tags = Tags::default();
+        let stored = self.store_volume(&group.origin.tenant, upload, &tags);
+        // Decoding is shared out between the senders.
+        let stored = match group.origin.address.parse() {
+            Ok(address) => ClientAddress::of_peer(address).scope(stored).await?,
+            Err(_) => stored.await?,
+        };
+        Ok(stored.volume.item.id)
+    }
+
+    async fn file(
+        &self,
+        group: &IntakeGroup,
+        rule: &Rule,
+        volume: &str,
+        key: String,
+    ) -> Result<String, MakeError> {
+        let tenant = &group.origin.tenant;
+        let names = Some(rule.send.clone()).filter(|names| !names.is_empty());
+        let send = self.send_order(tenant, &rule.kind, names, rule.to.as_deref(), None);
+        let job = UnattendedJob {
+            ordered_by: "rule",
+            tenant,
+            kind: &rule.kind,
+            priority: Priority::default(),
+            parameters: &rule.parameters,
+            volume: Some(volume),
+            source: None,
+            send: send.map_err(ServiceError::from)?,
+            key,
+        };
+        Ok(self.file_unattended(job).await?)
+    }
+}
+
+impl Service {
+    /// Checks the rules and the procedures of the settings: kinds, parameters, objects to send and archives.
+    ///
+    /// # Errors
+    /// The fault, with the number of the rule or procedure.
+    pub(crate) fn check_rules(&self) -> Result<(), String> {
+        for (number, rule) in self.settings.rules.0.iter().enumerate() {
+            // An archive may serve some tenants only; whose the volumes are is not known yet.
+            let mut archives = self.settings.archives.0.iter();
+            let archive = archives.find(|archive| Some(&archive.name) == rule.to.as_ref());
+            let tenant = archive.and_then(|archive| archive.tenants.first().cloned());
+            let tenant = tenant.unwrap_or_default();
+            self.check_work(
+                &tenant,
+                &rule.kind,
+                &rule.parameters,
+                &rule.send,
+                rule.to.as_deref(),
+            )
+            .map_err(|reason| format!("rule {}: {reason}", number + 1))?;
+        }
+        for (number, procedure) in self.settings.procedures.0.iter().enumerate() {
+            let wrong = |reason: String| format!("procedure {}: {reason}", number + 1);
+            let tenant = &procedure.tenant;
+            let archive = self.settings.archives.named(&procedure.archive, tenant);
+            if archive.is_none_or(|archive| archive.dicomweb.is_none()) {
+                let name = &procedure.archive;
+                return Err(wrong(format!(
+                    "the tenant has no archive `{name}` with `dicomweb`"
+                )));
+            }
+            let to = if procedure.send.is_empty() {
+                procedure.to.as_ref()
+            } else {
+                procedure.to.as_ref().or(Some(&procedure.archive))
+            };
+            let to = to.map(String::as_str);
+            self.check_work(
+                tenant,
+                &procedure.kind,
+                &procedure.parameters,
+                &procedure.send,
+                to,
+            )
+            .map_err(wrong)?;
+        }
+        Ok(())
+    }
+
+    fn check_work(
+        &self,
+        tenant: &Tenant,
+        kind: &str,
+        parameters: &Map<String, Value>,
+        send: &[String],
+        to: Option<&str>,
+    ) -> Result<(), String> {
+        let Some(work) = self.engine.work(kind) else {
+            let kinds: Vec<_> = self.engine.works.iter().map(|w| w.makes().noun()).collect();
+            return Err(format!(
+                "there is no kind of job `{kind}`; known are {}",
+                kinds.join(", ")
+            ));
+        };
+        work.parameters_from_json(parameters)
+            .map_err(|failure| failure.detail)?;
+        let names = Some(send.to_vec()).filter(|names| !names.is_empty());
+        self.send_order(tenant, kind, names, to, None)
+            .map_err(|failure| failure.detail)?;
+        Ok(())
+    }
+}

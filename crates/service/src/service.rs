@@ -1,0 +1,111 @@
+//! The service: one method for each use case, whoever asks for it.
+//!
+//! HTTP, C-STORE, archive fetches, rules, work items and background tasks call the same methods, which check the
+//! same quotas and limits and return a [`ServiceError`](crate::error::ServiceError).
+//!
+//! | use case | where |
+//! |---|---|
+//! | store a volume | [`crate::uploads`] |
+//! | file a job | [`crate::filing`], its archives [`crate::series`] |
+//! | add a template or a reader | [`crate::library`] |
+//! | read whose scan a volume is | [`crate::scans`] |
+//! | serve rules for received series | [`crate::rules`] |
+//! | perform work items | [`crate::procedures`] |
+//! | count what tenants may store and queue | [`crate::quotas`] |
+
+use crate::access::{AccessStore, Recorder};
+use crate::archive::ArchiveDesk;
+use crate::config::Settings;
+use crate::decoding::Decoding;
+use crate::hooks::Hooks;
+use crate::intake::Intake;
+use crate::items::{Items, RetentionAges};
+use crate::jobs::Queue;
+use crate::memory::MemoryBudget;
+use crate::quotas::Quotas;
+use crate::records::{Clock, FigureStore, Holding, Resource, Timestamp};
+use crate::telemetry::{Metrics, Readiness, Spans};
+use crate::work::Engine;
+use crate::worklist::Worklist;
+use std::sync::Arc;
+use tokio::sync::Notify;
+use tokio_util::sync::CancellationToken;
+
+/// The parts of one service.
+pub struct Service {
+    pub(crate) queue: Arc<Queue>,
+    /// The kinds of work, and the reader of uploads.
+    pub engine: Engine,
+    /// Keys and audit trail.
+    pub access: Arc<dyn AccessStore>,
+    /// Writes the audit trail.
+    pub recorder: Arc<Recorder>,
+    /// Work items of other systems.
+    pub worklist: Arc<dyn Worklist>,
+    /// Notified when a work item is scheduled or changed.
+    pub scheduled: Notify,
+    /// Limits on what tenants store and queue.
+    pub quotas: Quotas,
+    /// The operator's settings.
+    pub settings: Settings,
+    /// Cancelled when the service shuts down, so that long answers end.
+    pub closing: CancellationToken,
+    /// Reads files outside of jobs.
+    pub decoding: Decoding,
+    /// The memory that requests may hold.
+    pub memory: MemoryBudget,
+    /// Webhooks.
+    pub hooks: Hooks,
+    /// Archives.
+    pub archives: ArchiveDesk,
+    /// Receives objects of other systems.
+    pub intake: Intake,
+    /// Figures for operators.
+    pub metrics: Metrics,
+    /// Whether the storage works.
+    pub readiness: Readiness,
+    /// Figures that only the database knows.
+    pub figures: Arc<dyn FigureStore>,
+    /// Traces of requests.
+    pub spans: Spans,
+}
+
+/// The ages at which the operator lets things be erased.
+pub fn retention_ages(settings: &Settings) -> RetentionAges {
+    let general = settings.retention.0.map(|span| span.0);
+    RetentionAges {
+        volumes: settings.volume_retention.or(general),
+        results: settings.result_retention.or(general),
+        jobs: settings.job_retention.or(general),
+    }
+}
+
+impl Service {
+    /// The jobs.
+    pub fn queue(&self) -> &Arc<Queue> {
+        &self.queue
+    }
+
+    /// The volumes and products.
+    pub fn items(&self) -> &Arc<Items> {
+        self.queue.items()
+    }
+
+    /// The time of day.
+    pub fn clock(&self) -> &Arc<dyn Clock> {
+        self.queue.clock()
+    }
+
+    /// The time now.
+    pub fn now(&self) -> Timestamp {
+        self.queue.now()
+    }
+
+    /// When an item of that kind will be erased; `None` if it is kept.
+    pub fn expires_at(&self, kind: Resource, holding: &Holding) -> Option<Timestamp> {
+        if holding.legal_hold.is_some() || holding.source_on_hold {
+            return None;
+        }
+        retention_ages(&self.settings).expires_at(kind, holding.renewed_at)
+    }
+}

@@ -1,0 +1,348 @@
+//! Uploads: the files of one volume on their way into the store, whoever sends them.
+//!
+//! In: files as streams of bytes. Out: a stored volume, pinned until the caller has done with it.
+//!
+//! 1. [`VolumeUpload::write`] streams each file to the disk and hashes it on the way; nothing but a few pieces is held in memory.
+//! 2. [`Service::store_volume`] tells the volume by its content, reads it if it is new, and adds it.
+//!
+//! Guaranteed: what arrives counts against the tenant's quota as it comes. Not guaranteed: that a refused upload has
+//! not been written to the disk; its files are deleted.
+
+use crate::error::ServiceError;
+use crate::items::Pin;
+use crate::memory::{HeldMemory, MemoryBudget};
+use crate::quotas::Counting;
+use crate::records::{
+    BlobError, BlobStore, BlobWriter, Failure, Fault, FileRecord, Held, StagedFiles, StagedFor,
+    StoredVolume, Tags, Tenant, hex, volume_id,
+};
+use crate::service::Service;
+use crate::work::INSPECTION_MEMORY;
+use bytes::Bytes;
+use futures::{Stream, StreamExt};
+use sha2::{Digest, Sha256};
+use std::sync::Arc;
+use tokio::io::AsyncWriteExt;
+use ventriform::progress::Monitor;
+
+/// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
+/// Up to the first write an upload lies in memory alone: clients that send a few bytes and then wait cost neither
+/// files nor turns of the disk.
+const WRITE_BYTES: usize = 1 << 20;
+const FIRST_WRITE: usize = 64 << 10;
+const LEAST_WRITE: usize = 8 << 10;
+
+/// Memory for a gathered byte: it lies here, and once more in the file's writer.
+const MEMORY_PER_BYTE: u64 = 2;
+
+/// The files of one volume, which are not stored yet.
+pub struct VolumeUpload {
+    blobs: Arc<dyn BlobStore>,
+    memory: MemoryBudget,
+    counting: Counting,
+    /// Where the files lie; made for the first of them.
+    staged: Option<Box<dyn StagedFiles>>,
+    files: Vec<ReceivedFile>,
+}
+
+/// A stored volume, which is not deleted while this exists.
+pub struct Stored {
+    /// Its record.
+    pub volume: Held<StoredVolume>,
+    /// Whether the tenant did not have it before.
+    pub new: bool,
+    /// Keeps it from being deleted.
+    pub pin: Pin,
+}
+
+/// One received file.
+pub struct ReceivedFile {
+    name: String,
+    kind: &'static str,
+    digest: [u8; 32],
+    bytes: u64,
+}
+
+impl ReceivedFile {
+    /// Uses the extension of the client's name for the file where the content does not tell.
+    pub fn known_as(&mut self, given: &str) {
+        self.kind = kind_by_name(given).unwrap_or(self.kind);
+    }
+}
+
+/// A file on its way to the disk.
+struct Arriving<'a> {
+    upload: &'a mut VolumeUpload,
+    name: String,
+    file: Option<BlobWriter>,
+    waiting: Vec<u8>,
+    /// Bytes that may wait, and the memory that is held for them.
+    room: usize,
+    held: HeldMemory,
+}
+
+impl Arriving<'_> {
+    /// Lets `room` bytes wait, if the client's share of memory has them.
+    fn extend(&mut self, room: usize) {
+        let more = room.saturating_sub(self.room) as u64;
+        if more > 0 && self.held.try_extend(MEMORY_PER_BYTE * more) {
+            self.room = room;
+        }
+    }
+
+    /// Takes the next piece: lets it wait, or writes it with what waits.
+    async fn take(&mut self, piece: &[u8]) -> Result<(), ServiceError> {
+        if self.waiting.len() + piece.len() > self.room {
+            self.extend(match self.file {
+                None => FIRST_WRITE,
+                Some(_) => WRITE_BYTES,
+            });
+        }
+        if self.waiting.len() + piece.len() > self.room {
+            self.flush().await?;
+        }
+        if piece.len() > self.room {
+            return self.write(piece).await;
+        }
+        if self.waiting.is_empty() {
+            self.waiting.reserve_exact(self.room);
+        }
+        self.waiting.extend_from_slice(piece);
+        Ok(())
+    }
+
+    /// Writes the bytes that wait, and keeps no room for others: more may not come for a while.
+    async fn flush(&mut self) -> Result<(), ServiceError> {
+        let waiting = std::mem::take(&mut self.waiting);
+        self.write(&waiting).await
+    }
+
+    async fn write(&mut self, bytes: &[u8]) -> Result<(), ServiceError> {
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(self.upload.staged().await?.create(&self.name).await?),
+        };
+        file.write_all(bytes).await.map_err(BlobError::from)?;
+        Ok(())
+    }
+
+    async fn end(mut self) -> Result<(), ServiceError> {
+        self.flush().await?;
+        if let Some(mut file) = self.file {
+            file.shutdown().await.map_err(BlobError::from)?;
+        }
+        Ok(())
+    }
+}
+
+/// The extension that the first bytes of the content imply.
+fn kind_by_content(head: &[u8]) -> &'static str {
+    match head {
+        [0x1f, 0x8b, ..] => "nii.gz",
+        [b'P', b'K', 3, 4, ..] => "zip",
+        _ if head.get(128..132) == Some(b"DICM") => "dcm",
+        _ => "nii",
+    }
+}
+
+/// `hdr` or `img`, which only the file's name can tell apart.
+fn kind_by_name(name: &str) -> Option<&'static str> {
+    ["hdr.gz", "img.gz", "hdr", "img"]
+        .into_iter()
+        .find(|kind| name.ends_with(&format!(".{kind}")))
+}
+
+impl VolumeUpload {
+    /// An empty upload. What it receives counts against a quota.
+    pub fn new(service: &Service, counting: &Counting) -> Self {
+        Self {
+            blobs: service.items().blobs().clone(),
+            memory: service.memory.clone(),
+            counting: counting.clone(),
+            staged: None,
+            files: Vec::new(),
+        }
+    }
+
+    /// Where the files lie.
+    async fn staged(&mut self) -> Result<&mut Box<dyn StagedFiles>, ServiceError> {
+        Ok(match &mut self.staged {
+            Some(staged) => staged,
+            none => none.insert(self.blobs.stage(StagedFor::Upload).await?),
+        })
+    }
+
+    /// Whether nothing was received.
+    pub fn is_empty(&self) -> bool {
+        self.files.iter().all(|file| file.bytes == 0)
+    }
+
+    /// Adds a file: writes the stream to the disk and hashes it on the way. Publishing forces the
+    /// file to the disk.
+    ///
+    /// # Errors
+    /// The error in the stream, `storage-quota` beyond the tenant's quota, or the storage's error.
+    pub async fn write<E: From<ServiceError>>(
+        &mut self,
+        mut pieces: impl Stream<Item = Result<Bytes, E>> + Unpin,
+    ) -> Result<&mut ReceivedFile, E> {
+        let name = self.files.len().to_string();
+        let counting = self.counting.clone();
+        let held = self.memory.hold();
+        let mut arriving = Arriving {
+            upload: self,
+            name: name.clone(),
+            file: None,
+            waiting: Vec::new(),
+            room: 0,
+            held,
+        };
+        arriving.extend(LEAST_WRITE);
+        let mut hash = Sha256::new();
+        let mut head = Vec::new();
+        let mut bytes = 0;
+        while let Some(piece) = pieces.next().await {
+            let piece = piece?;
+            hash.update(&piece);
+            bytes += piece.len() as u64;
+            counting.arrived(piece.len() as u64).await?;
+            if head.len() < 132 {
+                head.extend_from_slice(&piece[..piece.len().min(132 - head.len())]);
+            }
+            arriving.take(&piece).await?;
+        }
+        arriving.end().await?;
+        self.files.push(ReceivedFile {
+            name,
+            kind: kind_by_content(&head),
+            digest: hash.finalize().into(),
+            bytes,
+        });
+        let last = self.files.len() - 1;
+        Ok(&mut self.files[last])
+    }
+
+    /// Bytes of all files.
+    pub fn bytes(&self) -> u64 {
+        self.files.iter().map(|file| file.bytes).sum()
+    }
+
+    /// Makes one of the last file and an earlier one with the same content.
+    ///
+    /// # Errors
+    /// If the file cannot be renamed.
+    pub async fn join_repeated(&mut self) -> Result<(), ServiceError> {
+        let Some((last, before)) = self.files.split_last() else {
+            return Ok(());
+        };
+        let twin = before.iter().find(|file| file.digest == last.digest);
+        if let (Some(twin), Some(staged)) = (twin, &self.staged) {
+            staged.rename(&last.name, &twin.name).await?;
+            self.files.pop();
+        }
+        Ok(())
+    }
+
+    /// The id of the volume of these files.
+    pub fn volume_id(&mut self) -> String {
+        // The order of the form's parts has no meaning, so it must not change the id.
+        self.files
+            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+        volume_id(&self.records())
+    }
+
+    /// The files under their final names: `volume` with its extension for one file or a pair, else
+    /// numbers with extensions.
+    fn records(&self) -> Vec<FileRecord> {
+        let pair = self.files.len() == 2
+            && self.files[0].kind.starts_with("hdr")
+            && self.files[1].kind.starts_with("img");
+        let name = |number: usize, kind| match (pair, self.files.len()) {
+            (true, _) | (_, 1) => format!("volume.{kind}"),
+            _ => format!("{number:04}.{kind}"),
+        };
+        let files = self.files.iter().enumerate();
+        files
+            .map(|(number, file)| FileRecord {
+                name: name(number, file.kind),
+                bytes: file.bytes,
+                sha256: hex(&file.digest),
+                place: None,
+            })
+            .collect()
+    }
+}
+
+impl Service {
+    /// Checks and stores the volume of an upload. One that is stored already is not checked again; its age
+    /// counts from now.
+    ///
+    /// # Errors
+    /// If the files are no usable volume, the tenant's quota has no room for them, or the storage fails.
+    pub async fn store_volume(
+        &self,
+        tenant: &Tenant,
+        upload: VolumeUpload,
+        tags: &Tags,
+    ) -> Result<Stored, ServiceError> {
+        let counting = upload.counting.clone();
+        counting.settle().await?;
+        let stored = self.store_counted(tenant, upload, tags).await?;
+        counting.stored();
+        Ok(stored)
+    }
+
+    async fn store_counted(
+        &self,
+        tenant: &Tenant,
+        mut upload: VolumeUpload,
+        tags: &Tags,
+    ) -> Result<Stored, ServiceError> {
+        let (id, records) = (upload.volume_id(), upload.records());
+        let items = self.items();
+        let pin = items.pin(&id).await?;
+        if let Some(stored) = items.intact_volume(&id).await? {
+            let scan = self.scan_to_note(tenant, &id, &stored).await?;
+            let renewed = items.renew_volume(tenant, &id, tags, scan.as_ref());
+            if let Some((volume, new)) = renewed.await? {
+                return Ok(Stored { volume, new, pin });
+            }
+        }
+        let received = upload.files;
+        let staged = upload.staged.ok_or_else(empty)?;
+        let mut files = Vec::with_capacity(records.len());
+        for (file, record) in received.iter().zip(&records) {
+            staged.rename(&file.name, &record.name).await?;
+            files.push(staged.local(&record.name).await?);
+        }
+        let reader = self.engine.reader.clone();
+        let inspect = move |monitor: &Monitor<'_>| {
+            let facts = reader.inspect(&files, monitor)?;
+            Ok::<_, Failure>((facts, reader.scan(&files, monitor)?))
+        };
+        // The disk and the processor work at the same time.
+        let bytes = received.iter().map(|file| file.bytes).sum();
+        let decoding = self.decoding.run_on(bytes, INSPECTION_MEMORY, inspect);
+        let inspected = async { Ok(decoding.await??) };
+        let settled = async { Ok::<(), ServiceError>(staged.settle(&id).await?) };
+        let ((facts, scan), ()) = tokio::try_join!(inspected, settled)?;
+        let volume = StoredVolume {
+            sequence: 0,
+            created_at: items.now(),
+            bytes,
+            files: records,
+            facts: facts.to_json(),
+            id,
+        };
+        let added = items.add_volume(volume, staged, tenant, tags, scan);
+        let (volume, new) = added.await?;
+        Ok(Stored { volume, new, pin })
+    }
+}
+
+/// An upload of no file.
+fn empty() -> ServiceError {
+    Failure::new(Fault::Request, "empty-body", "The body holds no volume.")
+        .fix("Send the volume as the body: curl --data-binary @volume.nii.gz ...")
+        .into()
+}
