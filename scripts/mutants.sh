@@ -7,7 +7,7 @@
 #
 # Mutants come from cargo-mutants (installed if it is missing) and are made in a clone of the last commit, under
 # target/mutants. All of them are in one build, each behind a switch (scripts/mutants.py), and each is tested by the
-# library's own tests and the domain tests that enter the changed function, without the service, until one fails.
+# library's own tests, the domain tests and the commands' tests that enter the changed function, until one fails.
 # The quality gate is one of them.
 #
 # Prints the mutants missed, those of them that scripts/mutants_accepted.txt accepts, and the share caught; writes one

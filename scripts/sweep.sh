@@ -11,4 +11,4 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 export VENTRIFORM_SEEDS=${1:-100}
 [ -z "${DUMP:-}" ] || export VENTRIFORM_DUMP=$DUMP
-exec cargo test --release --test guarantees "${@:2}" -- --nocapture
+exec cargo test --release --package ventriform --test guarantees "${@:2}" -- --nocapture

@@ -1,4 +1,4 @@
-//! What the fuzzers do with their bytes. `tests/fuzz.rs` of the crate drives the same functions over
+//! What the fuzzers do with their bytes. `tests/fuzz.rs` of the library and of the program drive the same functions over
 //! the same corpus with random damage, for a few seconds and without libFuzzer.
 
 #![allow(clippy::unwrap_used, reason = "a panic is what a fuzzer looks for")]

@@ -125,8 +125,6 @@ pub mod optimise;
 
 pub mod decimate;
 
-pub mod export;
-
 pub mod model;
 
 pub mod deform;
@@ -139,9 +137,11 @@ pub mod polar;
 
 pub mod reader;
 
+pub mod parameters;
+
 pub mod report;
 
-pub mod parameters;
+pub mod export;
 
 pub mod pipeline;
 

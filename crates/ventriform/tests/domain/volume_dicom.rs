@@ -7,7 +7,7 @@ use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, Reading, V
 /// A folder of the test data, unless it is absent.
 fn data(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../shared/data")
+        .join("../../../shared/data")
         .join(folder);
     if !path.is_dir() {
         eprintln!("skipped: ../shared/data/{folder} is absent");

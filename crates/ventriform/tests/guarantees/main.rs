@@ -5,7 +5,7 @@
 //! bytes are the same on any number of threads. If no such model can be made, the error gives the
 //! reason; if N is too small, the error names an N that works.
 //!
-//! `VENTRIFORM_SEEDS=200 cargo test --release --test guarantees -- --nocapture` tests more surfaces
+//! `VENTRIFORM_SEEDS=200 cargo test --release -p ventriform --test guarantees -- --nocapture` tests more surfaces
 //! of each family than CI does and prints how many models were refused. `VENTRIFORM_DUMP=DIR`
 //! writes some of the models to DIR, so that other programs can check them.
 
@@ -24,7 +24,6 @@ use ventriform::parameters::ModelParameters;
 use ventriform::progress::Monitor;
 use ventriform::retile::{RetileError, retile};
 use ventriform::surface::Surface;
-use ventriform_service::work::problems::advice;
 
 /// Numbers of points; the sweeps take them in turn.
 const POINTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];
@@ -126,9 +125,8 @@ fn sweep_at(numbers: &[usize], name: &str, family: fn(u64) -> Surface, seeds: u6
                         demand(&surface, needed, &mesh, &what);
                     }
                 }
-                Err(error @ RetileError::NotCarried { .. }) => {
+                Err(RetileError::NotCarried { .. }) => {
                     *refused.entry("not carried").or_default() += 1;
-                    assert!(advice(&error).contains("topology"), "{what}");
                 }
                 Err(other) => panic!("{what}: {other}"),
             }

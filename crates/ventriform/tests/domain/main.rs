@@ -1,7 +1,6 @@
 //! The stages on real and simulated volumes, one file per stage or promise.
 //!
-//! One binary: linking the library once instead of nineteen times takes minutes off a build. What calls
-//! the program or the service's advice needs the feature; the rest tests the library alone, too.
+//! One binary: linking the library once instead of nineteen times takes minutes off a build.
 
 mod volume_dicom;
 mod volume_odd_nifti;
@@ -31,9 +30,7 @@ mod hot_neighbours;
 mod orientation;
 mod pipeline;
 mod quality;
-mod segment;
 
 mod reader;
 
-mod evaluate_cohort;
 mod evaluate_reference;

@@ -12,7 +12,6 @@ use ventriform::progress::Monitor;
 use ventriform::retile::RetileError;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{ReadLimits, Volume, VolumeError, VolumeFile};
-use ventriform_service::work::problems::advice;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();
@@ -53,7 +52,6 @@ fn generate_stored(
             assert!(serde_json::from_str::<serde_json::Value>(&text).is_ok());
         }
         Err(error) => {
-            assert!(!advice(error).is_empty(), "{error}");
             assert!(!matches!(error, PipelineError::Unsound { .. }), "{error}");
         }
     }
@@ -62,8 +60,7 @@ fn generate_stored(
 
 /// A model; an error fails the test.
 fn model(volume: &Volume, pairs: &[(&str, &str)]) -> Model {
-    generate(volume, pairs)
-        .unwrap_or_else(|e| panic!("{:?} {pairs:?}: {e}: {}", volume.shape, advice(&e)))
+    generate(volume, pairs).unwrap_or_else(|e| panic!("{:?} {pairs:?}: {e}", volume.shape))
 }
 
 /// A blunt body that fills most of the box; its values fall by 1 over its radius.
@@ -261,7 +258,6 @@ fn an_iso_value_that_many_voxels_have() {
     for (volume, iso) in [(&steps, "absolute:9"), (&saturated, "absolute:10.5")] {
         let error = generate(volume, &[("iso", iso)]).unwrap_err();
         assert_eq!(error.field(), Some("iso"));
-        assert!(advice(&error).contains("between"), "{}", advice(&error));
     }
 }
 
@@ -270,7 +266,6 @@ fn constant_volumes_are_refused() {
     for value in [0.0, -3.5, 1e30] {
         let error = generate(&volume([9; 3], [1.0; 3], |_| value), &[]).unwrap_err();
         assert!(error.to_string().contains("every voxel"), "{error}");
-        assert!(!advice(&error).is_empty());
     }
 }
 

@@ -5,11 +5,10 @@
 use std::path::{Path, PathBuf};
 use ventriform::progress::Monitor;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
-use ventriform_service::work::problems::advice;
 
 /// The folder of the test data, unless it is absent.
 fn data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/nifti-odd");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/nifti-odd");
     if !folder.is_dir() {
         eprintln!("skipped: ../shared/data/nifti-odd is absent");
         return None;
@@ -164,7 +163,6 @@ fn other_files_are_refused_by_field_and_value() {
         let error = result.err().unwrap_or_else(|| panic!("{names:?} was read"));
         let message = error.to_string();
         assert!(message.contains(part), "{names:?}: {message}");
-        assert!(!advice(&error).is_empty());
     }
 }
 
