@@ -84,7 +84,7 @@ pub fn negotiate(request: &AssociationRQ, offer: &Offer) -> (AssociationAC, Cont
         user_variables: vec![
             UserVariableItem::MaxLength(offer.longest),
             UserVariableItem::ImplementationClassUID(
-                ventriform::export::dicom::IMPLEMENTATION.into(),
+                ventriform::export::dicom::IMPLEMENTATION_CLASS_UID.into(),
             ),
             UserVariableItem::ImplementationVersionName(
                 ventriform::export::dicom::IMPLEMENTATION_NAME.into(),

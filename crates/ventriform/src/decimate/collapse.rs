@@ -16,7 +16,7 @@ use crate::mesh::{FaceId, TriMesh, VertexId, ids};
 
 /// Radius ratio 2r/R below which a triangle is a needle. Collapses that make one are not allowed,
 /// since the normal of a needle is noise.
-const NEEDLE: f64 = 0.01;
+const NEEDLE_RADIUS_RATIO: f64 = 0.01;
 
 /// The collapse of an edge into one vertex.
 #[derive(Debug, Clone, Copy)]
@@ -257,7 +257,7 @@ impl Collapses {
             let after = triangle::area_normal(&new[0], &new[1], &new[2]);
             let turned = before.dot(&after) < least * before.norm() * after.norm();
             let needle = triangle::radius_ratio(&new[0], &new[1], &new[2])
-                < NEEDLE.min(triangle::radius_ratio(&old[0], &old[1], &old[2]));
+                < NEEDLE_RADIUS_RATIO.min(triangle::radius_ratio(&old[0], &old[1], &old[2]));
             if turned || needle || self.index.intersects(new_ids, &new, &changed) {
                 return false;
             }

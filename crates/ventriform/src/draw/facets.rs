@@ -2,7 +2,7 @@
 //!
 //! In: triangles in patient coordinates, a direction to look from, a [`Style`]. Out: square RGBA
 //! pixels. Orthographic projection, a depth buffer, flat shading, triangle edges drawn in; facets
-//! that face away are left out. Rendered at [`SUPERSAMPLING`] times the size and averaged, so that
+//! that face away are left out. Rendered at [`SAMPLES_PER_PIXEL_SIDE`] times the size and averaged, so that
 //! outlines are smooth. The background is transparent, so that the picture suits light and dark
 //! pages.
 
@@ -10,9 +10,9 @@ use super::image::Image;
 use crate::geometry::Vec3;
 
 /// Rows and columns of rendered pixels for each of the picture's.
-const SUPERSAMPLING: usize = 2;
+const SAMPLES_PER_PIXEL_SIDE: usize = 2;
 /// Share of the picture's side that the object may take.
-const FILL: f64 = 0.88;
+const OBJECT_SHARE: f64 = 0.88;
 
 /// A colour: red, green, blue, 0..=1, as shown on a screen.
 pub type Colour = [f64; 3];
@@ -97,13 +97,13 @@ pub struct Style {
 /// Draws `facets` as seen from `view`: `style.side` rows and columns.
 pub fn picture(facets: &[Facet], view: &View, style: &Style) -> Image<4> {
     let side = style.side;
-    let fine = side * SUPERSAMPLING;
+    let fine = side * SAMPLES_PER_PIXEL_SIDE;
     let mut buffer = DepthBuffer {
         side: fine,
         depth: vec![f64::NEG_INFINITY; fine * fine],
         pixels: vec![None; fine * fine],
     };
-    let scale = FILL * fine as f64 / 2.0 / style.reach.max(f64::MIN_POSITIVE);
+    let scale = OBJECT_SHARE * fine as f64 / 2.0 / style.reach.max(f64::MIN_POSITIVE);
     let middle = fine as f64 / 2.0;
     let toward = view.toward();
     for facet in facets {
@@ -131,7 +131,12 @@ pub fn picture(facets: &[Facet], view: &View, style: &Style) -> Image<4> {
             normal.dot(&toward),
         );
         let colour = shade(facet.colour, &local, style.ambient);
-        buffer.fill(&seen, colour, &sides, style.line * SUPERSAMPLING as f64);
+        buffer.fill(
+            &seen,
+            colour,
+            &sides,
+            style.line * SAMPLES_PER_PIXEL_SIDE as f64,
+        );
     }
     buffer.averaged(side)
 }
@@ -186,9 +191,9 @@ impl DepthBuffer {
             for column in 0..side {
                 let mut sum = [0.0; 3];
                 let mut covered = 0.0;
-                for k in 0..SUPERSAMPLING * SUPERSAMPLING {
-                    let y = row * SUPERSAMPLING + k / SUPERSAMPLING;
-                    let x = column * SUPERSAMPLING + k % SUPERSAMPLING;
+                for k in 0..SAMPLES_PER_PIXEL_SIDE * SAMPLES_PER_PIXEL_SIDE {
+                    let y = row * SAMPLES_PER_PIXEL_SIDE + k / SAMPLES_PER_PIXEL_SIDE;
+                    let x = column * SAMPLES_PER_PIXEL_SIDE + k % SAMPLES_PER_PIXEL_SIDE;
                     if let Some(colour) = self.pixels[y * self.side + x] {
                         covered += 1.0;
                         (0..3).for_each(|r| sum[r] += colour[r]);
@@ -196,7 +201,8 @@ impl DepthBuffer {
                 }
                 let byte = |x: f64| (255.0 * x).round() as u8;
                 let [r, g, b] = sum.map(|s| byte(s / f64::max(covered, 1.0)));
-                let alpha = byte(covered / (SUPERSAMPLING * SUPERSAMPLING) as f64);
+                let alpha =
+                    byte(covered / (SAMPLES_PER_PIXEL_SIDE * SAMPLES_PER_PIXEL_SIDE) as f64);
                 pixels.push([r, g, b, alpha]);
             }
         }
@@ -262,7 +268,7 @@ mod tests {
         let picture = picture(&facets(&mesh), &View::ALL[0], &style);
         let alpha = picture.pixels.iter().map(|pixel| f64::from(pixel[3]));
         let share = alpha.sum::<f64>() / 255.0 / (style.side * style.side) as f64;
-        let disc = std::f64::consts::PI * (FILL / 2.0).powi(2);
+        let disc = std::f64::consts::PI * (OBJECT_SHARE / 2.0).powi(2);
         assert!((share / disc - 1.0).abs() < 0.01, "{share} {disc}");
     }
 

@@ -5,9 +5,9 @@
 pub type GlyphPoint = (i8, i8);
 
 /// Height of a capital or a digit in the strokes' units.
-pub const HEIGHT: f64 = 14.0;
+pub const CAPITAL_HEIGHT: f64 = 14.0;
 /// Width of a character.
-pub const WIDTH: f64 = 10.0;
+pub const GLYPH_WIDTH: f64 = 10.0;
 
 /// The strokes of a character; none for one that is not known.
 #[rustfmt::skip]

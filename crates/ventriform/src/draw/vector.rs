@@ -75,15 +75,15 @@ pub enum VectorShape {
 }
 
 /// Width of the rim about a character, pixels.
-const RIM: f64 = 1.5;
+const HALO_WIDTH_PX: f64 = 1.5;
 /// Height of a capital as a share of a text's size.
-const CAPITAL: f64 = 0.7;
+const CAPITAL_HEIGHT_SHARE: f64 = 0.7;
 /// Width of a character's strokes as a share of a text's size.
-const STROKE: f64 = 0.1;
+const STROKE_WIDTH_SHARE: f64 = 0.1;
 /// Width of a stroke's unit as a share of its height: characters are slim.
-const SLIM: f64 = 0.75;
+const GLYPH_ASPECT: f64 = 0.75;
 /// Room between characters as a share of their width.
-const SPACING: f64 = 0.4;
+const GLYPH_SPACING_SHARE: f64 = 0.4;
 
 impl Drawing {
     /// An SVG file with a viewer's own sans-serif font.
@@ -148,9 +148,9 @@ impl VectorShape {
                 ink,
                 rim,
             } => html! {
-                text x=(format_args!("{x:.1}")) y=(format_args!("{:.1}", y + CAPITAL / 2.0 * size))
+                text x=(format_args!("{x:.1}")) y=(format_args!("{:.1}", y + CAPITAL_HEIGHT_SHARE / 2.0 * size))
                     font-size=(size) fill=(hex(*ink)) stroke=[rim.map(hex)]
-                    stroke-width=[rim.map(|_| 2.0 * RIM)] paint-order=[rim.map(|_| "stroke")] {
+                    stroke-width=[rim.map(|_| 2.0 * HALO_WIDTH_PX)] paint-order=[rim.map(|_| "stroke")] {
                     (text)
                 }
             },
@@ -184,10 +184,15 @@ impl VectorShape {
                 ink,
                 rim,
             } => {
-                let width = STROKE * size;
+                let width = STROKE_WIDTH_SHARE * size;
                 let lines = text_lines(*middle, text, *size);
                 for ends in lines.iter().filter(|_| rim.is_some()) {
-                    paint_line(image, *ends, rim.unwrap_or_default(), width + 2.0 * RIM);
+                    paint_line(
+                        image,
+                        *ends,
+                        rim.unwrap_or_default(),
+                        width + 2.0 * HALO_WIDTH_PX,
+                    );
                 }
                 for ends in lines {
                     paint_line(image, ends, *ink, width);
@@ -269,18 +274,18 @@ fn paint_line(image: &mut Image<3>, [from, to]: [Point; 2], stroke: Rgb, width: 
 
 /// The strokes of `text` about `middle` as lines.
 fn text_lines([x, y]: Point, text: &str, size: f64) -> Vec<[Point; 2]> {
-    let unit = CAPITAL * size / glyphs::HEIGHT;
-    let width = glyphs::WIDTH * SLIM * unit;
-    let advance = width * (1.0 + SPACING);
+    let unit = CAPITAL_HEIGHT_SHARE * size / glyphs::CAPITAL_HEIGHT;
+    let width = glyphs::GLYPH_WIDTH * GLYPH_ASPECT * unit;
+    let advance = width * (1.0 + GLYPH_SPACING_SHARE);
     let count = text.chars().count() as f64;
-    let left = x - (count * advance - SPACING * width) / 2.0;
-    let top = y - CAPITAL * size / 2.0;
+    let left = x - (count * advance - GLYPH_SPACING_SHARE * width) / 2.0;
+    let top = y - CAPITAL_HEIGHT_SHARE * size / 2.0;
     let mut lines = Vec::new();
     for (place, character) in text.chars().enumerate() {
         let start = left + place as f64 * advance;
         let point = |(x, y): (i8, i8)| {
             [
-                start + f64::from(x) * SLIM * unit,
+                start + f64::from(x) * GLYPH_ASPECT * unit,
                 top + f64::from(y) * unit,
             ]
         };

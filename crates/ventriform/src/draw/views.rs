@@ -10,11 +10,11 @@ use crate::geometry::bvh::Aabb;
 use crate::mesh::TriMesh;
 
 /// Side of a picture in pixels; shown at half of that or less.
-const SIDE: usize = 500;
+const PICTURE_SIDE_PX: usize = 500;
 /// Colour of the heart's wall.
-const MYOCARDIUM: Colour = [0.90, 0.42, 0.36];
+const MYOCARDIUM_COLOUR: Colour = [0.90, 0.42, 0.36];
 /// Uncertainty at which the colour is full, mm, and that colour.
-const UNSURE: f64 = 6.0;
+const FULL_COLOUR_UNCERTAINTY_MM: f64 = 6.0;
 const UNSURE_COLOUR: Colour = [0.16, 0.27, 0.68];
 
 /// Three pictures as `data:` URIs, in the order of [`View::ALL`].
@@ -32,7 +32,7 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64], touched: bool) 
                 .sum();
             colour_of(sum / 3.0)
         }
-        false => MYOCARDIUM,
+        false => MYOCARDIUM_COLOUR,
     };
     let facets: Vec<Facet> = (0..mesh.triangles.len())
         .map(|t| Facet {
@@ -49,7 +49,7 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64], touched: bool) 
                 "A anterior, P posterior, S superior, I inferior."
                 @if known {
                     " The bluer a triangle, the less certain its place: full colour where the standard "
-                    "deviation of its distance from the wall is " (UNSURE) " mm or more."
+                    "deviation of its distance from the wall is " (FULL_COLOUR_UNCERTAINTY_MM) " mm or more."
                 }
             }
             @if touched { (document::place("viewer")) }
@@ -60,8 +60,8 @@ pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64], touched: bool) 
 
 /// The colour of a place with this uncertainty, mm.
 fn colour_of(uncertainty: f64) -> Colour {
-    let share = (uncertainty / UNSURE).clamp(0.0, 1.0);
-    [0, 1, 2].map(|c| MYOCARDIUM[c] + (UNSURE_COLOUR[c] - MYOCARDIUM[c]) * share)
+    let share = (uncertainty / FULL_COLOUR_UNCERTAINTY_MM).clamp(0.0, 1.0);
+    [0, 1, 2].map(|c| MYOCARDIUM_COLOUR[c] + (UNSURE_COLOUR[c] - MYOCARDIUM_COLOUR[c]) * share)
 }
 
 /// `facets`, triangles of `mesh` or parts of them, from three sides; `ambient` as in [`Style`].
@@ -70,11 +70,11 @@ pub fn pictures(facets: &[Facet], mesh: &TriMesh, ambient: f64) -> Pictures {
     let reach = (aabb.max - aabb.min).amax() / 2.0;
     // Full-width lines about many small triangles would make the picture black.
     let edge = (4.0 * mesh.area() / 3f64.sqrt() / mesh.triangles.len() as f64).sqrt();
-    let pixels = edge / reach * SIDE as f64 / 2.0;
+    let pixels = edge / reach * PICTURE_SIDE_PX as f64 / 2.0;
     let style = Style {
         centre: (aabb.min + aabb.max) / 2.0,
         reach,
-        side: SIDE,
+        side: PICTURE_SIDE_PX,
         line: (pixels / 16.0).clamp(0.0, 1.6),
         ambient,
     };

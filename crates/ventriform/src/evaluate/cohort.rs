@@ -66,7 +66,7 @@ pub struct Cohort {
 }
 
 /// Name of a scan's file without its ending.
-const SCAN: &str = "spect";
+const SCAN_STEM: &str = "spect";
 
 impl Cohort {
     /// Reads the manifest and the names of the files of `folder`. `manual` names the template
@@ -86,7 +86,7 @@ impl Cohort {
         };
         let roles = cohort.roles();
         for name in cohort.names(&roles)? {
-            if cohort.file(&name, SCAN).is_none() {
+            if cohort.file(&name, SCAN_STEM).is_none() {
                 cohort.problem(&name, "it has no spect.nii.gz");
                 continue;
             }
@@ -142,7 +142,7 @@ impl Cohort {
                 .file_name()
                 .to_string_lossy()
                 .into_owned();
-            let stems = [SCAN, "lv_truth", "lv_expert_img"];
+            let stems = [SCAN_STEM, "lv_truth", "lv_expert_img"];
             if stems.iter().any(|stem| self.file(&name, stem).is_some()) {
                 names.push(name);
             }
@@ -211,7 +211,7 @@ impl Cohort {
 
     /// A case's scan.
     pub fn scan(&self, case: &str) -> Option<PathBuf> {
-        self.file(case, SCAN)
+        self.file(case, SCAN_STEM)
     }
 
     /// A case's gold standard.
@@ -273,7 +273,7 @@ pub fn case_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
 /// The mask `stem` of the folder `case` in `folder`: a volume, or a mesh.
 pub fn mask_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
     case_file(folder, case, stem).or_else(|| {
-        MeshFormat::ENDINGS
+        MeshFormat::FILE_EXTENSIONS
             .iter()
             .map(|ending| folder.join(case).join(format!("{stem}.{ending}")))
             .find(|path| path.is_file())

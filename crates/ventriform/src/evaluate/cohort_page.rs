@@ -108,7 +108,7 @@ fn class(variant: Variant) -> &'static str {
     }
 }
 
-const POINTS: &str = "points N";
+const POINTS_COLUMN: &str = "points N";
 
 fn figure3(models: &[ModelRow]) -> Markup {
     let series = |pick: fn(&ModelRow) -> f64| -> Vec<Series> {
@@ -148,9 +148,9 @@ fn figure3(models: &[ModelRow]) -> Markup {
                 "models by the triangles' shape as well."
             }
             div.row.beside {
-                (chart::lines("Fitness, the paper's raw form", POINTS, &series(|m| m.raw)))
-                (chart::lines("Fitness, normalised (1 is perfect)", POINTS, &series(|m| m.normalised)))
-                (chart::lines("Triangle shape 2r/R, mean", POINTS, &series(|m| m.shape)))
+                (chart::lines("Fitness, the paper's raw form", POINTS_COLUMN, &series(|m| m.raw)))
+                (chart::lines("Fitness, normalised (1 is perfect)", POINTS_COLUMN, &series(|m| m.normalised)))
+                (chart::lines("Triangle shape 2r/R, mean", POINTS_COLUMN, &series(|m| m.shape)))
             }
         }
     }
@@ -176,12 +176,12 @@ fn agreement(rows: &[FitRow], gold: Gold) -> Markup {
                 div.row.beside {
                     (chart::lines(
                         "Jaccard E_J (eq. 2), higher is better",
-                        POINTS,
+                        POINTS_COLUMN,
                         &curves(rows, gold, |c| Some(c.jaccard)),
                     ))
                     (chart::lines(
                         "Contour distance E_CD (eq. 3), voxels, lower is better",
-                        POINTS,
+                        POINTS_COLUMN,
                         &curves(rows, gold, |c| c.contour),
                     ))
                 }
@@ -404,7 +404,7 @@ fn pictures(evaluation: &Evaluation) -> Markup {
                     @for picture in &evaluation.pictures {
                         figure.slices {
                             img alt=(format!("Slices of {}", picture.case))
-                                width=(3 * slices::SIDE + 8)
+                                width=(3 * slices::SLICE_SIDE_PX + 8)
                                 src=(data_uri("image/png", &picture.png));
                             p.soft { (picture.caption) }
                         }

@@ -141,7 +141,7 @@ fn best(curve: &[(usize, f64)]) -> Option<(usize, f64)> {
     })
 }
 
-/// The claim holds where all numbers of points whose mean E_J is within [`NOTICEABLE`] of the greatest
+/// The claim holds where all numbers of points whose mean E_J is within [`NOTICEABLE_JACCARD`] of the greatest
 /// lie between 110 and 200, and fails where none of them does. A curve that is flat across a border of
 /// that range, or ends there, decides nothing.
 /// The sample of figures over all rows.
@@ -192,7 +192,7 @@ fn best_number(rows: &[FitRow]) -> Finding {
 }
 
 /// Smaller changes of the mean E_J do not count: half the difference between two readers.
-const NOTICEABLE: f64 = 0.005;
+const NOTICEABLE_JACCARD: f64 = 0.005;
 
 fn more_points_hurt(rows: &[FitRow]) -> Finding {
     let curve = curve(rows, Variant::Optimised);
@@ -209,8 +209,8 @@ fn more_points_hurt(rows: &[FitRow]) -> Finding {
     let holds = found.and_then(|(_, _, lost)| {
         let told = lost.count >= LEAST_PATIENTS;
         match lost.interval {
-            [low, _] if told && low > 0.0 && lost.mean > NOTICEABLE => Some(true),
-            [_, high] if told && high < NOTICEABLE => Some(false),
+            [low, _] if told && low > 0.0 && lost.mean > NOTICEABLE_JACCARD => Some(true),
+            [_, high] if told && high < NOTICEABLE_JACCARD => Some(false),
             _ => None,
         }
     });
@@ -300,7 +300,7 @@ fn new_models_beat_the_reference(rows: &[FitRow]) -> Finding {
 
 fn flips_help_the_fit(rows: &[FitRow]) -> Finding {
     let claim = "Models after the flips segment no worse than after re-tiling alone (E_J).";
-    compare(rows, claim, Variant::Retiled, -NOTICEABLE)
+    compare(rows, claim, Variant::Retiled, -NOTICEABLE_JACCARD)
 }
 
 #[cfg(test)]

@@ -236,9 +236,9 @@ impl PatientFits {
         let auto = self.auto.as_ref().map(move |fit| {
             let kind = ModelKind {
                 variant: Variant::Auto,
-                points: built_in::POINTS,
+                points: built_in::HEART_POINTS,
             };
-            row(built_in::NAME, kind, fit)
+            row(built_in::NAME_PREFIX, kind, fit)
         });
         own.chain(auto)
     }

@@ -100,7 +100,7 @@ pub fn evaluate(
         evaluation.reader = reader(cohort, parameters);
     }
     evaluation.settings = parameters.settings(cohort);
-    make_folder(&out.join(table::SLICES))?;
+    make_folder(&out.join(table::SLICES_FOLDER))?;
     write_results(out, &evaluation)?;
     Ok(evaluation)
 }

@@ -3,7 +3,7 @@
 //! In go the differences, one for each patient; out come their mean, an interval for it and the chance
 //! that as uneven a split of signs comes about by itself.
 //!
-//! - The interval is the bootstrap's: patients are drawn with replacement [`DRAWS`] times, and the
+//! - The interval is the bootstrap's: patients are drawn with replacement [`BOOTSTRAP_DRAWS`] times, and the
 //!   middle 95 % of the means are kept. The draws follow from the number of patients alone, so that
 //!   the same differences give the same interval.
 //! - The sign test is exact and two-sided; differences of 0 are left out.
@@ -11,7 +11,7 @@
 use crate::geometry::random::{Purpose, stream, uniform};
 
 /// Draws of the bootstrap.
-const DRAWS: usize = 4000;
+const BOOTSTRAP_DRAWS: usize = 4000;
 
 /// The differences of a number of pairs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,7 +34,7 @@ impl PairedDifference {
         let count = differences.len();
         let mean = super::rows::average(differences)?;
         let mut random = stream(count as u64, Purpose::Measure);
-        let mut means: Vec<f64> = (0..DRAWS)
+        let mut means: Vec<f64> = (0..BOOTSTRAP_DRAWS)
             .map(|_| {
                 let drawn = (0..count).map(|_| {
                     let place = (uniform(&mut random) * count as f64) as usize;
@@ -44,7 +44,7 @@ impl PairedDifference {
             })
             .collect();
         means.sort_by(f64::total_cmp);
-        let at = |share: f64| means[((DRAWS - 1) as f64 * share).round() as usize];
+        let at = |share: f64| means[((BOOTSTRAP_DRAWS - 1) as f64 * share).round() as usize];
         let up = differences.iter().filter(|d| **d > 0.0).count();
         let down = differences.iter().filter(|d| **d < 0.0).count();
         Some(Self {

@@ -53,7 +53,7 @@ pub enum StatisticsError {
 }
 
 /// Rounds of the Procrustes alignment, which converges in three or four.
-const ROUNDS: usize = 10;
+const PROCRUSTES_ROUNDS: usize = 10;
 
 /// Aligns `fits` and finds their mean and modes.
 ///
@@ -70,7 +70,7 @@ pub fn statistics(fits: &[TriMesh]) -> Result<Statistics, StatisticsError> {
     }
     let mut shapes: Vec<Vec<Vec3>> = fits.iter().map(|m| centred(&m.vertices)).collect();
     let mut mean = shapes[0].clone();
-    for _ in 0..ROUNDS {
+    for _ in 0..PROCRUSTES_ROUNDS {
         for shape in &mut shapes {
             turn_onto(shape, &mean);
         }

@@ -55,12 +55,12 @@ pub struct Picture {
 }
 
 /// The folder of the pictures.
-pub const SLICES: &str = "slices";
+pub const SLICES_FOLDER: &str = "slices";
 
 impl Picture {
     /// Its path in the folder of results.
     pub fn file(&self) -> String {
-        format!("{SLICES}/{}.png", self.case)
+        format!("{SLICES_FOLDER}/{}.png", self.case)
     }
 }
 
@@ -69,7 +69,7 @@ pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-const AGREED: [&str; 5] = [
+const AGREEMENT_COLUMNS: [&str; 5] = [
     "jaccard",
     "contour_distance_voxels",
     "contour_distance_mm",
@@ -119,7 +119,7 @@ pub fn fits_csv(rows: &[FitRow]) -> Result<Vec<u8>, csv::Error> {
     names.dedup();
     let mut head = words("case,template,model,points,sample,state,reason");
     for gold in Gold::ALL {
-        head.extend(AGREED.map(|name| format!("{name}_{}", gold.as_str())));
+        head.extend(AGREEMENT_COLUMNS.map(|name| format!("{name}_{}", gold.as_str())));
     }
     head.extend(names.iter().map(|name| (*name).to_owned()));
     let line = |row: &FitRow| {
@@ -388,7 +388,7 @@ fn reader_json(made: &Calibration) -> Value {
 fn row_json(row: &FitRow) -> Value {
     let agreed = |gold: Gold| -> Value {
         let figures = agreed_figures(row.agreed[gold as usize].as_ref());
-        let named = AGREED.iter().zip(figures);
+        let named = AGREEMENT_COLUMNS.iter().zip(figures);
         let object: serde_json::Map<String, Value> =
             named.map(|(n, v)| ((*n).to_owned(), json!(v))).collect();
         Value::Object(object)

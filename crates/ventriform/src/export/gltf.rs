@@ -31,7 +31,7 @@ const PATIENT_TO_WORLD: [f64; 16] = [
 // Numbers of component types and buffer targets in the specification.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
-const FLOAT: u32 = 5126;
+const FLOAT_COMPONENT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
@@ -80,7 +80,9 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         buffer.extend(&attribute.bytes);
     }
     // Colours of vertices are multiplied by that of the material.
-    let painted = more.iter().any(|attribute| attribute.name == COLOURS);
+    let painted = more
+        .iter()
+        .any(|attribute| attribute.name == COLOUR_ATTRIBUTE);
     let base_colour = match painted {
         true => [1.0; 4],
         false => [0.64, 0.13, 0.11, 1.0],
@@ -120,11 +122,11 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
         }],
         "accessors": [
             {
-                "bufferView": 0, "componentType": FLOAT, "type": "VEC3",
+                "bufferView": 0, "componentType": FLOAT_COMPONENT, "type": "VEC3",
                 "count": positions.len(), "min": min, "max": max,
             },
             {
-                "bufferView": 1, "componentType": FLOAT, "type": "VEC3",
+                "bufferView": 1, "componentType": FLOAT_COMPONENT, "type": "VEC3",
                 "count": normals.len(),
             },
             {
@@ -230,7 +232,7 @@ fn groups(mesh: &TriMesh, metadata: &Metadata) -> Vec<Group> {
 }
 
 /// What glTF calls the colours of vertices.
-const COLOURS: &str = "COLOR_0";
+const COLOUR_ATTRIBUTE: &str = "COLOR_0";
 
 /// An attribute of vertices that not every mesh has.
 struct MoreAttribute {
@@ -245,14 +247,14 @@ struct MoreAttribute {
 fn more_attributes(mesh: &TriMesh, metadata: &Metadata) -> Vec<MoreAttribute> {
     let uncertainty = metadata.uncertainty_of(mesh).map(|values| MoreAttribute {
         name: "_UNCERTAINTY",
-        accessor: json!({ "componentType": FLOAT, "type": "SCALAR" }),
+        accessor: json!({ "componentType": FLOAT_COMPONENT, "type": "SCALAR" }),
         bytes: values
             .iter()
             .flat_map(|x| (*x as f32).to_le_bytes())
             .collect(),
     });
     let colours = metadata.field_of(mesh).map(|field| MoreAttribute {
-        name: COLOURS,
+        name: COLOUR_ATTRIBUTE,
         accessor: json!({
             "componentType": UNSIGNED_SHORT, "type": "VEC4", "normalized": true,
         }),

@@ -8,7 +8,7 @@ use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 
 /// Longest title, characters without the end of the line.
-const TITLE: usize = 255;
+const MAX_TITLE_CHARS: usize = 255;
 
 /// A VTK file.
 ///
@@ -23,7 +23,7 @@ pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportErro
         });
     };
     let mut title = metadata.comments().join("; ");
-    title.truncate(TITLE);
+    title.truncate(MAX_TITLE_CHARS);
     let mut bytes = format!(
         "# vtk DataFile Version 3.0\n{title}\nBINARY\nDATASET POLYDATA\nPOINTS {points} double\n"
     )

@@ -12,7 +12,7 @@
 use super::{Vec3, triangle};
 
 /// Number of children of a node.
-const WIDTH: usize = 4;
+const CHILDREN_PER_NODE: usize = 4;
 
 /// Smallest number of triangles in a half of a subtree for which both halves are built in
 /// parallel.
@@ -69,7 +69,7 @@ impl Aabb {
 
 /// Margin by which boxes are extended in ray queries, mm. It exceeds the rounding errors of
 /// coordinates up to metres, so that no triangle is missed.
-const SLACK: f64 = 1e-9;
+const BOX_MARGIN_MM: f64 = 1e-9;
 
 /// A ray prepared for tests against boxes.
 struct BoxRay {
@@ -83,8 +83,8 @@ impl BoxRay {
     fn meets(&self, aabb: &Aabb) -> bool {
         let (mut enters, mut leaves) = (0.0, f64::INFINITY);
         for a in 0..3 {
-            let one = (aabb.min[a] - self.start[a] - SLACK) * self.inverse[a];
-            let other = (aabb.max[a] - self.start[a] + SLACK) * self.inverse[a];
+            let one = (aabb.min[a] - self.start[a] - BOX_MARGIN_MM) * self.inverse[a];
+            let other = (aabb.max[a] - self.start[a] + BOX_MARGIN_MM) * self.inverse[a];
             enters = greater(lesser(one, other), enters);
             leaves = lesser(greater(one, other), leaves);
         }
@@ -122,11 +122,11 @@ pub struct Closest {
 /// the index of a node.
 const IS_TRIANGLE: u32 = 1 << 31;
 /// No child.
-const NONE: u32 = u32::MAX;
+const NO_CHILD: u32 = u32::MAX;
 
 /// Share by which a squared distance in single precision, rounded towards zero wherever it is computed, may
 /// still exceed the true one.
-const ROUNDING: f64 = 1e-6;
+const SINGLE_ROUNDING_SHARE: f64 = 1e-6;
 
 /// The largest number in single precision that is not greater.
 fn round_down(x: f64) -> f32 {
@@ -151,18 +151,18 @@ fn round_up(x: f64) -> f32 {
 /// Four children and their boxes, axis by axis.
 #[derive(Debug, Clone)]
 struct Node {
-    min: [[f32; WIDTH]; 3],
-    max: [[f32; WIDTH]; 3],
-    children: [u32; WIDTH],
+    min: [[f32; CHILDREN_PER_NODE]; 3],
+    max: [[f32; CHILDREN_PER_NODE]; 3],
+    children: [u32; CHILDREN_PER_NODE],
 }
 
 impl Node {
     /// A node without children, whose boxes contain nothing.
     fn empty() -> Self {
         Self {
-            min: [[f32::INFINITY; WIDTH]; 3],
-            max: [[f32::NEG_INFINITY; WIDTH]; 3],
-            children: [NONE; WIDTH],
+            min: [[f32::INFINITY; CHILDREN_PER_NODE]; 3],
+            max: [[f32::NEG_INFINITY; CHILDREN_PER_NODE]; 3],
+            children: [NO_CHILD; CHILDREN_PER_NODE],
         }
     }
 
@@ -182,13 +182,13 @@ impl Node {
         }
     }
 
-    /// Lower bounds of the squared distances from a point to the children, but for [`ROUNDING`]; infinite
+    /// Lower bounds of the squared distances from a point to the children, but for [`SINGLE_ROUNDING_SHARE`]; infinite
     /// for no child. `below` and `above` are the point's coordinates, rounded.
     #[inline]
-    fn squared_distances(&self, below: &[f32; 3], above: &[f32; 3]) -> [f32; WIDTH] {
-        let mut sums = [0.0f32; WIDTH];
+    fn squared_distances(&self, below: &[f32; 3], above: &[f32; 3]) -> [f32; CHILDREN_PER_NODE] {
+        let mut sums = [0.0f32; CHILDREN_PER_NODE];
         for r in 0..3 {
-            for k in 0..WIDTH {
+            for k in 0..CHILDREN_PER_NODE {
                 let (low, high) = (self.min[r][k] - above[r], below[r] - self.max[r][k]);
                 let outside = if low > high { low } else { high };
                 let outside = if outside > 0.0 { outside } else { 0.0 };
@@ -284,7 +284,7 @@ impl Bvh {
         );
         let limit = |best: &Option<Closest>| {
             best.map_or(f32::INFINITY, |found| {
-                round_up(found.squared_distance * (1.0 + ROUNDING))
+                round_up(found.squared_distance * (1.0 + SINGLE_ROUNDING_SHARE))
             })
         };
         let mut bound = limit(&best);
@@ -300,9 +300,9 @@ impl Bvh {
             let node = &self.nodes[index as usize];
             let distances = node.squared_distances(&below, &above);
             let first = height;
-            for k in 0..WIDTH {
+            for k in 0..CHILDREN_PER_NODE {
                 let child = node.children[k];
-                if child == NONE || distances[k] > bound {
+                if child == NO_CHILD || distances[k] > bound {
                     continue;
                 }
                 if child & IS_TRIANGLE != 0 {
@@ -375,7 +375,7 @@ impl Bvh {
     /// pair once. One search for all triangles of a leaf is several times as fast as one for each.
     pub fn for_each_pair_from(&self, leaf: Leaf, mut visit: impl FnMut(u32, u32)) {
         let Leaf(own) = leaf;
-        let mut triangles = [(0usize, Aabb::empty()); WIDTH];
+        let mut triangles = [(0usize, Aabb::empty()); CHILDREN_PER_NODE];
         let mut count = 0;
         let mut aabb = Aabb::empty();
         for slot in self.own_slots(&self.nodes[own as usize]) {
@@ -393,10 +393,10 @@ impl Bvh {
             height -= 1;
             let node = &self.nodes[stack[height] as usize];
             // All below a child ends before the next node does: earlier leaves have had their turn.
-            let mut next = NONE;
-            for k in (0..WIDTH).rev() {
+            let mut next = NO_CHILD;
+            for k in (0..CHILDREN_PER_NODE).rev() {
                 let child = node.children[k];
-                if child == NONE {
+                if child == NO_CHILD {
                     continue;
                 }
                 let is_node = child & IS_TRIANGLE == 0;
@@ -427,7 +427,7 @@ impl Bvh {
 
     /// The places in `order` of the triangles that are children of a node.
     fn own_slots<'a>(&self, node: &'a Node) -> impl Iterator<Item = usize> + use<'a> {
-        let is_triangle = |child: &&u32| **child != NONE && **child & IS_TRIANGLE != 0;
+        let is_triangle = |child: &&u32| **child != NO_CHILD && **child & IS_TRIANGLE != 0;
         let triangles = node.children.iter().filter(is_triangle);
         triangles.map(|child| (child & !IS_TRIANGLE) as usize)
     }
@@ -452,8 +452,8 @@ impl Bvh {
                 continue;
             }
             let node = &self.nodes[child as usize];
-            for k in (0..WIDTH).rev() {
-                if node.children[k] != NONE && ray.meets(&node.aabb(k)) {
+            for k in (0..CHILDREN_PER_NODE).rev() {
+                if node.children[k] != NO_CHILD && ray.meets(&node.aabb(k)) {
                     stack[height] = node.children[k];
                     height += 1;
                 }
@@ -495,7 +495,7 @@ fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[V
     let index = nodes.len();
     nodes.push(Node::empty());
     let count = items.len();
-    let quarters: [&mut [Item]; WIDTH] = if count <= WIDTH {
+    let quarters: [&mut [Item]; CHILDREN_PER_NODE] = if count <= CHILDREN_PER_NODE {
         let mut rest = items;
         std::array::from_fn(|k| {
             let (own, others) = std::mem::take(&mut rest).split_at_mut(usize::from(k < count));
@@ -522,7 +522,7 @@ fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[V
         nodes[index].set(k, child, &aabb);
         whole = whole.union(&aabb);
     };
-    if count >= WIDTH * PARALLEL_SIZE {
+    if count >= CHILDREN_PER_NODE * PARALLEL_SIZE {
         let apart = |(first, items): (usize, &mut [Item])| {
             let mut nodes = Vec::new();
             let aabb = build(&mut nodes, items, first, corners);

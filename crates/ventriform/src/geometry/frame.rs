@@ -136,7 +136,7 @@ impl VoxelToPatient {
         most: usize,
     ) -> Option<(VoxelToPatient, [usize; 3])> {
         /// Share of a voxel by which rounding may exceed a whole number of voxels.
-        const SLACK: f64 = 1e-3;
+        const ROUNDING_SHARE: f64 = 1e-3;
         let mut steps = [0, 1, 2].map(|axis| self.linear.column(axis).into_owned());
         for axis in 1..3 {
             for before in 0..axis {
@@ -154,8 +154,8 @@ impl VoxelToPatient {
             });
             let at = cover.to_voxel(&self.to_patient(&index));
             for axis in 0..3 {
-                low[axis] = low[axis].min((at[axis] + SLACK).floor());
-                high[axis] = high[axis].max((at[axis] - SLACK).ceil());
+                low[axis] = low[axis].min((at[axis] + ROUNDING_SHARE).floor());
+                high[axis] = high[axis].max((at[axis] - ROUNDING_SHARE).ceil());
             }
         }
         let sizes = [0, 1, 2].map(|axis| high[axis] - low[axis] + 1.0);

@@ -16,10 +16,10 @@ pub const MOST_LABELS: usize = 1 << 16;
 /// is left out because the air of a CT is as even as a label.
 const PIECEWISE_OF_MANY: f64 = 0.6;
 /// Labelled voxels from which the share says something.
-const ENOUGH: usize = 1000;
+const MIN_LABELLED_VOXELS: usize = 1000;
 /// Least share of labelled voxels whose next voxel along i carries the same label: a label map
 /// consists of pieces, an image with few counts does not.
-const PIECEWISE: f64 = 0.5;
+const MIN_PIECEWISE_SHARE: f64 = 0.5;
 
 /// What a volume holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,16 +79,16 @@ fn range_of_part(values: &[f32]) -> (f32, f32, usize) {
     let mut not_finite = 0;
     for chunk in values.chunks(1 << 10) {
         // Branchless and in lanes, so that it vectorises; 0 · NaN and 0 · ∞ are NaN and stay.
-        const LANES: usize = 16;
-        let mut lows = [f32::INFINITY; LANES];
-        let mut highs = [f32::NEG_INFINITY; LANES];
-        let mut sums = [0f32; LANES];
-        let (groups, rest) = chunk.as_chunks::<LANES>();
+        const PARALLEL_VALUES: usize = 16;
+        let mut lows = [f32::INFINITY; PARALLEL_VALUES];
+        let mut highs = [f32::NEG_INFINITY; PARALLEL_VALUES];
+        let mut sums = [0f32; PARALLEL_VALUES];
+        let (groups, rest) = chunk.as_chunks::<PARALLEL_VALUES>();
         // Values that do not fill the lanes are read twice.
-        let mut last = [chunk[0]; LANES];
+        let mut last = [chunk[0]; PARALLEL_VALUES];
         last[..rest.len()].copy_from_slice(rest);
         for group in groups.iter().chain([&last]) {
-            for l in 0..LANES {
+            for l in 0..PARALLEL_VALUES {
                 let v = group[l];
                 lows[l] = if v < lows[l] { v } else { lows[l] };
                 highs[l] = if v > highs[l] { v } else { highs[l] };
@@ -132,7 +132,7 @@ pub fn many_are_pieces(counts: impl Iterator<Item = (usize, usize)>, undecided: 
         greatest = greatest.max(label);
     }
     let (voxels, runs) = (voxels - greatest.0, runs - greatest.1);
-    if voxels < ENOUGH {
+    if voxels < MIN_LABELLED_VOXELS {
         return undecided;
     }
     (voxels - runs) as f64 >= PIECEWISE_OF_MANY * voxels as f64
@@ -174,7 +174,7 @@ pub fn label_map(
             label.runs += 1;
             labelled += run.len();
             same += run.len() - 1;
-            let grainy = labelled > ENOUGH && (same as f64) < 0.25 * labelled as f64;
+            let grainy = labelled > MIN_LABELLED_VOXELS && (same as f64) < 0.25 * labelled as f64;
             if counts.len() > MOST_LABELS || grainy {
                 return Ok(None);
             }
@@ -190,7 +190,7 @@ pub fn label_map(
     let everything = labelled == volume.voxels.len() && counts.len() == 1;
     let piecewise = match many {
         true => pieces(&counts, false),
-        false => counts.len() <= 1 || same as f64 >= PIECEWISE * labelled as f64,
+        false => counts.len() <= 1 || same as f64 >= MIN_PIECEWISE_SHARE * labelled as f64,
     };
     let counts = counts.into_iter().map(|(label, l)| (label, l.voxels));
     Ok((labelled > 0 && piecewise && !everything).then(|| counts.collect()))
@@ -258,21 +258,21 @@ pub fn objects(volume: &Volume, labels: &BTreeMap<i64, usize>) -> (BTreeMap<i64,
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
 /// maximum.
 pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
-    const BINS: usize = 256;
+    const HISTOGRAM_BINS: usize = 256;
     let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
-    let scale = BINS as f64 / width;
+    let scale = HISTOGRAM_BINS as f64 / width;
     let counted = |rows: &[&[f32]]| {
-        let mut histogram = [0u64; BINS];
+        let mut histogram = [0u64; HISTOGRAM_BINS];
         for v in rows.iter().flat_map(|row| row.iter()) {
             if v.is_finite() {
                 let bin = ((f64::from(*v) - low) * scale) as usize;
-                histogram[bin.min(BINS - 1)] += 1;
+                histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
             }
         }
         histogram
     };
     let histogram = rows.par_chunks(256).map(counted).reduce(
-        || [0; BINS],
+        || [0; HISTOGRAM_BINS],
         |a, b| std::array::from_fn(|bin| a[bin] + b[bin]),
     );
     let total = histogram.iter().sum::<u64>() as f64;
@@ -280,7 +280,7 @@ pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
     let all: f64 = histogram.iter().enumerate().map(weighted).sum();
     let (mut below, mut sum) = (0.0, 0.0);
     let mut best = (f64::NEG_INFINITY, 0);
-    for bin in 0..BINS {
+    for bin in 0..HISTOGRAM_BINS {
         below += histogram[bin] as f64;
         sum += bin as f64 * histogram[bin] as f64;
         let above = total - below;
@@ -291,7 +291,7 @@ pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
             }
         }
     }
-    (low + (best.1 as f64 + 1.0) / BINS as f64 * width) as f32
+    (low + (best.1 as f64 + 1.0) / HISTOGRAM_BINS as f64 * width) as f32
 }
 
 #[cfg(test)]

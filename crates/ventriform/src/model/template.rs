@@ -129,7 +129,7 @@ impl Template {
 /// Finds the cup in the model by the same search as in patients, so that centre, axis and length
 /// are defined alike in both.
 fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
-    const SPACING: f64 = 3.25;
+    const NODE_SPACING_MM: f64 = 3.25;
     let bounds = Aabb::of(&mesh.vertices);
     let size = bounds.max - bounds.min;
     let too_long = size.iter().any(|x| *x > 400.0);
@@ -137,9 +137,9 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     if too_long {
         return Err(none);
     }
-    let shape = [0, 1, 2].map(|a| ((size[a] + 80.0) / SPACING).ceil() as usize);
+    let shape = [0, 1, 2].map(|a| ((size[a] + 80.0) / NODE_SPACING_MM).ceil() as usize);
     let centre = (bounds.min + bounds.max) / 2.0;
-    let Ok(frame) = VoxelToPatient::centred(shape, [SPACING; 3], centre) else {
+    let Ok(frame) = VoxelToPatient::centred(shape, [NODE_SPACING_MM; 3], centre) else {
         return Err(none);
     };
     let mask = voxelise(mesh, shape, &frame);
@@ -155,7 +155,7 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     };
     match localisation::of_model(&picture, monitor) {
         Ok(found) if found.correlation > 0.6 => {
-            let mut sharper = Field::coarse(&picture, None, SPACING, monitor)?;
+            let mut sharper = Field::coarse(&picture, None, NODE_SPACING_MM, monitor)?;
             sharper.blur(5.5, monitor)?;
             Ok(localisation::refine(&sharper, &found.cup))
         }

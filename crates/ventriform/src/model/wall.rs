@@ -269,13 +269,13 @@ impl AxisFrame {
         let along = |p: &Vec3| (p - cup.centre).dot(&cup.axis);
         let apex = mesh.vertices.iter().map(along).fold(f64::MIN, f64::max);
         // The rim's height in each direction: the most basal node of every sector.
-        const SECTORS: usize = 12;
-        let mut heights = [f64::INFINITY; SECTORS];
+        const RIM_SECTORS: usize = 12;
+        let mut heights = [f64::INFINITY; RIM_SECTORS];
         let mut radius = 0.0;
         for p in &mesh.vertices {
             let r = p - cup.centre;
             let angle = r.dot(&anterior).atan2(r.dot(&lateral)).rem_euclid(TAU);
-            let sector = ((angle / TAU * SECTORS as f64) as usize).min(SECTORS - 1);
+            let sector = ((angle / TAU * RIM_SECTORS as f64) as usize).min(RIM_SECTORS - 1);
             heights[sector] = heights[sector].min(along(p));
             radius += (r - cup.axis * along(p)).norm();
         }

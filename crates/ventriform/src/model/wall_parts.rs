@@ -18,10 +18,10 @@ use crate::progress::{Cancelled, Monitor};
 
 /// How far from the rim the base may reach, as a share of the length from rim to apex. Valve planes
 /// are slanted, and the rim is their mean.
-const BASAL: f64 = 0.3;
+const MAX_BASE_SHARE: f64 = 0.3;
 
 /// How often patches beside the largest part of a side are given to the other side, until none is left.
-const ROUNDS: usize = 8;
+const MAX_REASSIGNMENTS: usize = 8;
 
 /// The part of each triangle of `mesh`, a ventricle's wall with this `cup` (LPS mm); `None` if the mesh has
 /// not got all parts.
@@ -36,7 +36,7 @@ pub fn wall_parts(
     // The sides of an angle about the axis do not matter here.
     let wall = VentricleWall::new(mesh, cup, &Vec3::z(), monitor)?;
     let [rim, apex] = wall.extent;
-    let basal_end = rim + BASAL * (apex - rim);
+    let basal_end = rim + MAX_BASE_SHARE * (apex - rim);
     let facing: Vec<Facing> = (0..mesh.triangles.len())
         .map(|t| {
             let [a, b, c] = mesh.corners(t);
@@ -54,7 +54,7 @@ pub fn wall_parts(
         .collect();
     let neighbours = neighbours(mesh);
     let mut outer: Vec<bool> = facing.iter().map(|f| f.outward > 0.0).collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_REASSIGNMENTS {
         if !flip_patches(&mut outer, &facing, &neighbours) {
             break;
         }

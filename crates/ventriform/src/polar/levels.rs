@@ -22,7 +22,7 @@ impl Level {
 }
 
 /// Shares of the way from the rim (0) to the end of the cavity (1) at which the levels end.
-const ENDS: [f64; 4] = [1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0];
+const LEVEL_ENDS: [f64; 4] = [1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0];
 
 /// Where each column of rays passes from one level to the next.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +50,7 @@ impl Levels {
                     least
                 })
                 .collect();
-            ENDS.map(|end| row_of(&shares, end))
+            LEVEL_ENDS.map(|end| row_of(&shares, end))
         });
         Self {
             ends: ends.collect(),

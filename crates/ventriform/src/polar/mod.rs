@@ -161,7 +161,7 @@ pub struct PolarMap {
 }
 
 /// Names of the segments 1 to 17.
-pub const NAMES: [&str; 17] = [
+pub const SEGMENT_NAMES: [&str; 17] = [
     "basal anterior",
     "basal anteroseptal",
     "basal inferoseptal",
@@ -191,7 +191,7 @@ pub fn territory(segment: usize) -> &'static str {
 }
 
 /// The names of the arteries of [`territory`].
-const ARTERIES: [&str; 3] = ["LAD", "LCX", "RCA"];
+const ARTERY_NAMES: [&str; 3] = ["LAD", "LCX", "RCA"];
 
 /// The segment of a `level` at `angle` degrees counter-clockwise from lateral.
 pub fn segment_at(level: Level, angle: f64) -> usize {
@@ -223,8 +223,8 @@ impl PolarMap {
     /// The name of a segment: the Association's, or where no side is known, its level and its place there.
     pub fn name_of(&self, segment: usize) -> String {
         let (level, first, count) = match segment {
-            _ if self.is_oriented() => return NAMES[segment - 1].to_owned(),
-            17 => return NAMES[16].to_owned(),
+            _ if self.is_oriented() => return SEGMENT_NAMES[segment - 1].to_owned(),
+            17 => return SEGMENT_NAMES[16].to_owned(),
             13..=16 => ("apical", 13, 4),
             7..=12 => ("mid", 7, 6),
             _ => ("basal", 1, 6),
@@ -311,7 +311,7 @@ pub fn map(
         let own = indexed().filter(|(i, _)| segment_of(&levels, i / COLUMNS, i % COLUMNS) == s + 1);
         summarise(s + 1, own.map(|(_, p)| p), reference, limit)
     });
-    let territories = ARTERIES.map(|name| {
+    let territories = ARTERY_NAMES.map(|name| {
         let own = segments.iter().filter(|s| territory(s.number) == name);
         let (mean_percent, extent_percent, area) = together(own);
         Territory {

@@ -9,14 +9,14 @@ use super::{COLUMNS, Level, PolarMap, Projection, ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
 
 /// Height of the picture, pixels.
-const SIZE: usize = 640;
+const PICTURE_HEIGHT_PX: usize = 640;
 /// Its width: the map, and the colour bar on its right.
-const WIDTH: usize = 760;
+const PICTURE_WIDTH_PX: usize = 760;
 /// Radius of the map.
-const RADIUS: f64 = 280.0;
-const CENTRE: f64 = SIZE as f64 / 2.0;
+const MAP_RADIUS_PX: f64 = 280.0;
+const MAP_CENTRE_PX: f64 = PICTURE_HEIGHT_PX as f64 / 2.0;
 /// Height of a line of text.
-const TEXT: f64 = 18.0;
+const TEXT_HEIGHT_PX: f64 = 18.0;
 
 /// The colours of maps, which the page (`web/src/viewer/colours.ts`) reads from the same file.
 #[derive(Deserialize)]
@@ -34,14 +34,14 @@ static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
         .expect("the file holds what `Palette` names")
 });
 
-const BORDER: Rgb = [200; 3];
+const BORDER_COLOUR: Rgb = [200; 3];
 /// Borders between the territories of two arteries.
 const TERRITORY_BORDER: Rgb = [255; 3];
 const WHITE: Rgb = [255; 3];
 const BLACK: Rgb = [0; 3];
 
 /// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
-const SIDES: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
+const SIDE_LETTERS: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
 
 /// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
 /// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
@@ -74,8 +74,8 @@ fn drawing(map: &PolarMap) -> Drawing {
                 "; orientation unknown"
             }
         ),
-        width: WIDTH,
-        height: SIZE,
+        width: PICTURE_WIDTH_PX,
+        height: PICTURE_HEIGHT_PX,
         shapes: tiles
             .chain(threshold_line(map, &rings))
             .chain(borders(map, &rings))
@@ -190,9 +190,9 @@ fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     let mut shapes: Vec<VectorShape> = rings
         .iter()
         .map(|share| VectorShape::Circle {
-            centre: [CENTRE; 2],
-            radius: RADIUS * share,
-            stroke: BORDER,
+            centre: [MAP_CENTRE_PX; 2],
+            radius: MAP_RADIUS_PX * share,
+            stroke: BORDER_COLOUR,
             width: 1.5,
         })
         .collect();
@@ -203,7 +203,7 @@ fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
             let turns = 0.25 + (k as f64 - 0.5) / count as f64;
             let pair = [(k + count - 1) % count, k].map(|k| territory(first + k));
             let (stroke, width) = match pair[0] == pair[1] || !map.is_oriented() {
-                true => (BORDER, 1.5),
+                true => (BORDER_COLOUR, 1.5),
                 false => (TERRITORY_BORDER, 4.0),
             };
             shapes.push(VectorShape::Line {
@@ -226,17 +226,17 @@ fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = Ve
         VectorShape::Label {
             middle: screen(share, turns),
             text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}")),
-            size: TEXT,
+            size: TEXT_HEIGHT_PX,
             ink: if bright { BLACK } else { WHITE },
             rim: Some(if bright { WHITE } else { BLACK }),
         }
     });
-    let letters = SIDES
+    let letters = SIDE_LETTERS
         .map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()))
         .into_iter()
         .filter(|_| map.is_oriented());
     let unknown = text(
-        [CENTRE, SIZE as f64 - 18.0],
+        [MAP_CENTRE_PX, PICTURE_HEIGHT_PX as f64 - 18.0],
         "ORIENTATION UNKNOWN".to_owned(),
     );
     let unknown = (!map.is_oriented()).then_some(unknown);
@@ -247,7 +247,7 @@ fn text(middle: Point, text: String) -> VectorShape {
     VectorShape::Label {
         middle,
         text,
-        size: TEXT,
+        size: TEXT_HEIGHT_PX,
         ink: BLACK,
         rim: None,
     }
@@ -266,12 +266,13 @@ fn label_place(segment: usize, rings: &[f64; 4]) -> (f64, f64) {
 
 /// The colours from 0 to 100 per cent, with the threshold.
 fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
-    const STEPS: usize = 100;
+    const COLOUR_BAR_STEPS: usize = 100;
     let (left, right, top, bottom) = (652.0, 676.0, 140.0, 500.0);
     let height = |share: f64| bottom - (bottom - top) * share;
-    let mut shapes: Vec<VectorShape> = (0..STEPS)
+    let mut shapes: Vec<VectorShape> = (0..COLOUR_BAR_STEPS)
         .map(|step| {
-            let ends = [step as f64, step as f64 + 1.03].map(|s| height(s / STEPS as f64));
+            let ends =
+                [step as f64, step as f64 + 1.03].map(|s| height(s / COLOUR_BAR_STEPS as f64));
             VectorShape::Polygon {
                 corners: vec![
                     [left, ends[0]],
@@ -279,7 +280,7 @@ fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
                     [right, ends[1]],
                     [left, ends[1]],
                 ],
-                fill: colour((step as f64 + 0.5) / STEPS as f64),
+                fill: colour((step as f64 + 0.5) / COLOUR_BAR_STEPS as f64),
             }
         })
         .collect();
@@ -319,5 +320,8 @@ fn sums(map: &PolarMap) -> Vec<VectorShape> {
 /// Place in the picture of a share of the radius and an angle in turns from lateral.
 fn screen(share: f64, turns: f64) -> Point {
     let (sin, cos) = (TAU * turns).sin_cos();
-    [CENTRE + RADIUS * share * cos, CENTRE - RADIUS * share * sin]
+    [
+        MAP_CENTRE_PX + MAP_RADIUS_PX * share * cos,
+        MAP_CENTRE_PX - MAP_RADIUS_PX * share * sin,
+    ]
 }

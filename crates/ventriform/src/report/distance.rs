@@ -25,19 +25,19 @@ use crate::optimise::Reference;
 use crate::progress::{Cancelled, Monitor};
 
 /// Queries between two checks of the cancel token, about 10 ms of work.
-const CHUNK: usize = 8192;
+const QUERIES_PER_CHECK: usize = 8192;
 /// Largest excess of the true largest distance over the one reported, as a share of the latter.
-const TOLERANCE: f64 = 0.01;
+const EXCESS_TOLERANCE: f64 = 0.01;
 /// Upper limit of the queries for a largest distance, in units of the even samples.
 const MOST_REFINED: usize = 40;
 
 /// No point of a triangle is farther from the nearest corner than this share of the longest side: the
 /// circumradius of an equilateral triangle, 1/√3.
-const SPREAD: f64 = 0.577_350_269_189_625_8;
+const CIRCUMRADIUS_SHARE: f64 = 0.577_350_269_189_625_8;
 
 /// Number of recently closest triangles that are tried before the tree is searched: consecutive
 /// vertices of a Marching Cubes surface alternate between the sheets of a wall.
-const RECENT: usize = 6;
+const RECENT_TRIANGLES: usize = 6;
 
 /// Distances between a model and its surface, and what they enclose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -159,7 +159,7 @@ impl Direction {
 
 /// Lower and upper bound of the largest distance of any point of `from` to `to`. The lower bound
 /// is a distance that was found, at least `found`. There is no upper bound where more than
-/// `budget` queries would be needed to bring the two within [`TOLERANCE`].
+/// `budget` queries would be needed to bring the two within [`EXCESS_TOLERANCE`].
 fn farthest(
     from: &TriMesh,
     (to, tree): (&TriMesh, &Bvh),
@@ -173,7 +173,7 @@ fn farthest(
     let mut best = closest.iter().map(distance).fold(found, f64::max);
     let mut cells = from.triangles.clone();
     loop {
-        let limit = best * (1.0 + TOLERANCE) + f64::EPSILON;
+        let limit = best * (1.0 + EXCESS_TOLERANCE) + f64::EPSILON;
         cells = (cells.into_par_iter().with_min_len(256))
             .filter(|cell| {
                 let corners = cell.map(|v| points[v as usize]);
@@ -183,14 +183,14 @@ fn farthest(
             })
             .collect();
         if cells.is_empty() {
-            return Ok((best, Some(best * (1.0 + TOLERANCE))));
+            return Ok((best, Some(best * (1.0 + EXCESS_TOLERANCE))));
         }
         let (quarters, sides) = quarter(&cells, &points);
         cells = quarters;
         if points.len() + sides.len() > budget {
             return Ok((best, None));
         }
-        let near = |side: f64| best.min(limit - side * SPREAD);
+        let near = |side: f64| best.min(limit - side * CIRCUMRADIUS_SHARE);
         let new = close_middles(&sides, &closest, (to, tree), near, monitor)?;
         best = new.iter().map(distance).fold(best, f64::max);
         points.extend(sides.iter().map(|side| side.middle));
@@ -245,7 +245,7 @@ fn longest_side([a, b, c]: &[Vec3; 3]) -> f64 {
 /// Upper bound of the distance of a cell's points, from those of its corners.
 fn bound_by_distances(cell: &[Vec3; 3], closest: &[Closest; 3]) -> f64 {
     let greatest = closest.iter().map(|c| c.squared_distance);
-    greatest.fold(0.0, f64::max).sqrt() + longest_side(cell) * SPREAD
+    greatest.fold(0.0, f64::max).sqrt() + longest_side(cell) * CIRCUMRADIUS_SHARE
 }
 
 /// Whether no point of a cell is farther than `limit` from one of the triangles closest to its corners. The
@@ -295,7 +295,7 @@ fn in_order<P: Sync>(
     look: impl Fn(&[P]) -> Vec<Closest> + Sync,
 ) -> Result<Vec<Closest>, Cancelled> {
     let mut closest = Vec::with_capacity(points.len());
-    for block in points.chunks(CHUNK) {
+    for block in points.chunks(QUERIES_PER_CHECK) {
         monitor.check()?;
         let parts: Vec<Vec<Closest>> = block.par_chunks(256).map(&look).collect();
         closest.extend(parts.into_iter().flatten());
@@ -313,7 +313,7 @@ fn close_points(
     monitor: &Monitor,
 ) -> Result<Vec<Closest>, Cancelled> {
     in_order(points, monitor, |points| {
-        let mut recent: VecDeque<u32> = VecDeque::with_capacity(RECENT);
+        let mut recent: VecDeque<u32> = VecDeque::with_capacity(RECENT_TRIANGLES);
         let find = |p: &Vec3| {
             let known = recent.iter().map(|&t| closest_on(to, t, p));
             let mut known = known.filter(|c| c.squared_distance <= near * near);
@@ -321,7 +321,7 @@ fn close_points(
                 return Some(found);
             }
             let found = tree.closest_from(p, recent.front().copied(), |_| true)?;
-            recent.truncate(RECENT - 1);
+            recent.truncate(RECENT_TRIANGLES - 1);
             recent.push_front(found.triangle);
             Some(found)
         };
@@ -377,7 +377,7 @@ fn closest_on(mesh: &TriMesh, t: u32, p: &Vec3) -> Closest {
 /// which is even and needs no random numbers.
 fn even_samples(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
     // 1/g and 1/g² for the real root g of x³ = x + 1.
-    const STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
+    const R2_SEQUENCE_STEP: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
     let total = mesh.area();
     if !(total > 0.0) {
         return Vec::new();
@@ -388,7 +388,7 @@ fn even_samples(mesh: &TriMesh, count: usize) -> Vec<Vec3> {
         covered += mesh.area_normal(t).norm() / 2.0 / total;
         let [a, b, c] = mesh.corners(t);
         while points.len() < count && (points.len() as f64 + 0.5) / (count as f64) < covered {
-            let [u, v] = STEP.map(|s| (0.5 + s * points.len() as f64).fract());
+            let [u, v] = R2_SEQUENCE_STEP.map(|s| (0.5 + s * points.len() as f64).fract());
             let (u, v) = if u + v > 1.0 {
                 (1.0 - u, 1.0 - v)
             } else {
@@ -477,7 +477,7 @@ mod tests {
                 corner(1.0, 0.0),
                 corner((t * 0.618).fract(), 0.01 + (t * 0.005).fract() * 0.93),
             ];
-            let bound = longest_side(&cell) * SPREAD;
+            let bound = longest_side(&cell) * CIRCUMRADIUS_SHARE;
             for i in 0..=40 {
                 for j in 0..=40 - i {
                     let [u, v] = [i, j].map(|x| f64::from(x) / 40.0);

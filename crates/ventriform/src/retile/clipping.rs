@@ -22,7 +22,7 @@ const MIN_CHUNK: usize = 1024;
 const MAX_CHUNKS: usize = 16;
 
 /// Multiplying by it is faster than dividing by 3, which would take most of the time.
-const THIRD: f64 = 1.0 / 3.0;
+const ONE_THIRD: f64 = 1.0 / 3.0;
 
 /// First moment (mass times position) and mass.
 #[derive(Debug, Clone, Copy)]
@@ -127,7 +127,7 @@ impl<'a> Patches<'a> {
         let (lone, rest) = ([a, b, c][k], [a, b, c][(k + 1) % 3]);
         let plane = Bisector::new(&sites[lone as usize], &sites[rest as usize]);
         let (s, u) = (plane.crossing(&p, &q), plane.crossing(&p, &r));
-        let way = (q - p) * (s * THIRD) + (r - p) * (u * THIRD);
+        let way = (q - p) * (s * ONE_THIRD) + (r - p) * (u * ONE_THIRD);
         let piece = Moment::of(p + way, whole.mass * s * u);
         sums[lone as usize].add(&piece);
         sums[rest as usize].add(&Moment {

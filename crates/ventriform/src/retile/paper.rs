@@ -5,7 +5,7 @@
 //!
 //! The new mesh then replaces the old one and the procedure is repeated until the result is good:
 //! the points of the last mesh push each other again with the full force of the first round, and
-//! are joined anew. It ends when [`PATIENCE`] repetitions in a row have not raised the mean radius
+//! are joined anew. It ends when [`MAX_STALE_REPEATS`] repetitions in a row have not raised the mean radius
 //! ratio 2r/R of the best mesh by a fraction of [`LEAST_RISE`] together, or after
 //! [`RetileParameters::repeats`]; the best mesh is kept. Unlike in the paper's words the points stay
 //! on the surface S: a mesh of N points that takes the place of S cuts off its bulges, and each
@@ -23,13 +23,13 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
 
 /// Number of seeds tried before re-tiling fails.
-const SEEDS: u64 = 4;
+const MAX_SEEDS: u64 = 4;
 
 /// Fraction of the stage's time that repulsion takes.
 const REPULSION_SHARE: f64 = 0.6;
 
 /// Number of repetitions in a row without a rise after which the result is good.
-const PATIENCE: usize = 3;
+const MAX_STALE_REPEATS: usize = 3;
 
 /// Smallest relative rise of the mean radius ratio that counts.
 const LEAST_RISE: f64 = 0.002;
@@ -45,7 +45,7 @@ pub(super) fn retile(
     if parameters.points < least {
         return Err(refusal(&run, None));
     }
-    tile(&run, SEEDS)?.map_err(|error| refusal(&run, Some(error)))
+    tile(&run, MAX_SEEDS)?.map_err(|error| refusal(&run, Some(error)))
 }
 
 /// Tries the paper's method with `seeds` seeds; `None` if it fails with all of them.
@@ -118,7 +118,7 @@ fn repeat(
     };
     // The ratio that a rise is measured from, and the repetitions since.
     let (mut from, mut waited) = (best.ratio, 0);
-    while best.repeats < run.parameters.repeats && waited < PATIENCE {
+    while best.repeats < run.parameters.repeats && waited < MAX_STALE_REPEATS {
         best.repeats += 1;
         waited += 1;
         push_apart(run, &mut last, |_| run.monitor.check())?;
@@ -291,7 +291,7 @@ mod tests {
             for n in 1..=10 {
                 if best_until(n) > best_until(risen) * (1.0 + LEAST_RISE) {
                     risen = n;
-                } else if n == risen + PATIENCE {
+                } else if n == risen + MAX_STALE_REPEATS {
                     expected = n;
                     break;
                 }

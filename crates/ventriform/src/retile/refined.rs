@@ -38,17 +38,17 @@ const SAMPLES_PER_CELL: usize = 20;
 const SETTLING_ROUNDS: usize = 20;
 
 /// Largest number of repairs after one random start.
-const REPAIRS: usize = 24;
+const MAX_REPAIRS: usize = 24;
 
 /// Largest number of sites that one repair moves.
-const TRANSPLANTS: usize = 4;
+const MAX_TRANSPLANTS: usize = 4;
 
 /// Factor by which a repair raises the density around a crowded cell. The spacing changes with
 /// its fourth root.
 const DENSITY_FACTOR: f64 = 3.0;
 
 /// Number of random starts.
-const STARTS: u64 = 3;
+const RANDOM_STARTS: u64 = 3;
 
 /// Number of seeds with which the paper's method is tried afterwards.
 const PAPER_SEEDS: u64 = 2;
@@ -74,8 +74,8 @@ pub(super) fn retile(
     }
     let run = RefinedRun::new(surface, parameters);
     let mut facts = RetileFacts::default();
-    for start in 0..STARTS {
-        if let Some((mesh, sizing)) = run.attempt(start, REPAIRS, &mut facts, monitor)? {
+    for start in 0..RANDOM_STARTS {
+        if let Some((mesh, sizing)) = run.attempt(start, MAX_REPAIRS, &mut facts, monitor)? {
             return Ok(Tiled {
                 mesh,
                 sizing,
@@ -218,7 +218,7 @@ impl<'a> RefinedRun<'a> {
                 return Ok(None);
             }
             self.raise_density(&cells, &crowded, &mut weights);
-            for &site in crowded.iter().take(TRANSPLANTS) {
+            for &site in crowded.iter().take(MAX_TRANSPLANTS) {
                 let Some(light) = self.least_loaded(&cells, &weights, &crowded, site, &moved)
                 else {
                     return Ok(None);
@@ -670,7 +670,7 @@ mod tests {
             assert_eq!(tiled.mesh.vertices.len(), points);
             assert_eq!(topology::check(&tiled.mesh).unwrap().genus(), 0);
             assert!(self_intersections(&tiled.mesh).is_empty());
-            if facts.attempts > 1 && facts.attempts < REPAIRS {
+            if facts.attempts > 1 && facts.attempts < MAX_REPAIRS {
                 // At most 50 rounds, and 20 after each repair.
                 let most = 50 + SETTLING_ROUNDS * (facts.attempts - 1);
                 let rounds = facts.relaxation_rounds;
@@ -746,7 +746,7 @@ mod tests {
             );
             assert_eq!(topology::check(&tiled.mesh).unwrap().genus(), 0);
             assert!(self_intersections(&tiled.mesh).is_empty());
-            assert!((3..=REPAIRS).contains(&facts.attempts) && facts.warnings.is_empty());
+            assert!((3..=MAX_REPAIRS).contains(&facts.attempts) && facts.warnings.is_empty());
             // At most 50 rounds, and 20 after each repair.
             let most = 50 + SETTLING_ROUNDS * (facts.attempts - 1);
             assert!(
@@ -772,7 +772,7 @@ mod tests {
         assert_eq!(facts.repulsion_rounds, parameters.repulsion_iterations);
         assert!(facts.relaxation_rounds > 400, "{facts:?}");
         // All attempts of all starts, and those of the paper's method.
-        let of_cells = STARTS as usize * (REPAIRS + 1);
+        let of_cells = RANDOM_STARTS as usize * (MAX_REPAIRS + 1);
         assert!(facts.attempts > of_cells && facts.attempts <= of_cells + PAPER_SEEDS as usize);
     }
 }

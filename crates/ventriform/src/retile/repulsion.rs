@@ -21,13 +21,13 @@ use crate::mesh::FaceId;
 use crate::progress::Cancelled;
 
 /// Fraction by which k has fallen after the last round.
-const ANNEALED: f64 = 0.9;
+const ANNEALED_FRACTION: f64 = 0.9;
 
 /// Longest move in one round, as a fraction of the radius.
 const LONGEST_MOVE: f64 = 0.5;
 
 /// The end of a list of points.
-const NONE: u32 = u32::MAX;
+const LIST_END: u32 = u32::MAX;
 
 /// Moves `points` apart for the relative `spacing` at every vertex. `tick` is called with the
 /// fraction done and may cancel.
@@ -74,7 +74,7 @@ fn repel_by<M: GeodesicMap>(
 
 /// The strength k after a `share` of the rounds.
 fn strength(parameters: &RetileParameters, share: f64) -> f64 {
-    parameters.repulsion_strength * (1.0 - ANNEALED * share)
+    parameters.repulsion_strength * (1.0 - ANNEALED_FRACTION * share)
 }
 
 /// The points with their radii, as one linked list per triangle.
@@ -96,8 +96,8 @@ impl<'a> Neighbourhood<'a> {
             .iter()
             .map(|p| radius * domain.interpolate(spacing, p))
             .collect();
-        let mut first = vec![NONE; domain.half_edges.face_count()];
-        let mut next = vec![NONE; points.len()];
+        let mut first = vec![LIST_END; domain.half_edges.face_count()];
+        let mut next = vec![LIST_END; points.len()];
         for (i, p) in points.iter().enumerate().rev() {
             next[i] = first[p.triangle.index()];
             first[p.triangle.index()] = i as u32;
@@ -140,7 +140,7 @@ impl<'a> Neighbourhood<'a> {
             }
             for h in self.domain.half_edges.around(v) {
                 let t = h.face();
-                if self.first[t.index()] == NONE || t == own.triangle {
+                if self.first[t.index()] == LIST_END || t == own.triangle {
                     continue;
                 }
                 // Each triangle once, and only those entirely within the radius.
@@ -163,7 +163,7 @@ impl<'a> Neighbourhood<'a> {
         let mut q = self.first[t.index()];
         std::iter::from_fn(move || {
             let this = q;
-            if this == NONE {
+            if this == LIST_END {
                 return None;
             }
             q = self.next[this as usize];

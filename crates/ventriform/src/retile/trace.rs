@@ -18,7 +18,7 @@ const MAX_CROSSINGS: usize = 10_000;
 
 /// How far points near an edge of their triangle are moved towards its centroid, as a fraction of
 /// the way.
-pub(crate) const INSET: f64 = 2e-3;
+pub(crate) const EDGE_INSET: f64 = 2e-3;
 
 /// Follows the straight path of length and direction `step` (mm, in the frame of the start's
 /// triangle). Returns its end and the unit direction there (in the frame of the last triangle).
@@ -109,10 +109,10 @@ pub(crate) fn inset(barycentric: [f64; 3]) -> [f64; 3] {
     let clipped = barycentric.map(|x| x.max(0.0));
     let sum: f64 = clipped.iter().sum();
     let scaled = clipped.map(|x| x / sum);
-    if scaled.iter().all(|x| *x >= INSET / 3.0) {
+    if scaled.iter().all(|x| *x >= EDGE_INSET / 3.0) {
         return scaled;
     }
-    scaled.map(|x| x * (1.0 - INSET) + INSET / 3.0)
+    scaled.map(|x| x * (1.0 - EDGE_INSET) + EDGE_INSET / 3.0)
 }
 
 #[cfg(test)]
@@ -274,23 +274,23 @@ mod tests {
     fn points_near_an_edge_are_moved_inside_and_others_are_not() {
         let inside = [0.2, 0.5, 0.3];
         assert!((0..3).all(|k| (inset(inside)[k] - inside[k]).abs() < 1e-15));
-        for x in [0.0, 1e-9, 0.5 * INSET / 3.0, -0.01] {
+        for x in [0.0, 1e-9, 0.5 * EDGE_INSET / 3.0, -0.01] {
             for k in 0..3 {
                 let mut near = [0.6 - x, 0.4, x];
                 near.rotate_left(k);
                 let moved = inset(near);
                 assert!((moved.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-                assert!(moved.iter().all(|x| *x >= INSET / 3.0));
+                assert!(moved.iter().all(|x| *x >= EDGE_INSET / 3.0));
                 // Towards the centroid, by a small share of the way.
                 let clipped = near.map(|x| x.max(0.0));
                 let sum: f64 = clipped.iter().sum();
                 for m in 0..3 {
                     let from = clipped[m] / sum;
-                    assert!((moved[m] - from - INSET * (1.0 / 3.0 - from)).abs() < 1e-12);
+                    assert!((moved[m] - from - EDGE_INSET * (1.0 / 3.0 - from)).abs() < 1e-12);
                 }
             }
         }
-        let limit = INSET / 3.0;
+        let limit = EDGE_INSET / 3.0;
         let just = [1.0 - 2.0 * 1.01 * limit, 1.01 * limit, 1.01 * limit];
         assert!((inset(just)[1] - 1.01 * limit).abs() < 1e-12);
     }

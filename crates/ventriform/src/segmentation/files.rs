@@ -23,17 +23,17 @@ use crate::volume::{AffineSource, Reading};
 use serde_json::{Map, Value, json};
 
 /// The mask of the wall that was asked for.
-const MASK: &str = "mask.nii.gz";
+const MASK_FILE: &str = "mask.nii.gz";
 /// The mask of the anatomical wall, where `mask.nii.gz` shows the apparent one.
 const ANATOMICAL_MASK: &str = "mask_anatomical.nii.gz";
 /// The mask of the apparent wall, where `mask.nii.gz` shows the anatomical one.
 const APPARENT_MASK: &str = "mask_apparent.nii.gz";
 /// The wall as 1 and the cavity as 2.
-const LABELS: &str = "labels.nii.gz";
+const LABELS_FILE: &str = "labels.nii.gz";
 /// The same for 3D Slicer.
-const SEGMENTS: &str = "labels.seg.nrrd";
+const SEGMENTS_FILE: &str = "labels.seg.nrrd";
 /// The scan about the organ, which the page shows.
-const REGION: &str = "region.nii.gz";
+const REGION_FILE: &str = "region.nii.gz";
 
 /// One file of a segmentation.
 #[derive(Debug, Clone)]
@@ -82,14 +82,14 @@ impl SegmentedVolume {
         let edge = self.parameters.deform.edge;
         let place = MaskPlace::of(&self.reading, self.parameters.mask_grid).ok_or_else(|| {
             SegmentationFilesError::Other {
-                what: MASK,
+                what: MASK_FILE,
                 reason: "a grid at right angles that covers so skewed a scan has too many voxels; \
                          leave out mask_grid, or resample the scan first"
                     .into(),
             }
         })?;
         let mask = place.mask(&segmentation.mask, &segmentation.fit.model.mesh);
-        let mut files = vec![self.mask(MASK, &mask, &place, monitor)?];
+        let mut files = vec![self.mask(MASK_FILE, &mask, &place, monitor)?];
         if let (Some(mask), Some(surface)) = (
             &segmentation.other_mask,
             segmentation.fit.model.other_surface(edge),
@@ -123,9 +123,9 @@ impl SegmentedVolume {
         let region = region(&self.reading.volume, &fit.model.mesh, monitor)?;
         let region = nifti::write(&region, StoredType::Scaled8, true);
         files.push(NamedFile {
-            name: REGION.into(),
+            name: REGION_FILE.into(),
             media_type: "application/gzip",
-            bytes: region.map_err(|error| other(REGION, &error))?,
+            bytes: region.map_err(|error| other(REGION_FILE, &error))?,
         });
         files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
@@ -264,7 +264,7 @@ impl SegmentedVolume {
             slices: bytes("slices.png"),
             polar: bytes("polar.svg"),
             polar_map: map.as_ref(),
-            region: bytes(REGION),
+            region: bytes(REGION_FILE),
             scan,
         });
         NamedFile {
@@ -374,11 +374,11 @@ impl SegmentedVolume {
         let grid = (place.shape, &place.frame);
         let nifti = nifti::write_labels(&labels, &entries, grid, place.stated, monitor);
         let nrrd = NamedFile {
-            name: SEGMENTS.into(),
+            name: SEGMENTS_FILE.into(),
             media_type: seg_nrrd::MEDIA_TYPE,
             bytes: seg_nrrd::encode(&labels, &segments, grid, monitor)?,
         };
-        Ok([nifti_file(LABELS, nifti)?, nrrd])
+        Ok([nifti_file(LABELS_FILE, nifti)?, nrrd])
     }
 
     fn polar(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {

@@ -10,9 +10,9 @@ use crate::volume::Volume;
 use nalgebra::Matrix3;
 
 /// How far the part reaches beyond the organ on every side, mm: a heart stays in slices of 140 mm.
-const MARGIN: f64 = 25.0;
+const REGION_MARGIN_MM: f64 = 25.0;
 /// Smaller voxels are merged into blocks of about this size, mm: finer than the detail of emission scans.
-const BLOCK: f64 = 2.5;
+const BLOCK_SIZE_MM: f64 = 2.5;
 
 /// The part of `volume` about `organ`. Voxels keep their places, unless they are so small that blocks of
 /// them are merged. Values that are not finite count as 0.
@@ -25,12 +25,12 @@ pub(super) fn region(
     monitor: &Monitor,
 ) -> Result<Volume, Cancelled> {
     let organ = Aabb::of(&organ.vertices);
-    let margin = Vec3::repeat(MARGIN);
+    let margin = Vec3::repeat(REGION_MARGIN_MM);
     let about = Aabb {
         min: organ.min - margin,
         max: organ.max + margin,
     };
-    let field = Field::coarse(volume, Some(&about), BLOCK, monitor)?;
+    let field = Field::coarse(volume, Some(&about), BLOCK_SIZE_MM, monitor)?;
     let origin = field.to_patient(&Vec3::zeros());
     let steps = [Vec3::x(), Vec3::y(), Vec3::z()].map(|axis| field.to_patient(&axis) - origin);
     let frame = VoxelToPatient::new(Matrix3::from_columns(&steps), origin);
@@ -76,7 +76,10 @@ mod tests {
             ));
             let half = (size as f64 - 1.0) * spacing / 2.0;
             for axis in 0..3 {
-                let reach = [bounds.min[axis] - MARGIN, bounds.max[axis] + MARGIN];
+                let reach = [
+                    bounds.min[axis] - REGION_MARGIN_MM,
+                    bounds.max[axis] + REGION_MARGIN_MM,
+                ];
                 assert!(first[axis] <= reach[0].max(-half) + block);
                 assert!(last[axis] >= reach[1].min(half) - block);
                 assert!(last[axis] - first[axis] <= reach[1] - reach[0] + 3.0 * block);

@@ -26,18 +26,18 @@ use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 
 /// Millimetres per pixel of a ventricle.
-pub const STEP: f64 = 0.6;
+pub const PIXEL_MM: f64 = 0.6;
 /// Pixels along both sides of a slice: 132 mm of a ventricle.
-pub const SIDE: usize = 220;
+pub const SLICE_SIDE_PX: usize = 220;
 /// Largest share of a slice's side that an organ takes.
-const FILL: f64 = 0.8;
+const ORGAN_SHARE: f64 = 0.8;
 /// Black columns between the slices.
-const GAP: usize = 4;
+const SLICE_GAP_PX: usize = 4;
 
 /// The fit's contour.
-pub const FIT: [u8; 3] = [255, 150, 0];
+pub const FIT_COLOUR: [u8; 3] = [255, 150, 0];
 /// The expert's contour.
-pub const EXPERT: [u8; 3] = [0, 210, 255];
+pub const EXPERT_COLOUR: [u8; 3] = [0, 210, 255];
 
 /// The three slices of one patient as a PNG file, `cut` as it says, with the contour of `fit` and,
 /// where it is given, of `expert` (a mask on the volume's grid).
@@ -55,7 +55,7 @@ pub fn png(
     for plane in &cut.planes {
         slices.push(slice(plane, volume, fit, expert, monitor)?);
     }
-    Ok(Image::side_by_side(&slices, GAP).png())
+    Ok(Image::side_by_side(&slices, SLICE_GAP_PX).png())
 }
 
 /// Where to cut: for each slice the places of its pixels, index (column, row, 0) to patient.
@@ -78,7 +78,7 @@ impl Cut {
         let up = anterior(&cup.axis, superior);
         let lateral = up.cross(&cup.axis);
         let sides = [(lateral, -up), (lateral, -cup.axis), (cup.axis, -up)];
-        Self::through(&cup.centre, sides, STEP)
+        Self::through(&cup.centre, sides, PIXEL_MM)
     }
 
     /// Through the middle of any organ.
@@ -86,7 +86,7 @@ impl Cut {
         let bounds = Aabb::of(&mesh.vertices);
         let longest = (bounds.max - bounds.min).amax();
         let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
-        let step = (longest / (FILL * SIDE as f64)).max(0.1);
+        let step = (longest / (ORGAN_SHARE * SLICE_SIDE_PX as f64)).max(0.1);
         let middle = (bounds.min + bounds.max) / 2.0;
         Self::through(&middle, [(x, y), (x, -z), (y, -z)], step)
     }
@@ -94,7 +94,7 @@ impl Cut {
     /// Slices about `middle`; of each the directions right and down on the picture.
     fn through(middle: &Vec3, sides: [(Vec3, Vec3); 3], step: f64) -> Self {
         let planes = sides.map(|(right, down)| {
-            let half = (SIDE - 1) as f64 / 2.0;
+            let half = (SLICE_SIDE_PX - 1) as f64 / 2.0;
             let origin = middle - (right + down) * (half * step);
             let linear = Matrix3::from_columns(&[right, down, right.cross(&down)]) * step;
             let frame = VoxelToPatient::new(linear, origin);
@@ -112,32 +112,40 @@ fn slice(
     monitor: &Monitor,
 ) -> Result<Image<3>, Cancelled> {
     let place = |pixel: usize| {
-        let (column, row) = (pixel % SIDE, pixel / SIDE);
+        let (column, row) = (pixel % SLICE_SIDE_PX, pixel / SLICE_SIDE_PX);
         frame.to_patient(&Vec3::new(column as f64, row as f64, 0.0))
     };
-    let corners = [0, SIDE - 1, SIDE * (SIDE - 1), SIDE * SIDE - 1].map(place);
+    let corners = [
+        0,
+        SLICE_SIDE_PX - 1,
+        SLICE_SIDE_PX * (SLICE_SIDE_PX - 1),
+        SLICE_SIDE_PX * SLICE_SIDE_PX - 1,
+    ]
+    .map(place);
     let region = Aabb::of(&corners);
     let field = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
-    let values: Vec<f64> = (0..SIDE * SIDE).map(|p| field.at(&place(p))).collect();
+    let values: Vec<f64> = (0..SLICE_SIDE_PX * SLICE_SIDE_PX)
+        .map(|p| field.at(&place(p)))
+        .collect();
 
-    let inside = voxelise(fit, [SIDE, SIDE, 1], frame).voxels;
-    let white = (0..SIDE * SIDE)
+    let inside = voxelise(fit, [SLICE_SIDE_PX, SLICE_SIDE_PX, 1], frame).voxels;
+    let white = (0..SLICE_SIDE_PX * SLICE_SIDE_PX)
         .filter(|p| inside[*p])
         .map(|p| values[p])
         .fold(0.0, f64::max);
     let grey = |v: &f64| [(255.0 * v / white.max(f64::MIN_POSITIVE)).clamp(0.0, 255.0) as u8; 3];
     let mut picture = Image {
-        width: SIDE,
-        height: SIDE,
+        width: SLICE_SIDE_PX,
+        height: SLICE_SIDE_PX,
         pixels: values.iter().map(grey).collect(),
     };
     if let Some(expert) = expert {
-        let drawn: Vec<bool> = (0..SIDE * SIDE)
+        let drawn: Vec<bool> = (0..SLICE_SIDE_PX * SLICE_SIDE_PX)
             .map(|p| at_nearest(expert, &volume.frame.to_voxel(&place(p))))
             .collect();
-        outline(&mut picture.pixels, &drawn, EXPERT);
+        outline(&mut picture.pixels, &drawn, EXPERT_COLOUR);
     }
-    outline(&mut picture.pixels, &inside, FIT);
+    outline(&mut picture.pixels, &inside, FIT_COLOUR);
     Ok(picture)
 }
 
@@ -157,16 +165,16 @@ fn at_nearest(mask: &Mask, index: &Vec3) -> bool {
 fn outline(pixels: &mut [[u8; 3]], inside: &[bool], colour: [u8; 3]) {
     let at = |column: usize, row: usize| {
         // Steps beyond the left and upper border wrap to numbers that are out of range.
-        column < SIDE && row < SIDE && inside[row * SIDE + column]
+        column < SLICE_SIDE_PX && row < SLICE_SIDE_PX && inside[row * SLICE_SIDE_PX + column]
     };
-    for row in 0..SIDE {
-        for column in 0..SIDE {
+    for row in 0..SLICE_SIDE_PX {
+        for column in 0..SLICE_SIDE_PX {
             let surrounded = at(column.wrapping_sub(1), row)
                 && at(column + 1, row)
                 && at(column, row.wrapping_sub(1))
                 && at(column, row + 1);
             if at(column, row) && !surrounded {
-                pixels[row * SIDE + column] = colour;
+                pixels[row * SLICE_SIDE_PX + column] = colour;
             }
         }
     }
@@ -203,17 +211,20 @@ mod tests {
         let cut = Cut::heart(&cup, &Vec3::z());
         let bytes = png(&volume, &mesh, &cut, Some(&wall), &Monitor::silent()).unwrap();
         let (width, height, pixels) = decoded(&bytes);
-        assert_eq!((width, height), (3 * SIDE + 2 * GAP, SIDE));
+        assert_eq!(
+            (width, height),
+            (3 * SLICE_SIDE_PX + 2 * SLICE_GAP_PX, SLICE_SIDE_PX)
+        );
         // Grey values on the axis, apical and basal of the centre: wall and nothing.
         let at = |column: usize, row: usize| pixels[3 * (row * width + column)];
-        let middle = SIDE + GAP + SIDE / 2;
-        let millimetres = |mm: f64| (SIDE as f64 / 2.0 + mm / STEP) as usize;
+        let middle = SLICE_SIDE_PX + SLICE_GAP_PX + SLICE_SIDE_PX / 2;
+        let millimetres = |mm: f64| (SLICE_SIDE_PX as f64 / 2.0 + mm / PIXEL_MM) as usize;
         assert!(at(middle, millimetres(-25.0)) > 150, "the apex is on top");
         assert!(
             at(middle, millimetres(25.0)) < 100,
             "the base is open below"
         );
         let count = |colour: [u8; 3]| pixels.chunks(3).filter(|p| **p == colour).count();
-        assert!(count(FIT) > 500 && count(EXPERT) > 100);
+        assert!(count(FIT_COLOUR) > 500 && count(EXPERT_COLOUR) > 100);
     }
 }

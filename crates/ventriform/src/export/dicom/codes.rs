@@ -54,7 +54,7 @@ pub(super) const SOURCE_FOR_PROCESSING: Code =
 pub(super) const MILLIMETRE: Code = ucum("mm", "mm");
 
 /// The colour of the structure, sRGB: the CIELab colour of its segment.
-const COLOUR: [u8; 3] = [255, 150, 0];
+const STRUCTURE_RGB: [u8; 3] = [255, 150, 0];
 /// The colour of the cavity, sRGB.
 const CAVITY_COLOUR: [u8; 3] = [60, 120, 220];
 
@@ -118,7 +118,7 @@ impl Structure {
             entry: LabelEntry {
                 value: 1,
                 name: self.label,
-                colour: COLOUR,
+                colour: STRUCTURE_RGB,
             },
             category: ANATOMICAL_STRUCTURE,
             kind: self.kind,

@@ -9,7 +9,7 @@ use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 
 /// Implementation Class UID (0002,0012) of this software: derived from a UUID that was drawn once.
-pub const IMPLEMENTATION: &str = "2.25.212046303391268093411418305311126403873";
+pub const IMPLEMENTATION_CLASS_UID: &str = "2.25.212046303391268093411418305311126403873";
 
 /// Implementation Version Name (0002,0013) of this software.
 pub const IMPLEMENTATION_NAME: &str = "VENTRIFORM";
@@ -130,7 +130,7 @@ impl DataSet {
     pub(super) fn file(self) -> Result<Vec<u8>, DicomError> {
         let meta = FileMetaTableBuilder::new()
             .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
-            .implementation_class_uid(IMPLEMENTATION)
+            .implementation_class_uid(IMPLEMENTATION_CLASS_UID)
             .implementation_version_name(IMPLEMENTATION_NAME);
         let object = self.0.with_meta(meta).map_err(encoding)?;
         let mut bytes = Vec::new();
@@ -152,7 +152,7 @@ pub fn file_start(
         .media_storage_sop_class_uid(sop_class)
         .media_storage_sop_instance_uid(sop_instance)
         .transfer_syntax(transfer_syntax)
-        .implementation_class_uid(IMPLEMENTATION)
+        .implementation_class_uid(IMPLEMENTATION_CLASS_UID)
         .implementation_version_name(IMPLEMENTATION_NAME)
         .build()
         .map_err(encoding)?;
@@ -174,15 +174,15 @@ fn representation(tag: Tag) -> VR {
 
 /// A decimal string (DS): at most 16 characters, as many digits as they hold.
 pub(super) fn decimal(number: f64) -> String {
-    const LONGEST: usize = 16;
+    const MAX_TEXT_CHARS: usize = 16;
     let number = number + 0.0;
     let shortest = format!("{number}");
-    if shortest.len() <= LONGEST {
+    if shortest.len() <= MAX_TEXT_CHARS {
         return shortest;
     }
     let fixed = (0..=14).rev().map(|digits| format!("{number:.digits$}"));
     let scientific = (0..=10).rev().map(|digits| format!("{number:.digits$e}"));
-    let fits = |text: &String| text.len() <= LONGEST;
+    let fits = |text: &String| text.len() <= MAX_TEXT_CHARS;
     let best = match number.abs() < 1e-4 {
         true => scientific.chain(fixed).find(fits),
         false => fixed.chain(scientific).find(fits),

@@ -1,10 +1,10 @@
 //! The figures of a report as Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID 1500 of
 //! PS3.16.
 //!
-//! One measurement group holds what was measured of the whole structure ([`FIGURES`]). It is a
+//! One measurement group holds what was measured of the whole structure ([`STRUCTURE_FIGURES`]). It is a
 //! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
 //! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
-//! wall and cavity have a group of TID 1501 each ([`PARTS`]), and so has each of the 17 segments of the heart
+//! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
 //! measured, not at the figure. A figure that the report lacks is left out.
 
@@ -59,7 +59,7 @@ impl Figure {
 }
 
 /// What is measured of the whole structure. A new figure of the report is a new line here.
-const FIGURES: &[Figure] = &[
+const STRUCTURE_FIGURES: &[Figure] = &[
     figure("/volumes_ml/wall", VOLUME, MILLILITRE),
     figure("/mass_g", MASS, GRAM),
     figure("/wall_thickness_mm", THICKNESS, MILLIMETRE).mean(),
@@ -100,7 +100,7 @@ struct Part {
 const APPARENT: Code = own("APPARENT", "With the blur of the image");
 const ANATOMICAL: Code = own("ANATOMICAL", "Without the blur of the image");
 
-const PARTS: [Part; 5] = [
+const WALL_FIGURES: [Part; 5] = [
     Part {
         name: "cavity",
         method: None,
@@ -205,7 +205,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
 
 /// Language, observer and procedure.
 fn context(results: &DicomResults<'_>) -> Vec<DataSet> {
-    const OBSERVER: &str = "HAS OBS CONTEXT";
+    const OBSERVER_RELATION: &str = "HAS OBS CONTEXT";
     let english = Code {
         value: "en",
         scheme: "RFC5646",
@@ -223,13 +223,17 @@ fn context(results: &DicomResults<'_>) -> Vec<DataSet> {
     vec![
         concept("HAS CONCEPT MOD", language, english),
         concept(
-            OBSERVER,
+            OBSERVER_RELATION,
             dcm("121005", "Observer Type"),
             dcm("121007", "Device"),
         ),
-        unique(OBSERVER, dcm("121012", "Device Observer UID"), &device),
+        unique(
+            OBSERVER_RELATION,
+            dcm("121012", "Device Observer UID"),
+            &device,
+        ),
         text(
-            OBSERVER,
+            OBSERVER_RELATION,
             dcm("121013", "Device Observer Name"),
             "ventriform",
         ),
@@ -252,7 +256,11 @@ fn image_library(results: &DicomResults<'_>) -> Option<DataSet> {
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
-    groups.extend(PARTS.iter().filter_map(|part| of_part(results, part)));
+    groups.extend(
+        WALL_FIGURES
+            .iter()
+            .filter_map(|part| of_part(results, part)),
+    );
     let segments = results.report.pointer("/polar/segments");
     for segment in segments.and_then(Value::as_array).into_iter().flatten() {
         let number = segment["number"].as_u64().unwrap_or(0) as usize;
@@ -300,7 +308,7 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
             ));
         }
     }
-    content.extend(measured(results.report, FIGURES));
+    content.extend(measured(results.report, STRUCTURE_FIGURES));
     let flags = results.report.pointer("/flags").and_then(Value::as_array);
     for flag in flags.into_iter().flatten() {
         if let Some(reason) = flag["reason"].as_str() {
@@ -360,11 +368,15 @@ fn measured(report: &Value, figures: &[Figure]) -> Vec<DataSet> {
 }
 
 fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
-    const OBSERVATION: &str = "HAS OBS CONTEXT";
+    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
     vec![
-        text(OBSERVATION, dcm("112039", "Tracking Identifier"), name),
+        text(
+            OBSERVATION_RELATION,
+            dcm("112039", "Tracking Identifier"),
+            name,
+        ),
         unique(
-            OBSERVATION,
+            OBSERVATION_RELATION,
             dcm("112040", "Tracking Unique Identifier"),
             uid,
         ),

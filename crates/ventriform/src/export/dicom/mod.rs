@@ -36,7 +36,7 @@ mod uid;
 mod tests;
 
 pub use codes::{LabelSegment, Structure};
-pub use data_set::{IMPLEMENTATION, IMPLEMENTATION_NAME, file_start};
+pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use uid::is_uid;
 
@@ -417,10 +417,10 @@ fn algorithm() -> DataSet {
 }
 
 /// Red, green and blue of the structure in viewers.
-const COLOUR: [u8; 3] = [255, 150, 0];
+const STRUCTURE_RGB: [u8; 3] = [255, 150, 0];
 
-/// [`COLOUR`] as CIELab values (PS3.3 C.10.7.1.1).
-const CIELAB: [u16; 3] = [46928, 41046, 52636];
+/// [`STRUCTURE_RGB`] as CIELab values (PS3.3 C.10.7.1.1).
+const STRUCTURE_CIELAB: [u16; 3] = [46928, 41046, 52636];
 
 /// Blue, for the cavity, as CIELab values.
 const CAVITY_CIELAB: [u16; 3] = [33644, 36596, 18297];

@@ -8,7 +8,7 @@
 use super::codes::{CAVITY, SEGMENTATION};
 use super::data_set::DataSet;
 use super::source::for_processing;
-use super::{CAVITY_CIELAB, CIELAB, DicomError, DicomResults, algorithm, put_segment};
+use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm, put_segment};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::Mask;
@@ -77,7 +77,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     set.text(tags::SEGMENTATION_TYPE, "BINARY");
     let mut segment = DataSet::new();
     results.put_segment(&mut segment);
-    put_look(&mut segment, CIELAB);
+    put_look(&mut segment, STRUCTURE_CIELAB);
     let mut segments = vec![segment];
     let masks: Vec<&Mask> = [Some(results.mask), results.cavity]
         .into_iter()

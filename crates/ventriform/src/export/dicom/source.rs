@@ -175,7 +175,7 @@ impl StatedIdentity {
 }
 
 /// The fields of a scan that its objects state or refer to.
-const CARRIED: [&str; 15] = [
+const CARRIED_FIELDS: [&str; 15] = [
     "patient_name",
     "patient_id",
     "patient_birth_date",
@@ -199,7 +199,7 @@ const CARRIED: [&str; 15] = [
 /// [`DicomError::Undecoded`].
 pub fn legible(scan: &Provenance) -> Result<(), DicomError> {
     let lost = |field: &&str| scan.undecoded.iter().any(|lost| lost == field);
-    match CARRIED.into_iter().find(lost) {
+    match CARRIED_FIELDS.into_iter().find(lost) {
         Some(field) => Err(DicomError::Undecoded { field }),
         None => Ok(()),
     }

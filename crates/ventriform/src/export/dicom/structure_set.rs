@@ -6,7 +6,7 @@
 
 use super::data_set::{DataSet, reference};
 use super::segmentation::SlicePlanes;
-use super::{COLOUR, DicomError, DicomResults};
+use super::{DicomError, DicomResults, STRUCTURE_RGB};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use dicom_dictionary_std::tags;
@@ -53,7 +53,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     outlines.text(tags::REFERENCED_ROI_NUMBER, "1");
     outlines.text(
         tags::ROI_DISPLAY_COLOR,
-        COLOUR.map(|c| c.to_string()).join("\\"),
+        STRUCTURE_RGB.map(|c| c.to_string()).join("\\"),
     );
     outlines.items(tags::CONTOUR_SEQUENCE, contours(results)?);
     set.item(tags::ROI_CONTOUR_SEQUENCE, outlines);
@@ -74,7 +74,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
 /// One item for every polygon of every slice.
 fn contours(results: &DicomResults<'_>) -> Result<Vec<DataSet>, DicomError> {
     /// Longest value of an element with a 16-bit length.
-    const LONGEST: usize = 65_534;
+    const MAX_SHORT_VALUE_BYTES: usize = 65_534;
     let scan = results.scan;
     let planes = SlicePlanes::of(&scan.frame, scan.shape[2])?;
     let mut items = Vec::new();
@@ -88,7 +88,7 @@ fn contours(results: &DicomResults<'_>) -> Result<Vec<DataSet>, DicomError> {
             let numbers = points.iter().flat_map(|p| [p.x, p.y, p.z]);
             let numbers: Vec<String> = numbers.map(micrometres).collect();
             let text = numbers.join("\\");
-            if text.len() > LONGEST {
+            if text.len() > MAX_SHORT_VALUE_BYTES {
                 return Err(DicomError::LongContour { slice });
             }
             let mut item = DataSet::new();

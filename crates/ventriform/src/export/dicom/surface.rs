@@ -1,7 +1,7 @@
 //! The mesh as Surface Segmentation Storage (PS3.3 A.57).
 
 use super::data_set::DataSet;
-use super::{CIELAB, DicomError, DicomResults, algorithm};
+use super::{DicomError, DicomResults, STRUCTURE_CIELAB, algorithm};
 use crate::export::single;
 use dicom_core::{PrimitiveValue, VR};
 use dicom_dictionary_std::tags;
@@ -45,7 +45,7 @@ fn mesh(results: &DicomResults<'_>) -> Result<DataSet, DicomError> {
     surface.text(tags::SURFACE_COMMENTS, results.structure.label);
     surface.text(tags::SURFACE_PROCESSING, "NO");
     surface.short(tags::RECOMMENDED_DISPLAY_GRAYSCALE_VALUE, 0xffff);
-    surface.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &CIELAB);
+    surface.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &STRUCTURE_CIELAB);
     surface.floats(tags::RECOMMENDED_PRESENTATION_OPACITY, vec![1.0]);
     surface.text(tags::RECOMMENDED_PRESENTATION_TYPE, "SURFACE");
     surface.text(tags::FINITE_VOLUME, "YES");

@@ -19,7 +19,7 @@ use crate::mesh::TriMesh;
 
 /// Smallest volume of the parallelepiped of two edges and n over the product of their lengths. Rounding
 /// contributes less than 1e-14.
-const CLEARLY: f64 = 1e-9;
+const MIN_RELATIVE_VOLUME: f64 = 1e-9;
 
 /// Fewest vertices per parallel task.
 const PER_TASK: usize = 1024;
@@ -67,7 +67,9 @@ fn is_embedded(vertices: &[Vec3], v: usize, ring: &[[u32; 2]]) -> bool {
     let keeps_orientation = |edge: &[u32; 2]| {
         let volume = normal(edge).dot(&n);
         let [a, b] = edge.map(|w| spoke(w).norm_squared());
-        volume > 0.0 && volume * volume > CLEARLY * CLEARLY * a * b * n.norm_squared()
+        volume > 0.0
+            && volume * volume
+                > MIN_RELATIVE_VOLUME * MIN_RELATIVE_VOLUME * a * b * n.norm_squared()
     };
     if !ring.iter().all(keeps_orientation) {
         return false;

@@ -19,14 +19,14 @@ const PEAK_CAP: f64 = 20.0;
 
 /// Relative residual at which a round's equations count as solved; the partners change by more
 /// from round to round.
-const TOLERANCE: f64 = 1e-3;
+const SOLVER_TOLERANCE: f64 = 1e-3;
 
 /// Weight of the volume relative to that of all distances: leaves an error of a few hundredths
 /// of a percent.
 const VOLUME_WEIGHT: f64 = 1000.0;
 
 /// Distance, relative to the root mean square, up to which midpoints count squared.
-const NEAR: f64 = 0.2;
+const HUBER_SHARE: f64 = 0.2;
 
 /// Largest number of rounds of conjugate gradients per round of the fit.
 const MAX_SOLVER_ROUNDS: usize = 200;
@@ -60,7 +60,7 @@ pub fn displacement(state: &mut FitState, monitor: &Monitor) -> Result<Vec<Vec3>
     let damping = state.parameters.damping / state.vertices.len() as f64;
     let mut equations = NormalEquations::new(&elements, &state.half_edges, damping);
     set_volume(&mut equations, state);
-    equations.solve(TOLERANCE, MAX_SOLVER_ROUNDS, monitor)
+    equations.solve(SOLVER_TOLERANCE, MAX_SOLVER_ROUNDS, monitor)
 }
 
 /// Pulls the samples of S and their partners together.
@@ -121,7 +121,7 @@ type TangentPlane = (Vec3, f64);
 /// Pulls the midpoints of the model's edges and the centres of its triangles to S. The samples
 /// of S alone would not register a triangle that none of them has as its partner.
 struct Midpoints {
-    /// For each triangle the plane at each of its [`PLACES`]; `None` for a midpoint that belongs
+    /// For each triangle the plane at each of its [`SAMPLE_BARYCENTRICS`]; `None` for a midpoint that belongs
     /// to the other triangle of the edge, or if S has no triangle that faces the same way.
     planes: Vec<[Option<TangentPlane>; 4]>,
     weight: f64,
@@ -131,7 +131,7 @@ struct Midpoints {
 
 /// The midpoints of a triangle's edges and its centre, in barycentric coordinates. The midpoint
 /// of an edge belongs to the lower half-edge.
-const PLACES: [[f64; 3]; 4] = [
+const SAMPLE_BARYCENTRICS: [[f64; 3]; 4] = [
     [0.5, 0.5, 0.0],
     [0.0, 0.5, 0.5],
     [0.5, 0.0, 0.5],
@@ -169,7 +169,9 @@ impl Midpoints {
                             return None;
                         }
                     }
-                    let place = a * PLACES[k][0] + b * PLACES[k][1] + c * PLACES[k][2];
+                    let place = a * SAMPLE_BARYCENTRICS[k][0]
+                        + b * SAMPLE_BARYCENTRICS[k][1]
+                        + c * SAMPLE_BARYCENTRICS[k][2];
                     let found = reference.bvh.closest_from(&place, guesses[k], faces)?;
                     guesses[k] = Some(found.triangle);
                     let n = normals[found.triangle as usize];
@@ -183,12 +185,12 @@ impl Midpoints {
         Self {
             planes,
             weight: parameters.midpoint_weight / places,
-            near: NEAR * (square / places).sqrt(),
+            near: HUBER_SHARE * (square / places).sqrt(),
         }
     }
 
     fn add_to(&self, element: &mut Element, t: FaceId) {
-        for (b, plane) in PLACES.iter().zip(&self.planes[t.index()]) {
+        for (b, plane) in SAMPLE_BARYCENTRICS.iter().zip(&self.planes[t.index()]) {
             if let Some((n, r)) = plane {
                 // Beyond `near` the distance counts linearly: term D of the fitness rewards
                 // midpoints very close to S, and the distant ones must not outweigh them.

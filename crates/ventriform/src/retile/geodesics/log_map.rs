@@ -93,7 +93,7 @@ fn queue_key(distance: f64, vertex: VertexId) -> Reverse<u64> {
 
 /// Factor by which a distance must fall for its vertex to be processed again. It exceeds rounding
 /// errors, so that the process ends.
-const SHORTER: f64 = 1.0 + 1e-9;
+const REPROCESS_FACTOR: f64 = 1.0 + 1e-9;
 
 /// What is known of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -206,7 +206,7 @@ impl LogMap {
         let v = vertex.index();
         if self.state[v] == VertexState::Unseen {
             self.visited.push(vertex);
-        } else if reach.distance * SHORTER >= self.reach[v].distance {
+        } else if reach.distance * REPROCESS_FACTOR >= self.reach[v].distance {
             return;
         }
         self.state[v] = VertexState::Queued;

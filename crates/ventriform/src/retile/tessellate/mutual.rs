@@ -18,7 +18,7 @@ const SMALLEST_SHARE: f64 = 1e-6;
 
 /// Height over longest side below which a triangle is triangulated as if it were equilateral; in
 /// its own frame the result would depend on rounding.
-const FLATTEST: f64 = 1e-6;
+const MIN_FLATNESS: f64 = 1e-6;
 
 /// The triangles over the points, which are numbered first, and the old vertices, numbered after
 /// them.
@@ -97,7 +97,7 @@ fn own_frame([a, b, c]: &[Vec3; 3]) -> Option<[Vec2; 3]> {
     let base = ab.norm();
     let doubled_area = ab.cross(&ac).norm();
     // The height over any side is at most the longest one, so no side is shorter than the limit.
-    if !(doubled_area > FLATTEST * longest * longest) {
+    if !(doubled_area > MIN_FLATNESS * longest * longest) {
         return None;
     }
     let along = ab.dot(&ac) / base;
@@ -146,7 +146,7 @@ mod tests {
     fn a_triangle_has_an_own_frame_if_its_height_exceeds_the_limit_whatever_its_size() {
         for size in [1e-3, 1.0, 1e3] {
             for (height, own) in [(0.9, false), (1.1, true)] {
-                let top = Vec3::new(0.3, 0.0, height * FLATTEST);
+                let top = Vec3::new(0.3, 0.0, height * MIN_FLATNESS);
                 let corners = [Vec3::zeros(), Vec3::x(), top].map(|p| p * size);
                 for turn in 0..3 {
                     let corners = [0, 1, 2].map(|k| corners[(k + turn) % 3]);

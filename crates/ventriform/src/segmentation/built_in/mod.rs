@@ -26,20 +26,20 @@ use serde_json::{Value, json};
 use std::sync::OnceLock;
 
 /// How the names of built-in hearts begin in reports.
-pub const NAME: &str = "built-in";
+pub const NAME_PREFIX: &str = "built-in";
 
 /// The hearts, as [`hearts_json`] writes them.
-const EMBEDDED: &str = include_str!("hearts.json");
+const EMBEDDED_HEARTS: &str = include_str!("hearts.json");
 
 /// Points of each model: within the paper's best range.
-pub const POINTS: usize = 150;
+pub const HEART_POINTS: usize = 150;
 
 /// The shape of a heart: name; length, width, thickness of the wall and how far it extends beyond the
 /// widest place, mm; slant of the base, degrees.
 type HeartShape = (&'static str, [f64; 4], f64);
 
 /// The shapes, the usual one first.
-const SHAPES: [HeartShape; 4] = [
+const HEART_SHAPES: [HeartShape; 4] = [
     ("usual", [85.0, 65.0, 11.0, 15.0], 15.0),
     ("small", [70.0, 52.0, 12.0, 12.0], 15.0),
     ("large", [100.0, 88.0, 9.0, 15.0], 15.0),
@@ -65,7 +65,7 @@ pub fn templates(monitor: &Monitor<'_>) -> Result<Vec<NamedTemplate>, Cancelled>
         return Ok(templates.clone());
     }
     let hearts: Vec<Heart> =
-        serde_json::from_str(EMBEDDED).expect("the embedded hearts are what a test reads");
+        serde_json::from_str(EMBEDDED_HEARTS).expect("the embedded hearts are what a test reads");
     let read = |heart: Heart| {
         let bytes = heart.mesh.to_string();
         let mesh = read_json::decode(bytes.as_bytes()).expect("likewise");
@@ -77,7 +77,7 @@ pub fn templates(monitor: &Monitor<'_>) -> Result<Vec<NamedTemplate>, Cancelled>
             breadth,
         };
         Ok(NamedTemplate {
-            name: format!("{NAME} {}", heart.name),
+            name: format!("{NAME_PREFIX} {}", heart.name),
             template: Template::of_cup(mesh, cup, monitor)?,
             built_in: true,
         })
@@ -92,7 +92,7 @@ pub fn templates(monitor: &Monitor<'_>) -> Result<Vec<NamedTemplate>, Cancelled>
 /// [`Cancelled`].
 pub fn hearts_json(monitor: &Monitor<'_>) -> Result<String, Cancelled> {
     let mut lines = Vec::new();
-    for shape in &SHAPES {
+    for shape in &HEART_SHAPES {
         let mut mesh = generate(shape, monitor)?;
         for vertex in &mut mesh.vertices {
             *vertex = vertex.map(|x| (1e3 * x).round() / 1e3);
@@ -137,7 +137,7 @@ fn generate(
     let scan = sound(phantom(&parameters, monitor), monitor)?.volume;
     let bytes = nifti::write(&scan, nifti::StoredType::Float32, false);
     let file = VolumeFile::in_memory("built-in.nii", sound(bytes, monitor)?);
-    let points = POINTS.to_string();
+    let points = HEART_POINTS.to_string();
     // The scan has no noise. The rounds are those of the release that the confidence was calibrated with.
     let pairs = [
         ("points", points.as_str()),
@@ -184,11 +184,11 @@ mod tests {
     fn the_built_in_hearts_are_plausible_and_differ() {
         let templates = templates(&Monitor::silent()).unwrap();
         let names: Vec<&str> = templates.iter().map(|t| t.name.as_str()).collect();
-        let expected = SHAPES.map(|shape| format!("{NAME} {}", shape.0));
+        let expected = HEART_SHAPES.map(|shape| format!("{NAME_PREFIX} {}", shape.0));
         assert_eq!(names, expected);
         let mut sizes = Vec::new();
         for NamedTemplate { template, .. } in &templates {
-            assert_eq!(template.mesh.vertices.len(), POINTS);
+            assert_eq!(template.mesh.vertices.len(), HEART_POINTS);
             let cup = template.cup.unwrap();
             assert!((50.0..120.0).contains(&cup.length), "{cup:?}");
             assert!(!template.struts.is_empty());
@@ -201,6 +201,6 @@ mod tests {
     #[test]
     fn the_embedded_hearts_are_those_that_the_command_makes() {
         let monitor = Monitor::silent();
-        assert_eq!(hearts_json(&monitor).unwrap(), EMBEDDED);
+        assert_eq!(hearts_json(&monitor).unwrap(), EMBEDDED_HEARTS);
     }
 }

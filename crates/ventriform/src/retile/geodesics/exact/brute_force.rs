@@ -12,7 +12,7 @@ use crate::retile::SurfacePoint;
 use crate::retile::domain::Domain;
 
 /// Largest number of triangles in one strip.
-const DEEPEST: usize = 40;
+const MAX_STRIP_TRIANGLES: usize = 40;
 
 /// Exact distances between all `points`, in their order.
 pub(super) fn distances(domain: &Domain, points: &[SurfacePoint]) -> Vec<Vec<f64>> {
@@ -153,7 +153,7 @@ impl StripSearch<'_> {
                 *slot = slot.min(at.norm());
             }
         }
-        if depth == DEEPEST {
+        if depth == MAX_STRIP_TRIANGLES {
             return;
         }
         for k in (0..3).filter(|&k| Some(k) != entry) {

@@ -50,16 +50,16 @@ const ON_EDGE: f64 = 1e-12;
 
 /// Angle, rad, by which a vertex must exceed 2π to count as a saddle. Smaller excesses turn no
 /// path by more than windows overlap.
-const SADDLE: f64 = 1e-10;
+const SADDLE_EXCESS_RAD: f64 = 1e-10;
 
 /// Angle, rad, by which the windows of a saddle overlap those beside it.
 const FAN_OVERLAP: f64 = 1e-9;
 
 /// Factor by which a path must be longer than another to be dropped; exceeds rounding errors.
-const LONGER: f64 = 1.0 + 1e-12;
+const DROPPED_PATH_FACTOR: f64 = 1.0 + 1e-12;
 
 /// The end of a list of windows.
-const NONE: u32 = u32::MAX;
+const LIST_END: u32 = u32::MAX;
 
 /// An entry of the queue. At equal distances vertices come first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -136,7 +136,7 @@ impl GeodesicMap for ExactMap {
             roots: Vec::new(),
             source_triangles: Vec::new(),
             windows: Vec::new(),
-            last: vec![NONE; half_edges],
+            last: vec![LIST_END; half_edges],
             split: vec![Split::UNSEEN; half_edges],
             queue: BinaryHeap::new(),
             radius: 0.0,
@@ -198,7 +198,7 @@ impl GeodesicMap for ExactMap {
             let axis = (flat[(k + 1) % 3] - flat[k]) / domain.length(h);
             let seen_from_edge = in_frame(axis, here - flat[k]);
             let mut w = self.last[h.index()];
-            while w != NONE {
+            while w != LIST_END {
                 let (window, before) = &self.windows[w as usize];
                 if let Some(sight) = window.sight(domain, seen_from_edge) {
                     let distance = self.roots[window.root as usize].distance + sight.norm();
@@ -274,7 +274,7 @@ impl ExactMap {
         if apex.seen {
             let distance = self.roots[window.root as usize].distance + apex.distance;
             let best = self.split[h.index()];
-            if distance > best.distance * LONGER {
+            if distance > best.distance * DROPPED_PATH_FACTOR {
                 left = apex.crossing <= best.crossing;
                 right = apex.crossing >= best.crossing;
             } else if distance < best.distance {
@@ -339,7 +339,7 @@ impl ExactMap {
             self.offer(domain.half_edges.target(h), along, back);
         }
         let whole: f64 = corners.iter().map(|c| c.1).sum();
-        if whole <= TAU + SADDLE {
+        if whole <= TAU + SADDLE_EXCESS_RAD {
             return;
         }
         let root = self.roots.len() as u32;
@@ -371,7 +371,7 @@ impl ExactMap {
     /// edge is shorter than the straight one.
     fn is_beaten(&self, window: &EdgeWindow, root: f64, v: VertexId, place: Vec2, x: f64) -> bool {
         let detour = self.reach[v.index()].distance + (place.x - x).hypot(place.y);
-        root + window.distance_at(x) > detour * LONGER
+        root + window.distance_at(x) > detour * DROPPED_PATH_FACTOR
     }
 
     /// Adds a window to the queue unless it is empty, useless or beyond the radius.
@@ -385,7 +385,7 @@ impl ExactMap {
             return;
         }
         let id = self.windows.len() as u32;
-        self.windows.push((window, NONE));
+        self.windows.push((window, LIST_END));
         self.queue
             .push(Reverse((nearest.to_bits(), Event::Window(id))));
     }
@@ -420,7 +420,7 @@ impl ExactMap {
             self.done[v.index()] = false;
         }
         for (window, _) in self.windows.drain(..) {
-            self.last[window.half_edge.index()] = NONE;
+            self.last[window.half_edge.index()] = LIST_END;
             self.split[window.half_edge.index()] = Split::UNSEEN;
         }
         self.roots.clear();

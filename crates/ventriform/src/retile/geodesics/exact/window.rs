@@ -11,10 +11,10 @@ use crate::retile::domain::Domain;
 
 /// How far a window extends beyond its ends, as a fraction of the edge. Otherwise neighbouring
 /// windows could leave a gap where a ray meets a vertex.
-const OVERLAP: f64 = 1e-9;
+const WINDOW_OVERLAP: f64 = 1e-9;
 
-/// Width, as a fraction of the edge, below which windows are dropped; far less than [`OVERLAP`].
-const NARROWEST: f64 = 1e-14;
+/// Width, as a fraction of the edge, below which windows are dropped; far less than [`WINDOW_OVERLAP`].
+const MIN_WINDOW_WIDTH: f64 = 1e-14;
 
 /// The visible part of an edge, in its own frame; see the module's documentation.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +66,7 @@ impl EdgeWindow {
 
     fn sees(&self, crossing: f64, edge: f64) -> bool {
         let [first, last] = self.interval;
-        crossing >= first - OVERLAP * edge && crossing <= last + OVERLAP * edge
+        crossing >= first - WINDOW_OVERLAP * edge && crossing <= last + WINDOW_OVERLAP * edge
     }
 
     /// The smallest distance from the source to the window, mm.
@@ -156,7 +156,7 @@ impl EdgeWindow {
             turn: turned(self.turn, axis),
             root: self.root,
         };
-        let wide = interval[1] - interval[0] > NARROWEST * length;
+        let wide = interval[1] - interval[0] > MIN_WINDOW_WIDTH * length;
         wide.then(|| (window, in_frame(axis, third - from)))
     }
 }
