@@ -58,7 +58,7 @@ impl Figure {
     }
 }
 
-/// What is measured of the whole structure. A new figure of the report is a new line here.
+/// Measurements of the whole structure. A new figure of the report is a new line here.
 const STRUCTURE_FIGURES: &[Figure] = &[
     figure("/volumes_ml/wall", VOLUME, MILLILITRE),
     figure("/mass_g", MASS, GRAM),
@@ -88,7 +88,7 @@ const STRUCTURE_FIGURES: &[Figure] = &[
 
 /// A part of a ventricle that has volumes of its own, and what is measured of it.
 struct Part {
-    /// What it is called, after the name of the structure.
+    /// Its name, after the name of the structure.
     name: &'static str,
     /// How it was measured, if in several ways.
     method: Option<Code>,
@@ -160,7 +160,7 @@ const WALL_SEGMENTS: [Code; 17] = [
     sct("128564006", "Apex of left ventricle"),
 ];
 
-/// What is measured of each of them, from its entry in `/polar/segments`.
+/// Measurements of each of them, from its entry in `/polar/segments`.
 const SEGMENT_FIGURES: &[Figure] = &[
     figure("/mean_percent", PERFUSION, PERCENT).mean(),
     figure("/extent_percent", DEFECT, PERCENT),
