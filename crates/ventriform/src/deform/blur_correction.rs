@@ -15,7 +15,7 @@ use std::f64::consts::SQRT_2;
 /// Standard deviations in a full width at half maximum.
 const SIGMAS_PER_FWHM: f64 = 2.354_820_045;
 
-/// What blur of `resolution` mm (full width at half maximum) adds to the thickness of a wall that
+/// Thickness that a blur of `resolution` mm (full width at half maximum) adds to a wall that
 /// looks `apparent` mm thick, mm.
 pub fn excess(apparent: f64, resolution: f64) -> f64 {
     if !(resolution > 0.0 && apparent > 0.0) {

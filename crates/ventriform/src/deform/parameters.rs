@@ -11,12 +11,12 @@ use crate::locate::patient_orientation::Superior;
 /// Parameters of [`fit`](super::fit()).
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeformParameters {
-    /// What is known of the organ's place. Default: nothing.
+    /// Hints at the organ's position. Default: none.
     pub hints: Hints,
     /// Rotation of the template about the long axis, added to the least rotation that aligns the
     /// axes, degrees. Default 0.
     pub roll: f64,
-    /// What decides the patient's superior direction. The model is posed by it, and the columns
+    /// Source of the patient's superior direction. The model is posed by it, and the columns
     /// and segments of the wall are counted from it. Ventricles only. Default
     /// [`Superior::Body`].
     pub superior: Superior,

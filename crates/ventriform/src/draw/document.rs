@@ -28,7 +28,7 @@ pub struct HtmlDocument<'a> {
     pub subtitle: &'a str,
     /// Its sections.
     pub body: Markup,
-    /// What the script draws; without it the page has no script.
+    /// Data for the script; without it the page has no script.
     pub data: Option<Value>,
     /// The last line.
     pub footer: &'a str,
@@ -76,7 +76,7 @@ pub fn place(name: &str) -> Markup {
     html! { div id=(name) hidden {} }
 }
 
-/// What a page needs to be allowed, as the value of a `Content-Security-Policy` header: its style,
+/// Permissions of a page, as the value of a `Content-Security-Policy` header: its style,
 /// embedded pictures and, for a page with data, the script and the style of what that draws.
 pub fn content_security_policy(scripted: bool) -> String {
     let hash = |text: &str| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)));
@@ -92,7 +92,7 @@ pub fn content_security_policy(scripted: bool) -> String {
     )
 }
 
-/// What the first section of a page says at a glance.
+/// An item of the first section of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sign {
     /// All is well.
@@ -133,7 +133,7 @@ pub struct HeadlineFigure {
     pub value: String,
     /// Its unit.
     pub unit: &'static str,
-    /// What it is.
+    /// Its label.
     pub label: String,
 }
 

@@ -19,13 +19,13 @@ pub type Rgb = [u8; 3];
 /// A picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawing {
-    /// What it shows, in words.
+    /// Alternative text.
     pub title: String,
     /// Pixels in a row.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// What is drawn, from back to front.
+    /// The marks, from back to front.
     pub shapes: Vec<VectorShape>,
 }
 
@@ -63,7 +63,7 @@ pub enum VectorShape {
     Label {
         /// Its middle.
         middle: Point,
-        /// What it says.
+        /// The text.
         text: String,
         /// Height of a line of text, pixels (SVG's font size).
         size: f64,

@@ -56,7 +56,7 @@ pub fn cases_of(folder: &Path, mask: &str) -> std::io::Result<Vec<CalibrationCas
     Ok(cases)
 }
 
-/// What a mask and a reader's have in common.
+/// Agreement of a mask with a reader's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaseFigures {
     /// E_J.
@@ -106,7 +106,7 @@ impl Calibration {
         }
     }
 
-    /// What the profile changes in E_J, from the figures of that sample.
+    /// Change of E_J by the profile, from the figures of that sample.
     pub fn gain(&self, sample: Sample) -> Option<PairedDifference> {
         let gains: Vec<f64> = self
             .rows
@@ -131,7 +131,7 @@ pub enum CalibrationError {
     /// No case can be used.
     #[error("no mask can be learnt from: {}", reasons.join("; "))]
     NoMask {
-        /// What is wrong with each case.
+        /// The problem of each case.
         reasons: Vec<String>,
     },
 }

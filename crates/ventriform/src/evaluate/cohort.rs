@@ -219,7 +219,7 @@ impl Cohort {
         mask_file(&self.folder, case, gold.file().strip_suffix(".nii.gz")?)
     }
 
-    /// What a template's model is made of: the file, and what that is.
+    /// Source of a template's model: the file and its kind.
     pub fn source(&self, template: &str) -> Option<(PathBuf, &'static str)> {
         if self.manual.as_deref() == Some(template) {
             let mask = self.gold(template, Gold::Expert)?;

@@ -25,7 +25,7 @@ pub enum EvaluateError {
     /// Not one model could be made.
     #[error("no model could be made: {}", reasons.join("; "))]
     NoModel {
-        /// What went wrong with each template.
+        /// The problem of each template.
         reasons: Vec<String>,
     },
     /// A scan that was read before cannot be read again.

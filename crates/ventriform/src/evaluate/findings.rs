@@ -77,7 +77,7 @@ fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
     }
 }
 
-/// What a step gains in the raw form over the re-tiled model, in percent.
+/// Gain of a step in the raw form over the re-tiled model, in percent.
 struct Gains {
     models: usize,
     least: f64,

@@ -34,13 +34,13 @@ pub struct PatientFits {
     pub golds: [bool; 2],
     /// One for each model, in the order of the models.
     pub fits: Vec<CohortFit>,
-    /// What `auto` keeps of the built-in hearts.
+    /// The fit that `auto` keeps of the built-in hearts.
     pub auto: Option<CohortFit>,
-    /// What is wrong with the patient's files or fits.
+    /// Problems of the patient's files or fits.
     pub problems: Vec<String>,
 }
 
-/// What all fits of a run have in common.
+/// Input that all fits of a run share.
 pub struct FitRun<'a> {
     /// How the models are fitted.
     pub parameters: &'a DeformParameters,
@@ -277,7 +277,7 @@ impl PatientFits {
 /// A patient's volume, and the gold standards on its grid.
 struct PatientImages {
     volume: Result<Volume, String>,
-    /// What is wrong with a gold standard, where it cannot be used.
+    /// The problem of a gold standard that cannot be used.
     golds: [Option<Result<Mask, String>>; 2],
     search: OrganSearch,
 }

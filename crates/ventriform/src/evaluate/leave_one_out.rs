@@ -1,4 +1,4 @@
-//! What a choice of a model is worth on cases that had no part in it.
+//! Value of a choice of a model on cases that had no part in it.
 //!
 //! Every model is a candidate: template, variant and number of points. For each case the candidate with the
 //! greatest mean E_J over the *other* cases is chosen and judged on the case (held-out). Beside it stands

@@ -1,4 +1,4 @@
-//! What decides an evaluation, but for the cohort's files.
+//! Parameters of an evaluation.
 
 use super::cohort::Cohort;
 use super::error::EvaluateError;
@@ -71,7 +71,7 @@ impl EvaluationParameters {
         ModelParameters::from_pairs(pairs.iter().map(|(name, text)| (*name, text.as_str())))
     }
 
-    /// What the run was asked for, by name, for the page of the results.
+    /// The run's parameters by name, for the page of the results.
     pub(super) fn settings(&self, cohort: &Cohort) -> Vec<(String, String)> {
         let list = |numbers: &[usize]| {
             let texts: Vec<String> = ascending(numbers).iter().map(usize::to_string).collect();

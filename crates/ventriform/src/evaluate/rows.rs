@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// Which kind of model it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Variant {
-    /// What `auto` keeps of the built-in hearts, whatever the cohort's templates.
+    /// The fit that `auto` keeps of the built-in hearts, whatever the cohort's templates.
     Auto,
     /// The stand-in for the paper's older model: Marching Cubes thinned out by quadric error.
     Reference,
@@ -62,7 +62,7 @@ impl Variant {
     }
 }
 
-/// What the fits are measured against.
+/// Gold standard of the fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Gold {
     /// `lv_expert_img`: what a reader would draw on the image; the paper's gold standard.

@@ -48,7 +48,7 @@ impl Evaluation {
 pub struct Picture {
     /// The patient.
     pub case: String,
-    /// What it shows.
+    /// Its title.
     pub caption: String,
     /// PNG.
     pub png: Vec<u8>,
@@ -166,7 +166,7 @@ pub fn figure3_csv(models: &[ModelRow]) -> Result<Vec<u8>, csv::Error> {
     csv_bytes([head].into_iter().chain(models.iter().map(line)))
 }
 
-/// What a line of Table 1 is a mean over.
+/// The fits that a line of Table 1 is a mean over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Line {
     /// The template, or `all`.
@@ -175,7 +175,7 @@ pub struct Line {
     pub case: String,
 }
 
-/// What a line of Table 1 holds: a cell for each kind of model, where there is one.
+/// The cells of a line of Table 1: one for each kind of model, where there is one.
 pub type TableCells = Vec<(ModelKind, Option<Cell>)>;
 
 /// Table 1: for every template and for all of them, each patient and the mean over all.

@@ -231,7 +231,7 @@ fn groups(mesh: &TriMesh, metadata: &Metadata) -> Vec<Group> {
     Part::ALL.into_iter().filter_map(group).collect()
 }
 
-/// What glTF calls the colours of vertices.
+/// glTF's name of the colours of vertices.
 const COLOUR_ATTRIBUTE: &str = "COLOR_0";
 
 /// An attribute of vertices that not every mesh has.

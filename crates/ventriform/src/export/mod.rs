@@ -147,7 +147,7 @@ impl Format {
     }
 }
 
-/// What a file contains besides the mesh.
+/// Content of a file besides the mesh.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Metadata {
     /// Title for people; also the name of the object if the format has one.

@@ -77,7 +77,7 @@ pub fn decode(bytes: &[u8]) -> Result<TriMesh, ReadMeshError> {
     })
 }
 
-/// What [`super::Metadata::uncertainty`] was of the mesh in `bytes`; empty if the file has none.
+/// [`super::Metadata::uncertainty`] of the mesh in `bytes`; empty if the file has none.
 pub fn uncertainty(bytes: &[u8]) -> Vec<f64> {
     #[derive(Default, Deserialize)]
     #[serde(default)]

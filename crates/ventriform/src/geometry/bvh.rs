@@ -118,7 +118,7 @@ pub struct Closest {
     pub squared_distance: f64,
 }
 
-/// What a child of a node is, in [`Node::children`]: a triangle's place in `order`, with this bit set, or
+/// A child of a node in [`Node::children`] is a triangle's index in `order`, with this bit set, or
 /// the index of a node.
 const IS_TRIANGLE: u32 = 1 << 31;
 /// No child.

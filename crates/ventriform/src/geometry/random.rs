@@ -6,7 +6,7 @@
 use rand::Rng;
 use rand_pcg::Pcg64;
 
-/// What a stream of random numbers is used for. The numbers of the variants are part of every
+/// The use of a stream of random numbers. The numbers of the variants are part of every
 /// result and must never change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]

@@ -21,7 +21,7 @@ const MIN_LABELLED_VOXELS: usize = 1000;
 /// consists of pieces, an image with few counts does not.
 const MIN_PIECEWISE_SHARE: f64 = 0.5;
 
-/// What a volume holds.
+/// The content of a volume.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
     /// Smallest value that is not NaN or infinite; 0 where there is none.

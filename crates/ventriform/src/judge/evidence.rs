@@ -1,4 +1,4 @@
-//! What a fitted ventricle shows of its own quality, in numbers.
+//! Figures of a fitted ventricle that tell good fits from bad ones.
 //!
 //! In go the fitted model and the wall seen from its axis; out comes [`Evidence`], the figures that
 //! [`confidence`](super::confidence) turns into a chance and the flags give as reasons. No other
@@ -54,7 +54,7 @@ pub struct Evidence {
     /// Share of the wall beside which, 12 to 18 mm beyond its outer surface, something takes up more than
     /// half as much as the bright wall does, 0..=1: other organs, or the wall's own image elsewhere.
     pub beside: f64,
-    /// What the projections of the image show of motion; `None` where it is unknown how the patient lay.
+    /// Figures of the projections of the image; `None` where it is unknown how the patient lay.
     pub views: Option<Views>,
 }
 

@@ -121,7 +121,7 @@ pub enum Flag {
     },
 }
 
-/// What the projections say of two places, in words.
+/// The two positions in the projections, in words.
 fn two_places(evidence: &Evidence) -> String {
     evidence.views.map_or_else(String::new, |views| {
         format!(

@@ -1,4 +1,4 @@
-//! What the image shows of a displacement during the scan.
+//! Motion during the scan, from projections of the image.
 //!
 //! In go the image and the fitted wall; out comes [`Views`]: whether the wall lies higher or lower in some of
 //! the camera's views than in the others. No sinogram is needed.
@@ -60,7 +60,7 @@ const SHIFT_COUNT: usize = 4 * MAX_SHIFT_STEPS + 1;
 /// Least number of angles in a set.
 const MIN_SET_ANGLES: usize = 6;
 
-/// What the projections of the image show of the fitted wall.
+/// Figures of the fitted wall in the projections of the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Views {
     /// Mean correlation of image and wall in the projections, with one shift for all, -1..=1.

@@ -21,7 +21,7 @@ use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::model::wall::{ROWS, VentricleWall};
 
-/// What is known of a node.
+/// Figures of a node behind its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NodeEvidence {
     /// Mean weight of the sensors about the node, 0..=1: 0 where the profile is flat.

@@ -65,7 +65,7 @@ struct Sample {
 /// The samples of a cup of unit size, and what they are expected to show.
 pub struct Pattern(Vec<Sample>);
 
-/// What the wall, the cavity and the surroundings of a healthy heart show, wall = 1.
+/// Values of the cavity and the surroundings of a healthy heart, wall = 1.
 const HEALTHY_CAVITY_VALUE: f64 = 0.40;
 const HEALTHY_OUTSIDE_VALUE: f64 = 0.25;
 /// The samples outside lie this far from the middle of the wall, mm.
@@ -137,7 +137,7 @@ impl Default for Pattern {
     }
 }
 
-/// What a wall without uptake shows, wall = 1: blood, and what blur and scatter bring there.
+/// Value of a wall without uptake, wall = 1: blood, and what blur and scatter bring there.
 const INFARCTED_WALL_VALUE: f64 = 0.35;
 
 impl Pattern {

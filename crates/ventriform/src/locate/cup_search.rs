@@ -91,7 +91,7 @@ pub struct ScoredCup {
 }
 
 impl ScoredCup {
-    /// What speaks against a ventricle, of what the cup itself shows.
+    /// The reason against a ventricle that the cup itself shows, if any.
     pub fn doubt(&self) -> Option<NotAHeart> {
         let (correlation, hollowness) = (self.correlation, self.hollowness);
         if correlation < MIN_CORRELATION {

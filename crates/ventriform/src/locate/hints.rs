@@ -1,4 +1,4 @@
-//! What the caller knows of the ventricle's place.
+//! The caller's hints at the position of the ventricle.
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -6,7 +6,7 @@ use crate::geometry::bvh::Aabb;
 /// Places nearer to each other than this are the same one, mm.
 pub const DISTINCT_DISTANCE_MM: f64 = 25.0;
 
-/// What the caller knows of the ventricle's place; every hint is optional.
+/// The caller's hints at the position of the ventricle; every hint is optional.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Hints {
     /// A point in the cavity, LPS mm: the search keeps within 25 mm of it.

@@ -14,7 +14,7 @@
 //! 4. Where no cup will do either, the heart is doubtful: [`Heart::localisation`] is an error, and
 //!    [`Heart::cavity`] is the best proposal of the rays, whatever its score.
 //!
-//! What else a caller needs of the heart is worked out when asked for: the cavity with the
+//! Other figures of the heart are computed when asked for: the cavity with the
 //! distances of its wall, or the cup with its length, its margin over the best structure elsewhere
 //! and, where the apex does not show ([`apex`]), its place by the base.
 //!
@@ -78,7 +78,7 @@ pub struct Heart<'v> {
     decision: Decision,
 }
 
-/// What decided.
+/// The evidence that decided.
 enum Decision {
     /// Rays and the cup at their proposal agree.
     Rays(Cavity),

@@ -59,7 +59,7 @@ pub const MAX_TILT_DEG: f64 = 45.0;
 /// Pull to the frame's superior, in the measure of the mean of sin²(2φ).
 const FRAME_PULL: f64 = 0.05;
 
-/// What decides the superior direction that segments are counted from.
+/// The source of the superior direction that segments are counted from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Superior {
     /// The outline of the body where it is seen, else the volume's frame.
@@ -70,7 +70,7 @@ pub enum Superior {
     Stated(Vec3),
 }
 
-/// What a patient's orientation was taken from.
+/// The source of a patient's orientation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OrientationSource {
     /// A superior direction stated by the caller.
@@ -113,7 +113,7 @@ pub struct PatientOrientation {
     /// Unit vector, LPS. If the source is a stated direction to the anterior wall, the part of that
     /// across the long axis; if it is unknown, a direction across the long axis.
     pub superior: Vec3,
-    /// What it was read from.
+    /// Its source.
     pub source: OrientationSource,
     /// 0 (taken from the frame, or unknown) to 1 (stated, or the outline is a cylinder's).
     pub confidence: f64,
@@ -130,7 +130,7 @@ impl PatientOrientation {
         confidence: 0.0,
     };
 
-    /// What the caller states of a heart with this long `axis` (unit vector), if anything: the superior
+    /// The orientation that the caller states of a heart with this long `axis` (unit vector), if any: the superior
     /// direction, or where that runs along the axis, the direction to the anterior wall. Unknown if
     /// everything stated runs along the axis.
     pub fn stated(superior: Superior, anterior: Option<Vec3>, axis: &Vec3) -> Option<Self> {

@@ -190,7 +190,7 @@ fn best<'c>(cavities: impl Iterator<Item = &'c Cavity>) -> Option<&'c Cavity> {
     })
 }
 
-/// What one ray met.
+/// The profile along one ray.
 #[derive(Debug, Clone, Copy, Default)]
 struct RayHit {
     /// Distance of the peak, mm.

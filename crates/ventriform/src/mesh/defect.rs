@@ -1,4 +1,4 @@
-//! What can be wrong with a list of triangles that should be a closed manifold.
+//! Defects of a list of triangles that should be a closed manifold.
 
 use super::ids::{FaceId, VertexId};
 

@@ -27,7 +27,7 @@ pub enum MeshFileError {
         format: MeshFormat,
         /// Byte, line or element.
         place: String,
-        /// What is wrong there.
+        /// The problem there.
         reason: String,
     },
     /// The format allows it, and this program does not read it.
@@ -35,7 +35,7 @@ pub enum MeshFileError {
     Unsupported {
         /// The format.
         format: MeshFormat,
-        /// What it has.
+        /// Its content.
         what: String,
     },
     /// There is no triangle.
@@ -52,7 +52,7 @@ pub enum MeshFileError {
     NoSuchVertex {
         /// Number of the face, from 0.
         face: usize,
-        /// What it refers to.
+        /// The target of the reference.
         vertex: String,
         /// Number of vertices.
         count: usize,
@@ -90,9 +90,9 @@ pub enum MeshFileError {
     Contradiction {
         /// `unit` or `frame`.
         field: &'static str,
-        /// What the file says.
+        /// The file's statement.
         file: &'static str,
-        /// What was stated.
+        /// The caller's statement.
         caller: &'static str,
     },
     /// The file names a unit or frame that is not known.
@@ -102,7 +102,7 @@ pub enum MeshFileError {
         field: &'static str,
         /// Its value.
         word: String,
-        /// What is known.
+        /// The names that are known.
         known: &'static str,
     },
     /// Nobody stated the unit, and the size is not that of an organ.

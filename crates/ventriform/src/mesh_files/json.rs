@@ -7,7 +7,7 @@ use super::said::Said;
 use crate::geometry::Vec3;
 use serde::Deserialize;
 
-/// What a JSON mesh states of the surface.
+/// A JSON mesh's statements about the surface.
 #[derive(Debug, Deserialize)]
 pub struct JsonMesh {
     /// Name of the frame.

@@ -97,7 +97,7 @@ pub struct ReadMesh {
     pub mesh: TriMesh,
     /// The format of the file.
     pub format: MeshFormat,
-    /// What was assumed or changed, in sentences.
+    /// Assumptions and changes, in sentences.
     pub notes: Vec<String>,
     /// Why its size is not that of an organ, if nobody stated its unit.
     pub unlikely: Option<UnlikelySize>,

@@ -1,4 +1,4 @@
-//! What the reader of a format takes from a file.
+//! The content of a file as the reader of a format takes it.
 
 use super::MeshFormat;
 use super::error::MeshFileError;

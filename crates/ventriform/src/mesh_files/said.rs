@@ -1,9 +1,9 @@
-//! What a file says of its unit and frame.
+//! A file's statements about unit and frame.
 
 use super::error::MeshFileError;
 use super::statement::{MeshFrame, MeshUnit};
 
-/// What the caller or the file states.
+/// The statement of the caller or the file.
 ///
 /// # Errors
 /// [`MeshFileError::Contradiction`] if both do, and differ.
@@ -22,7 +22,7 @@ pub(super) fn agreed<T: Copy + PartialEq + Named>(
     }
 }
 
-/// What has a name in files and requests.
+/// A value with a name in files and requests.
 pub(super) trait Named {
     fn name(&self) -> &'static str;
 }

@@ -66,7 +66,7 @@ impl MeshFrame {
     }
 }
 
-/// What the caller states of a mesh. A file that says otherwise is refused.
+/// The caller's statements about a mesh. A file that says otherwise is refused.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct MeshStatement {
     /// Its unit. Default: what the file says, or millimetres (of glTF metres) if the size is that of an organ.

@@ -136,7 +136,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
     Ok(parsed)
 }
 
-/// What the whole file says, and what may still be unpacked.
+/// The statements of the whole file, and the bytes that may still be unpacked.
 #[derive(Debug, Default)]
 struct File<'a> {
     big_endian: bool,

@@ -68,7 +68,7 @@ pub const MAX_NODES: usize = 5000;
 pub struct Template {
     /// The model, LPS mm of the patient it was made from.
     pub mesh: TriMesh,
-    /// What it shows.
+    /// The organ.
     pub organ: Organ,
     /// Centre, long axis and size of the wall; ventricles only.
     pub cup: Option<Cup>,

@@ -59,11 +59,11 @@ pub struct Optimised {
     pub optimised: FitnessSummary,
     /// The lengths to which distances were related.
     pub lengths: Lengths,
-    /// What was done.
+    /// The facts of the optimisation.
     pub facts: OptimiseFacts,
 }
 
-/// What [`optimise`] did; part of the report.
+/// Facts of [`optimise`]; part of the report.
 #[derive(Debug, Clone, Default)]
 pub struct OptimiseFacts {
     /// Number of edges flipped by the greedy sweeps.

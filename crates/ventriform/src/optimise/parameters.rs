@@ -19,7 +19,7 @@ pub struct OptimiseParameters {
     pub fitness: FitnessForm,
     /// Weights w1..w4 of the four terms A, B, C, D: not negative, not all zero. Default 1 each.
     pub weights: [f64; 4],
-    /// What a flip must increase. Default [`Gain::Total`].
+    /// The figure that a flip must increase. Default [`Gain::Total`].
     pub gain: Gain,
     /// Smallest radius ratio 2r/R, 0..=1, of a triangle that a flip may make, unless it replaces
     /// one that is as bad. If it is not 0, a flip may also not move its two triangles farther

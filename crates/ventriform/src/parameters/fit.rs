@@ -64,7 +64,7 @@ impl Default for FitParameters {
     }
 }
 
-/// What the user knows about the organ's position.
+/// The user's hints about the organ's position.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KnownPlace {
     /// A point in the cavity (or in the organ), LPS mm.

@@ -1,6 +1,6 @@
 //! The kinds of values that parameters take.
 
-/// What kind of value a parameter takes.
+/// The kind of value that a parameter takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// A whole number in a range.

@@ -33,7 +33,7 @@ pub use table::{ParameterSpec, Parameters};
 pub struct ParameterError {
     /// The parameter's name as given.
     pub field: String,
-    /// What is wrong with it.
+    /// The problem.
     pub message: String,
     /// A sentence with the valid values.
     pub fix: String,

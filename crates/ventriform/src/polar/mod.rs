@@ -153,7 +153,7 @@ pub struct PolarMap {
     pub levels: Levels,
     /// How wide the levels are drawn.
     pub projection: Projection,
-    /// What the patient's orientation was taken from. If it is unknown, levels hold, but no place of a level
+    /// The source of the patient's orientation. If it is unknown, levels hold, but no position of a level
     /// is known to be anterior: segments of a level are then counted from a convention.
     pub orientation: OrientationSource,
     /// Share of the whole wall below the threshold, per cent.

@@ -64,7 +64,7 @@ pub struct ReaderProfile {
     pub edge: WallEdge,
     /// The distances, in the order of [`ReaderOffsets`].
     pub offsets: [ReaderOffset; 3],
-    /// What it was learnt on, one entry for each mask.
+    /// The masks it was learnt on, one entry each.
     pub learnt_on: Vec<LearntOn>,
 }
 
@@ -82,14 +82,14 @@ pub enum ProfileError {
     Field {
         /// The field.
         field: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }
 
 /// The version of the JSON.
 const PROFILE_VERSION: u32 = 1;
-/// What the JSON says that it is.
+/// The JSON's statement of its format.
 const FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
 const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];

@@ -152,11 +152,11 @@ pub struct Tiled {
     pub mesh: TriMesh,
     /// Wanted spacing at each vertex relative to the mean: 1 everywhere unless adaptive.
     pub sizing: Vec<f64>,
-    /// What was done.
+    /// The facts of the re-tiling.
     pub facts: RetileFacts,
 }
 
-/// What [`retile`] did; part of the report.
+/// Facts of [`retile`]; part of the report.
 #[derive(Debug, Clone, Default)]
 pub struct RetileFacts {
     /// Seed of every random choice.

@@ -143,7 +143,7 @@ fn mean_radius_ratio(mesh: &TriMesh) -> f64 {
     mesh.radius_ratios().sum::<f64>() / mesh.triangles.len() as f64
 }
 
-/// What all seeds share.
+/// Input that all seeds share.
 struct PaperRun<'a> {
     surface: &'a Surface,
     parameters: &'a RetileParameters,

@@ -121,7 +121,7 @@ fn by_repulsion(
     paper::attempt(surface, parameters, seeds, monitor)
 }
 
-/// What all random starts share.
+/// Input that all random starts share.
 struct RefinedRun<'a> {
     surface: &'a Surface,
     parameters: &'a RetileParameters,

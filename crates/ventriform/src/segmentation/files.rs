@@ -216,7 +216,7 @@ impl SegmentedVolume {
         })
     }
 
-    /// What is odd about the input, and about the place of masks of it.
+    /// Warnings about the input and about the grid of its masks.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.reading.facts.warnings.clone();
         let frame = &self.reading.volume.frame;

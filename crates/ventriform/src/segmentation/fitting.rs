@@ -74,7 +74,7 @@ pub struct RankedTemplate {
     pub name: String,
     /// The figure that templates are ranked by ([`Judgement::confidence`](crate::judge::Judgement::confidence)), by this fit alone.
     pub confidence: f64,
-    /// What decides between equals ([`Fit::merit`]).
+    /// Figure that decides between equals ([`Fit::merit`]).
     pub merit: f64,
     /// Share of area whose sensors see an edge, 0..=1.
     pub active: f64,

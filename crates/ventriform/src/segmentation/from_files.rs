@@ -15,7 +15,7 @@ use crate::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeF
 pub struct SegmentedVolume {
     /// The volume and the facts of its header.
     pub reading: Reading,
-    /// What was taken of the expert's mask, if one was given.
+    /// The part of the expert's mask that was compared, if one was given.
     pub expert: Option<ExpertFacts>,
     /// The segmentation.
     pub segmentation: Segmentation,
@@ -23,7 +23,7 @@ pub struct SegmentedVolume {
     pub parameters: FitParameters,
 }
 
-/// What was taken of an expert's mask.
+/// The part of an expert's mask that was compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpertFacts {
     /// The structure; `None` if the file holds nothing else.
@@ -43,7 +43,7 @@ impl ExpertFacts {
         }
     }
 
-    /// What a person needs to know of the comparison, in sentences.
+    /// Notes on the comparison for people, in sentences.
     pub fn warnings(&self) -> Vec<String> {
         let structure = self.structure.as_ref().map(|structure| {
             format!(

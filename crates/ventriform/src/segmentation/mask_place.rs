@@ -58,7 +58,7 @@ impl<'a> MaskPlace<'a> {
         }
     }
 
-    /// What to know about masks on the grid of `frame` if its axes are not at right angles.
+    /// Warning about masks on the grid of `frame` if its axes are not at right angles.
     pub fn warning(frame: &VoxelToPatient, wanted: MaskGrid) -> Option<String> {
         let degrees = frame.shear().min(1.0).acos().to_degrees();
         is_sheared(frame).then(|| match wanted {

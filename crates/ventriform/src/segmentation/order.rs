@@ -1,4 +1,4 @@
-//! What a segmentation starts from.
+//! The input of a segmentation.
 
 use crate::mesh::TriMesh;
 use crate::parameters::FitParameters;

@@ -37,15 +37,15 @@ pub enum SurfaceError {
     /// A fraction outside (0, 1), an absolute value that is not finite.
     #[error("iso: {value} is not {expected}")]
     BadIso {
-        /// What was given.
+        /// The value given.
         value: f64,
-        /// What would do.
+        /// Values that would do.
         expected: &'static str,
     },
     /// `mask_smoothing` outside its range.
     #[error("mask_smoothing: {value} is not between 0 and 3 voxels")]
     BadSmoothing {
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// The label does not occur, or the volume is not a label map.

@@ -2,7 +2,7 @@
 
 use super::denoise::SurfaceNoise;
 
-/// What the volume holds.
+/// The content of the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum VolumeKind {
     /// Uptake, counts: any grey values.
@@ -14,7 +14,7 @@ pub enum VolumeKind {
     Labels,
 }
 
-/// What [`extract`](super::extract) found and changed; part of the report.
+/// Facts and changes of [`extract`](super::extract); part of the report.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SurfaceFacts {
     /// The iso-value used, in the volume's units (for masks: level of the smoothed mask, 0..1).
@@ -28,7 +28,7 @@ pub struct SurfaceFacts {
     pub otsu: Option<f64>,
     /// Smallest and largest finite value of the volume.
     pub range: [f64; 2],
-    /// What the volume holds.
+    /// The content of the volume.
     pub kind: VolumeKind,
     /// The label surfaced.
     pub label: Option<i64>,

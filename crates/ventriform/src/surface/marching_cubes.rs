@@ -255,7 +255,7 @@ fn write_vertices(
     }
 }
 
-/// What determines a vertex's place on its edge.
+/// Values that determine a vertex's position on its edge.
 struct VertexPlacement<'a> {
     samples: &'a Samples<'a>,
     iso: f32,

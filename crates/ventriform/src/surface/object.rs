@@ -18,7 +18,7 @@ pub(super) struct Object<'a> {
     pub mask: Option<MaskObject>,
 }
 
-/// What is special about the surface of a mask.
+/// Settings for the surface of a mask.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MaskObject {
     /// Passes of Taubin's smoothing.

@@ -46,7 +46,7 @@ pub enum TopologyMode {
     Keep,
 }
 
-/// What is done about the noise of intensities.
+/// Treatment of the noise of intensities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Denoise {
     /// It is measured and taken off the surface.
@@ -62,7 +62,7 @@ pub struct SurfaceParameters {
     pub iso: IsoLevel,
     /// Default [`Isolate::Auto`].
     pub isolate: Isolate,
-    /// What is known of the ventricle's place, for [`Isolate::Auto`]. Default: nothing.
+    /// Hints at the ventricle's position, for [`Isolate::Auto`]. Default: none.
     pub hints: Hints,
     /// Default [`TopologyMode::Genus0`].
     pub topology: TopologyMode,

@@ -43,7 +43,7 @@ pub struct WallShell<'a> {
     pub reference: f32,
 }
 
-/// What the region at an iso-value is and what was cut away.
+/// The region at an iso-value and the parts that were cut away.
 #[derive(Debug, Clone)]
 pub struct Region {
     /// The ventricle's voxels.

@@ -24,7 +24,7 @@ use crate::progress::{Cancelled, Monitor};
 /// The most voxels of a bounding box that is filled from outside; larger ones are only cut.
 const MOST_FILLED: usize = 8_000_000;
 
-/// What topology control changed.
+/// Changes by topology control.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Changes {
     /// Voxels taken away to open handles.

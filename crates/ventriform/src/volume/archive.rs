@@ -118,7 +118,7 @@ struct Archive<'a> {
     most_files: u64,
 }
 
-/// What an end record says, and where it begins.
+/// An end record, and where it begins.
 struct End {
     count: u64,
     directory: u64,
@@ -263,7 +263,7 @@ impl Archive<'_> {
         }))
     }
 
-    /// What the zip64 end record says whose locator ends at byte `at`; `None` if there is none.
+    /// The zip64 end record whose locator ends at byte `at`; `None` if there is none.
     fn zip64(&mut self, at: u64) -> Result<Option<End>, VolumeError> {
         let Some(locator_at) = at.checked_sub(LOCATOR_BYTES as u64) else {
             return Ok(None);

@@ -137,7 +137,7 @@ pub(super) struct Figures {
 #[derive(Debug, Default)]
 struct Padded {
     count: u64,
-    /// What they count as.
+    /// The value they count as.
     value: f32,
 }
 

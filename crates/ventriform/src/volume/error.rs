@@ -3,7 +3,7 @@
 use crate::mesh_files::MeshFileError;
 use crate::progress::Cancelled;
 
-/// What is wrong with a file. [`VolumeError::field`] names the field concerned.
+/// Problems of a file. [`VolumeError::field`] names the field concerned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// No file was given.
@@ -32,9 +32,9 @@ pub enum VolumeError {
         file: String,
         /// Name, SOP class and modality of the object.
         found: String,
-        /// What it holds instead.
+        /// Its content.
         reason: &'static str,
-        /// What can be sent.
+        /// Advice on files that can be sent.
         fix: &'static str,
     },
     /// Files that do not belong to one DICOM series, or of which some are missing.
@@ -42,7 +42,7 @@ pub enum VolumeError {
     NotOneSeries {
         /// Number of files.
         count: usize,
-        /// What contradicts that.
+        /// The contradiction.
         reason: String,
     },
     /// An image whose Image Type says that it does not contain reconstructed slices.
@@ -52,9 +52,9 @@ pub enum VolumeError {
         file: String,
         /// Image Type (0008,0008), or the value that tells.
         image_type: String,
-        /// What it contains instead.
+        /// Its content.
         reason: &'static str,
-        /// What can be sent.
+        /// Advice on files that can be sent.
         fix: &'static str,
     },
     /// The format is unknown.

@@ -141,7 +141,7 @@ impl LengthUnit {
     }
 }
 
-/// What a person needs to see to check that the right volume was read correctly.
+/// Facts by which a person checks that the right volume was read correctly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeFacts {
     /// Format of the file.

@@ -1,4 +1,4 @@
-//! What a caller asks of a reader: which volume of a file, and at what cost.
+//! A caller's choice of a volume of a file, and the limits of a reader.
 
 use super::VolumeError;
 

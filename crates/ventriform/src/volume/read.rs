@@ -183,7 +183,7 @@ pub fn preview_files(
 /// A volume whose header was checked.
 struct Opened {
     file: Box<dyn OpenVolume>,
-    /// What was left out of the files.
+    /// The files that were left out.
     notes: Vec<String>,
 }
 

@@ -23,7 +23,7 @@ pub(super) enum Recognised<'a> {
     Mesh(&'a VolumeFile),
 }
 
-/// What a single file is.
+/// The kind of a single file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileKind {
     NiftiSingle,
@@ -32,10 +32,10 @@ enum FileKind {
     Other,
 }
 
-/// What was found among files, and what is said of the others.
+/// The file that was found among others, and notes on the others.
 pub(super) struct Found<'a> {
     pub volume: Recognised<'a>,
-    /// What was left out.
+    /// The files that were left out.
     pub notes: Vec<String>,
 }
 
@@ -175,7 +175,7 @@ impl<'a> Sorted<'a> {
         }
     }
 
-    /// What was left out of what a person named, and which files are empty.
+    /// The files that were left out of those a person named, and the empty ones.
     fn notes(&self, volume: &Recognised<'_>) -> Vec<String> {
         let used = |file: &VolumeFile| match volume {
             Recognised::Nifti { voxels, .. } => std::ptr::eq(file, *voxels),

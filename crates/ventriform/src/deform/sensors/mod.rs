@@ -36,7 +36,7 @@ pub const PER_TRIANGLE: usize = 9;
 /// patients than its radius does.
 const RIM_REACH: f64 = 1.75;
 
-/// What one sensor found.
+/// Reading of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorReading {
     /// Place of the sensor, mm.

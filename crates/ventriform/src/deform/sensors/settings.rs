@@ -1,4 +1,4 @@
-//! What the sensors look for: the kind of edge, their reach, and where a reader draws the edge.
+//! Settings of the sensors: the kind of edge, their reach, and where a reader draws the edge.
 
 use crate::geometry::Vec3;
 
@@ -29,7 +29,7 @@ pub struct SensorSettings {
     pub level: f64,
     /// Greater values of the image are clipped to this one before slopes are computed.
     pub ceiling: f64,
-    /// What is added to the distances found.
+    /// Shift that is added to the distances found.
     pub shift: EdgeShift,
     /// Where sensors see nothing.
     pub blind: Option<BlindSector>,

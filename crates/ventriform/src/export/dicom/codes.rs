@@ -76,7 +76,7 @@ impl LabelSegment {
     }
 }
 
-/// What is segmented: its codes and the words for it.
+/// A segmented structure: its codes and the words for it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Structure {
     /// Type of the segmented property (CID 7192, CID 7151).

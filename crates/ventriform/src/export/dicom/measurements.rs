@@ -59,7 +59,7 @@ const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Fig
     }
 }
 
-/// What is measured of the whole structure. A new figure of the report is a new line here.
+/// Measurements of the whole structure. A new figure of the report is a new line here.
 const STRUCTURE_FIGURES: &[Figure] = &[
     figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
     figure(|r| r.mass_g, MASS, GRAM),
@@ -89,7 +89,7 @@ const STRUCTURE_FIGURES: &[Figure] = &[
 
 /// A part of a ventricle that has volumes of its own, and what is measured of it.
 struct Part {
-    /// What it is called, after the name of the structure.
+    /// Its name, after the name of the structure.
     name: &'static str,
     /// How it was measured, if in several ways.
     method: Option<Code>,
@@ -177,7 +177,7 @@ const WALL_SEGMENTS: [Code; 17] = [
     sct("128564006", "Apex of left ventricle"),
 ];
 
-/// What is measured of each of them.
+/// Measurements of each of them.
 const SEGMENT_FIGURES: &[Figure<PolarSegment>] = &[
     mean(|s| s.mean_percent, PERFUSION, PERCENT),
     figure(|s| Some(s.extent_percent), DEFECT, PERCENT),

@@ -55,19 +55,19 @@ pub enum DicomError {
     /// Patient or study is unknown.
     #[error("the volume's file does not say whose scan it is: `{field}` is needed")]
     NoIdentity {
-        /// What is needed.
+        /// The field that is needed.
         field: &'static str,
     },
     /// A person states another value than the file.
     #[error("`{field}` differs from what the volume's file says")]
     Contradiction {
-        /// What differs.
+        /// The field that differs.
         field: &'static str,
     },
     /// The file states a value in characters that cannot be told.
     #[error("the volume's file has a `{field}` that cannot be decoded")]
     Undecoded {
-        /// What cannot be decoded.
+        /// The field that cannot be decoded.
         field: &'static str,
     },
     /// A stated value is not valid DICOM.
@@ -75,7 +75,7 @@ pub enum DicomError {
     Identity {
         /// The value at fault.
         field: &'static str,
-        /// What is valid.
+        /// Values that are valid.
         expected: &'static str,
     },
     /// Rows and columns of the volume are not at right angles.
@@ -214,7 +214,7 @@ impl DicomObject {
     }
 }
 
-/// What distinguishes an object from the others.
+/// Attributes that distinguish an object from the others.
 struct ObjectFacts {
     name: &'static str,
     class: &'static str,
@@ -401,7 +401,7 @@ impl<'a> DicomResults<'a> {
     }
 }
 
-/// What segment `number` shows, for its item in the Segment Sequence.
+/// The description of segment `number` for its item in the Segment Sequence.
 fn put_segment(segment: &mut DataSet, number: u16, (kind, label): (Code, &str), tracking: &str) {
     segment.short(tags::SEGMENT_NUMBER, number);
     segment.text(tags::SEGMENT_LABEL, label);

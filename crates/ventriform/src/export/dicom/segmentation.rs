@@ -143,7 +143,7 @@ fn put_dimensions(results: &DicomResults<'_>, set: &mut DataSet) {
     set.items(tags::DIMENSION_INDEX_SEQUENCE, vec![segment, position]);
 }
 
-/// What all frames have in common.
+/// Attributes that all frames share.
 fn shared(planes: &SlicePlanes) -> DataSet {
     let mut measures = DataSet::new();
     measures.decimals(tags::PIXEL_SPACING, &planes.spacing);

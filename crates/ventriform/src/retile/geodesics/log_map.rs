@@ -95,7 +95,7 @@ fn queue_key(distance: f64, vertex: VertexId) -> Reverse<u64> {
 /// errors, so that the process ends.
 const REPROCESS_FACTOR: f64 = 1.0 + 1e-9;
 
-/// What is known of a vertex.
+/// The state of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum VertexState {
     /// No distance is known.

@@ -18,7 +18,7 @@ use crate::geometry::{Vec2, Vec3, triangle};
 use crate::mesh::intersections::triangles_intersect;
 use crate::mesh::{FaceId, VertexId};
 
-/// What a new triangle must satisfy, besides intersecting no others and keeping the topology.
+/// Conditions of a new triangle, besides intersecting no others and keeping the topology.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Demand {
     /// It faces as the old star did, and its dihedral angles are at most 120°.

@@ -29,7 +29,7 @@ const HIGH_VALENCE: usize = 14;
 /// Number of successive rounds with flips under each demand.
 const MAX_FLIP_ROUNDS: usize = 12;
 
-/// What a round may do.
+/// The limits of a round.
 #[derive(Debug, Clone, Copy)]
 struct RoundRules {
     /// The demand on triangles that close holes.

@@ -49,7 +49,7 @@ enum Set {
 
 /// A term and its sets, each with its escape sequence after ESC.
 struct Term {
-    /// What follows `ISO_IR ` or `ISO 2022 IR `.
+    /// The number after `ISO_IR ` or `ISO 2022 IR `.
     number: &'static str,
     g0: Option<(&'static [u8], Set)>,
     g1: Option<(&'static [u8], Set)>,

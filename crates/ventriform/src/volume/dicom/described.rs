@@ -1,4 +1,4 @@
-//! What a Segmentation says of its segments (Segment Sequence, PS3.3 C.8.20.4).
+//! The segments of a Segmentation (Segment Sequence, PS3.3 C.8.20.4).
 
 use super::attributes::{
     Attributes, SEGMENT_LABEL, SEGMENT_NUMBER, SEGMENT_REGION_MEANING, SEGMENT_REGION_VALUE,
@@ -12,7 +12,7 @@ pub struct Segment {
     pub number: u16,
     /// Segment Label.
     pub label: Option<String>,
-    /// What is segmented: the code of its type, then of its anatomic region, as far as stated.
+    /// Codes of its type, then of its anatomic region, as far as stated.
     pub codes: Vec<SegmentCode>,
 }
 

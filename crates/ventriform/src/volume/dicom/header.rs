@@ -1,4 +1,4 @@
-//! What a DICOM object says of itself, without reading its pixels: for those who receive objects and
+//! The header of a DICOM object, without reading its pixels: for those who receive objects and
 //! have to tell which belong together.
 
 use super::super::VolumeError;

@@ -1,11 +1,11 @@
-//! What a DICOM object is, and what to send instead of one that holds no volume.
+//! The kind of a DICOM object, and advice on what to send instead of one that holds no volume.
 
 use super::super::VolumeError;
 use super::attributes::{Attributes, IMAGE_TYPE, MODALITY, SERIES_TYPE, SOP_CLASS, UNITS, clip};
 use dicom_core::dictionary::{UidDictionary, UidDictionaryEntry};
 use dicom_dictionary_std::StandardSopClassDictionary;
 
-/// What the caller can send.
+/// Advice on objects that can be sent.
 const READABLE_ADVICE: &str = "Send reconstructed slices: a multi-frame NM image with the Image Type \
     RECON TOMO or RECON GATED TOMO, an Enhanced PET, CT or MR image, all files of one PET, CT or MR \
     series (as several files or as one zip), or a Segmentation.";

@@ -92,7 +92,7 @@ pub(super) struct DicomFile {
     warnings: Vec<String>,
 }
 
-/// What the frames hold.
+/// The values of the frames.
 enum Content {
     /// Slices, in the order in which they are stored.
     Slices(Vec<StoredSlice>),
@@ -477,7 +477,7 @@ fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
     }
 }
 
-/// What orders files for whatever one of them has to speak for all: Instance Number, SOP Instance UID,
+/// The order of files where one of them has to speak for all: Instance Number, SOP Instance UID,
 /// name.
 type FirstKey = (u64, String, String);
 
@@ -514,7 +514,7 @@ struct Series {
     doubt: Option<String>,
 }
 
-/// What a person knows a series by.
+/// A series in a person's words.
 #[derive(Default)]
 struct SeriesName {
     number: Option<String>,

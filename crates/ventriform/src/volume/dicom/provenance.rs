@@ -48,7 +48,7 @@ macro_rules! provenance {
         }
 
         impl Provenance {
-            /// What the data set says, without the frames of the slices.
+            /// The provenance that the data set states, without the frames of the slices.
             pub(super) fn of(a: &Attributes) -> Self {
                 let mut undecoded = Vec::new();
                 $(if a.decoded($attribute).is_err() {

@@ -49,7 +49,7 @@ pub(super) enum PixelElement {
 pub(super) struct Scan {
     /// Values of the needed attributes.
     pub attributes: Attributes,
-    /// What the object is.
+    /// The kind of the object.
     pub kind: Kind,
     /// The element that holds the pixels.
     pub element: PixelElement,

@@ -50,7 +50,7 @@ pub(super) struct Located {
     oriented: bool,
     /// Distance of rows and of columns, mm.
     spacing: [f64; 2],
-    /// What tells frames at the same position apart.
+    /// Attributes that tell frames at the same position apart.
     pub marks: Marks,
 }
 
@@ -148,7 +148,7 @@ pub(super) fn stated_gap(a: &Attributes) -> Result<Option<f64>, VolumeError> {
 /// lies along row x column, mm.
 ///
 /// # Errors
-/// What contradicts one volume.
+/// The contradiction to one volume.
 pub(super) fn heights(frames: &[Located]) -> Result<Vec<f64>, String> {
     let first = &frames[0];
     if let Some(other) = frames.iter().find(|frame| !frame.is_like(first)) {
@@ -171,7 +171,7 @@ impl Stack {
     /// volume of one slice; `name` says for error messages which frame that of an index is.
     ///
     /// # Errors
-    /// What contradicts one volume.
+    /// The contradiction to one volume.
     pub(super) fn of(
         frames: &[Located],
         [columns, rows]: [usize; 2],

@@ -210,7 +210,7 @@ impl Mark {
     }
 }
 
-/// What one frame says of itself.
+/// The statements of one frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Marks(Vec<Mark>);
 

@@ -5,7 +5,7 @@ use super::label::MaskLabel;
 use super::structures::{HeldKind, HeldStructures, MaskStructure};
 use crate::mesh_files::MeshStatement;
 
-/// What the caller says of a mask.
+/// The caller's statements about a mask.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct MaskChoice {
     /// The structure. Default: the only one, or the myocardium among segments.

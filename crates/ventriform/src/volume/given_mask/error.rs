@@ -56,9 +56,9 @@ pub enum GivenMaskError {
     /// The structure that was named is not in the file.
     #[error("the mask has no structure {label}; it has {}", list(present))]
     NoSuchStructure {
-        /// What was asked for.
+        /// The structure that was asked for.
         label: MaskLabel,
-        /// What there is.
+        /// The structures there are.
         present: Vec<MaskStructure>,
     },
     /// The mask's voxels are not those of the volume.

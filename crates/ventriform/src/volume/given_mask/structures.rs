@@ -1,4 +1,4 @@
-//! What a mask's file holds.
+//! The structures in a mask's file.
 
 use crate::grid::survey;
 use crate::progress::Monitor;

@@ -81,7 +81,7 @@ pub fn is_bare(
     }
 }
 
-/// What precedes the voxels.
+/// The bytes before the voxels.
 struct Content(Vec<u8>);
 
 impl Content {

@@ -36,7 +36,7 @@ pub(super) struct Header {
     pub unit: LengthUnit,
     /// `xyzt_units` as stated.
     pub xyzt_units: i32,
-    /// What the file is meant to hold.
+    /// Intent code of the file.
     pub intent_code: i32,
     /// `pixdim`, entry 0 being qfac.
     pub pixdim: [f64; 8],

@@ -84,7 +84,7 @@ struct View {
     /// The place of the first voxel, bins.
     start: f64,
     bins: usize,
-    /// What a voxel adds to a bin, times what a filtered bin adds to a voxel.
+    /// The weight of a voxel in a bin, times that of a filtered bin in a voxel.
     weight: f64,
 }
 

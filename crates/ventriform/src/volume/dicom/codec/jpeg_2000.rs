@@ -8,7 +8,7 @@
 //! - is irreversible where the transfer syntax says that it is not, or lacks a tile or a part of one;
 //! - has more code blocks, layers and precincts than its pixels warrant ([`most_parts`]).
 //!
-//! What is left costs a time per pixel that is bounded by the bit-planes, of which the decoder takes 31.
+//! The rest costs a time per pixel that is bounded by the bit-planes, of which the decoder takes 31.
 //! Numbers outside the range of their bits, which quantised wavelets give at edges, are set to its ends
 //! (ISO 15444-1, G.1.2). Letters of fields (`Xsiz`, `Isot`) are those of the standard.
 
@@ -276,7 +276,7 @@ fn spans([begin, end]: [u64; 2], exponent: u32) -> u64 {
     end.div_ceil(1 << exponent) - (begin >> exponent)
 }
 
-/// What the marker segments of a stream say.
+/// The marker segments of a stream.
 struct Structure<'a> {
     /// The stream; the length of its last tile-part is filled in if it was left open.
     stream: std::borrow::Cow<'a, [u8]>,

@@ -173,7 +173,7 @@ impl FrameLayout {
 /// Decodes the frame in `bytes`. `report` is called regularly.
 ///
 /// # Errors
-/// What is wrong with the bytes, or that `report` stopped it.
+/// The problem of the bytes, or that `report` stopped it.
 pub(super) fn decode(
     compression: Compression,
     bytes: &[u8],

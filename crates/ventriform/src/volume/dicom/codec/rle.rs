@@ -10,7 +10,7 @@ const HEADER_BYTES: usize = 64;
 /// Decodes the frame in `bytes`.
 ///
 /// # Errors
-/// What is wrong with the bytes.
+/// The problem of the bytes.
 pub(super) fn decode(bytes: &[u8], layout: FrameLayout) -> Result<Vec<u8>, String> {
     let header = bytes
         .get(..HEADER_BYTES)

@@ -55,7 +55,7 @@ fn frame_name(marker: u8) -> &'static str {
     }
 }
 
-/// What the marker segments before the coded numbers say.
+/// The marker segments before the coded numbers.
 struct Header<'a> {
     bits: u32,
     /// Tables of quantisation, in zigzag order.
