@@ -48,10 +48,11 @@ pub fn escaped_json(text: &str) -> Cow<'_, str> {
     }
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        match escapes(c) {
+        if escapes(c) {
             // All of them are below U+10000.
-            true => shown.push_str(&format!("\\u{:04x}", u32::from(c))),
-            false => shown.push(c),
+            shown.push_str(&format!("\\u{:04x}", u32::from(c)));
+        } else {
+            shown.push(c);
         }
     }
     shown.into()
@@ -64,9 +65,10 @@ fn escape<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     }
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        match escapes(c) {
-            true => shown.extend(c.escape_default()),
-            false => shown.push(c),
+        if escapes(c) {
+            shown.extend(c.escape_default())
+        } else {
+            shown.push(c)
         }
     }
     shown.into()

@@ -71,9 +71,10 @@ impl FitSetup {
             (OrganPlace::Ventricle { found, orientation }, Some(from)) => {
                 let to = found.cup;
                 let roll = parameters.roll.to_radians();
-                let turn = match orientation.source.is_stated() {
-                    true => wall::turn_between(&from.axis, &to.axis, &orientation.superior),
-                    false => orientation.turn(),
+                let turn = if orientation.source.is_stated() {
+                    wall::turn_between(&from.axis, &to.axis, &orientation.superior)
+                } else {
+                    orientation.turn()
                 };
                 let pose = TemplatePose::of_ventricle(from, &to, &turn, roll);
                 let inner_end = to.base() + to.axis * (0.6 * to.length);

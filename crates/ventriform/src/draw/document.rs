@@ -80,12 +80,13 @@ pub fn place(name: &str) -> Markup {
 /// embedded pictures and, for a page with data, the script and the style of what that draws.
 pub fn content_security_policy(scripted: bool) -> String {
     let hash = |text: &str| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)));
-    let (style, script) = match scripted {
-        true => (
+    let (style, script) = if scripted {
+        (
             format!("{} {}", hash(STYLE), hash(SCRIPT_STYLE)),
             format!(" script-src {};", hash(SCRIPT)),
-        ),
-        false => (hash(STYLE), String::new()),
+        )
+    } else {
+        (hash(STYLE), String::new())
     };
     format!(
         "default-src 'none'; img-src data:; style-src {style};{script} base-uri 'none'; form-action 'none'"

@@ -69,9 +69,10 @@ fn short(x: f64) -> String {
     }
     let decimals = (5.0 - x.abs().log10().floor()).clamp(0.0, 12.0) as usize;
     let text = number(x, decimals);
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
     }
 }
 

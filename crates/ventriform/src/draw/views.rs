@@ -24,15 +24,16 @@ pub type Pictures = Vec<String>;
 /// `uncertainty` of each vertex, mm, colours the pictures; without it they have the wall's colour.
 pub fn section(title: &str, mesh: &TriMesh, uncertainty: &[f64], touched: bool) -> Markup {
     let known = !uncertainty.is_empty() && uncertainty.len() == mesh.vertices.len();
-    let colour = |t: usize| match known {
-        true => {
+    let colour = |t: usize| {
+        if known {
             let sum: f64 = mesh.triangles[t]
                 .iter()
                 .map(|v| uncertainty[*v as usize])
                 .sum();
             colour_of(sum / 3.0)
+        } else {
+            MYOCARDIUM_COLOUR
         }
-        false => MYOCARDIUM_COLOUR,
     };
     let facets: Vec<Facet> = (0..mesh.triangles.len())
         .map(|t| Facet {

@@ -280,10 +280,12 @@ fn compare(rows: &[FitRow], claim: &'static str, old: Variant, least: f64) -> Fi
         });
         figures.push(format!("N = {}: {}", new.points, described(&found)));
     }
-    let holds = match verdicts.is_empty() {
-        true => None,
-        false if verdicts.contains(&Some(false)) => Some(false),
-        false => verdicts.iter().all(|v| *v == Some(true)).then_some(true),
+    let holds = if verdicts.is_empty() {
+        None
+    } else if verdicts.contains(&Some(false)) {
+        Some(false)
+    } else {
+        verdicts.iter().all(|v| *v == Some(true)).then_some(true)
     };
     Finding {
         claim,

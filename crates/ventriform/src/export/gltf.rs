@@ -83,9 +83,10 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
     let painted = more
         .iter()
         .any(|attribute| attribute.name == COLOUR_ATTRIBUTE);
-    let base_colour = match painted {
-        true => [1.0; 4],
-        false => [0.64, 0.13, 0.11, 1.0],
+    let base_colour = if painted {
+        [1.0; 4]
+    } else {
+        [0.64, 0.13, 0.11, 1.0]
     };
 
     let vertex_bytes = 12 * positions.len();

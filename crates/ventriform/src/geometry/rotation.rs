@@ -20,9 +20,10 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Matrix3<f64> {
 /// The least rotation that takes the unit vector `from` to the unit vector `to`; `None` for opposite ones.
 /// Equal vectors give no rotation, also where rounding makes their scalar product exceed 1.
 pub fn least_rotation(from: &Vec3, to: &Vec3) -> Option<Rotation3<f64>> {
-    match (from - to).norm() < 1e-9 {
-        true => Some(Rotation3::identity()),
-        false => Rotation3::rotation_between(from, to),
+    if (from - to).norm() < 1e-9 {
+        Some(Rotation3::identity())
+    } else {
+        Rotation3::rotation_between(from, to)
     }
 }
 

@@ -68,9 +68,10 @@ pub fn range(values: &[f32], monitor: &Monitor) -> Result<(f32, f32, usize), Can
     let minimum = parts.iter().map(|p| p.0).fold(f32::INFINITY, f32::min);
     let maximum = parts.iter().map(|p| p.1).fold(f32::NEG_INFINITY, f32::max);
     let not_finite = parts.iter().map(|p| p.2).sum();
-    Ok(match not_finite == values.len() {
-        true => (0.0, 0.0, not_finite),
-        false => (minimum, maximum, not_finite),
+    Ok(if not_finite == values.len() {
+        (0.0, 0.0, not_finite)
+    } else {
+        (minimum, maximum, not_finite)
     })
 }
 
@@ -188,9 +189,10 @@ pub fn label_map(
     }
     // A constant volume is no label map.
     let everything = labelled == volume.voxels.len() && counts.len() == 1;
-    let piecewise = match many {
-        true => pieces(&counts, false),
-        false => counts.len() <= 1 || same as f64 >= MIN_PIECEWISE_SHARE * labelled as f64,
+    let piecewise = if many {
+        pieces(&counts, false)
+    } else {
+        counts.len() <= 1 || same as f64 >= MIN_PIECEWISE_SHARE * labelled as f64
     };
     let counts = counts.into_iter().map(|(label, l)| (label, l.voxels));
     Ok((labelled > 0 && piecewise && !everything).then(|| counts.collect()))

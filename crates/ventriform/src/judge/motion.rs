@@ -114,9 +114,10 @@ impl Views {
 
 /// The grid about `mesh`, whose first axis is `superior`.
 fn frame_about(mesh: &TriMesh, superior: &Vec3) -> Option<VoxelToPatient> {
-    let across = superior.cross(&match superior.x.abs() < 0.7 {
-        true => Vec3::x(),
-        false => Vec3::y(),
+    let across = superior.cross(&if superior.x.abs() < 0.7 {
+        Vec3::x()
+    } else {
+        Vec3::y()
     });
     let across = across.try_normalize(1e-6)?;
     let axes = [*superior, across, superior.cross(&across)];

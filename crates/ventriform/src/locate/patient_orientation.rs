@@ -186,9 +186,10 @@ impl PatientOrientation {
         let across_heart = ShortAxisSlices::of(&volume.frame, &cup.axis);
         let believed = body.source == OrientationSource::Body
             || across_heart.is_none_or(|slices| !slices.frame_is_plain);
-        Ok(match believed {
-            true => body,
-            false => Self::unknown(&cup.axis),
+        Ok(if believed {
+            body
+        } else {
+            Self::unknown(&cup.axis)
         })
     }
 
@@ -226,13 +227,14 @@ impl PatientOrientation {
         let within = superior.z > MAX_TILT_DEG.to_radians().cos();
         // NaN (no outline in view) is not below the limit.
         let seen = body.litres >= LEAST_BODY && within && disorder < MAX_DISORDER;
-        Ok(match seen {
-            true => Self {
+        Ok(if seen {
+            Self {
                 superior,
                 source: OrientationSource::Body,
                 confidence: 1.0 - disorder,
-            },
-            false => Self::FRAME,
+            }
+        } else {
+            Self::FRAME
         })
     }
 }

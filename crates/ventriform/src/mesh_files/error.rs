@@ -114,12 +114,11 @@ pub enum MeshFileError {
 pub(super) fn unknown(start: &[u8]) -> MeshFileError {
     let first = &start[..start.len().min(8)];
     let is_text = first.iter().all(|b| (b' '..=b'~').contains(b));
-    let start = match is_text {
-        true => format!("{:?}", String::from_utf8_lossy(first)),
-        false => {
-            let bytes: Vec<String> = first.iter().map(|b| format!("{b:02x}")).collect();
-            format!("the bytes {}", bytes.join(" "))
-        }
+    let start = if is_text {
+        format!("{:?}", String::from_utf8_lossy(first))
+    } else {
+        let bytes: Vec<String> = first.iter().map(|b| format!("{b:02x}")).collect();
+        format!("the bytes {}", bytes.join(" "))
     };
     MeshFileError::Unknown { start }
 }

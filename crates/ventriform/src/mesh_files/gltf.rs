@@ -174,9 +174,10 @@ struct Buffer<'a> {
 }
 
 pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
-    let (json, binary) = match bytes.starts_with(b"glTF") {
-        true => chunks(bytes)?,
-        false => (bytes, None),
+    let (json, binary) = if bytes.starts_with(b"glTF") {
+        chunks(bytes)?
+    } else {
+        (bytes, None)
     };
     let document: Document<'_> = serde_json::from_slice(json).map_err(|error| {
         broken(
@@ -359,9 +360,10 @@ impl Reader<'_> {
                     let start = self.vertices.len();
                     for p in numbers.chunks_exact(3) {
                         let p = Vec3::new(p[0], p[1], p[2]);
-                        self.vertices.push(match self.patient {
-                            true => p,
-                            false => world.transform_point(&p.into()).coords,
+                        self.vertices.push(if self.patient {
+                            p
+                        } else {
+                            world.transform_point(&p.into()).coords
                         });
                     }
                     starts.insert(position, [start, count]);
@@ -372,9 +374,12 @@ impl Reader<'_> {
                 Some(indices) => self.numbers(indices, 1)?.0,
                 None => (0..count).map(|v| v as f64).collect(),
             };
-            let own = |corner: &f64| match *corner >= 0.0 && *corner < count as f64 {
-                true => corner + start as f64,
-                false => f64::from(u32::MAX),
+            let own = |corner: &f64| {
+                if *corner >= 0.0 && *corner < count as f64 {
+                    corner + start as f64
+                } else {
+                    f64::from(u32::MAX)
+                }
             };
             let (before, all) = (self.faces.triangles.len(), self.vertices.len());
             match primitive.mode {

@@ -222,9 +222,10 @@ fn finish(
     weld::close(&mut mesh, parsed.corners_only, &mut notes)?;
 
     let world = format == MeshFormat::Gltf;
-    let used_unit = unit.unwrap_or(match world {
-        true => MeshUnit::Metre,
-        false => MeshUnit::Millimetre,
+    let used_unit = unit.unwrap_or(if world {
+        MeshUnit::Metre
+    } else {
+        MeshUnit::Millimetre
     });
     let scale = used_unit.in_millimetres();
     for p in &mut mesh.vertices {
@@ -236,17 +237,15 @@ fn finish(
         *p = lps * scale;
     }
     if frame.is_none() {
-        notes.push(match world {
-            true => "The file does not say which way the patient lies; the axes of glTF were assumed: x to the left, \
+        notes.push(if world { "The file does not say which way the patient lies; the axes of glTF were assumed: x to the left, \
                      y to superior, z to anterior."
-                .into(),
-            false => "The file does not say in which frame its coordinates are; LPS was assumed.".into(),
-        });
+                .into() } else { "The file does not say in which frame its coordinates are; LPS was assumed.".into() });
     }
     if unit.is_none() {
-        let assumed = match world {
-            true => "metres were assumed, as glTF says",
-            false => "millimetres were assumed",
+        let assumed = if world {
+            "metres were assumed, as glTF says"
+        } else {
+            "millimetres were assumed"
         };
         notes.push(format!(
             "The file does not state its unit of length; {assumed}."

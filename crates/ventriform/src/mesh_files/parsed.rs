@@ -98,13 +98,14 @@ impl Faces {
 
     fn index(&self, corner: f64, face: usize, count: usize) -> Result<u32, MeshFileError> {
         let whole = corner.fract() == 0.0 && corner >= 0.0 && corner < count as f64;
-        match whole && corner < f64::from(u32::MAX) {
-            true => Ok(corner as u32),
-            false => Err(MeshFileError::NoSuchVertex {
+        if whole && corner < f64::from(u32::MAX) {
+            Ok(corner as u32)
+        } else {
+            Err(MeshFileError::NoSuchVertex {
                 face,
                 vertex: corner.to_string(),
                 count,
-            }),
+            })
         }
     }
 

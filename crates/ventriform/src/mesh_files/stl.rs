@@ -35,9 +35,10 @@ pub(super) fn is_text(text: &[u8]) -> bool {
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    match is_binary(bytes, bytes.len() as u64) {
-        true => binary(bytes),
-        false => text(bytes),
+    if is_binary(bytes, bytes.len() as u64) {
+        binary(bytes)
+    } else {
+        text(bytes)
     }
 }
 
@@ -93,9 +94,10 @@ fn text(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
             }
         }
     }
-    match inside {
-        true => Err(cursor.damaged("the text ends without `endsolid`")),
-        false => Ok(numbered(parsed).said(said)),
+    if inside {
+        Err(cursor.damaged("the text ends without `endsolid`"))
+    } else {
+        Ok(numbered(parsed).said(said))
     }
 }
 

@@ -106,27 +106,26 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn number(&mut self, kind: NumberType) -> Result<f64, MeshFileError> {
-        match self.binary {
-            true => self.cursor.binary(kind, true),
-            false => self.cursor.number(),
+        if self.binary {
+            self.cursor.binary(kind, true)
+        } else {
+            self.cursor.number()
         }
     }
 
     /// A number of elements, in text.
     fn count(&mut self) -> Result<u64, MeshFileError> {
         let count = self.cursor.number()?;
-        match count >= 0.0 && count.fract() == 0.0 {
-            true => Ok(count as u64),
-            false => Err(self.cursor.damaged(format!("{count} elements are stated"))),
+        if count >= 0.0 && count.fract() == 0.0 {
+            Ok(count as u64)
+        } else {
+            Err(self.cursor.damaged(format!("{count} elements are stated")))
         }
     }
 
     /// `count` if the bytes of so many elements of `each` numbers are there.
     fn require(&self, count: u64, each: usize, kind: NumberType) -> Result<usize, MeshFileError> {
-        let bytes = match self.binary {
-            true => kind.bytes(),
-            false => 2,
-        };
+        let bytes = if self.binary { kind.bytes() } else { 2 };
         self.cursor.require(count, each * bytes, "elements")
     }
 
@@ -202,9 +201,10 @@ impl Reader<'_> {
         let offsets = list(b"OFFSETS", offsets)?;
         let corners = list(b"CONNECTIVITY", size)?;
         for pair in offsets.windows(2) {
-            let cell = match pair[0] >= 0.0 && pair[0] <= pair[1] {
-                true => corners.get(pair[0] as usize..pair[1] as usize),
-                false => None,
+            let cell = if pair[0] >= 0.0 && pair[0] <= pair[1] {
+                corners.get(pair[0] as usize..pair[1] as usize)
+            } else {
+                None
             };
             let cell = cell.ok_or_else(|| {
                 self.cursor
@@ -239,12 +239,11 @@ impl Reader<'_> {
             self.cursor = Cursor::new(before, FORMAT);
             let kind = self.kind()?;
             let entries = self.require(entries, 1, kind)?;
-            match self.binary {
-                true => drop(self.cursor.take(entries * kind.bytes())?),
-                false => {
-                    for _ in 0..entries {
-                        self.cursor.word()?;
-                    }
+            if self.binary {
+                self.cursor.take(entries * kind.bytes())?;
+            } else {
+                for _ in 0..entries {
+                    self.cursor.word()?;
                 }
             }
         }

@@ -207,9 +207,10 @@ impl File<'_> {
             let (corners, offsets) = (self.numbers(corners)?, self.numbers(offsets)?);
             let mut begin = 0.0;
             for end in offsets {
-                let cell = match end >= begin && end.fract() == 0.0 {
-                    true => corners.get(begin as usize..end as usize),
-                    false => None,
+                let cell = if end >= begin && end.fract() == 0.0 {
+                    corners.get(begin as usize..end as usize)
+                } else {
+                    None
                 };
                 let cell = cell.ok_or_else(|| MeshFileError::Damaged {
                     format: FORMAT,
@@ -217,13 +218,17 @@ impl File<'_> {
                     reason: format!("a cell leads from {begin} to {end} of {}", corners.len()),
                 })?;
                 // Pieces number their own points.
-                let own = |corner: &f64| match *corner >= 0.0 && *corner < count as f64 {
-                    true => corner + before as f64,
-                    false => f64::from(u32::MAX),
+                let own = |corner: &f64| {
+                    if *corner >= 0.0 && *corner < count as f64 {
+                        corner + before as f64
+                    } else {
+                        f64::from(u32::MAX)
+                    }
                 };
-                match strip {
-                    true => faces.strip(cell.iter().map(own), vertices.len())?,
-                    false => faces.polygon(cell.iter().map(own), vertices.len())?,
+                if strip {
+                    faces.strip(cell.iter().map(own), vertices.len())?
+                } else {
+                    faces.polygon(cell.iter().map(own), vertices.len())?
                 }
                 begin = end;
             }
@@ -291,19 +296,21 @@ impl File<'_> {
             }
         };
         let first = |count: u64| -> Result<Vec<u8>, MeshFileError> {
-            let found = match raw {
-                true => source[..source
+            let found = if raw {
+                source[..source
                     .len()
                     .min(usize::try_from(count).unwrap_or(usize::MAX))]
-                    .to_vec(),
-                false => base64(source, count),
+                    .to_vec()
+            } else {
+                base64(source, count)
             };
-            match found.len() as u64 == count {
-                true => Ok(found),
-                false => Err(broken(format!(
+            if found.len() as u64 == count {
+                Ok(found)
+            } else {
+                Err(broken(format!(
                     "{count} bytes are stated, and {} are there",
                     found.len()
-                ))),
+                )))
             }
         };
         let word: u64 = if self.wide_headers { 8 } else { 4 };
@@ -365,15 +372,14 @@ impl File<'_> {
     }
 
     fn spend(&mut self, bytes: u64) -> Result<(), MeshFileError> {
-        match bytes <= self.budget {
-            true => {
-                self.budget -= bytes;
-                Ok(())
-            }
-            false => Err(MeshFileError::TooLong {
+        if bytes <= self.budget {
+            self.budget -= bytes;
+            Ok(())
+        } else {
+            Err(MeshFileError::TooLong {
                 bytes,
                 limit: self.budget,
-            }),
+            })
         }
     }
 }
@@ -401,12 +407,11 @@ fn array<'a>(bytes: &'a [u8], tag: &Tag<'a>) -> Result<Array<'a>, MeshFileError>
         b"Float64" => Some(NumberType::F64),
         _ => None,
     };
-    let text = match tag.empty {
-        true => &[][..],
-        false => {
-            let end = xml::find(bytes, tag.end, b"<").unwrap_or(bytes.len());
-            &bytes[tag.end..end]
-        }
+    let text = if tag.empty {
+        &[][..]
+    } else {
+        let end = xml::find(bytes, tag.end, b"<").unwrap_or(bytes.len());
+        &bytes[tag.end..end]
     };
     let content = match tag.value(b"format").unwrap_or(b"ascii") {
         b"ascii" => Content::Text(text),

@@ -74,12 +74,11 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   segments, the one coded as myocardium",
         read: |d, v| {
             let Ok(label) = v.text().parse();
-            match v.text().trim().is_empty() {
-                true => Err("a label has a number or a name".into()),
-                false => {
-                    d.mask.label = Some(label);
-                    Ok(())
-                }
+            if v.text().trim().is_empty() {
+                Err("a label has a number or a name".into())
+            } else {
+                d.mask.label = Some(label);
+                Ok(())
             }
         },
         write: |p| match &p.mask.label {
@@ -98,9 +97,12 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             d.mask.resample = v.switch();
             Ok(())
         },
-        write: |p| match p.mask.resample {
-            true => json!(true),
-            false => Value::Null,
+        write: |p| {
+            if p.mask.resample {
+                json!(true)
+            } else {
+                Value::Null
+            }
         },
     },
     ParameterSpec {

@@ -91,9 +91,10 @@ impl Checked {
     pub(super) fn corners(&self) -> Result<[[usize; 3]; 2], String> {
         let list = self.indices()?;
         let corners = [[list[0], list[1], list[2]], [list[3], list[4], list[5]]];
-        match (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
-            true => Err("the first corner lies beyond the last one".into()),
-            false => Ok(corners),
+        if (0..3).any(|axis| corners[0][axis] > corners[1][axis]) {
+            Err("the first corner lies beyond the last one".into())
+        } else {
+            Ok(corners)
         }
     }
 }

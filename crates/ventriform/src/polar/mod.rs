@@ -421,9 +421,10 @@ fn together<'a>(segments: impl Iterator<Item = &'a Segment>) -> (Option<f64>, f6
             area += segment.area;
         }
     }
-    match area > 0.0 {
-        true => (Some(sum / area), low / area, area),
-        false => (None, 0.0, 0.0),
+    if area > 0.0 {
+        (Some(sum / area), low / area, area)
+    } else {
+        (None, 0.0, 0.0)
     }
 }
 

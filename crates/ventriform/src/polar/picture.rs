@@ -202,9 +202,10 @@ fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
             // Segments follow each other counter-clockwise; the first is centred on anterior.
             let turns = 0.25 + (k as f64 - 0.5) / count as f64;
             let pair = [(k + count - 1) % count, k].map(|k| territory(first + k));
-            let (stroke, width) = match pair[0] == pair[1] || !map.is_oriented() {
-                true => (BORDER_COLOUR, 1.5),
-                false => (TERRITORY_BORDER, 4.0),
+            let (stroke, width) = if pair[0] == pair[1] || !map.is_oriented() {
+                (BORDER_COLOUR, 1.5)
+            } else {
+                (TERRITORY_BORDER, 4.0)
             };
             shapes.push(VectorShape::Line {
                 ends: [screen(rings[level - 1], turns), screen(rings[level], turns)],

@@ -52,9 +52,10 @@ impl<'a> MaskPlace<'a> {
 
     /// `mask`, which is that of the inside of `mesh` on the scan's grid, on this grid.
     pub fn mask<'m>(&self, mask: &'m Mask, mesh: &TriMesh) -> Cow<'m, Mask> {
-        match self.covering {
-            false => Cow::Borrowed(mask),
-            true => Cow::Owned(voxelise(mesh, self.shape, &self.frame)),
+        if self.covering {
+            Cow::Owned(voxelise(mesh, self.shape, &self.frame))
+        } else {
+            Cow::Borrowed(mask)
         }
     }
 

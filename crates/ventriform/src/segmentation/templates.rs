@@ -17,9 +17,10 @@ pub fn prepare(
     monitor: &Monitor<'_>,
 ) -> Result<(Vec<NamedTemplate>, Vec<RefusedTemplate>), SegmentationError> {
     let organ = order.parameters.organ;
-    let mut templates = match order.auto && organ == Organ::LeftVentricle {
-        true => built_in::templates(monitor)?,
-        false => Vec::new(),
+    let mut templates = if order.auto && organ == Organ::LeftVentricle {
+        built_in::templates(monitor)?
+    } else {
+        Vec::new()
     };
     if templates.is_empty() && order.models.is_empty() {
         return Err(SegmentationError::NoModel {

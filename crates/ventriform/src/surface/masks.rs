@@ -308,9 +308,10 @@ fn level_of<E>(
     let (mut near, mut far) = ((first, at_first), None);
     for step in 0..8 {
         let share = 0.1 * f64::from(1 << step);
-        let level = match at_first > 0.0 {
-            true => first + (top - first) * share.min(1.0),
-            false => first * (1.0 - share).max(1e-3),
+        let level = if at_first > 0.0 {
+            first + (top - first) * share.min(1.0)
+        } else {
+            first * (1.0 - share).max(1e-3)
         };
         let level = level.clamp(f64::from(f32::MIN_POSITIVE), top);
         let found = (level, off(level)?);

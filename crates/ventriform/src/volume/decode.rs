@@ -402,9 +402,10 @@ impl Decoder {
             figures.odd.settle(bytes, format, decoded, first)?;
         }
         // Tallied here because the portion is still in the cache.
-        match format.is_whole() {
-            true => figures.tally.add_whole_portion(decoded),
-            false => figures.tally.add_portion(decoded),
+        if format.is_whole() {
+            figures.tally.add_whole_portion(decoded)
+        } else {
+            figures.tally.add_portion(decoded)
         }
         Ok(())
     }
@@ -430,9 +431,10 @@ impl Odd {
         if large && format.data_type != DataType::F32 {
             self.inexact = Some(format.data_type);
         }
-        match infinite {
-            true => self.settle_infinite(bytes, format, voxels, first),
-            false => Ok(()),
+        if infinite {
+            self.settle_infinite(bytes, format, voxels, first)
+        } else {
+            Ok(())
         }
     }
 
@@ -513,9 +515,10 @@ macro_rules! label {
 /// The whole number that `value` is, or [`NO_LABEL`].
 fn whole(value: f64) -> i64 {
     // From 2^53 on, not every whole number is representable.
-    match value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 {
-        true => value as i64,
-        false => NO_LABEL,
+    if value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 {
+        value as i64
+    } else {
+        NO_LABEL
     }
 }
 

@@ -24,10 +24,12 @@ impl VolumeFile {
         let mut files = Vec::new();
         for path in paths {
             let path = path.as_ref();
-            match path.is_dir() {
-                true => files.extend(files_in(path, limits)?),
-                false if paths.len() == 1 => files.extend(Self::with_other_half(path)),
-                false => files.push(Self::at(path)),
+            if path.is_dir() {
+                files.extend(files_in(path, limits)?);
+            } else if paths.len() == 1 {
+                files.extend(Self::with_other_half(path));
+            } else {
+                files.push(Self::at(path));
             }
         }
         Ok(files)

@@ -124,9 +124,12 @@ pub(super) trait OpenVolume {
         take: &mut dyn FnMut(usize, &[i64]),
         monitor: &Monitor,
     ) -> Result<(), VolumeError> {
-        let label = |v: &f32| match v.fract() == 0.0 && v.abs() <= MAX_EXACT_WHOLE {
-            true => *v as i64,
-            false => NO_LABEL,
+        let label = |v: &f32| {
+            if v.fract() == 0.0 && v.abs() <= MAX_EXACT_WHOLE {
+                *v as i64
+            } else {
+                NO_LABEL
+            }
         };
         let mut labels = Vec::new();
         let mut portion = |first: usize, voxels: &[f32]| {
@@ -280,11 +283,10 @@ pub(super) fn inspect<'a>(
         let rounded = is_rounded(&tally.summary(None), file.header().data_type);
         let mut counts = LabelCounts::new();
         let mut again = open()?;
-        match rounded {
-            true => again.stream_labels(0, &mut |_, labels| counts.add_exact(labels), monitor)?,
-            false => {
-                again.decode_all(&mut |_, voxels| counts.add(voxels), monitor)?;
-            }
+        if rounded {
+            again.stream_labels(0, &mut |_, labels| counts.add_exact(labels), monitor)?
+        } else {
+            again.decode_all(&mut |_, voxels| counts.add(voxels), monitor)?;
         }
         labels = counts.labels();
     }

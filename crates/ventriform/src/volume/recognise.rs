@@ -148,9 +148,10 @@ impl<'a> Sorted<'a> {
             _ => return Err(self.not_one(inside)),
         };
         let rest = self.dicom.iter().any(|file| !std::ptr::eq(*file, voxels));
-        match rest {
-            true => Err(self.not_one(inside)),
-            false => Ok(Recognised::Nifti { header, voxels }),
+        if rest {
+            Err(self.not_one(inside))
+        } else {
+            Ok(Recognised::Nifti { header, voxels })
         }
     }
 

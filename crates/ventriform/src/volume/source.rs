@@ -115,10 +115,11 @@ impl VolumeFile {
                     length: entry.packed,
                     position: 0,
                 };
-                match entry.deflated {
+                if entry.deflated {
                     // The archive states the size, and no more is taken from it.
-                    true => Box::new(Inflated::new(packed, entry.size)),
-                    false => Box::new(packed),
+                    Box::new(Inflated::new(packed, entry.size))
+                } else {
+                    Box::new(packed)
                 }
             }
         })
@@ -206,9 +207,10 @@ impl Source {
         let mut mark = [0; 2];
         let gzipped = stored >= 2 && reader.read_exact(&mut mark).is_ok() && mark == GZIP_MAGIC;
         reader.rewind().map_err(io)?;
-        let body = match gzipped {
-            true => Body::Gzip(Box::new(Members::new(reader))),
-            false => Body::Plain(BufReader::with_capacity(PORTION_BYTES, reader)),
+        let body = if gzipped {
+            Body::Gzip(Box::new(Members::new(reader)))
+        } else {
+            Body::Plain(BufReader::with_capacity(PORTION_BYTES, reader))
         };
         let mut source = Self::new(file, body, stored, limit);
         source.gzip = gzipped;
@@ -272,9 +274,10 @@ impl Source {
 
     /// Upper bound on the number of unpacked bytes in the file.
     pub(super) fn capacity(&self) -> u64 {
-        match self.gzip || matches!(self.body, Body::Deflated(_)) {
-            false => self.stored,
-            true => self.stored.saturating_mul(GREATEST_RATIO),
+        if self.gzip || matches!(self.body, Body::Deflated(_)) {
+            self.stored.saturating_mul(GREATEST_RATIO)
+        } else {
+            self.stored
         }
     }
 
@@ -363,18 +366,20 @@ impl Source {
             }
         }
         self.position += filled as u64;
-        match self.position > self.limit {
-            true => Err(self.beyond_limit(self.position)),
-            false => Ok(filled),
+        if self.position > self.limit {
+            Err(self.beyond_limit(self.position))
+        } else {
+            Ok(filled)
         }
     }
 
     /// Fills `buffer` completely. `needed` is the size of the file that the header implies, for the
     /// error if the file ends before.
     pub(super) fn fill_all(&mut self, buffer: &mut [u8], needed: u64) -> Result<(), VolumeError> {
-        match self.fill(buffer)? == buffer.len() {
-            true => Ok(()),
-            false => Err(self.truncated(needed, self.position)),
+        if self.fill(buffer)? == buffer.len() {
+            Ok(())
+        } else {
+            Err(self.truncated(needed, self.position))
         }
     }
 
@@ -407,13 +412,14 @@ impl Source {
         let mut rest = vec![0; PORTION_BYTES];
         self.limit = u64::MAX;
         let left_over = self.fill(&mut rest)? > 0;
-        match self.cut_off {
-            true => Err(VolumeError::Corrupt {
+        if self.cut_off {
+            Err(VolumeError::Corrupt {
                 file: self.file.clone(),
                 byte: self.position,
                 reason: "the packed data end before the checksum".into(),
-            }),
-            false => Ok(left_over),
+            })
+        } else {
+            Ok(left_over)
         }
     }
 

@@ -126,9 +126,10 @@ impl Tally {
     /// The figures over `voxels`, all of which have been added, with their labels if they look like a
     /// label map.
     pub(super) fn with_labels(&self, voxels: &[f32], row: usize) -> IntensitySummary {
-        let labels = match self.is_whole() {
-            true => labels(voxels, row),
-            false => None,
+        let labels = if self.is_whole() {
+            labels(voxels, row)
+        } else {
+            None
         };
         self.summary(labels)
     }

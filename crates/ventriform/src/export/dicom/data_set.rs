@@ -31,9 +31,10 @@ impl DataSet {
     /// Puts text; backslashes separate several values. Empty text gives an empty element.
     pub(super) fn text(&mut self, tag: Tag, text: impl Into<String>) {
         let text = text.into();
-        let value = match text.is_empty() {
-            true => PrimitiveValue::Empty,
-            false => PrimitiveValue::Str(text),
+        let value = if text.is_empty() {
+            PrimitiveValue::Empty
+        } else {
+            PrimitiveValue::Str(text)
         };
         self.put(tag, representation(tag), value);
     }
@@ -183,9 +184,10 @@ pub(super) fn decimal(number: f64) -> String {
     let fixed = (0..=14).rev().map(|digits| format!("{number:.digits$}"));
     let scientific = (0..=10).rev().map(|digits| format!("{number:.digits$e}"));
     let fits = |text: &String| text.len() <= MAX_TEXT_CHARS;
-    let best = match number.abs() < 1e-4 {
-        true => scientific.chain(fixed).find(fits),
-        false => fixed.chain(scientific).find(fits),
+    let best = if number.abs() < 1e-4 {
+        scientific.chain(fixed).find(fits)
+    } else {
+        fixed.chain(scientific).find(fits)
     };
     best.unwrap_or_else(|| "0".into())
 }

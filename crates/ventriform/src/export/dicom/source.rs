@@ -270,9 +270,10 @@ fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
             "1 to 64 printable characters without a backslash",
         ),
     };
-    match valid {
-        true => Ok(()),
-        false => Err(DicomError::Identity { field, expected }),
+    if valid {
+        Ok(())
+    } else {
+        Err(DicomError::Identity { field, expected })
     }
 }
 
@@ -355,9 +356,10 @@ impl SourceScan {
     /// The images that the volume was read from; `None` unless they were DICOM.
     pub(super) fn images(&self) -> Option<SourceImages<'_>> {
         let p = &self.provenance;
-        let instances = match p.instance_uids.is_empty() {
-            false => p.instance_uids.iter().map(String::as_str).collect(),
-            true => vec![p.sop_instance_uid.as_deref()?],
+        let instances = if p.instance_uids.is_empty() {
+            vec![p.sop_instance_uid.as_deref()?]
+        } else {
+            p.instance_uids.iter().map(String::as_str).collect()
         };
         Some(SourceImages {
             series: p.series_uid.as_deref()?,

@@ -388,9 +388,10 @@ impl Attributes {
             .split('\\')
             .map(|p| p.trim_matches(['\0', ' ']).to_owned());
         let parts: Vec<_> = parts.collect();
-        match parts.iter().all(String::is_empty) {
-            true => Vec::new(),
-            false => parts,
+        if parts.iter().all(String::is_empty) {
+            Vec::new()
+        } else {
+            parts
         }
     }
 

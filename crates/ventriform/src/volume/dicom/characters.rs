@@ -255,9 +255,10 @@ impl CharacterSets {
                         "byte {at} begins an escape sequence of no set that the file names"
                     )));
                 };
-                match right {
-                    true => g1 = Some(*set),
-                    false => g0 = *set,
+                if *right {
+                    g1 = Some(*set);
+                } else {
+                    g0 = *set;
                 }
                 rest = &rest[1 + escape.len()..];
                 continue;

@@ -33,9 +33,10 @@ impl FrameOrder {
         gated: bool,
         warnings: &mut Vec<String>,
     ) -> Result<Self, VolumeError> {
-        let vectors: &[Attribute] = match gated {
-            true => &[RR_INTERVAL_VECTOR, TIME_SLOT_VECTOR, SLICE_VECTOR],
-            false => &[SLICE_VECTOR],
+        let vectors: &[Attribute] = if gated {
+            &[RR_INTERVAL_VECTOR, TIME_SLOT_VECTOR, SLICE_VECTOR]
+        } else {
+            &[SLICE_VECTOR]
         };
         check_pointer(attributes, vectors)?;
         if !gated && attributes.shorts(SLICE_VECTOR).is_empty() {

@@ -70,9 +70,10 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
     })?;
     Ok(Placement {
         frame,
-        source: match known {
-            true => AffineSource::ImagePosition,
-            false => AffineSource::UnknownOrigin,
+        source: if known {
+            AffineSource::ImagePosition
+        } else {
+            AffineSource::UnknownOrigin
         },
         warnings,
     })
@@ -87,13 +88,14 @@ pub(super) fn pixel_spacing(a: &Attributes, frame: Option<usize>) -> Result<[f64
     let Some([between_rows, between_columns]) = stated else {
         return Err(a.missing(PIXEL_SPACING));
     };
-    match between_rows > 0.0 && between_columns > 0.0 {
-        true => Ok([between_rows, between_columns]),
-        false => Err(a.wrong(
+    if between_rows > 0.0 && between_columns > 0.0 {
+        Ok([between_rows, between_columns])
+    } else {
+        Err(a.wrong(
             PIXEL_SPACING.name,
             &format!("{between_rows}\\{between_columns}"),
             "expected positive numbers".into(),
-        )),
+        ))
     }
 }
 
@@ -124,12 +126,13 @@ pub(super) fn directions(a: &Attributes, cosines: [f64; 6]) -> Result<(Vec3, Vec
     let [x0, x1, x2, y0, y1, y2] = cosines;
     let (x, y) = (Vec3::new(x0, x1, x2), Vec3::new(y0, y1, y2));
     let unit = |v: &Vec3| (v.norm() - 1.0).abs() <= COSINE_SLACK;
-    match unit(&x) && unit(&y) && x.dot(&y).abs() <= COSINE_SLACK {
-        true => Ok((x.normalize(), y.normalize())),
-        false => Err(a.wrong(
+    if unit(&x) && unit(&y) && x.dot(&y).abs() <= COSINE_SLACK {
+        Ok((x.normalize(), y.normalize()))
+    } else {
+        Err(a.wrong(
             DETECTOR_ORIENTATION.name,
             &format!("{cosines:?}"),
             "expected two perpendicular unit vectors".into(),
-        )),
+        ))
     }
 }

@@ -75,13 +75,14 @@ pub fn read_header(
 fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
     let text = a.text(attribute).ok_or_else(|| a.missing(attribute))?;
     let formed = |b: u8| b.is_ascii_digit() || b == b'.';
-    match text.len() <= LONGEST_UID && text.bytes().all(formed) {
-        true => Ok(text),
-        false => Err(a.wrong(
+    if text.len() <= LONGEST_UID && text.bytes().all(formed) {
+        Ok(text)
+    } else {
+        Err(a.wrong(
             attribute.name,
             &text,
             format!("a UID has at most {LONGEST_UID} digits and dots"),
-        )),
+        ))
     }
 }
 

@@ -147,9 +147,10 @@ impl Kind {
         let name = name.map_or("object of an unknown SOP class", |entry| entry.name());
         let name = name.trim_end_matches(" Storage");
         let modality = attributes.texts(MODALITY).join("\\");
-        let modality = match modality.is_empty() {
-            true => String::new(),
-            false => format!(", modality {}", clip(&modality)),
+        let modality = if modality.is_empty() {
+            String::new()
+        } else {
+            format!(", modality {}", clip(&modality))
         };
         let begins = |begin: &str| {
             let rest = suffix.strip_prefix(begin);
@@ -161,9 +162,10 @@ impl Kind {
         let spelled = ["RT ", "MR ", "NM "]
             .iter()
             .any(|letters| name.starts_with(letters));
-        let article = match spelled || name.starts_with(['A', 'E', 'I', 'O', 'o']) {
-            true => "an",
-            false => "a",
+        let article = if spelled || name.starts_with(['A', 'E', 'I', 'O', 'o']) {
+            "an"
+        } else {
+            "a"
         };
         refuse(
             format!("{article} {name} ({}{modality})", clip(&class)),
@@ -235,9 +237,10 @@ fn nuclear(attributes: &Attributes, image_type: &[String]) -> Result<Kind, Volum
     }
     let shown = image_type.get(2).map_or("", String::as_str);
     let is_map = shown.starts_with("RECON") && image_type.iter().any(|v| v == "TRANSMISSION");
-    let named = match shown.is_empty() || is_map {
-        true => image_type.join("\\"),
-        false => shown.to_owned(),
+    let named = if shown.is_empty() || is_map {
+        image_type.join("\\")
+    } else {
+        shown.to_owned()
     };
     let refuse = |reason| {
         Err(VolumeError::NotSlices {

@@ -465,15 +465,16 @@ fn attenuation_doubt(a: &Attributes) -> Option<String> {
 /// Checks that the functional groups do not describe more frames than there are.
 fn check_groups(a: &Attributes, frames: usize) -> Result<(), VolumeError> {
     let described = a.frames_described();
-    match described > frames {
-        true => Err(a.wrong(
+    if described > frames {
+        Err(a.wrong(
             NUMBER_OF_FRAMES.name,
             &frames.to_string(),
             format!(
                 "the Per-frame Functional Groups Sequence (5200,9230) describes {described} frames"
             ),
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 

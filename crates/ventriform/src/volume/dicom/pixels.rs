@@ -91,9 +91,10 @@ impl Pixels {
         let storage =
             match &scan.pixels {
                 PixelPlace::Whole { begin, length } => {
-                    let bytes = match bits {
-                        true => voxels.div_ceil(8),
-                        false => voxels * data_type.size() as u64,
+                    let bytes = if bits {
+                        voxels.div_ceil(8)
+                    } else {
+                        voxels * data_type.size() as u64
                     };
                     if bytes > *length {
                         return Err(VolumeError::Truncated {
@@ -103,9 +104,10 @@ impl Pixels {
                         });
                     }
                     check_surplus(a, frames, voxels, *length, bytes)?;
-                    match bits {
-                        true => Storage::Bits { begin: *begin },
-                        false => Storage::Whole { begin: *begin },
+                    if bits {
+                        Storage::Bits { begin: *begin }
+                    } else {
+                        Storage::Whole { begin: *begin }
                     }
                 }
                 PixelPlace::Fragments { offsets, fragments } => {
@@ -372,14 +374,16 @@ fn number_of_frames(a: &Attributes, kind: Kind) -> Result<usize, VolumeError> {
         None if matches!(kind, Kind::Nuclear { .. }) => return Err(a.missing(NUMBER_OF_FRAMES)),
         None => 1.0,
     };
-    let (most, reason) = match kind.is_single_slice() {
-        true => (1.0, "expected 1 for this SOP class"),
+    let (most, reason) = if kind.is_single_slice() {
+        (1.0, "expected 1 for this SOP class")
+    } else {
         // The vectors hold 16 bits per frame in an element of at most one mebibyte.
-        false => (524_288.0, "expected a whole number from 1 to 524288"),
+        (524_288.0, "expected a whole number from 1 to 524288")
     };
-    match frames.fract() == 0.0 && (1.0..=most).contains(&frames) {
-        true => Ok(frames as usize),
-        false => Err(a.wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into())),
+    if frames.fract() == 0.0 && (1.0..=most).contains(&frames) {
+        Ok(frames as usize)
+    } else {
+        Err(a.wrong(NUMBER_OF_FRAMES.name, &frames.to_string(), reason.into()))
     }
 }
 
@@ -443,13 +447,14 @@ fn check_surplus(
 ) -> Result<(), VolumeError> {
     let of_one = (bytes / frames as u64).max(1);
     let held = length / of_one;
-    match voxels > 0 && held > frames as u64 && length - bytes >= of_one.max(2) {
-        true => Err(a.wrong(
+    if voxels > 0 && held > frames as u64 && length - bytes >= of_one.max(2) {
+        Err(a.wrong(
             NUMBER_OF_FRAMES.name,
             &frames.to_string(),
             format!("the Pixel Data (7FE0,0010) of {length} bytes hold {held} frames"),
-        )),
-        false => Ok(()),
+        ))
+    } else {
+        Ok(())
     }
 }
 
@@ -474,9 +479,10 @@ fn padding(scan: &Scan, data_type: DataType, unused_bits: u32) -> Option<Padding
             let signed = matches!(data_type, DataType::I8 | DataType::I16 | DataType::I32);
             let value = |attribute| {
                 let stored = a.shorts(attribute).first().copied()?;
-                Some(match signed {
-                    true => f64::from(stored as i16),
-                    false => f64::from(stored),
+                Some(if signed {
+                    f64::from(stored as i16)
+                } else {
+                    f64::from(stored)
                 })
             };
             (value(PADDING)?, value(PADDING_LIMIT))

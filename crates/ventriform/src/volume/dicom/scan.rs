@@ -373,13 +373,14 @@ impl Walk {
 
     fn enter(&mut self, tag: Tag) -> Result<(), VolumeError> {
         self.path.push((tag, 0));
-        match self.path.len() > MAX_SEQUENCE_DEPTH {
-            true => Err(self.attributes.wrong(
+        if self.path.len() > MAX_SEQUENCE_DEPTH {
+            Err(self.attributes.wrong(
                 "depth of sequences",
                 &self.path.len().to_string(),
                 format!("sequences may be nested at most {MAX_SEQUENCE_DEPTH} deep"),
-            )),
-            false => Ok(()),
+            ))
+        } else {
+            Ok(())
         }
     }
 

@@ -234,9 +234,10 @@ impl Stack {
             order: sorted,
             placement: Placement {
                 frame,
-                source: match first.oriented {
-                    true => AffineSource::ImagePosition,
-                    false => AffineSource::UnknownOrigin,
+                source: if first.oriented {
+                    AffineSource::ImagePosition
+                } else {
+                    AffineSource::UnknownOrigin
                 },
                 warnings,
             },

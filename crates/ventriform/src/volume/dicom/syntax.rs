@@ -353,15 +353,12 @@ impl Meta {
                 &element[2..4],
                 b"OB" | b"OW" | b"UN" | b"UT" | b"SQ" | b"OF"
             );
-            let (value, length) = match long {
-                true => {
-                    let length = start.get(meta.end + 8..)?.first_chunk()?;
-                    (meta.end + 12, u32::from_le_bytes(*length) as usize)
-                }
-                false => {
-                    let length = [element[4], element[5]];
-                    (meta.end + 8, usize::from(u16::from_le_bytes(length)))
-                }
+            let (value, length) = if long {
+                let length = start.get(meta.end + 8..)?.first_chunk()?;
+                (meta.end + 12, u32::from_le_bytes(*length) as usize)
+            } else {
+                let length = [element[4], element[5]];
+                (meta.end + 8, usize::from(u16::from_le_bytes(length)))
             };
             let end = value.checked_add(length)?;
             let bytes = start.get(value..end)?;

@@ -78,12 +78,11 @@ impl Encoding {
                 bytes.extend(self.long(value.len() as u32));
             } else {
                 bytes.extend(vr.as_bytes());
-                match matches!(*vr, "SQ" | "OW" | "OB") {
-                    true => {
-                        bytes.extend([0, 0]);
-                        bytes.extend(self.long(value.len() as u32));
-                    }
-                    false => bytes.extend(self.short(value.len() as u16)),
+                if matches!(*vr, "SQ" | "OW" | "OB") {
+                    bytes.extend([0, 0]);
+                    bytes.extend(self.long(value.len() as u32));
+                } else {
+                    bytes.extend(self.short(value.len() as u16))
                 }
             }
             bytes.extend(value);

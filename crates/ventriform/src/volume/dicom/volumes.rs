@@ -183,9 +183,10 @@ struct Key {
 
 impl Key {
     fn criterion(self) -> &'static Criterion {
-        match self.of_frames {
-            true => &OF_FRAMES[usize::from(self.criterion)],
-            false => &OF_FILES[usize::from(self.criterion)],
+        if self.of_frames {
+            &OF_FRAMES[usize::from(self.criterion)]
+        } else {
+            &OF_FILES[usize::from(self.criterion)]
         }
     }
 
@@ -528,12 +529,13 @@ impl Dealer<'_> {
         let (names, other) = pairs
             .min_by_key(|(names, _)| names.len())
             .unwrap_or((Vec::new(), first));
-        let how = match names.is_empty() {
-            true => "no attribute tells apart which volume each belongs to".to_owned(),
-            false => format!(
+        let how = if names.is_empty() {
+            "no attribute tells apart which volume each belongs to".to_owned()
+        } else {
+            format!(
                 "they cannot be told apart: {} differ, but not alike at every place of a slice",
                 names.join(", ")
-            ),
+            )
         };
         format!(
             "of {} and {}, which lie at the same place, {how}; send the images of one volume alone",

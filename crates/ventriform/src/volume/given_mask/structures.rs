@@ -130,9 +130,10 @@ pub(super) fn of_labels(facts: &VolumeFacts) -> HeldStructures {
         .map(|l| label((l.label, l.voxels as usize)))
         .collect();
     HeldStructures {
-        kind: match all.is_empty() {
-            true => HeldKind::None,
-            false => HeldKind::Labels,
+        kind: if all.is_empty() {
+            HeldKind::None
+        } else {
+            HeldKind::Labels
         },
         objects: all.clone(),
         all,
@@ -174,9 +175,10 @@ pub(super) fn of_volume(volume: &Volume) -> HeldStructures {
         return held(HeldKind::TwoValues { background }, one(), Vec::new());
     }
     // Scaling may exceed 1 by rounding.
-    match low >= 0.0 && high <= 1.0 + 1e-5 {
-        true => held(HeldKind::Probabilities, one(), Vec::new()),
-        false => held(HeldKind::None, Vec::new(), Vec::new()),
+    if low >= 0.0 && high <= 1.0 + 1e-5 {
+        held(HeldKind::Probabilities, one(), Vec::new())
+    } else {
+        held(HeldKind::None, Vec::new(), Vec::new())
     }
 }
 

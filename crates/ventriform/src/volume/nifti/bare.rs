@@ -123,9 +123,10 @@ impl Content {
     }
 
     fn is_bare(&self, header: &Header) -> bool {
-        let (size, texts, descrip) = match header.is_second() {
-            true => (NIFTI2_BYTES, SECOND_TEXT, 240),
-            false => (NIFTI1_BYTES, FIRST_TEXT, 148),
+        let (size, texts, descrip) = if header.is_second() {
+            (NIFTI2_BYTES, SECOND_TEXT, 240)
+        } else {
+            (NIFTI1_BYTES, FIRST_TEXT, 148)
         };
         let blank = |bytes: Option<&[u8]>| bytes.is_some_and(|bytes| bytes.iter().all(|b| *b == 0));
         let own = |text: &Range<usize>| {

@@ -170,9 +170,10 @@ impl Header {
         if end > source.capacity() {
             return Err(source.truncated(end, source.capacity()));
         }
-        match end > limits.unpacked_bytes {
-            true => Err(source.beyond_limit(end)),
-            false => Ok(()),
+        if end > limits.unpacked_bytes {
+            Err(source.beyond_limit(end))
+        } else {
+            Ok(())
         }
     }
 }
@@ -256,9 +257,10 @@ impl StatedHeader {
 
     /// Offset of the first voxel, bytes.
     fn first_voxel(&self) -> Result<u64, VolumeError> {
-        let least = match self.pair {
-            true => 0,
-            false => self.offsets.size as u64 + EXTENDER_BYTES,
+        let least = if self.pair {
+            0
+        } else {
+            self.offsets.size as u64 + EXTENDER_BYTES
         };
         let invalid = |value: String, reason: String| {
             self.invalid("vox_offset", value, reason, self.offsets.vox_offset)
@@ -277,12 +279,13 @@ impl StatedHeader {
             }
             StatedOffset::Real(stated) => stated as u64,
         };
-        match offset < least {
-            true => Err(invalid(
+        if offset < least {
+            Err(invalid(
                 offset.to_string(),
                 format!("the voxels cannot begin before byte {least}"),
-            )),
-            false => Ok(offset),
+            ))
+        } else {
+            Ok(offset)
         }
     }
 
@@ -298,9 +301,12 @@ impl StatedHeader {
             }
             return Ok(None);
         }
-        let check = |name, value: f64, at| match value.is_finite() {
-            true => Ok(()),
-            false => Err(self.invalid(name, value, "must be a finite number".into(), at)),
+        let check = |name, value: f64, at| {
+            if value.is_finite() {
+                Ok(())
+            } else {
+                Err(self.invalid(name, value, "must be a finite number".into(), at))
+            }
         };
         check("scl_slope", slope, self.offsets.scl_slope)?;
         check("scl_inter", inter, self.offsets.scl_inter)?;

@@ -68,9 +68,10 @@ impl NiftiFile {
                 header.frames
             ));
         }
-        let mut source = match header.pair {
-            true => Source::open(voxel_file, limits.unpacked_bytes)?,
-            false => start,
+        let mut source = if header.pair {
+            Source::open(voxel_file, limits.unpacked_bytes)?
+        } else {
+            start
         };
         header.check_size(&mut source, limits)?;
         Ok(Self {

@@ -159,14 +159,12 @@ fn spacing(header: &Header) -> Result<[f64; 3], VolumeError> {
     let mut spacing = [1.0; 3];
     for axis in 0..header.dim.len().min(3) {
         let stated = header.pixdim[axis + 1].abs();
-        match stated.is_finite() && stated > 0.0 {
-            true => spacing[axis] = stated,
-            false if stated == 0.0 && header.shape[axis] == 1 => {}
-            false => {
-                let value = header.pixdim[axis + 1];
-                let reason = "the spacing must be a positive number";
-                return Err(wrong(header, SPACING_NAMES[axis], value, reason));
-            }
+        if stated.is_finite() && stated > 0.0 {
+            spacing[axis] = stated;
+        } else if stated != 0.0 || header.shape[axis] != 1 {
+            let value = header.pixdim[axis + 1];
+            let reason = "the spacing must be a positive number";
+            return Err(wrong(header, SPACING_NAMES[axis], value, reason));
         }
     }
     Ok(spacing)
@@ -279,9 +277,10 @@ fn disagreement(header: &Header, sform: &Matrix4<f64>) -> Option<String> {
             "a {s}-handed and a {q}-handed grid: one mirrors the other"
         ));
     }
-    let differences = match differences.is_empty() {
-        true => String::new(),
-        false => format!(" ({})", differences.join("; ")),
+    let differences = if differences.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", differences.join("; "))
     };
     let apart = apart * scale;
     Some(format!(

@@ -122,17 +122,19 @@ impl StatedHeader {
             bytes: &bytes,
             big_endian: byte_order == ByteOrder::Big,
         };
-        let rank = match second {
-            true => fields.long(offsets.dim),
-            false => i64::from(fields.short(offsets.dim)),
+        let rank = if second {
+            fields.long(offsets.dim)
+        } else {
+            i64::from(fields.short(offsets.dim))
         };
         if !(1..=7).contains(&rank) {
             let reason = "the number of dimensions must be 1 to 7".into();
             return Err(invalid(file, "dim[0]", rank, reason, offsets.dim(0)));
         }
-        match second {
-            true => Ok(Self::second(&fields, byte_order, file)),
-            false => Self::first(&bytes, file),
+        if second {
+            Ok(Self::second(&fields, byte_order, file))
+        } else {
+            Self::first(&bytes, file)
         }
     }
 

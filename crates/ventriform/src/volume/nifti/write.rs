@@ -254,12 +254,13 @@ fn scaling(voxels: &[f32]) -> Scaling {
     let mut numbers = voxels.iter().filter(|v| v.is_finite());
     let whole = numbers.all(|v| v.trunc() == *v);
     if !(low < high) || (whole && low >= -MAX_STORED_VALUE && high <= MAX_STORED_VALUE) {
-        return match low.is_finite() && !whole {
-            true => Scaling {
+        return if low.is_finite() && !whole {
+            Scaling {
                 slope: 1.0,
                 inter: low as f32,
-            },
-            false => Scaling::NONE,
+            }
+        } else {
+            Scaling::NONE
         };
     }
     Scaling {

@@ -294,9 +294,10 @@ impl<'a> Anatomy<'a> {
         if GUT.iter().any(|loops| loops.holds(p)) {
             return parameters.gut;
         }
-        match LUNGS.iter().any(|lung| lung.holds(p)) {
-            true => LUNG_SHARE * parameters.background,
-            false => parameters.background,
+        if LUNGS.iter().any(|lung| lung.holds(p)) {
+            LUNG_SHARE * parameters.background
+        } else {
+            parameters.background
         }
     }
 }
@@ -307,9 +308,10 @@ fn across(to_base: &Vec3) -> (Vec3, Vec3) {
     let part = |v: Vec3| v - v.dot(to_base) * to_base;
     let up = part(Vec3::z());
     // For a vertical axis, the anterior wall is in front.
-    let anterior = match up.norm() > 1e-3 {
-        true => up.normalize(),
-        false => part(-Vec3::y()).normalize(),
+    let anterior = if up.norm() > 1e-3 {
+        up.normalize()
+    } else {
+        part(-Vec3::y()).normalize()
     };
     // Points to the right if the apex is to the left and in front.
     let septal = anterior.cross(to_base);

@@ -31,9 +31,10 @@ pub(super) fn moved(voxels: &[f32], p: &PhantomParameters) -> Vec<f32> {
     let of_a_head = VIEW_COUNT / usize::from(p.heads);
     let first_after = ((1.0 - p.motion_share) * of_a_head as f64).round() as usize;
     let few_after = first_after > of_a_head / 2;
-    let (mut image, other) = match few_after {
-        true => (voxels.to_vec(), after.as_slice()),
-        false => (after, voxels),
+    let (mut image, other) = if few_after {
+        (voxels.to_vec(), after.as_slice())
+    } else {
+        (after, voxels)
     };
     let views: Vec<View> = (0..VIEW_COUNT)
         .filter(|n| (n % of_a_head >= first_after) == few_after)

@@ -182,13 +182,14 @@ impl PhantomParameters {
 }
 
 fn within(field: &'static str, value: f64, low: f64, high: f64) -> Result<(), PhantomError> {
-    match (low..=high).contains(&value) {
-        true => Ok(()),
-        false => Err(PhantomError::OutOfRange {
+    if (low..=high).contains(&value) {
+        Ok(())
+    } else {
+        Err(PhantomError::OutOfRange {
             field,
             value,
             low,
             high,
-        }),
+        })
     }
 }

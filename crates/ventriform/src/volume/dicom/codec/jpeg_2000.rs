@@ -74,10 +74,7 @@ pub(super) fn decode(
         return Err("the JPEG 2000 frame has several components".into());
     };
     // The decoder shifts signed numbers as it does unsigned ones, so that the least becomes 0.
-    let shift = match size.signed {
-        true => 1 << (size.bits - 1),
-        false => 0,
-    };
+    let shift = if size.signed { 1 << (size.bits - 1) } else { 0 };
     let most = ((1_u32 << size.bits) - 1) as f32;
     let samples = component.samples().iter();
     let values = samples.map(|v| v.round_ties_even().clamp(0.0, most) as i32 - shift);
@@ -99,9 +96,10 @@ fn code_stream(bytes: &[u8]) -> Result<&[u8], String> {
     }
     let start = bytes.windows(4).position(|four| four == CODESTREAM_START);
     let (boxes, stream) = bytes.split_at(start.unwrap_or(bytes.len()));
-    match boxes.windows(4).any(|four| four == b"pclr") {
-        true => Err("the JPEG 2000 frame has a palette".into()),
-        false => Ok(stream),
+    if boxes.windows(4).any(|four| four == b"pclr") {
+        Err("the JPEG 2000 frame has a palette".into())
+    } else {
+        Ok(stream)
     }
 }
 
@@ -206,9 +204,10 @@ impl CodingStyle {
         if *levels > MOST_LEVELS || wide > 10 || high > 10 || wide + high > 12 {
             return Err("the JPEG 2000 code blocks or levels exceed the standard's".into());
         }
-        let sizes = match precincts {
-            true => sizes.get(..usize::from(*levels) + 1),
-            false => Some(&[][..]),
+        let sizes = if precincts {
+            sizes.get(..usize::from(*levels) + 1)
+        } else {
+            Some(&[][..])
         };
         let sizes = sizes.ok_or("the JPEG 2000 precincts are cut off")?;
         let exponents = |size: &u8| [u32::from(size & 15), u32::from(size >> 4)];
@@ -231,9 +230,10 @@ impl CodingStyle {
             // Precincts on the grid of the resolution (B-16).
             let along = |axis: usize| {
                 let [begin, end] = tile[axis].map(|edge| scaled(edge, level, 0));
-                match begin < end {
-                    true => spans([begin, end], exponents[axis]),
-                    false => 0,
+                if begin < end {
+                    spans([begin, end], exponents[axis])
+                } else {
+                    0
                 }
             };
             precincts = precincts.checked_add(along(0).checked_mul(along(1))?)?;
@@ -250,9 +250,10 @@ impl CodingStyle {
                     let [begin, end] = tile[axis].map(|edge| scaled(edge, depth, band[axis]));
                     // A precinct of one number of the resolution holds none or one of the band.
                     let precinct = exponents[axis].saturating_sub(halved);
-                    match begin < end {
-                        true => spans([begin, end], self.block[axis].min(precinct)),
-                        false => 0,
+                    if begin < end {
+                        spans([begin, end], self.block[axis].min(precinct))
+                    } else {
+                        0
                     }
                 };
                 blocks = blocks.checked_add(along(0).checked_mul(along(1))?)?;
@@ -382,9 +383,10 @@ impl<'a> Structure<'a> {
             }
             _ => at + length,
         };
-        match end <= self.stream.len() {
-            true => Ok(end),
-            false => Err("the JPEG 2000 stream is cut off".into()),
+        if end <= self.stream.len() {
+            Ok(end)
+        } else {
+            Err("the JPEG 2000 stream is cut off".into())
         }
     }
 

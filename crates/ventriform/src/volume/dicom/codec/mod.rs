@@ -108,33 +108,36 @@ impl FrameLayout {
 
     /// Checks the size that a code stream states.
     fn check(self, columns: u64, rows: u64, components: u64) -> Result<(), String> {
-        match (columns, rows, components) == (self.columns as u64, self.rows as u64, 1) {
-            true => Ok(()),
-            false => Err(format!(
+        if (columns, rows, components) == (self.columns as u64, self.rows as u64, 1) {
+            Ok(())
+        } else {
+            Err(format!(
                 "the compressed frame has {columns} columns, {rows} rows and {components} \
                  component(s), the data set {} columns and {} rows",
                 self.columns, self.rows
-            )),
+            ))
         }
     }
 
     /// Checks the width of a code stream's numbers.
     fn check_bits(self, bits: u32) -> Result<(), String> {
-        match bits <= 8 * self.size as u32 {
-            true => Ok(()),
-            false => Err(format!(
+        if bits <= 8 * self.size as u32 {
+            Ok(())
+        } else {
+            Err(format!(
                 "the compressed numbers have {bits} bits, and Bits Allocated is {}",
                 8 * self.size
-            )),
+            ))
         }
     }
 
     /// The value that a reader takes the lowest Bits Stored bits of `number` for.
     fn stored(self, number: i32) -> i64 {
         let unused = 64 - self.bits;
-        match self.signed {
-            true => i64::from(number) << unused >> unused,
-            false => ((number as u64) << unused >> unused) as i64,
+        if self.signed {
+            i64::from(number) << unused >> unused
+        } else {
+            ((number as u64) << unused >> unused) as i64
         }
     }
 
@@ -150,9 +153,10 @@ impl FrameLayout {
             let extended = i64::from(value) << spare >> spare;
             stored == i64::from(value) || (self.signed && stored == extended)
         };
-        let wrong = match numbers.bits == self.bits {
-            true => None,
-            false => numbers.values.iter().find(|value| !holds(**value)),
+        let wrong = if numbers.bits == self.bits {
+            None
+        } else {
+            numbers.values.iter().find(|value| !holds(**value))
         };
         if let Some(value) = wrong {
             let kind = if self.signed { "signed" } else { "unsigned" };
@@ -195,13 +199,14 @@ pub(super) fn decode(
         Ok(layout.pack(&numbers)?)
     }));
     let decoded = decoded.unwrap_or_else(|_| Err("the decoder failed on this frame".into()))?;
-    match decoded.len() == layout.pixels() * layout.size {
-        true => Ok(decoded),
-        false => Err(FrameError::Wrong(format!(
+    if decoded.len() == layout.pixels() * layout.size {
+        Ok(decoded)
+    } else {
+        Err(FrameError::Wrong(format!(
             "the frame holds {} bytes after decompression; expected {}",
             decoded.len(),
             layout.pixels() * layout.size
-        ))),
+        )))
     }
 }
 

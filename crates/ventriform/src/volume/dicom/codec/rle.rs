@@ -31,9 +31,10 @@ pub(super) fn decode(bytes: &[u8], layout: FrameLayout) -> Result<Vec<u8>, Strin
     let mut decoded = vec![0; layout.pixels() * layout.size];
     for segment in 0..segments {
         let begin = offsets[segment];
-        let end = match segment + 1 < segments {
-            true => offsets[segment + 1],
-            false => bytes.len(),
+        let end = if segment + 1 < segments {
+            offsets[segment + 1]
+        } else {
+            bytes.len()
         };
         let packed = bytes.get(begin..end).filter(|_| begin >= HEADER_BYTES);
         let packed = packed.ok_or("an RLE segment lies outside its frame")?;

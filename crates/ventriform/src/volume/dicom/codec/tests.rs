@@ -223,9 +223,10 @@ fn decoding_stops_when_it_is_told_to() {
         calls = 0;
         decode(LOSSLESS, &frame, layout, &mut || {
             calls += 1;
-            match calls > *most {
-                true => Err(Cancelled),
-                false => Ok(()),
+            if calls > *most {
+                Err(Cancelled)
+            } else {
+                Ok(())
             }
         })
         .map(|_| calls)

@@ -44,9 +44,12 @@ const ROWS: usize = 7;
 
 /// The image: 12 bits, with a flat part, edges and gradients.
 fn image() -> Vec<f32> {
-    let value = |x: usize, y: usize| match x < 4 && y < 3 {
-        true => 0,
-        false => (37 * x * x + 91 * y * (x % 3) + 13 * y * y) % 4096,
+    let value = |x: usize, y: usize| {
+        if x < 4 && y < 3 {
+            0
+        } else {
+            (37 * x * x + 91 * y * (x % 3) + 13 * y * y) % 4096
+        }
     };
     let pixels = (0..COLUMNS * ROWS).map(|n| value(n % COLUMNS, n / COLUMNS) as f32);
     pixels.collect()

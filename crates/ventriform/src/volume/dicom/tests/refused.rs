@@ -277,9 +277,12 @@ fn fragments(vr: Option<&[u8; 2]>) -> Vec<u8> {
 
 /// A sequence of one item, of defined or undefined lengths.
 fn sequence(tag: [u8; 4], vr: Option<&[u8; 2]>, content: &[u8], defined: bool) -> Vec<u8> {
-    let length = |n: usize| match defined {
-        true => (n as u32).to_le_bytes(),
-        false => [0xff; 4],
+    let length = |n: usize| {
+        if defined {
+            (n as u32).to_le_bytes()
+        } else {
+            [0xff; 4]
+        }
     };
     let mut item = vec![0xfe, 0xff, 0x00, 0xe0];
     item.extend(length(content.len()));

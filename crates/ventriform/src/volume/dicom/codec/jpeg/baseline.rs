@@ -99,9 +99,10 @@ fn read_block(
             _ => return Err(too_large(size)),
         }
     }
-    match k <= 64 {
-        true => Ok(block),
-        false => Err("the JPEG coefficients exceed their block".into()),
+    if k <= 64 {
+        Ok(block)
+    } else {
+        Err("the JPEG coefficients exceed their block".into())
     }
 }
 

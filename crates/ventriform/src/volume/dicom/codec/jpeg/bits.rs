@@ -110,9 +110,10 @@ impl<'a> Bits<'a> {
                 return Ok(table.symbols[place + index as usize]);
             }
         }
-        Err(match self.count < 16 {
-            true => "the JPEG data are cut off".into(),
-            false => "the JPEG data hold bits that are no code".into(),
+        Err(if self.count < 16 {
+            "the JPEG data are cut off".into()
+        } else {
+            "the JPEG data hold bits that are no code".into()
         })
     }
 
@@ -126,9 +127,10 @@ impl<'a> Bits<'a> {
         }
         let number = (self.held >> (64 - size)) as i32;
         self.drop(size)?;
-        Ok(match number < 1 << (size - 1) {
-            true => number - (1 << size) + 1,
-            false => number,
+        Ok(if number < 1 << (size - 1) {
+            number - (1 << size) + 1
+        } else {
+            number
         })
     }
 
