@@ -127,6 +127,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "optimise",
             "model",
             "deform",
+            "judge",
             "polar",
             "reader",
             "parameters",
