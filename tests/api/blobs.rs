@@ -14,12 +14,12 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
-use ventriform_service::items::Items;
+use ventriform_service::items::{Custodian, Items};
 use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
 use ventriform_service::records::{
-    BlobError, BlobStore, BlobStream, BlobWriter, FileRecord, Filed, ItemRecord, JobState,
-    LocalFile, NewJob, Resource, Shelved, StagedFiles, StagedFor, StoredVolume, SystemClock, Tags,
-    Tenant, Timestamp,
+    BlobError, BlobStore, BlobStream, BlobWriter, Erased, ErasureAgent, ErasureOrder,
+    ErasureReason, FileRecord, Filed, ItemRecord, JobState, LocalFile, NewJob, Resource, Shelved,
+    StagedFiles, StagedFor, StoredVolume, SystemClock, Tags, Tenant, Timestamp,
 };
 use ventriform_store::Store;
 
@@ -31,6 +31,10 @@ type Files = Arc<Mutex<ItemFiles>>;
 #[derive(Clone, Default)]
 struct MemoryBlobs {
     items: Arc<Mutex<BTreeMap<String, ItemFiles>>>,
+    /// Erases the item whose file is verified, as soon as it has been read.
+    erasing: Arc<Mutex<Option<Arc<Items>>>>,
+    /// The items that were described.
+    described: Arc<Mutex<Vec<String>>>,
 }
 
 /// A copy in a temporary folder that is deleted with the last clone of the result.
@@ -154,10 +158,22 @@ impl BlobStore for MemoryBlobs {
     }
 
     async fn hash(&self, id: &str, file: &FileRecord) -> Result<FileRecord, BlobError> {
-        panic!("nobody verifies {id}/{}", file.name)
+        let erasing = self.erasing.lock().unwrap().take();
+        let items = erasing.expect("nobody verifies files but the test that erases meanwhile");
+        let order = ErasureOrder {
+            tenant: Tenant::default(),
+            id: id.to_owned(),
+            cascade: false,
+            renewed_before: None,
+            by: ErasureAgent::default(),
+            reason: ErasureReason::Request,
+        };
+        assert!(matches!(items.erase(order).await, Ok(Erased::Done(_))));
+        Ok(file.clone())
     }
 
-    async fn describe(&self, _: &ItemRecord) -> Result<(), BlobError> {
+    async fn describe(&self, record: &ItemRecord) -> Result<(), BlobError> {
+        self.described.lock().unwrap().push(record.id().to_owned());
         Ok(())
     }
 
@@ -268,4 +284,44 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
     drop(stored);
     assert!(!path.exists(), "the copy is deleted after use");
     workers.stop(Duration::from_secs(5)).await;
+}
+
+/// An item that is erased while its files are verified is not described: the description would stay as a file
+/// without an item.
+#[tokio::test]
+async fn what_is_erased_while_it_is_verified_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let blobs = MemoryBlobs::default();
+    let clock = Arc::new(SystemClock);
+    let items = Items::new(store.rows.clone(), Arc::new(blobs.clone()), clock, None);
+    let items = Arc::new(items);
+    let staged = blobs.stage(StagedFor::Upload).await.unwrap();
+    let mut writer = staged.create("volume.nii").await.unwrap();
+    writer.write_all(&volume("sphere")).await.unwrap();
+    writer.shutdown().await.unwrap();
+    let record = StoredVolume {
+        id: "vol_1".into(),
+        sequence: 0,
+        created_at: 0,
+        bytes: 13,
+        files: vec![FileRecord {
+            name: "volume.nii".into(),
+            bytes: 13,
+            sha256: "a".repeat(64),
+            place: None,
+        }],
+        facts: json!({}),
+    };
+    let (tenant, tags) = (Tenant::default(), Tags::default());
+    let added = items.add_volume(record, staged, &tenant, &tags, None).await;
+    added.unwrap();
+    *blobs.erasing.lock().unwrap() = Some(items.clone());
+    let custodian = Custodian {
+        items,
+        quarantine_keep: None,
+        scrub_rate: 1 << 20,
+    };
+    assert_eq!(custodian.scrub().await.unwrap(), 0);
+    assert_eq!(*blobs.described.lock().unwrap(), Vec::<String>::new());
 }
