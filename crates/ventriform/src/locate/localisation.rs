@@ -129,7 +129,7 @@ impl Cups {
             .find(|s| self.is_open(s));
         let place = report(best, elsewhere);
         if best.infarcted {
-            // Where the dark arc holds the apex, what is left of the wall has told the length already.
+            // Where the dark arc holds the apex, the rest of the wall has determined the length already.
             return place;
         }
         match apex::by_base(&CupSearch::new(&self.field, &self.hints), &best.cup) {

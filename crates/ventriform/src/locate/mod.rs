@@ -67,7 +67,7 @@ use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
 const SAME_HEART: f64 = 30.0;
 /// Correlation from which on the cup at a proposal settles the matter.
 const CLEAR_CORRELATION: f64 = 0.75;
-/// How far from a proposal the picture for its cup reaches, mm: a large heart and the blur.
+/// Distance that the picture for a cup reaches from its proposal, mm: a large heart and the blur.
 const SURROUNDINGS_MM: f64 = 90.0;
 
 /// The heart that [`find`] decided on.
