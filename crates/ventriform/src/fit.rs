@@ -9,7 +9,7 @@
 //! an error and no result.
 
 use crate::deform::setup::FitSetup;
-use crate::deform::{self, DeformError, DeformParameters, OrganPlace, check_supports};
+use crate::deform::{self, DeformError, DeformParameters, OrganPosition, check_supports};
 use crate::grid::Volume;
 use crate::judge::{judge, refusal, septum};
 use crate::model::Template;
@@ -28,17 +28,17 @@ pub fn fit(
     monitor: &Monitor,
 ) -> Result<Fit, DeformError> {
     check_supports(template.mesh.vertices.len(), &parameters.stiffness)?;
-    let place = OrganPlace::find(volume, template, parameters, monitor)?;
-    fit_at(&place, volume, template, parameters, monitor)
+    let position = OrganPosition::find(volume, template, parameters, monitor)?;
+    fit_at(&position, volume, template, parameters, monitor)
 }
 
-/// Fits `template` to the organ at `place` in `volume`. [`OrganPlace::find`] must have found it in
+/// Fits `template` to the organ at `position` in `volume`. [`OrganPosition::find`] must have found it in
 /// this volume, by these parameters, for this template or another one of the same organ.
 ///
 /// # Errors
 /// [`DeformError`].
 pub fn fit_at(
-    place: &OrganPlace,
+    position: &OrganPosition,
     volume: &Volume,
     template: &Template,
     parameters: &DeformParameters,
@@ -47,7 +47,7 @@ pub fn fit_at(
     parameters.validate()?;
     check_supports(template.mesh.vertices.len(), &parameters.stiffness)?;
     monitor.report(Stage::Align, 0.0)?;
-    let setup = FitSetup::new(place, volume, template, parameters, monitor)?;
+    let setup = FitSetup::new(position, volume, template, parameters, monitor)?;
     let fit_from = |setup: &FitSetup| -> Result<Fit, DeformError> {
         let model = deform::fit(setup, template, parameters, monitor)?;
         let (organ, edge) = (template.organ, parameters.edge);

@@ -86,7 +86,7 @@ pub fn anatomical_mesh(
         .unwrap_or_else(|| mesh.clone())
 }
 
-/// Where the wall begins and ends on each ray, and by how much its surfaces move outward, mm.
+/// Beginning and end of the wall on each ray, and the distances by which its surfaces move outward, mm.
 struct WallShifts {
     inner: RayMap,
     outer: RayMap,

@@ -1,7 +1,7 @@
 //! Runs of the motion, repeated with a stiffer model while the result is folded.
 
 use super::base_plane;
-use super::dynamics::{self, Moved};
+use super::dynamics::{self, MotionResult};
 use super::elastic::Elastic;
 use super::fitted_model::{FittedModel, WallSurface, WallSurfaces};
 use super::parameters::DeformParameters;
@@ -22,7 +22,7 @@ const STIFFNESS_FACTOR: f64 = 4.0;
 
 /// One run of the motion and its folds.
 pub struct Attempt {
-    moved: Moved,
+    moved: MotionResult,
     strain: f64,
     intersections: usize,
     turned: usize,

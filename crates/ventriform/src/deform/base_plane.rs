@@ -56,7 +56,7 @@ const REWEIGHTING_ROUNDS: usize = 30;
 /// Length of wall next to the rim that is stretched, mm.
 pub const STRETCHED_LENGTH_MM: f64 = 25.0;
 
-/// How far towards the base the rim is moved where it lies `distance` mm too near to the apex, mm.
+/// Distance towards the base by which a rim is moved that lies `distance` mm too near to the apex, mm.
 fn correction(distance: f64) -> f64 {
     let beyond = (distance - 4.0).max(0.0) * 1.136 + (-distance - 4.0).max(0.0) * 0.278;
     (0.784 + 0.95 * distance + beyond).clamp(-12.0, 16.0)
@@ -103,7 +103,7 @@ pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<Tr
         .find(|moved| self_intersections(moved).is_empty())
 }
 
-/// How far a rim is moved at most, mm towards the base. Towards the apex, wall of the length [`STRETCHED_LENGTH_MM`] is pushed
+/// Range of the distance by which a rim is moved, mm towards the base. Towards the apex, wall of the length [`STRETCHED_LENGTH_MM`] is pushed
 /// together, so it must stay below that.
 const RIM_SHIFT_RANGE_MM: [f64; 2] = [-20.0, 40.0];
 

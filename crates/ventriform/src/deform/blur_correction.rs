@@ -1,4 +1,4 @@
-//! How much thicker a wall looks because of blur.
+//! Thickness that blur adds to a wall.
 //!
 //! A slab of thickness w and uptake 1, seen with a Gaussian of full width F at half maximum
 //! (s = F / 2.355), shows the profile f(x) = [Φ(x + w/2) - Φ(x - w/2)] with

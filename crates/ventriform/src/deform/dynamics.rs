@@ -50,7 +50,7 @@ impl StopReason {
     }
 }
 
-/// How the model moves.
+/// Parameters of the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Mass of the whole model relative to a sensor force of 1 per mm, in units of dt². Default
@@ -85,9 +85,9 @@ impl Default for Motion {
     }
 }
 
-/// How the motion went.
+/// Result of the motion.
 #[derive(Debug, Clone)]
-pub struct Moved {
+pub struct MotionResult {
     /// The model at rest.
     pub mesh: TriMesh,
     /// Why the motion ended.
@@ -113,7 +113,7 @@ pub fn run(
     settings: &SensorSettings,
     motion: &Motion,
     monitor: &Monitor,
-) -> Result<Moved, Cancelled> {
+) -> Result<MotionResult, Cancelled> {
     let mut state = MotionState::new(start, body, motion);
     let mut mean = SensorMean::default();
     let mut reach = settings.reach;
@@ -163,7 +163,7 @@ pub fn run(
         &SensorSettings { reach, ..*settings },
         monitor,
     )?;
-    Ok(Moved {
+    Ok(MotionResult {
         mesh: state.mesh,
         reason,
         iterations: energies.len(),

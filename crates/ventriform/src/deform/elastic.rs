@@ -54,7 +54,7 @@ pub struct Stiffness {
     pub support_scaling: SupportScaling,
 }
 
-/// How the stiffness of a support spring depends on the number of nodes.
+/// Dependence of a support spring's stiffness on the number of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SupportScaling {
     /// Every spring has the stiffness k_p.

@@ -5,7 +5,7 @@
 //! position and shape, with the nodes and triangles of the template. [`judge`](crate::judge) says how likely it is
 //! right, and [`fit`](crate::fit) does both.
 //!
-//! 1. [`place`]: find the organ in the volume, once for all templates, and the patient's
+//! 1. [`organ_position`]: find the organ in the volume, once for all templates, and the patient's
 //!    orientation ([`crate::locate`]).
 //! 2. [`setup`]: pose the template there ([`crate::model::pose`]), blur the image about it.
 //! 3. [`align`]: move, turn, stretch and thicken the model as a whole.
@@ -38,15 +38,15 @@ pub mod dynamics;
 pub mod elastic;
 pub mod error;
 pub mod fitted_model;
+pub mod organ_position;
 pub mod parameters;
-pub mod place;
 pub mod sensors;
 pub mod setup;
 
 pub use error::DeformError;
 pub use fitted_model::{FittedModel, WallSurface, WallSurfaces};
+pub use organ_position::OrganPosition;
 pub use parameters::{DeformParameters, WallEdge};
-pub use place::OrganPlace;
 
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};

@@ -2,8 +2,8 @@
 //! sensors.
 
 use super::error::DeformError;
+use super::organ_position::OrganPosition;
 use super::parameters::DeformParameters;
-use super::place::OrganPlace;
 use super::sensors::{BlindSector, EdgeShift, SensorKind, SensorSettings};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -56,19 +56,19 @@ pub struct FitSetup {
 const RV_SECTOR_HALF_ANGLE_DEG: f64 = 65.0;
 
 impl FitSetup {
-    /// Poses `template` at `place` and blurs the image about it.
+    /// Poses `template` at `position` and blurs the image about it.
     ///
     /// # Errors
     /// [`DeformError::OtherOrgan`], [`DeformError::Cancelled`].
     pub fn new(
-        place: &OrganPlace,
+        position: &OrganPosition,
         volume: &Volume,
         template: &Template,
         parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Self, DeformError> {
-        let (localisation, pose, axis, cavity_axis, uptake) = match (place, &template.cup) {
-            (OrganPlace::Ventricle { found, orientation }, Some(from)) => {
+        let (localisation, pose, axis, cavity_axis, uptake) = match (position, &template.cup) {
+            (OrganPosition::Ventricle { found, orientation }, Some(from)) => {
                 let to = found.cup;
                 let roll = parameters.roll.to_radians();
                 let turn = if orientation.source.is_stated() {
@@ -81,7 +81,7 @@ impl FitSetup {
                 let ends = [to.base(), inner_end];
                 (Some(found.clone()), pose, to.axis, ends, found.wall)
             }
-            (OrganPlace::Body { blob, .. }, None) => {
+            (OrganPosition::Body { blob, .. }, None) => {
                 let pose = TemplatePose::of_body(&template.mesh, blob);
                 (None, pose, Vec3::z(), [blob.centre; 2], blob.uptake)
             }
@@ -93,11 +93,11 @@ impl FitSetup {
         let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
         region.min -= border;
         region.max += border;
-        let picture = place.mask().unwrap_or(volume);
+        let picture = position.mask().unwrap_or(volume);
         let field = Field::cut_out(picture, Some(&region), parameters.blur, monitor)?;
         Ok(Self {
             localisation,
-            patient_orientation: place.patient_orientation(),
+            patient_orientation: position.patient_orientation(),
             pose,
             posed,
             axis,

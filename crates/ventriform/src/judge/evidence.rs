@@ -58,7 +58,7 @@ pub struct Evidence {
     pub views: Option<Views>,
 }
 
-/// How a model met the edges of the image.
+/// Agreement of a model with the edges of the image.
 pub(super) struct Edges {
     /// [`Evidence::active`].
     pub active: f64,
@@ -119,7 +119,7 @@ struct WallUptake {
 
 /// Quantile of the wall's uptake that counts as that of bright wall.
 const BRIGHT_WALL_QUANTILE: f64 = 0.85;
-/// Where it is looked for neighbours, mm beyond the outer surface.
+/// Distances of neighbours beyond the outer surface, least and greatest, mm.
 const NEIGHBOUR_DISTANCE_MM: [i32; 2] = [12, 18];
 
 impl WallUptake {
@@ -204,7 +204,7 @@ fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
     (radius > 0.0).then_some(([x, y], radius))
 }
 
-/// Where the rays of these columns, between the apical cap and the rim, enter and leave the wall.
+/// Distances at which the rays of these columns, between the apical cap and the rim, enter and leave the wall.
 fn of_body(wall: &VentricleWall, columns: Range<usize>) -> impl Iterator<Item = [f64; 2]> {
     const { assert!(BODY_ROWS.end <= ROWS) };
     let rows = BODY_ROWS.flat_map(move |row| columns.clone().map(move |c| row * COLUMNS + c));

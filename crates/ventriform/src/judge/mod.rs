@@ -43,7 +43,7 @@ use crate::progress::{Cancelled, Monitor};
 use evidence::Edges;
 use motion::Views;
 
-/// How likely a fitted model is right, and why.
+/// The chance that a fitted model is right, its reasons, and warnings.
 #[derive(Debug, Clone)]
 pub struct Judgement {
     /// Of a ventricle, the chance that the mask agrees with an expert's by a Jaccard index of 0.75

@@ -2,7 +2,7 @@
 
 use super::{Fit, judge};
 use crate::deform::setup::FitSetup;
-use crate::deform::{self, DeformParameters, OrganPlace};
+use crate::deform::{self, DeformParameters, OrganPosition};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::Volume;
@@ -20,7 +20,7 @@ pub(super) fn ball() -> (Volume, Fit) {
     let model = shapes::icosphere(25.0, 2);
     let template = Template::new(model, Organ::Generic, &silent).unwrap();
     let parameters = DeformParameters::default();
-    let position = OrganPlace::find(&volume, &template, &parameters, &silent).unwrap();
+    let position = OrganPosition::find(&volume, &template, &parameters, &silent).unwrap();
     let setup = FitSetup::new(&position, &volume, &template, &parameters, &silent).unwrap();
     let model = deform::fit(&setup, &template, &parameters, &silent).unwrap();
     let edge = parameters.edge;

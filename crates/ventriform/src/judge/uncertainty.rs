@@ -1,4 +1,4 @@
-//! How far each node of a fitted ventricle may lie from the wall.
+//! Standard deviation of each node's distance from the wall of a fitted ventricle.
 //!
 //! In go what is known of each node ([`NodeEvidence`]) and the chance of a good fit; out comes a standard
 //! deviation, mm, along the normal ([`of_nodes`]).

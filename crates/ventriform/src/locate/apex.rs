@@ -1,4 +1,4 @@
-//! Where the apex is when it does not show.
+//! The position of an apex that does not show.
 //!
 //! In: the cup that agrees best with the picture. Out: if the apical wall takes up next to nothing,
 //! the cup placed by the basal wall alone; otherwise nothing.

@@ -24,7 +24,7 @@ const MAX_CANDIDATES: usize = 60;
 /// Balls whose shell is darker than this share of the brightest value are left out.
 const MIN_SHELL_SHARE: f64 = 0.08;
 
-/// Where hollow balls fit best: local maxima of their correlation, best first.
+/// Positions where hollow balls fit best: local maxima of their correlation, best first.
 ///
 /// # Errors
 /// [`Cancelled`].

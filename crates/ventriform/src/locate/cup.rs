@@ -21,7 +21,7 @@ pub(super) const WALL_PROFILE: [(f64, f64, usize); 6] = [
     (0.83, 0.196, 6),
 ];
 
-/// Where the middle of the wall crosses the axis at the apex.
+/// Share of the length at which the middle of the wall crosses the axis at the apex.
 pub(super) const APEX_SHARE: f64 = 0.91;
 
 /// Rings up to this share of the length are basal: segments 1 to 6 and most of 7 to 12.
@@ -279,7 +279,7 @@ impl Mean {
     }
 }
 
-/// How well a cup agrees with the image.
+/// Agreement of a cup with the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
     /// Weighted correlation, -1..=1.

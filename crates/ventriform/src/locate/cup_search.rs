@@ -24,8 +24,8 @@ use rayon::prelude::*;
 
 use super::cavity_candidates;
 use super::cup::{Cup, Pattern, perpendicular};
-use super::doubt::{MIN_CORRELATION, MIN_HOLLOWNESS, NotAHeart};
 use super::hints::{DISTINCT_DISTANCE_MM, Hints};
+use super::not_a_heart::{MIN_CORRELATION, MIN_HOLLOWNESS, NotAHeart};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::grid::field::Field;
@@ -92,7 +92,7 @@ pub struct ScoredCup {
 
 impl ScoredCup {
     /// The reason against a ventricle that the cup itself shows, if any.
-    pub fn doubt(&self) -> Option<NotAHeart> {
+    pub fn refusal(&self) -> Option<NotAHeart> {
         let (correlation, hollowness) = (self.correlation, self.hollowness);
         if correlation < MIN_CORRELATION {
             Some(NotAHeart::Unlike { correlation })

@@ -1,6 +1,6 @@
 //! Why no ventricle was found.
 
-use super::doubt::NotAHeart;
+use super::not_a_heart::NotAHeart;
 use crate::progress::Cancelled;
 
 /// Why no ventricle was found.

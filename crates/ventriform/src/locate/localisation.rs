@@ -10,9 +10,9 @@
 use super::apex;
 use super::cup::Cup;
 use super::cup_search::{self, CupSearch, ScoredCup};
-use super::doubt::{MAX_LID_SHARE, MIN_CORRELATION, NotAHeart};
 use super::error::LocateError;
 use super::hints::{DISTINCT_DISTANCE_MM, Hints};
+use super::not_a_heart::{MAX_LID_SHARE, MIN_CORRELATION, NotAHeart};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::grid::volume::Volume;
@@ -40,7 +40,7 @@ pub struct Localisation {
     pub confidence: f64,
 }
 
-/// Most confidence of a place that a part of the wall tells: it is always doubted.
+/// Greatest confidence of a position found by a part of the wall: it is always flagged.
 const OF_A_PART: f64 = 0.5;
 
 /// Every cup found in a volume, best first, and the picture that they were found in.
@@ -99,9 +99,9 @@ impl Cups {
         let first = self.found.iter().find(admitted).unwrap_or(&self.found[0]);
         let best = self.found.iter().filter(admitted).find(|s| self.is_open(s));
         let (candidate, reason) = match best {
-            Some(best) => match best.doubt().filter(|_| self.hints.centre.is_none()) {
+            Some(best) => match best.refusal().filter(|_| self.hints.centre.is_none()) {
                 None => return Ok(best),
-                Some(doubt) => (best, doubt),
+                Some(refusal) => (best, refusal),
             },
             None => {
                 let lid = first.cup.lid(&self.field, first.wall);
@@ -129,7 +129,7 @@ impl Cups {
             .find(|s| self.is_open(s));
         let place = report(best, elsewhere);
         if best.infarcted {
-            // Where the dark arc holds the apex, what is left of the wall has told the length already.
+            // Where the dark arc holds the apex, the rest of the wall has determined the length already.
             return place;
         }
         match apex::by_base(&CupSearch::new(&self.field, &self.hints), &best.cup) {

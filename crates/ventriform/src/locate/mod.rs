@@ -40,11 +40,11 @@ mod component_tree;
 pub mod cup;
 mod cup_search;
 pub mod directions;
-mod doubt;
 mod error;
 mod grey_blocks;
 mod hints;
 pub mod localisation;
+mod not_a_heart;
 pub mod patient_orientation;
 pub mod rays;
 pub mod short_axis;
@@ -55,10 +55,10 @@ use crate::grid::Volume;
 use crate::progress::{Cancelled, Monitor};
 
 use cup_search::{CupSearch, ScoredCup};
-pub use doubt::NotAHeart;
 pub use error::LocateError;
 pub use hints::Hints;
 use localisation::{Cups, Localisation};
+pub use not_a_heart::NotAHeart;
 use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
 
 /// The centres that rays and cups find in one heart lie nearer to each other than this, mm.
@@ -67,7 +67,7 @@ use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
 const SAME_HEART: f64 = 30.0;
 /// Correlation from which on the cup at a proposal settles the matter.
 const CLEAR_CORRELATION: f64 = 0.75;
-/// How far from a proposal the picture for its cup reaches, mm: a large heart and the blur.
+/// Distance that the picture for a cup reaches from its proposal, mm: a large heart and the blur.
 const SURROUNDINGS_MM: f64 = 90.0;
 
 /// The heart that [`find`] decided on.
@@ -137,9 +137,9 @@ fn is_clear(
     };
     let field = cup_search::picture(volume, Some(&region), monitor)?;
     let found = CupSearch::new(&field, hints).around(centre);
-    let open = found.cup.lid(&field, found.wall) <= doubt::MAX_LID_SHARE;
+    let open = found.cup.lid(&field, found.wall) <= not_a_heart::MAX_LID_SHARE;
     let near = (found.cup.centre - centre).norm() < SAME_HEART;
-    Ok(near && open && found.doubt().is_none() && found.correlation >= CLEAR_CORRELATION)
+    Ok(near && open && found.refusal().is_none() && found.correlation >= CLEAR_CORRELATION)
 }
 
 impl Heart<'_> {

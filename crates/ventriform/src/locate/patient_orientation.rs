@@ -42,7 +42,7 @@ use crate::progress::{Cancelled, Monitor};
 const COARSE_VOXEL_MM: f64 = 8.0;
 /// Blur of the picture before and of the mask after the cut, mm.
 const OUTLINE_BLUR_MM: f64 = 8.0;
-/// How far the heart's surroundings reach, mm.
+/// Radius of the heart's surroundings, mm.
 const SURROUNDINGS_MM: f64 = 80.0;
 /// The body's border as a share of the surroundings' median.
 const BODY_BORDER_SHARE: f64 = 0.3;

@@ -68,7 +68,7 @@ pub const PLAUSIBLE_SCORE: f64 = 0.2;
 /// The same for candidates of the lattice, of which there are many more to be wrong.
 const PLAUSIBLE_ON_LATTICE: f64 = 0.3;
 
-/// Score below which rays alone do not decide, and the user is told to look.
+/// Score below which rays alone do not decide, and the user is warned.
 ///
 /// Of 133 distorted copies of the simulated patients (cropped, halved, noisy, mirrored, blurred,
 /// with hotter organs) every heart was found, 131 with 0.29 or more; of 19 scans with the heart

@@ -73,7 +73,7 @@ fn with_surfaces_moved(mesh: &TriMesh, wall: &VentricleWall, offsets: &ReaderOff
     moved
 }
 
-/// Where the wall begins and ends on each ray, mm; rays beyond the rim have those of the next ray of
+/// Beginning and end of the wall on each ray, mm; rays beyond the rim have those of the next ray of
 /// their column.
 struct WallEdges(Vec<[f64; 2]>);
 

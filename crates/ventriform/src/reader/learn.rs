@@ -9,7 +9,7 @@
 
 use super::profile::{ReaderOffset, ReaderOffsets};
 
-/// How far readers' edges lie from the fitted ones, in the order of [`ReaderOffsets`], mm.
+/// Distances of readers' edges from the fitted ones, in the order of [`ReaderOffsets`], mm.
 ///
 /// With the spread below, a profile of one mask applies a third of what that mask showed. Two real masks,
 /// perhaps of two readers, that were drawn 2.5 and 0.8 mm outside the fitted edge are the reason: the

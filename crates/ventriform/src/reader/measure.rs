@@ -1,4 +1,4 @@
-//! How far a mask's wall lies from a fitted one.
+//! Distances of a mask's wall from a fitted one.
 //!
 //! In go a fit, the mask of its shown wall and a reader's mask on the same grid; out come three distances.
 //!
@@ -25,9 +25,9 @@ use crate::model::wall::{COLUMNS, ROWS};
 
 /// Steps along a ray, mm.
 const RAY_STEP_MM: f64 = 0.25;
-/// How far from the middle of the wall its edges are looked for, mm.
+/// Greatest distance of an edge from the middle of the wall, mm.
 const MAX_EDGE_DISTANCE_MM: f64 = 25.0;
-/// How far above the last row of the wall the line to the rim begins, rows.
+/// Height above the last row of the wall at which the line to the rim begins, rows.
 const ABOVE_RIM: usize = 4;
 /// Share of the rays that must be usable.
 const LEAST_SEEN: f64 = 0.4;
@@ -101,7 +101,7 @@ fn medians(fit: &FittedModel, drawn: &Mask, frame: &VoxelToPatient) -> Option<Re
     })
 }
 
-/// How far from `start`, inside `mesh`, a line first meets it.
+/// Distance from `start`, inside `mesh`, at which a line first meets it.
 fn exit(mesh: &TriMesh, start: &Vec3, direction: &Vec3) -> Option<f64> {
     let met = (0..mesh.triangles.len()).filter_map(|t| {
         let [a, b, c] = mesh.corners(t);

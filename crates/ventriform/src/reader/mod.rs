@@ -1,4 +1,4 @@
-//! How a reader draws the wall: learnt from masks, applied to fits.
+//! A reader's way of drawing the wall: learnt from masks, applied to fits.
 //!
 //! Readers place the same edge differently, one by millimetres farther out than another, and end the wall
 //! at different heights of the base. In go the fits of some scans and the masks that a reader drew of

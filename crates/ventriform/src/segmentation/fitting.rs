@@ -3,7 +3,7 @@
 use super::built_in;
 use super::error::SegmentationError;
 use super::named_template::{NamedTemplate, RefusedTemplate};
-use crate::deform::{DeformError, DeformParameters, OrganPlace, WallEdge};
+use crate::deform::{DeformError, DeformParameters, OrganPosition, WallEdge};
 use crate::fit::{Fit, fit_at};
 use crate::judge::{Evidence, consensus};
 use crate::locate::LocateError;
@@ -22,32 +22,36 @@ pub struct OrganSearch {
 #[derive(Debug)]
 struct Done {
     of_ventricle: bool,
-    place: Result<OrganPlace, DeformError>,
+    position: Result<OrganPosition, DeformError>,
 }
 
 impl OrganSearch {
-    /// Where the organ of `template` lies in `volume`. Volume and parameters must be the same
+    /// The position of the organ of `template` in `volume`. Volume and parameters must be the same
     /// in all calls.
     ///
     /// # Errors
     /// [`DeformError`] where the organ is not found, in this search or an earlier one of the
     /// same kind.
-    pub fn place(
+    pub fn position(
         &mut self,
         volume: &Volume,
         template: &Template,
         parameters: &DeformParameters,
         monitor: &Monitor,
-    ) -> Result<&OrganPlace, DeformError> {
+    ) -> Result<&OrganPosition, DeformError> {
         let of_ventricle = template.cup.is_some();
         let done = match self.done.take().filter(|d| d.of_ventricle == of_ventricle) {
             Some(done) => done,
             None => Done {
                 of_ventricle,
-                place: OrganPlace::find(volume, template, parameters, monitor),
+                position: OrganPosition::find(volume, template, parameters, monitor),
             },
         };
-        self.done.insert(done).place.as_ref().map_err(Clone::clone)
+        self.done
+            .insert(done)
+            .position
+            .as_ref()
+            .map_err(Clone::clone)
     }
 
     /// Fits `template` to the organ in `volume`, searched before if it has to be. Volume and
@@ -62,8 +66,8 @@ impl OrganSearch {
         parameters: &DeformParameters,
         monitor: &Monitor,
     ) -> Result<Fit, DeformError> {
-        let place = self.place(volume, template, parameters, monitor)?;
-        fit_at(place, volume, template, parameters, monitor)
+        let position = self.position(volume, template, parameters, monitor)?;
+        fit_at(position, volume, template, parameters, monitor)
     }
 }
 
@@ -174,10 +178,10 @@ pub fn try_all(
             template,
             built_in,
         } = named;
-        let place = search.place(volume, template, parameters, monitor)?;
+        let position = search.position(volume, template, parameters, monitor)?;
         let monitor = monitor.part(index, templates.len());
         let name = name.clone();
-        match fit_at(place, volume, template, parameters, &monitor) {
+        match fit_at(position, volume, template, parameters, &monitor) {
             Ok(fit) => {
                 if *built_in {
                     trials.built_in.push(Some(trials.fits.len()));

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 /// reach a tenth of it.
 const RIGHT_ANGLE: f64 = 1e-3;
 
-/// How many times as many voxels as the scan a grid at right angles may have. A gantry tilted by 30
+/// Greatest number of voxels of a grid at right angles, over that of the scan. A gantry tilted by 30
 /// degrees makes it less than 3.
 const MOST_VOXELS: usize = 16;
 

@@ -9,7 +9,7 @@ use crate::progress::{Cancelled, Monitor};
 use crate::volume::Volume;
 use nalgebra::Matrix3;
 
-/// How far the part reaches beyond the organ on every side, mm: a heart stays in slices of 140 mm.
+/// Margin of the part beyond the organ on every side, mm: a heart stays in slices of 140 mm.
 const REGION_MARGIN_MM: f64 = 25.0;
 /// Smaller voxels are merged into blocks of about this size, mm: finer than the detail of emission scans.
 const BLOCK_SIZE_MM: f64 = 2.5;

@@ -58,7 +58,7 @@ pub fn png(
     Ok(Image::side_by_side(&slices, SLICE_GAP_PX).png())
 }
 
-/// Where to cut: for each slice the places of its pixels, index (column, row, 0) to patient.
+/// The planes of the slices: for each the places of its pixels, index (column, row, 0) to patient.
 #[derive(Debug, Clone)]
 pub struct Cut {
     planes: [VoxelToPatient; 3],

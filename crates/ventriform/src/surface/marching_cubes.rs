@@ -38,7 +38,7 @@ pub struct Samples<'a> {
     pub beyond: f32,
 }
 
-/// Where a row's output begins.
+/// Beginning of a row's output.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
     /// First vertex on an edge along x, y, z.

@@ -35,7 +35,7 @@ const PASS_SLACK: f64 = 0.05;
 /// Deviation of the surface's volume from the mask's at which the search for the level ends.
 const VOLUME_SLACK: f64 = 2e-4;
 /// Deviation at which a level is accepted though the search did not end.
-const VOLUME_DOUBT: f64 = 5e-3;
+const VOLUME_ERROR_WARNING: f64 = 5e-3;
 /// Most surfaces made in the search for one level.
 const MOST_TRIALS: usize = 24;
 
@@ -279,7 +279,7 @@ fn levelled(
         if off.abs() < best.0 && (smoothing <= PASS_SLACK || passes == 0) {
             best = (off.abs(), level, passes);
         }
-        if best.0 <= VOLUME_DOUBT {
+        if best.0 <= VOLUME_ERROR_WARNING {
             break;
         }
     }

@@ -4,7 +4,7 @@ use super::SurfaceError;
 use crate::locate::Hints;
 use crate::volume::Volume;
 
-/// How the iso-value is chosen.
+/// Choice of the iso-value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum IsoLevel {
     /// Half the ventricle's reference intensity, or another fraction near by where that tears the
@@ -36,7 +36,7 @@ pub enum Isolate {
     Label(i64),
 }
 
-/// How handles, cavities and further components are treated.
+/// Treatment of handles, cavities and further components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TopologyMode {
     /// Remove them, so that one component without handles or cavities remains (a digital ball), and

@@ -70,7 +70,7 @@ impl Region {
     }
 }
 
-/// Where a voxel lies with respect to the wall.
+/// Position of a voxel with respect to the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Zone {
     Core,

@@ -32,7 +32,7 @@ pub struct Reading {
     /// The place of the grid as the file states it; `None` unless the file is NIfTI.
     pub stated_grid: Option<StatedGrid>,
     /// Why no model can be made of it, though it can be described.
-    pub doubt: Option<VolumeError>,
+    pub problem: Option<VolumeError>,
 }
 
 impl Reading {
@@ -43,8 +43,8 @@ impl Reading {
     /// [`VolumeError::SingleSlice`] or [`VolumeError::Mesh`].
     pub fn usable(self) -> Result<Self, VolumeError> {
         let shape = self.volume.shape;
-        match &self.doubt {
-            Some(doubt) => Err(doubt.clone()),
+        match &self.problem {
+            Some(problem) => Err(problem.clone()),
             None if shape.contains(&1) => Err(VolumeError::SingleSlice { shape }),
             None => Ok(self),
         }
@@ -81,7 +81,7 @@ pub(super) trait OpenVolume {
     }
 
     /// Why no model can be made of it.
-    fn doubt(&self) -> Option<VolumeError> {
+    fn problem(&self) -> Option<VolumeError> {
         None
     }
 
@@ -225,7 +225,7 @@ pub(super) fn read(
         facts,
         provenance,
         stated_grid: file.stated_grid(),
-        doubt: file.doubt(),
+        problem: file.problem(),
     })
 }
 

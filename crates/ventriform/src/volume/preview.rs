@@ -98,8 +98,8 @@ impl MiddlePlanes {
         let longest = [axes.x, axes.y, axes.z].map(|a| a.extent_mm);
         let longest = longest.into_iter().fold(0.0, f64::max);
         let slices = views.map(|(right, down)| self.slice(right, down, longest));
-        let window = window(&slices);
-        Image::side_by_side(&slices.map(|slice| slice.grey(window)), SLICE_GAP_PX)
+        let (low, high) = window(&slices);
+        Image::side_by_side(&slices.map(|slice| slice.grey(low, high)), SLICE_GAP_PX)
     }
 
     /// The middle slice whose columns run along `right` and rows along `down`.
@@ -226,7 +226,7 @@ struct Slice {
 
 impl Slice {
     /// Grey values, black at `low` and white from `high` on.
-    fn grey(self, (low, high): (f32, f32)) -> Image<1> {
+    fn grey(self, low: f32, high: f32) -> Image<1> {
         let grey = |value: &f32| [(255.0 * (value - low) / (high - low)).round() as u8];
         Image {
             width: self.width,

@@ -173,7 +173,7 @@ impl OpenVolume for SurfaceFile {
         }
     }
 
-    fn doubt(&self) -> Option<VolumeError> {
+    fn problem(&self) -> Option<VolumeError> {
         Some(VolumeError::Mesh {
             file: self.name.clone(),
             error: mesh_files::MeshFileError::Size(self.unlikely?),

@@ -22,7 +22,7 @@ mod deform_fit;
 mod deform_invariance;
 mod deform_oracle;
 mod deform_varied;
-mod doubt;
+mod flags;
 
 mod containers;
 mod edges;

@@ -1,4 +1,4 @@
-//! Where the wall's edge is: sensors that sample the image along the model's normals.
+//! Sensors of the wall's edge, which sample the image along the model's normals.
 //!
 //! In go the model, the blurred image and [`SensorSettings`]; out comes a [`SensorReading`] for
 //! every sensor ([`read`]).

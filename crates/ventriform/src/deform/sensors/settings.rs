@@ -18,7 +18,7 @@ pub enum SensorKind {
     Level,
 }
 
-/// How the sensors sample the image and which edge they look for.
+/// Sampling of the image by the sensors, and the edge that they look for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorSettings {
     /// Which point of the edge is reported.

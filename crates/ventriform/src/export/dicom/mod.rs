@@ -362,7 +362,7 @@ impl<'a> DicomResults<'a> {
     /// The first segment: the structure, for its item in the Segment Sequence.
     fn put_segment(&self, segment: &mut DataSet) {
         let Structure { kind, label, .. } = self.structure;
-        put_segment(segment, 1, (kind, label), &self.tracking());
+        put_segment(segment, 1, kind, label, &self.tracking());
     }
 
     /// The Referenced Series Sequence of the Common Instance Reference module.
@@ -402,7 +402,7 @@ impl<'a> DicomResults<'a> {
 }
 
 /// The description of segment `number` for its item in the Segment Sequence.
-fn put_segment(segment: &mut DataSet, number: u16, (kind, label): (Code, &str), tracking: &str) {
+fn put_segment(segment: &mut DataSet, number: u16, kind: Code, label: &str, tracking: &str) {
     segment.short(tags::SEGMENT_NUMBER, number);
     segment.text(tags::SEGMENT_LABEL, label);
     segment.text(tags::SEGMENT_ALGORITHM_TYPE, "AUTOMATIC");

@@ -86,7 +86,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     if results.cavity.is_some() {
         let mut segment = DataSet::new();
         let tracking = results.uids.uid("tracking of the cavity");
-        put_segment(&mut segment, 2, (CAVITY, CAVITY.meaning), &tracking);
+        put_segment(&mut segment, 2, CAVITY, CAVITY.meaning, &tracking);
         put_look(&mut segment, CAVITY_CIELAB);
         segments.push(segment);
         set.text(tags::SEGMENTS_OVERLAP, "NO");

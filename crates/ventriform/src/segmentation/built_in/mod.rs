@@ -25,7 +25,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 
-/// How the names of built-in hearts begin in reports.
+/// Beginning of the names of built-in hearts in reports.
 pub const NAME_PREFIX: &str = "built-in";
 
 /// The hearts, as [`hearts_json`] writes them.

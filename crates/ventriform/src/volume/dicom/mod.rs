@@ -233,7 +233,7 @@ impl DicomFile {
                 )
             }
         };
-        warnings.extend(attenuation_doubt(a));
+        warnings.extend(attenuation_warning(a));
         let voxels = (columns * rows) as u64 * slices as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(a, voxels, limits.voxels));
@@ -444,8 +444,8 @@ fn check_numbers(
     Ok(())
 }
 
-/// A doubt about an emission image whose description is that of an attenuation map.
-fn attenuation_doubt(a: &Attributes) -> Option<String> {
+/// A warning about an emission image whose description is that of an attenuation map.
+fn attenuation_warning(a: &Attributes) -> Option<String> {
     if !matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT")) {
         return None;
     }
@@ -512,7 +512,7 @@ struct Series {
     volumes: usize,
     images: f64,
     /// Whether the description is that of another kind of image.
-    doubt: Option<String>,
+    warning: Option<String>,
 }
 
 /// A series in a person's words.
@@ -579,7 +579,7 @@ impl Series {
         self.slices = self.slices.max(stated(NUMBER_OF_SLICES));
         let volumes = stated(TIME_SLOTS) * stated(RR_INTERVALS) * stated(TIME_SLICES);
         self.volumes = self.volumes.max(volumes);
-        self.doubt = attenuation_doubt(a).or(self.doubt.take());
+        self.warning = attenuation_warning(a).or(self.warning.take());
         if let Ok(Some([images])) = a.decimals::<1>(IMAGES_IN_ACQUISITION) {
             self.images = self.images.max(images);
         }
@@ -625,9 +625,9 @@ impl Series {
         })
     }
 
-    /// Doubts about `volumes` volumes in `stack`.
+    /// Warnings about `volumes` volumes in `stack`.
     fn warnings(&self, stack: &Stack, volumes: usize) -> Vec<String> {
-        let mut warnings: Vec<String> = self.doubt.clone().into_iter().collect();
+        let mut warnings: Vec<String> = self.warning.clone().into_iter().collect();
         if self.repeated > 0 {
             warnings.push(format!(
                 "{} files repeat an instance of the series and were left out.",

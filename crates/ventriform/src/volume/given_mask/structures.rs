@@ -113,7 +113,7 @@ pub(super) fn of_segments(segments: &[Segment]) -> HeldStructures {
     }
 }
 
-fn label((number, voxels): (i64, usize)) -> MaskStructure {
+fn label(number: i64, voxels: usize) -> MaskStructure {
     MaskStructure {
         number,
         names: Vec::new(),
@@ -126,9 +126,7 @@ fn label((number, voxels): (i64, usize)) -> MaskStructure {
 /// The labels of a file whose numbers 32-bit floats do not tell apart.
 pub(super) fn of_labels(facts: &VolumeFacts) -> HeldStructures {
     let labels = facts.intensity.labels.iter().flatten();
-    let all: Vec<_> = labels
-        .map(|l| label((l.label, l.voxels as usize)))
-        .collect();
+    let all: Vec<_> = labels.map(|l| label(l.label, l.voxels as usize)).collect();
     HeldStructures {
         kind: if all.is_empty() {
             HeldKind::None
@@ -166,10 +164,14 @@ pub(super) fn of_volume(volume: &Volume) -> HeldStructures {
         if objects.len() > SMALL_LABELS && counts() {
             return held(HeldKind::None, Vec::new(), Vec::new());
         }
-        let list = |map: BTreeMap<i64, usize>| map.into_iter().map(label).collect();
+        let list = |map: BTreeMap<i64, usize>| {
+            map.into_iter()
+                .map(|(number, voxels)| label(number, voxels))
+                .collect()
+        };
         return held(HeldKind::Labels, list(objects), list(values));
     }
-    let one = || vec![label((1, 0))];
+    let one = || vec![label(1, 0)];
     if let Some(background) = two_values(volume) {
         let background = background.to_bits();
         return held(HeldKind::TwoValues { background }, one(), Vec::new());

@@ -1,4 +1,4 @@
-//! Where an organ lies in a volume.
+//! The position of an organ in a volume.
 
 use super::error::DeformError;
 use super::parameters::DeformParameters;
@@ -10,9 +10,9 @@ use crate::locate::patient_orientation::PatientOrientation;
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};
 
-/// Where an organ lies in a volume: the same for all templates of the organ.
+/// The position of an organ in a volume: the same for all templates of the organ.
 #[derive(Debug, Clone)]
-pub enum OrganPlace {
+pub enum OrganPosition {
     /// A left ventricle.
     Ventricle {
         /// Where it was found.
@@ -29,7 +29,7 @@ pub enum OrganPlace {
     },
 }
 
-impl OrganPlace {
+impl OrganPosition {
     /// Searches `volume` for the organ of `template`.
     ///
     /// # Errors
@@ -42,7 +42,7 @@ impl OrganPlace {
     ) -> Result<Self, DeformError> {
         parameters.validate()?;
         monitor.report(Stage::Localise, 0.0)?;
-        let place = match template.cup {
+        let position = match template.cup {
             Some(_) => {
                 let found =
                     locate::find(volume, &parameters.hints, monitor)?.localisation(monitor)?;
@@ -52,32 +52,32 @@ impl OrganPlace {
                     Some(stated) => stated,
                     None => PatientOrientation::observed(volume, cup, superior, monitor)?,
                 };
-                OrganPlace::Ventricle { found, orientation }
+                OrganPosition::Ventricle { found, orientation }
             }
             None => {
                 let mask = body::one_label(volume, &parameters.hints, monitor)?;
                 let picture = mask.as_ref().unwrap_or(volume);
                 let blob = body::find(picture, &parameters.hints, monitor)?;
-                OrganPlace::Body { blob, mask }
+                OrganPosition::Body { blob, mask }
             }
         };
         monitor.report(Stage::Localise, 1.0)?;
-        Ok(place)
+        Ok(position)
     }
 
     /// The patient's orientation in the frame; the frame's own for organs other than ventricles.
     pub(super) fn patient_orientation(&self) -> PatientOrientation {
         match self {
-            OrganPlace::Ventricle { orientation, .. } => *orientation,
-            OrganPlace::Body { .. } => PatientOrientation::FRAME,
+            OrganPosition::Ventricle { orientation, .. } => *orientation,
+            OrganPosition::Body { .. } => PatientOrientation::FRAME,
         }
     }
 
     /// The image to fit to, where it is not the volume itself.
     pub(super) fn mask(&self) -> Option<&Volume> {
         match self {
-            OrganPlace::Ventricle { .. } => None,
-            OrganPlace::Body { mask, .. } => mask.as_ref(),
+            OrganPosition::Ventricle { .. } => None,
+            OrganPosition::Body { mask, .. } => mask.as_ref(),
         }
     }
 }

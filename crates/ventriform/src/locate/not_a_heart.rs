@@ -61,7 +61,7 @@ pub enum NotAHeart {
         /// Chance of a heart, 0..=1.
         chance: f64,
     },
-    /// Both the search and the fitted model doubt it.
+    /// Both the search and the fitted model give it little confidence.
     #[error(
         "is no heart: the search has a confidence of {search:.2}, and the model fitted there a chance \
          of {:.0} % to be right",
