@@ -744,9 +744,9 @@ async fn holds_keep_what_they_name(on: &Stores) {
             .unwrap()
     );
     let held = on.b.volume(&tenant(), &volume).await.unwrap().unwrap();
-    assert_eq!(held.holding.legal_hold, Some(hold));
+    assert_eq!(held.ownership.legal_hold, Some(hold));
     let made = on.b.product(&tenant(), &result.id).await.unwrap().unwrap();
-    assert!(made.holding.source_on_hold);
+    assert!(made.ownership.source_on_hold);
     for id in [&volume, &result.id] {
         let expected = [id.clone()];
         let erased =
@@ -1007,7 +1007,7 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
         on.b.products(&tenant(), Resource::Template, &filter, ALL)
             .await
             .unwrap();
-    assert!(listed.items[0].holding.library);
+    assert!(listed.items[0].ownership.library);
     let of_scan = ItemFilter {
         scan: scan_filter("1.2.é"),
         ..ItemFilter::default()
@@ -1041,8 +1041,8 @@ async fn identities_are_kept_and_erased(on: &Stores) {
         on.a.renew_volume(&tenant(), &volume, &tags, scan, now())
             .await;
     let (held, new) = renewed.unwrap().unwrap();
-    assert!(!new && held.holding.scan.erased_at.is_none());
-    assert_eq!(held.holding.scan.found, Some(found.clone()));
+    assert!(!new && held.ownership.scan.erased_at.is_none());
+    assert_eq!(held.ownership.scan.found, Some(found.clone()));
     on.a.note_scan(&other(), &unread, Some(&found))
         .await
         .unwrap();

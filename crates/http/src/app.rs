@@ -1,12 +1,12 @@
 //! The state that all handlers share: the service, and what belongs to answering requests.
 
 use super::guard::state::Guard;
+use super::links::rfc3339;
 use super::response_cache::ResponseCache;
 use super::streams::EventStreams;
 use super::validators::ValidatedJson;
-use super::wire::rfc3339;
 use std::sync::Arc;
-use ventriform_service::records::{Holding, Product, Resource};
+use ventriform_service::records::{Ownership, Product, Resource};
 use ventriform_service::service::Service;
 
 /// The shared state of handlers.
@@ -42,8 +42,8 @@ impl App {
     }
 
     /// When an item of that kind will be erased (RFC 3339); `None` if it is kept.
-    pub fn expires_at(&self, kind: Resource, holding: &Holding) -> Option<String> {
-        self.service.expires_at(kind, holding).map(rfc3339)
+    pub fn expires_at(&self, kind: Resource, ownership: &Ownership) -> Option<String> {
+        self.service.expires_at(kind, ownership).map(rfc3339)
     }
 }
 

@@ -34,7 +34,7 @@ use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
-    Catalogue, Held, ItemFilter, ListPage, ListRequest, Resource, ScanFilter, StoreError,
+    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, ScanFilter, StoreError,
     TagFilter, Tenant,
 };
 
@@ -59,14 +59,14 @@ pub trait Collection: 'static {
     ///
     /// # Errors
     /// If the row holds something that cannot be read.
-    fn body(app: &App, scope: Scope, row: Held<Self::Row>) -> Result<Self::Body, StoreError>;
+    fn body(app: &App, scope: Scope, row: Owned<Self::Row>) -> Result<Self::Body, StoreError>;
 
     /// The tenant's row of that id.
     fn row(
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> impl Future<Output = Result<Option<Held<Self::Row>>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<Option<Owned<Self::Row>>, StoreError>> + Send;
 
     /// A page of the tenant's rows, newest first.
     fn rows(
@@ -74,7 +74,7 @@ pub trait Collection: 'static {
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> impl Future<Output = Result<ListPage<Held<Self::Row>>, StoreError>> + Send;
+    ) -> impl Future<Output = Result<ListPage<Owned<Self::Row>>, StoreError>> + Send;
 }
 
 /// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
@@ -137,7 +137,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 }
 
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
-pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Held<C::Row>> {
+pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Owned<C::Row>> {
     let catalogue = app.service.items().catalogue();
     let found = if Resource::of(id) == Some(C::RESOURCE) {
         C::row(catalogue, tenant, id).await?

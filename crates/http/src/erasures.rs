@@ -3,12 +3,12 @@
 use super::app::App;
 use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
+use super::links::{path_of, rfc3339};
 use super::openapi::{ListProblems, LookupProblems, PageParameters};
 use super::pagination::{list_query, next_cursor};
 use super::problem::not_found::{missing, no_receipt};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, query_pairs, refuse_unknown};
-use super::wire::{path_of, rfc3339};
 use super::{negotiate, validators};
 use crate::public_base::public_path;
 use axum::extract::{RawQuery, State};

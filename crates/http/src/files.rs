@@ -2,10 +2,10 @@
 //! 14).
 
 use super::app::App;
+use super::links::path_of;
 use super::memory::charge;
 use super::problem::{Answer, Problem};
 use super::validators::not_modified;
-use super::wire::path_of;
 use axum::body::{Body, Bytes};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::IntoResponse;

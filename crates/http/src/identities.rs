@@ -36,7 +36,7 @@ pub async fn get_identity(
 ) -> Answer {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    json(&headers, &volume.holding.scan.whole())
+    json(&headers, &volume.ownership.scan.whole())
 }
 
 /// State whose scan a volume is
@@ -75,7 +75,7 @@ pub async fn state_identity(
         .state_scan(&caller.tenant, &id, &ScanFields(stated))
         .await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    Ok(Json(volume.holding.scan.whole()))
+    Ok(Json(volume.ownership.scan.whole()))
 }
 
 /// Erase whose scan a volume is

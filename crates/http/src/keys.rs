@@ -4,11 +4,11 @@
 use super::app::App;
 use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
+use super::links::rfc3339;
 use super::openapi::{ListProblems, LookupProblems, PageParameters, UploadProblems};
 use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
-use super::wire::rfc3339;
 use crate::public_base::public_path;
 use axum::Extension;
 use axum::Json;

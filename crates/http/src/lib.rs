@@ -8,12 +8,12 @@
 //! |---|---|
 //! | the paths, the layers around them | [`router`] |
 //! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
-//! | webhooks and what became of their deliveries | [`webhooks`], [`given_webhook`], [`hooks`] |
+//! | webhooks and what became of their deliveries | [`webhooks`], [`webhook_request`], [`hooks`] |
 //! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept`] |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
-//! | objects that other systems send | [`stow`], [`received`], [`intake`], [`volume_maker`] |
+//! | objects that other systems send | [`stow`], [`intake_status`], [`intake`], [`volume_maker`] |
 //! | work items of other systems (UPS-RS) | [`workitems`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
 //! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
@@ -42,29 +42,28 @@ mod document;
 mod erasures;
 mod files;
 mod front_page;
-mod given_webhook;
 mod guard;
 mod health;
 mod held_body;
 mod idempotency;
 mod identities;
+mod intake_status;
 mod jobs;
 mod keys;
 mod legal_hold;
 mod limits;
+mod links;
 mod memory;
 mod models;
 mod negotiate;
 mod observe;
 mod openapi;
-mod originals;
 mod pagination;
 mod problem;
 mod products;
 mod public_base;
 mod quota;
 mod readers;
-mod received;
 mod request;
 mod response_cache;
 mod router;
@@ -77,10 +76,11 @@ mod tags;
 mod templates;
 mod upload;
 mod validators;
+mod volume_download;
 mod volumes;
 mod voxels;
+mod webhook_request;
 mod webhooks;
-mod wire;
 mod workitems;
 
 pub use app::App;

@@ -7,6 +7,7 @@ use super::app::App;
 use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::files;
+use super::links::path_of;
 use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
@@ -18,7 +19,6 @@ use super::problem::{Answer, Problem};
 use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
 use super::response_cache::Keep;
 use super::scans::{self, ScanUidsBody};
-use super::wire::path_of;
 use axum::extract::{RawQuery, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
@@ -40,7 +40,7 @@ use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
 use ventriform_service::decoding::LITTLE_MEMORY;
 use ventriform_service::records::{
-    Catalogue, Held, ItemFilter, ListPage, ListRequest, Product, Resource, StoreError, Tenant,
+    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError, Tenant,
 };
 use ventriform_service::work::{UploadFacts, dicom, part};
 
@@ -81,11 +81,11 @@ impl<P: ProductCollection> Collection for P {
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Held<Product>>, StoreError> {
+    ) -> Result<Option<Owned<Product>>, StoreError> {
         catalogue.product(tenant, id).await
     }
 
-    fn body(app: &App, _: Scope, product: Held<Product>) -> Result<P::Body, StoreError> {
+    fn body(app: &App, _: Scope, product: Owned<Product>) -> Result<P::Body, StoreError> {
         Ok(Presented::of(app, product).into())
     }
 
@@ -94,7 +94,7 @@ impl<P: ProductCollection> Collection for P {
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Held<Product>>, StoreError> {
+    ) -> Result<ListPage<Owned<Product>>, StoreError> {
         catalogue.products(tenant, P::RESOURCE, filter, page).await
     }
 }
@@ -113,11 +113,11 @@ pub struct Presented {
 
 impl Presented {
     /// A product as its tenant has it.
-    pub fn of(app: &App, held: Held<Product>) -> Self {
+    pub fn of(app: &App, held: Owned<Product>) -> Self {
         Self {
-            expires_at: app.expires_at(held.item.resource(), &held.holding),
-            scan: ScanUidsBody::of(&held.holding.scan),
-            library: held.holding.library,
+            expires_at: app.expires_at(held.item.resource(), &held.ownership),
+            scan: ScanUidsBody::of(&held.ownership.scan),
+            library: held.ownership.library,
             product: held.item,
         }
     }
@@ -284,7 +284,7 @@ macro_rules! body_of_product {
                 Self {
                     expires_at: presented.expires_at,
                     dicom: presented.scan,
-                    created_at: $crate::wire::rfc3339(product.created_at),
+                    created_at: $crate::links::rfc3339(product.created_at),
                     volume: product.volume.clone().unwrap_or_default(),
                     software: $crate::products::SoftwareBody::of(&product),
                     files: $crate::products::DownloadBody::all(&product),

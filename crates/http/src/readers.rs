@@ -2,12 +2,12 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, UploadProblems};
 use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use super::quota::reserve_item;
 use super::request::{json_bytes, query_pairs, refuse_unknown};
-use super::wire::{added, path_of, rfc3339};
 use axum::extract::{RawQuery, Request, State};
 use serde::Serialize;
 use serde_json::{Map, Value};

@@ -14,9 +14,9 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, collection, erasures, front_page, given_webhook, health, idempotency, identities, jobs,
-    keys, legal_hold, models, originals, products, readers, received, segmentations, stow,
-    templates, volumes, voxels, webhooks, workitems,
+    audit, collection, erasures, front_page, health, idempotency, identities, intake_status, jobs,
+    keys, legal_hold, models, products, readers, segmentations, stow, templates, volume_download,
+    volumes, voxels, webhook_request, webhooks, workitems,
 };
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -55,8 +55,8 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
-        routes!(originals::download_volume),
-        routes!(originals::download_volume_file),
+        routes!(volume_download::download_volume),
+        routes!(volume_download::download_volume_file),
         routes!(legal_hold::hold_volume).layer(json(settings.json_limit)),
         routes!(legal_hold::release_volume),
         routes!(identities::get_identity, identities::erase_identity),
@@ -83,8 +83,8 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(webhooks::redeliver),
         routes!(stow::store_instances).layer(upload()),
         routes!(stow::store_study_instances).layer(upload()),
-        routes!(received::list_received),
-        routes!(received::forget_received),
+        routes!(intake_status::list_received),
+        routes!(intake_status::forget_received),
         routes!(workitems::create_workitem, workitems::search_workitems)
             .layer(json(settings.json_limit)),
         routes!(workitems::get_workitem, workitems::update_workitem)
@@ -145,7 +145,7 @@ pub fn router(app: App) -> Router {
             header::PROXY_AUTHORIZATION,
             header::COOKIE,
             idempotency::HEADER,
-            given_webhook::SECRET_HEADER,
+            webhook_request::SECRET_HEADER,
         ]))
         .map_request(observe::drop_unusable_id)
         .layer(SetRequestIdLayer::new(REQUEST_ID, observe::TimeOrderedId))

@@ -3,6 +3,7 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::find;
+use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
@@ -11,7 +12,6 @@ use super::request::{
     PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
 };
 use super::upload::media_types::MESH_TYPES;
-use super::wire::{added, path_of, rfc3339};
 use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{RawQuery, Request, State};

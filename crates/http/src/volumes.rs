@@ -3,12 +3,12 @@
 use super::app::App;
 use super::caller::Caller;
 use super::collection::{Collection, find};
+use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
 use super::quota::reserve_upload;
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
 use super::validators::not_modified;
-use super::wire::{added, path_of, rfc3339};
 use super::{scans, tags, upload};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
@@ -21,8 +21,8 @@ use utoipa::ToSchema;
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
-    BlobError, Catalogue, FileRecord, Held, ItemFilter, LegalHold, ListPage, ListRequest,
-    LocalFile, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
+    BlobError, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest, LocalFile,
+    Owned, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
 use ventriform_service::work::{UploadFacts, preview_memory};
 
@@ -42,11 +42,15 @@ impl Collection for Volumes {
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Held<StoredVolume>>, StoreError> {
+    ) -> Result<Option<Owned<StoredVolume>>, StoreError> {
         catalogue.volume(tenant, id).await
     }
 
-    fn body(app: &App, scope: Scope, volume: Held<StoredVolume>) -> Result<VolumeBody, StoreError> {
+    fn body(
+        app: &App,
+        scope: Scope,
+        volume: Owned<StoredVolume>,
+    ) -> Result<VolumeBody, StoreError> {
         VolumeBody::of(app, scope, volume)
     }
 
@@ -55,7 +59,7 @@ impl Collection for Volumes {
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> Result<ListPage<Held<StoredVolume>>, StoreError> {
+    ) -> Result<ListPage<Owned<StoredVolume>>, StoreError> {
         catalogue.volumes(tenant, filter, page).await
     }
 }
@@ -223,20 +227,20 @@ impl VolumeBody {
     ///
     /// # Errors
     /// If its record is damaged.
-    pub fn of(app: &App, scope: Scope, volume: Held<StoredVolume>) -> Result<Self, StoreError> {
-        let expires_at = app.expires_at(Resource::Volume, &volume.holding);
-        let Held {
+    pub fn of(app: &App, scope: Scope, volume: Owned<StoredVolume>) -> Result<Self, StoreError> {
+        let expires_at = app.expires_at(Resource::Volume, &volume.ownership);
+        let Owned {
             item: volume,
-            holding,
+            ownership,
         } = volume;
         let itself = path_of(&volume.id);
         let facts = UploadFacts::of(&volume)?;
         Ok(Self {
-            created_at: rfc3339(holding.created_at),
-            external_id: holding.tags.external_id,
-            labels: holding.tags.labels,
+            created_at: rfc3339(ownership.created_at),
+            external_id: ownership.tags.external_id,
+            labels: ownership.tags.labels,
             expires_at,
-            legal_hold: holding.legal_hold.map(LegalHoldBody::from),
+            legal_hold: ownership.legal_hold.map(LegalHoldBody::from),
             originals: OriginalBody::all(&volume),
             bytes: volume.bytes,
             files: volume.files.len(),
@@ -257,7 +261,7 @@ impl VolumeBody {
             },
             label_values: facts.labels,
             warnings: facts.warnings,
-            dicom: scans::shown(&holding.scan, scope),
+            dicom: scans::shown(&ownership.scan, scope),
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),
                 content: (volume.files.len() == 1).then(|| format!("{itself}/content")),
@@ -338,7 +342,7 @@ pub async fn update_volume(
 ) -> Answer<Json<VolumeBody>> {
     refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    tags::change(&app, &caller.tenant, &id, volume.holding.tags, request).await?;
+    tags::change(&app, &caller.tenant, &id, volume.ownership.tags, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(VolumeBody::of(&app, caller.scope, volume)?))
 }

@@ -5,12 +5,12 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::given_webhook::GivenWebhook;
 use super::jobs::{self, ObjectDeliveryBody};
+use super::links::rfc3339;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::problem::{Answer, Problem, shorten};
 use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
-use super::wire::rfc3339;
+use super::webhook_request::GivenWebhook;
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};
 use axum::http::{StatusCode, header};

@@ -8,7 +8,7 @@ use crate::decoding::LITTLE_MEMORY;
 use crate::error::{Refusal, ServiceError};
 use crate::items::{NotAdded, TemplateSource};
 use crate::quotas::Counting;
-use crate::records::{Held, ItemFilter, ListRequest, Product, ProductRoom, Resource, Tenant};
+use crate::records::{ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, Tenant};
 use crate::service::Service;
 use bytes::Bytes;
 use ventriform::mesh_files::MeshStatement;
@@ -18,7 +18,7 @@ use ventriform::progress::Monitor;
 const MEMORY_PER_BYTE: u64 = 16;
 
 /// A product with its owner's record, and whether it is new.
-pub type Added = (Held<Product>, bool);
+pub type Added = (Owned<Product>, bool);
 
 impl From<NotAdded> for ServiceError {
     fn from(error: NotAdded) -> Self {

@@ -23,7 +23,7 @@ use crate::items::{Items, RetentionAges};
 use crate::jobs::Queue;
 use crate::memory::MemoryBudget;
 use crate::quotas::Quotas;
-use crate::records::{Clock, FigureStore, Holding, Resource, Timestamp};
+use crate::records::{Clock, FigureStore, Ownership, Resource, Timestamp};
 use crate::telemetry::{Metrics, Readiness, Spans};
 use crate::work::Engine;
 use crate::worklist::Worklist;
@@ -102,10 +102,10 @@ impl Service {
     }
 
     /// When an item of that kind will be erased; `None` if it is kept.
-    pub fn expires_at(&self, kind: Resource, holding: &Holding) -> Option<Timestamp> {
-        if holding.legal_hold.is_some() || holding.source_on_hold {
+    pub fn expires_at(&self, kind: Resource, ownership: &Ownership) -> Option<Timestamp> {
+        if ownership.legal_hold.is_some() || ownership.source_on_hold {
             return None;
         }
-        retention_ages(&self.settings).expires_at(kind, holding.renewed_at)
+        retention_ages(&self.settings).expires_at(kind, ownership.renewed_at)
     }
 }

@@ -13,7 +13,7 @@ use crate::items::Pin;
 use crate::memory::{HeldMemory, MemoryBudget};
 use crate::quotas::Counting;
 use crate::records::{
-    BlobError, BlobStore, BlobWriter, Failure, Fault, FileRecord, Held, StagedFiles, StagedFor,
+    BlobError, BlobStore, BlobWriter, Failure, Fault, FileRecord, Owned, StagedFiles, StagedFor,
     StoredVolume, Tags, Tenant, hex, volume_id,
 };
 use crate::service::Service;
@@ -48,7 +48,7 @@ pub struct VolumeUpload {
 /// A stored volume, which is not deleted while this exists.
 pub struct Stored {
     /// Its record.
-    pub volume: Held<StoredVolume>,
+    pub volume: Owned<StoredVolume>,
     /// Whether the tenant did not have it before.
     pub new: bool,
     /// Keeps it from being deleted.

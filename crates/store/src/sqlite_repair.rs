@@ -29,7 +29,7 @@ impl SqlStore {
         Ok(defects)
     }
 
-    /// Removes the row of an item, and every holding of it. Does not record an erasure.
+    /// Removes the row of an item, and every ownership of it. Does not record an erasure.
     pub(super) async fn forget(&self, id: &str) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
         for statement in [

@@ -2,9 +2,9 @@
 
 use super::priority::PriorityName;
 use crate::app::App;
+use crate::links::{path_of, rfc3339};
 use crate::openapi::JobParameters;
 use crate::problem::{Answer, Problem, ProblemBody};
-use crate::wire::{path_of, rfc3339};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;

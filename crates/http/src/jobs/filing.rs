@@ -6,13 +6,13 @@
 use super::{describe, priority};
 use crate::app::App;
 use crate::caller::Caller;
-use crate::given_webhook::GivenWebhook;
+use crate::links::path_of;
 use crate::problem::{Answer, Problem};
 use crate::products::{self, Offer};
 use crate::quota::reserve_upload;
 use crate::request::query_pairs;
 use crate::upload::{self, Upload};
-use crate::wire::path_of;
+use crate::webhook_request::GivenWebhook;
 use crate::{idempotency, negotiate, observe, tags};
 use axum::Json;
 use axum::extract::Request;

@@ -12,7 +12,6 @@ pub use priority::PriorityName;
 
 use super::app::App;
 use super::caller::Caller;
-use super::given_webhook::webhook_of;
 use super::idempotency;
 use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
@@ -24,6 +23,7 @@ use super::request::{
     PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown, unknown_state,
 };
 use super::validators::ValidatedJson;
+use super::webhook_request::webhook_of;
 use super::{scans, tags};
 use axum::Json;
 use axum::extract::{RawQuery, Request, State};

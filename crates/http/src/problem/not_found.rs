@@ -2,7 +2,7 @@
 //! an otherwise good request names such a thing.
 
 use super::{Problem, shorten};
-use crate::wire::rfc3339;
+use crate::links::rfc3339;
 use axum::http::StatusCode;
 use ventriform_service::records::{Catalogue, Resource, Tenant, Timestamp};
 

@@ -76,7 +76,7 @@ struct Known {
     settings: IssuerSettings,
     client: reqwest::Client,
     keys: RwLock<Option<Keys>>,
-    /// When reading was last tried. Held while reading, so that one request reads at a time.
+    /// When reading was last tried. Owned while reading, so that one request reads at a time.
     tried: tokio::sync::Mutex<Option<Instant>>,
 }
 

@@ -5,7 +5,7 @@
 
 use super::{Items, OutputFile, WorkOutput, to_its_end};
 use crate::records::{
-    AddedProduct, BlobError, Failure, Fault, FileRecord, Held, ItemRecord, Product, ProductFile,
+    AddedProduct, BlobError, Failure, Fault, FileRecord, ItemRecord, Owned, Product, ProductFile,
     ProductRoom, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
     StoredVolume, Tags, Tenant, content_id, hex,
 };
@@ -31,7 +31,7 @@ impl Items {
         tenant: &Tenant,
         tags: &Tags,
         scan: Option<ScanFields>,
-    ) -> Result<(Held<StoredVolume>, bool), StoreError> {
+    ) -> Result<(Owned<StoredVolume>, bool), StoreError> {
         let (items, tenant, tags) = (self.clone(), tenant.clone(), tags.clone());
         to_its_end(async move {
             let _lock = items.locks.lock(&volume.id).await;
@@ -71,7 +71,7 @@ impl Items {
         id: &str,
         tags: &Tags,
         scan: Option<&ScanFields>,
-    ) -> Result<Option<(Held<StoredVolume>, bool)>, StoreError> {
+    ) -> Result<Option<(Owned<StoredVolume>, bool)>, StoreError> {
         let now = self.clock.now();
         let catalogue = &self.catalogue;
         catalogue.renew_volume(tenant, id, tags, scan, now).await
@@ -88,7 +88,7 @@ impl Items {
         organ: &str,
         output: WorkOutput,
         room: ProductRoom,
-    ) -> Result<(Held<Product>, bool), NotAdded> {
+    ) -> Result<(Owned<Product>, bool), NotAdded> {
         check_name(source.name)?;
         self.blobs.require_room(0).map_err(StoreError::from)?;
         let parameters = [("name", source.name), ("organ", organ)]
@@ -111,7 +111,7 @@ impl Items {
         name: &str,
         output: WorkOutput,
         room: ProductRoom,
-    ) -> Result<(Held<Product>, bool), NotAdded> {
+    ) -> Result<(Owned<Product>, bool), NotAdded> {
         check_name(name)?;
         self.blobs.require_room(0).map_err(StoreError::from)?;
         let parameters = [("name".to_owned(), Value::from(name))]
@@ -135,7 +135,7 @@ impl Items {
         source: TemplateSource<'_>,
         output: WorkOutput,
         room: ProductRoom,
-    ) -> Result<(Held<Product>, bool), NotAdded> {
+    ) -> Result<(Owned<Product>, bool), NotAdded> {
         let (items, tenant) = (self.clone(), source.tenant.clone());
         let (volume, library) = (source.volume.map(str::to_owned), source.library);
         to_its_end(async move {

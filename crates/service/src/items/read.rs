@@ -141,9 +141,9 @@ impl Items {
             return Ok(None);
         };
         Ok(Some(StoredResult {
-            made_at: product.holding.created_at,
+            made_at: product.ownership.created_at,
             files: self.with_files(product.item, wanted).await?,
-            scan: volume.holding.scan,
+            scan: volume.ownership.scan,
             volume: volume.item,
             volume_files,
         }))
@@ -167,7 +167,7 @@ impl Items {
                 .catalogue
                 .products(tenant, Resource::Template, &filter, request)
                 .await?;
-            for product in page.items.into_iter().filter(|p| p.holding.library) {
+            for product in page.items.into_iter().filter(|p| p.ownership.library) {
                 library.push(self.with_files(product.item, wanted).await?);
             }
             before = page.next;

@@ -3,7 +3,7 @@
 //! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
 
 use super::{
-    Custody, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage, ListRequest,
+    Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest, Owned,
     Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
 use super::{Resource, Tenant, Timestamp};
@@ -70,10 +70,10 @@ pub trait Catalogue: Custody + Scans {
         tags: &Tags,
         scan: Option<&ScanFields>,
         now: Timestamp,
-    ) -> StoreResult<Option<(Held<StoredVolume>, bool)>>;
+    ) -> StoreResult<Option<(Owned<StoredVolume>, bool)>>;
 
     /// The volume with that id.
-    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>>;
+    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>>;
 
     /// Volumes, newest first.
     async fn volumes(
@@ -81,7 +81,7 @@ pub trait Catalogue: Custody + Scans {
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> StoreResult<ListPage<Held<StoredVolume>>>;
+    ) -> StoreResult<ListPage<Owned<StoredVolume>>>;
 
     /// Adds a product that was not made by a job, unless it is stored already, and gives it to a
     /// tenant that has it already or has room for it. `source` is the volume it was made of.
@@ -94,7 +94,7 @@ pub trait Catalogue: Custody + Scans {
     ) -> StoreResult<AddedProduct>;
 
     /// The product with that id.
-    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>>;
+    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<Product>>>;
 
     /// Products of one kind, newest first.
     async fn products(
@@ -103,7 +103,7 @@ pub trait Catalogue: Custody + Scans {
         kind: Resource,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> StoreResult<ListPage<Held<Product>>>;
+    ) -> StoreResult<ListPage<Owned<Product>>>;
 
     /// Replaces the tags of an item or a job. `false` if there is none with that id.
     async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool>;

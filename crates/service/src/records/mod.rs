@@ -3,7 +3,7 @@
 //! - **Identity.** A [`Tenant`] owns items and jobs. The id of an item is a hash of its content ([`volume_id`],
 //!   [`content_id`]), that of a job is random ([`random_id`]); its prefix tells the [`Resource`].
 //! - **Items.** A [`StoredVolume`] is an upload, a [`Product`] what was made of one or added to a library.
-//!   Several tenants may own the same item; the [`Holding`] says since when, under which names, and whether a
+//!   Several tenants may own the same item; the [`Ownership`] says since when, under which names, and whether a
 //!   legal hold keeps it.
 //! - **Jobs.** A [`Job`] is one row of the jobs table, which is also the queue.
 //! - **Erasures.** What is erased leaves a [`Receipt`].
@@ -57,7 +57,7 @@ pub use job_store::{
     Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
 };
 pub use listing::{ListPage, ListRequest};
-pub use ownership::{Held, Holding, ItemFilter, LegalHold, TagFilter, Tags};
+pub use ownership::{ItemFilter, LegalHold, Owned, Ownership, TagFilter, Tags};
 pub use peers::{News, NewsFeed, Peers};
 pub use priority::Priority;
 pub use product::{Product, ProductFile};

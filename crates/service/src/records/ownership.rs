@@ -1,7 +1,7 @@
 //! The record of an item that a tenant has: when it came, the tenant's own names for it, and
 //! whether it may be erased.
 //!
-//! Content is stored once, however many tenants have it. Each has a [`Holding`] of its own, and
+//! Content is stored once, however many tenants have it. Each has a [`Ownership`] of its own, and
 //! sees neither the others nor what they call the item.
 
 use super::{ScanFilter, ScanIdentity};
@@ -36,7 +36,7 @@ impl LegalHold {
 
 /// That a tenant has an item.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Holding {
+pub struct Ownership {
     /// The tenant.
     pub tenant: Tenant,
     /// When it first stored or computed the item.
@@ -57,14 +57,14 @@ pub struct Holding {
 
 /// An item as one tenant has it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Held<T> {
+pub struct Owned<T> {
     /// The item. Its sequence number and time of creation are the tenant's.
     pub item: T,
     /// The tenant's record of it.
-    pub holding: Holding,
+    pub ownership: Ownership,
 }
 
-impl<T> Deref for Held<T> {
+impl<T> Deref for Owned<T> {
     type Target = T;
 
     fn deref(&self) -> &T {

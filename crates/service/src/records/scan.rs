@@ -1,8 +1,8 @@
 //! Whose scan a volume is: what its file says of patient, study and acquisition, and what its tenant
 //! states beside that.
 //!
-//! It belongs to the tenant's holding and not to the content, which tenants share. It goes with the
-//! holding, can be erased by itself, and no result contains it.
+//! It belongs to the tenant's ownership of the volume and not to the content, which tenants share. It goes with the
+//! ownership, can be erased by itself, and no result contains it.
 
 use super::{FileRecord, StoreResult};
 use super::{Tenant, Timestamp};

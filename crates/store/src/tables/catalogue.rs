@@ -9,19 +9,19 @@ use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::records::{
-    AddedProduct, Catalogue, Erased, ErasureOrder, Expired, Held, ItemFilter, LegalHold, ListPage,
-    ListRequest, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult, StoredVolume,
-    Tags, Tenant, Timestamp,
+    AddedProduct, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage,
+    ListRequest, Owned, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult,
+    StoredVolume, Tags, Tenant, Timestamp,
 };
 
-/// A volume with the columns of its holding. `sequence` and `created_at` are the holding's.
+/// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
 const HELD_VOLUME: Select = Select {
     columns: "v.bytes, v.files, v.facts",
     table: "volumes AS v ON v.id = h.id",
     volume: "h.id",
 };
 
-/// A product with the columns of its holding, likewise.
+/// A product with the columns of its ownership, likewise.
 const HELD_PRODUCT: Select = Select {
     columns: "p.volume, p.parameters, p.summary, p.software, p.files",
     table: "products AS p ON p.id = h.id",
@@ -91,7 +91,7 @@ impl Catalogue for SqlStore {
         tags: &Tags,
         scan: Option<&ScanFields>,
         now: Timestamp,
-    ) -> StoreResult<Option<(Held<StoredVolume>, bool)>> {
+    ) -> StoreResult<Option<(Owned<StoredVolume>, bool)>> {
         let mut transaction = self.writer.begin().await?;
         let stored = query("SELECT 1 FROM volumes WHERE id = $1").bind(id);
         if stored.fetch_optional(&mut transaction).await?.is_none() {
@@ -105,7 +105,7 @@ impl Catalogue for SqlStore {
         Ok(held.map(|held| (held, new)))
     }
 
-    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<StoredVolume>>> {
+    async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>> {
         let row = one(&HELD_VOLUME, tenant, id)
             .build()
             .fetch_optional(&self.readers)
@@ -118,7 +118,7 @@ impl Catalogue for SqlStore {
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> StoreResult<ListPage<Held<StoredVolume>>> {
+    ) -> StoreResult<ListPage<Owned<StoredVolume>>> {
         let rows = listed_volumes(tenant, filter, page)
             .build()
             .fetch_all(&self.readers)
@@ -151,7 +151,7 @@ impl Catalogue for SqlStore {
         })
     }
 
-    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Held<Product>>> {
+    async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<Product>>> {
         let row = one(&HELD_PRODUCT, tenant, id)
             .build()
             .fetch_optional(&self.readers)
@@ -165,7 +165,7 @@ impl Catalogue for SqlStore {
         kind: Resource,
         filter: &ItemFilter,
         page: ListRequest,
-    ) -> StoreResult<ListPage<Held<Product>>> {
+    ) -> StoreResult<ListPage<Owned<Product>>> {
         let rows = listed_products(tenant, kind, filter, page)
             .build()
             .fetch_all(&self.readers)
@@ -456,7 +456,7 @@ async fn has_no_room(
     Ok((!fits).then_some(AddedProduct::TooLarge { stored }))
 }
 
-/// Gives an item to a tenant, or renews its holding. Returns whether it is new for the tenant.
+/// Gives an item to a tenant, or renews its ownership. Returns whether it is new for the tenant.
 async fn hold(
     to: &mut Transaction<'_>,
     tenant: &Tenant,

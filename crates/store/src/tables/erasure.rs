@@ -2,7 +2,7 @@
 //!
 //! 1. Collect what goes: the item; with `cascade` also what was made of a volume.
 //! 2. Refuse if a job that has not ended needs one of them, or a legal hold keeps one.
-//! 3. Delete the tenant's holdings; with the last holding of an item, the record of its content;
+//! 3. Delete the tenant's ownerships; with the last holding of an item, the record of its content;
 //!    with `cascade`, the jobs on the volume.
 //! 4. Remember each id (410 from then on), append a row to the audit trail, and store the receipt,
 //!    which names that row.
@@ -155,7 +155,7 @@ async fn is_needed(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> Sto
     Ok(row.is_some())
 }
 
-/// Deletes a tenant's holding and, if it was the last one, the record of the content.
+/// Deletes a tenant's ownership and, if it was the last one, the record of the content.
 async fn release(
     to: &mut Transaction<'_>,
     tenant: &Tenant,

@@ -4,7 +4,7 @@ use crate::query::DbRow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ventriform_service::records::{
-    Held, Holding, Job, JobState, LegalHold, ListPage, ListRequest, Priority, Product, Receipt,
+    Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, Priority, Product, Receipt,
     ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 
@@ -80,8 +80,8 @@ pub(super) fn product(row: DbRow) -> StoreResult<Product> {
     })
 }
 
-/// An item as a tenant has it, from a row of the item's columns and its holding's.
-pub(super) fn held<T>(row: DbRow, record: fn(DbRow) -> StoreResult<T>) -> StoreResult<Held<T>> {
+/// An item as a tenant has it, from a row of the item's columns and its ownership's.
+pub(super) fn held<T>(row: DbRow, record: fn(DbRow) -> StoreResult<T>) -> StoreResult<Owned<T>> {
     let since: Option<Timestamp> = row.try_get("held_at")?;
     let legal_hold = match since {
         Some(since) => Some(LegalHold {
@@ -91,7 +91,7 @@ pub(super) fn held<T>(row: DbRow, record: fn(DbRow) -> StoreResult<T>) -> StoreR
         }),
         None => None,
     };
-    let holding = Holding {
+    let ownership = Ownership {
         tenant: tenant(&row)?,
         created_at: row.try_get("created_at")?,
         renewed_at: row.try_get("renewed_at")?,
@@ -101,9 +101,9 @@ pub(super) fn held<T>(row: DbRow, record: fn(DbRow) -> StoreResult<T>) -> StoreR
         scan: scan(&row)?,
         library: row.try_get("library")?,
     };
-    Ok(Held {
+    Ok(Owned {
         item: record(row)?,
-        holding,
+        ownership,
     })
 }
 

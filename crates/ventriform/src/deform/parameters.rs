@@ -40,7 +40,7 @@ pub struct DeformParameters {
     /// Distance of the reader's edge from the edge found, mm outward, -5..=5. Default 0.
     pub margin: f64,
     /// Which wall of a ventricle the fit shows; the other one is kept beside it
-    /// ([`Fit::surfaces`](super::Fit::surfaces)). Default [`WallEdge::Apparent`].
+    /// ([`FittedModel::surfaces`](super::FittedModel::surfaces)). Default [`WallEdge::Apparent`].
     pub edge: WallEdge,
     /// The image's resolution (full width of a point at half its maximum, motion and filter
     /// included), mm, 0..=30, for the anatomical wall. Default `None`: by calibration.

@@ -13,7 +13,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Renewal {
     /// The job is still ours.
-    Held,
+    Owned,
     /// The job is still ours, and its cancellation was requested.
     CancelRequested,
     /// The lease expired and another run of the service took the job.
@@ -38,13 +38,13 @@ pub(super) fn claimant(queue: &Queue, settings: &WorkerSettings) -> Claimant {
 pub(super) async fn renew(queue: &Queue, settings: &WorkerSettings, lease: &Lease) -> Renewal {
     let now = queue.now();
     match queue.table().renew_lease(lease, settings.lease, now).await {
-        Ok(Some(false)) => Renewal::Held,
+        Ok(Some(false)) => Renewal::Owned,
         Ok(Some(true)) => Renewal::CancelRequested,
         Ok(None) => Renewal::Lost,
         Err(error) => {
             // If the lease does expire, the commit finds out: it names the token.
             tracing::warn!(job = %lease.job, %error, "the lease could not be renewed");
-            Renewal::Held
+            Renewal::Owned
         }
     }
 }

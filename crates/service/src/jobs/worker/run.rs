@@ -327,7 +327,7 @@ impl JobRunner {
                 () = &mut deadline, if stop.is_none() => Some(Stop::TimeLimit),
                 () = self.halt.cancelled(), if stop.is_none() => Some(Stop::Shutdown),
                 _ = renewal.tick() => match lease::renew(&self.queue, &self.settings, lease).await {
-                    Renewal::Held => None,
+                    Renewal::Owned => None,
                     Renewal::CancelRequested => Some(Stop::Requested),
                     Renewal::Lost => Some(Stop::LeaseLost),
                 },

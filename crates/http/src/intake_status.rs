@@ -3,11 +3,11 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::links::{path_of, rfc3339};
 use super::openapi::{ListProblems, LookupProblems, PageParameters};
 use super::pagination::{list_query, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::request::{PathSegments, query_pairs, refuse_unknown, unknown_state};
-use super::wire::{path_of, rfc3339};
 use crate::public_base::public_path;
 use axum::Json;
 use axum::extract::{RawQuery, State};
