@@ -1,28 +1,27 @@
 //! The service over HTTP: version 1 of the API.
 //!
 //! [`router`] is the map of all paths and the list of the layers that every request passes. There
-//! is one file per resource; a handler reads the request, calls [`ventriform_service::jobs`], and writes the
-//! answer. Nothing is computed here.
+//! is one file per resource; a handler reads the request, calls a method of
+//! [`Service`](ventriform_service::service::Service), and writes the answer. Nothing is computed here.
 //!
-//! | what | where |
+//! | content | where |
 //! |---|---|
 //! | the paths, the layers around them | [`router`] |
-//! | uploads, jobs, results | [`volumes`], [`jobs`], [`models`], [`segmentations`], [`templates`] |
-//! | webhooks and what became of their deliveries | [`webhooks`], [`webhook_request`], [`hooks`] |
-//! | what several of them share | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`kept`] |
-//! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`keys`], [`audit`] |
+//! | uploads, jobs, results | [`volumes`], [`volume_download`], [`jobs`], [`models`], [`segmentations`], [`templates`], [`readers`] |
+//! | webhooks and their deliveries | [`webhooks`], [`webhook_request`] |
+//! | common parts of them | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`response_cache`] |
+//! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`quota`], [`keys`], [`audit`] |
 //! | a tenant's names for its things, legal holds, receipts of erasures | [`tags`], [`legal_hold`], [`erasures`] |
 //! | whose scan a volume is | [`scans`] (in answers and searches), [`identities`] (stated, erased) |
-//! | objects that other systems send | [`stow`], [`intake_status`], [`intake`], [`volume_maker`] |
+//! | objects that other systems send | [`stow`], [`intake_status`] |
 //! | work items of other systems (UPS-RS) | [`workitems`] |
 //! | errors and their wording | [`problem`]; 404 and 410 in [`problem::not_found`] |
-//! | limits on bodies, connections and decoding | [`limits`], [`connections`], [`decoding`] |
+//! | limits on bodies, connections and memory | [`limits`], [`connections`], [`memory`] |
 //! | the address that sent a request | [`client`] |
 //! | reading requests | [`request`], [`negotiate`], [`pagination`], [`idempotency`], [`upload`] |
-//! | log, traces, metrics | [`observe`], [`spans`], [`metrics`], [`job_watch`] |
+//! | log, traces, health | [`observe`], [`health`] |
 //! | the published document | [`openapi`], [`document`] |
 //! | streams of events | [`streams`] |
-//! | what goes on in the background | [`duties`] |
 //!
 //! Guarantees: every error is a problem object (RFC 9457) with a stable `type`, and with `field`
 //! and `fix` where they apply; every body and list has a limit; uploads are streamed to the disk
