@@ -67,7 +67,7 @@ impl Items {
         Ok(Some(files))
     }
 
-    /// A range of bytes of a file; see [`BlobStore::read`](BlobStore::read).
+    /// A range of bytes of a file; see [`BlobStore::read`](crate::records::BlobStore::read).
     ///
     /// # Errors
     /// If the storage fails; [`StoreFault::Erased`] if the item was erased since its row was read.

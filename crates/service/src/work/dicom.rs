@@ -1,7 +1,7 @@
 //! Stored results as DICOM objects, for the archive.
 //!
 //! In: a stored result with its volume and whose scan that is, as
-//! [`Queue::result`](crate::jobs::Queue::result) returns them for [`FILES`]. Out: the file of one
+//! [`Items::result`](crate::items::Items::result) returns them for [`FILES`]. Out: the file of one
 //! [`DicomObject`]. To be called on a blocking thread, from a request, a job or a delivery alike.
 //!
 //! Objects are not stored: the same result, scan and secret give the same bytes, UIDs included.
