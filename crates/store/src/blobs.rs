@@ -42,7 +42,7 @@ pub(super) const QUARANTINE: &str = "quarantine";
 
 const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-[day]");
 
-/// What [`BlobStore::check`] writes: more than the free rest of a block.
+/// Content that [`BlobStore::check`] writes: more than the free rest of a block.
 pub(super) const CHECK: &[u8] = &[b'v'; 8192];
 
 /// Files below one folder.

@@ -178,7 +178,7 @@ impl Reading {
     }
 }
 
-/// What [`Reading::begin`] has begun to read.
+/// A file that [`Reading::begin`] has begun to read.
 pub(super) fn stream((chunk, rest): (Bytes, Reading)) -> BlobStream {
     let rest = stream::try_unfold(rest, async |reading: Reading| {
         if reading.left == 0 {

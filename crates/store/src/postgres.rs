@@ -268,7 +268,7 @@ async fn check_sessions(
     }
 }
 
-/// What the server limits of a session, so that a process that stands still or is cut off holds no lock
+/// The limits of a session, so that a process that stands still or is cut off holds no lock
 /// for long.
 fn session_limits(wait: Duration) -> [(&'static str, String); 7] {
     let ms = |time: Duration| time.as_millis().to_string();

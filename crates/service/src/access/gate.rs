@@ -61,7 +61,7 @@ pub struct Gate {
     store: Arc<dyn AccessStore>,
     clock: Arc<dyn Clock>,
     issuer: Option<Issuer>,
-    /// What a caller without credentials may do, and whether that holds although keys exist.
+    /// The scope of a caller without credentials, and whether that holds although keys exist.
     anonymous: Scope,
     always_open: bool,
     /// Set once there is a key, for ever.

@@ -35,7 +35,7 @@ pub struct Archive {
     pub dicom: Option<DicomPeer>,
     /// The tenants that may use it; all if empty.
     pub tenants: Vec<Tenant>,
-    /// What was found in the variables.
+    /// The credentials found in the variables.
     pub credentials: Credentials,
 }
 

@@ -28,7 +28,7 @@ pub struct ExchangeSettings {
     pub parts: usize,
 }
 
-/// What [`Puller`](super::Puller) and [`Deliverer`](super::Deliverer) share.
+/// The state that [`Puller`](super::Puller) and [`Deliverer`](super::Deliverer) share.
 pub struct Exchange {
     pub(super) store: Arc<dyn ArchiveStore>,
     pub(super) host: Arc<dyn ExchangeHost>,

@@ -1,4 +1,4 @@
-//! What a parser of `multipart` bodies reads: piece by piece, and within a limit on what it gathers.
+//! The input of a parser of `multipart` bodies: piece by piece, and within a limit on what it gathers.
 //!
 //! `multer` reads on as long as there is something to read and keeps that in memory. A pause after each
 //! piece makes it hand out what it has, so that what was read since the parser last returned something is

@@ -32,7 +32,7 @@ impl Trouble {
         Self::Final(Failure::new(fault, code, what).fix(fix))
     }
 
-    /// What happened.
+    /// The cause.
     pub fn what(&self) -> &str {
         match self {
             Trouble::Passing { what, .. } => what,

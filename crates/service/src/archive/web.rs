@@ -357,7 +357,7 @@ fn is_xml_without_failure(answer: &[u8]) -> bool {
     model && !text.contains(FAILED_SOP_SEQUENCE) && !text.contains("FailedSOPSequence")
 }
 
-/// What a Failure Reason of STOW-RS, or a status of C-STORE, means (PS3.3 C.14, PS3.4 B.2.3).
+/// The meaning of a Failure Reason of STOW-RS or a status of C-STORE (PS3.3 C.14, PS3.4 B.2.3).
 pub(super) fn store_failure(reason: Option<u16>) -> Result<Stored, Trouble> {
     let refuses = |what: &str| {
         let code = reason.unwrap_or_default();

@@ -66,7 +66,7 @@ pub enum ConfigError {
         path: PathBuf,
         /// The field: `archives[0].dicomweb`.
         field: String,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
     /// A variable that a field of a list in the file names is not set.
@@ -86,7 +86,7 @@ pub enum ConfigError {
         value: String,
         /// Where it came from.
         origin: Origin,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
 }
@@ -642,7 +642,7 @@ struct Layers {
     archives: Archives,
 }
 
-/// What the file of `--config` says.
+/// The content of the file of `--config`.
 #[derive(Default)]
 struct FileContent {
     /// The settings as text, so that values of every origin go through one parser.

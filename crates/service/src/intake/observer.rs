@@ -11,7 +11,7 @@ pub enum AssociationEnd {
     Broken,
     /// It was rejected: the caller is unknown, or too many are open.
     Rejected,
-    /// What the caller sent breaks the protocol.
+    /// The caller broke the protocol.
     Violation,
     /// It was idle or lasted for too long, or sent too much.
     Exceeded,

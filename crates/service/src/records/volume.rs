@@ -33,6 +33,6 @@ pub struct StoredVolume {
     pub bytes: u64,
     /// Its files in the file store. Their names are not those given by the client.
     pub files: Vec<FileRecord>,
-    /// What was found out about the content when it was uploaded; the queue does not read it.
+    /// Facts about the content, found when it was uploaded; the queue does not read it.
     pub facts: Value,
 }

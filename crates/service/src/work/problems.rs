@@ -55,7 +55,7 @@ pub fn advice(error: &impl Explain) -> String {
     error.explain().fix.unwrap_or_default()
 }
 
-/// What a job that met `error` ends with.
+/// The failure of a job that met `error`.
 pub(super) fn work_error(error: &impl Explain) -> WorkError {
     if error.is_cancelled() {
         WorkError::Cancelled

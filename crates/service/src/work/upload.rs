@@ -42,7 +42,7 @@ pub trait UploadReader: Send + Sync + 'static {
     /// Why the files do not make up a usable volume.
     fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure>;
 
-    /// What the files of one volume say about patient, study and acquisition: the fields of
+    /// The statements of the files of one volume about patient, study and acquisition: the fields of
     /// [`Provenance`](ventriform::volume::dicom::Provenance), without the frames of slices, which differ
     /// between gates. `None` unless they are DICOM.
     ///

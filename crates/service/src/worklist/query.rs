@@ -60,7 +60,7 @@ impl Matching {
         self.0.iter().all(|(path, wanted)| found(set, path, wanted))
     }
 
-    /// What the attribute with that tag must be, if it is asked for.
+    /// The value that the attribute with that tag must have, if it is asked for.
     pub fn wanted(&self, tag: &str) -> Option<&str> {
         let asked = self
             .0

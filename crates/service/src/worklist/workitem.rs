@@ -20,7 +20,7 @@ const INPUT: &str = "00404021";
 /// The SOP class Unified Procedure Step Push.
 const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
 
-/// What an item of the Performed Procedure Sequence must have when the work is completed
+/// Attributes that an item of the Performed Procedure Sequence must have when the work is completed
 /// (PS3.4 table CC.2.5-3, final state).
 const FINAL: [(&str, &str); 5] = [
     ("00404028", "Performed Station Name Code Sequence"),
@@ -101,7 +101,7 @@ pub enum Refusal {
         /// The state.
         state: WorkitemState,
     },
-    /// What the final state needs is not there.
+    /// An attribute that the final state needs is missing.
     #[error(
         "The submitted request does not meet the requirements of the requested state: {0} is missing."
     )]

@@ -1,4 +1,4 @@
-//! What a page embeds for its script, which draws it as the page of the service does (`web/src/report.tsx`).
+//! The data that a page embeds for its script, which draws them as the page of the service does (`web/src/report.tsx`).
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -18,7 +18,7 @@ pub(super) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, 
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
-/// What stands for a number that reports of older versions do not have.
+/// The value that stands for a number that reports of older versions do not have.
 pub(super) fn not_stated() -> f64 {
     f64::NAN
 }

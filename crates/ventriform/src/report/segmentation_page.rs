@@ -68,7 +68,7 @@ fn shows_scan(page: &SegmentationPage) -> bool {
     page.region.is_some() && page.slices.is_some()
 }
 
-/// What the script draws.
+/// The data that the script draws.
 fn embedded(page: &SegmentationPage) -> Option<Value> {
     let report = page.report;
     Embedded {
@@ -132,7 +132,7 @@ fn drawn_by(reader: &AppliedReaderReport) -> String {
     format!("drawn as reader {name}: {}", moved.join(", "))
 }
 
-/// What could be flagged, each with whether it is in order.
+/// The things that could be flagged, each with whether it is in order.
 fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
     let percent = |share: f64| number(100.0 * share, 0);
     let (fit, place) = (&report.fit, &report.localisation);

@@ -318,7 +318,7 @@ mod tests {
         p.position(&domain.vertices, domain.half_edges.triangles())
     }
 
-    /// What the points push each other, by definition on a plane; the longest move is half of the radius.
+    /// The moves by which the points push each other, by definition on a plane; the longest move is half of the radius.
     fn pushes(places: &[Vec3], radii: &[f64], strength: f64) -> Vec<Vec3> {
         let push = |p: usize| {
             let mut step = Vec3::zeros();

@@ -240,7 +240,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 /// A vector of single precision, with a fourth number so that it fills a register.
 type Lanes = [f32; 4];
 
-/// What a vertex adds to a step of the recurrence: its own value times `own`, less the weighted sum of its
+/// The addition of a vertex to a step of the recurrence: its own value times `own`, less the weighted sum of its
 /// neighbours' times `others`.
 #[derive(Clone, Copy)]
 struct Step {

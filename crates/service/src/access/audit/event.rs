@@ -45,7 +45,7 @@ pub enum Outcome {
     Refused,
 }
 
-/// What happened. The JSON of this is what is stored and hashed.
+/// An act. Its JSON is stored and hashed.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct AuditEvent {
     /// When it was recorded.
@@ -104,7 +104,7 @@ impl AuditEvent {
 pub struct AuditRecord {
     /// Its position in the chain.
     pub sequence: i64,
-    /// What happened.
+    /// The act.
     pub event: AuditEvent,
     /// Its hash.
     pub hash: String,

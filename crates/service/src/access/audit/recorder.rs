@@ -8,7 +8,7 @@
 //! - [`Recorder::note`] returns at once. Alike events of one second (the same caller, item and
 //!   activity) become one row with a count. A crash loses at most the last second of them.
 //!
-//! What cannot be written is kept and tried again each second. Beyond [`MOST_NOTED`] kinds of
+//! An event that cannot be written is kept and tried again each second. Beyond [`MOST_NOTED`] kinds of
 //! events further ones are counted; once the database can be written again, a row says how many
 //! are lost.
 

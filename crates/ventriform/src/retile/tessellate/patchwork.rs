@@ -192,7 +192,7 @@ mod tests {
     use crate::mesh::intersections::triangles_intersect;
     use crate::mesh::shapes;
 
-    /// What the mesh says of its vertices, edges and intersections against a list of its triangles.
+    /// The mesh's account of its vertices, edges and intersections against a list of its triangles.
     fn compare_with_list(mesh: &Patchwork) {
         let live: Vec<[VertexId; 3]> = mesh.live_triangles().collect();
         let vertices = VertexId::first(mesh.positions.len());

@@ -199,7 +199,7 @@ fn read_elements(elements: &Elements) -> Result<Reading, VolumeError> {
     read_frame(Encoding::Explicit.file(elements), None)
 }
 
-/// What `change` makes of the file.
+/// The file after `change`.
 fn changed(change: impl FnOnce(&mut Elements)) -> Result<Reading, VolumeError> {
     let mut elements = slices();
     change(&mut elements);

@@ -485,7 +485,7 @@ fn geometry_that_contradicts_itself_is_told_with_both_figures() {
     }
 }
 
-/// What of 12 voxels each is read of a file with these volumes along the fourth dimension: the sum
+/// The voxels, of 12 each, that are read of a file with these volumes along the fourth dimension: the sum
 /// unless the header contradicts that they are gates of one heart beat.
 #[test]
 fn gates_are_summed_and_what_is_none_needs_a_frame() {

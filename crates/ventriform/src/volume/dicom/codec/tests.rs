@@ -1,4 +1,4 @@
-//! What holds for every codec: sizes, kinds of code streams, stored bits, cost and cancelling.
+//! Properties of every codec: sizes, kinds of code streams, stored bits, cost and cancelling.
 
 use super::*;
 use crate::progress::Cancelled;

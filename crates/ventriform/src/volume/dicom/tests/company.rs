@@ -10,7 +10,7 @@ use std::io::Write as _;
 use std::path::Path;
 use zip::CompressionMethod;
 
-/// What lies beside scans on media and in folders.
+/// Files that lie beside scans on media and in folders.
 fn company() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("LOCKFILE", Vec::new()),

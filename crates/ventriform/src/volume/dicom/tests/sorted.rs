@@ -26,7 +26,7 @@ fn plain(volume: usize, slice: usize) -> Elements {
     elements
 }
 
-/// What one frame says of its volume and slice.
+/// Statements of one frame about its volume and slice.
 type Said = fn(usize, usize) -> Vec<((u16, u16), (&'static str, Value))>;
 
 /// One value of one attribute.
@@ -353,7 +353,7 @@ proptest! {
     }
 }
 
-/// What does not tell which images belong to one volume, with a word of the refusal.
+/// Attributes that do not tell which images belong to one volume, with a word of the refusal.
 const UNTOLD: &[(Said, &str)] = &[
     (|_, _| Vec::new(), "no attribute tells apart"),
     // Numbers that begin again in every volume.

@@ -34,7 +34,7 @@ impl Writer {
     }
 }
 
-/// What a lossless frame is made of.
+/// The parts of a lossless frame.
 #[derive(Clone, Copy)]
 struct Options {
     bits: u32,
