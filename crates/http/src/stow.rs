@@ -28,6 +28,10 @@ use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use ventriform_service::access::{Activity, NotRecorded};
 use ventriform_service::archive::{RelatedType, Unparsed};
+use ventriform_service::dicom_tags::{
+    FAILED_SOP_SEQUENCE, FAILURE_REASON, OTHER_FAILURES_SEQUENCE, REFERENCED_SOP_CLASS_UID,
+    REFERENCED_SOP_INSTANCE_UID, REFERENCED_SOP_SEQUENCE, RETRIEVE_URL,
+};
 use ventriform_service::intake::{
     Incoming, Origin, Protocol, ReceiveError, Refused, Session, Stated,
 };
@@ -117,32 +121,38 @@ impl Outcome {
     fn module(&self) -> Value {
         let reference = |class: &str, instance: &str| {
             let mut item = Map::new();
-            item.insert("00081150".into(), json!({"vr": "UI", "Value": [class]}));
-            item.insert("00081155".into(), json!({"vr": "UI", "Value": [instance]}));
+            item.insert(
+                REFERENCED_SOP_CLASS_UID.into(),
+                json!({"vr": "UI", "Value": [class]}),
+            );
+            item.insert(
+                REFERENCED_SOP_INSTANCE_UID.into(),
+                json!({"vr": "UI", "Value": [instance]}),
+            );
             item
         };
         let reason = |status: u16| json!({"vr": "US", "Value": [status]});
         let stored = self.stored.iter().map(|(class, instance)| {
             let mut item = reference(class, instance);
-            item.insert("00081190".into(), json!({"vr": "UR"}));
+            item.insert(RETRIEVE_URL.into(), json!({"vr": "UR"}));
             Value::Object(item)
         });
         let failed = self.failed.iter().map(|(class, instance, status)| {
             let mut item = reference(class, instance);
-            item.insert("00081197".into(), reason(*status));
+            item.insert(FAILURE_REASON.into(), reason(*status));
             Value::Object(item)
         });
         let others = self
             .others
             .iter()
-            .map(|status| json!({"00081197": reason(*status)}));
+            .map(|status| json!({FAILURE_REASON: reason(*status)}));
         // Stored objects are not retrieved from here, so no URL is known.
         let mut module = Map::new();
-        module.insert("00081190".into(), json!({"vr": "UR"}));
+        module.insert(RETRIEVE_URL.into(), json!({"vr": "UR"}));
         let sequences: [(&str, Vec<Value>); 3] = [
-            ("00081198", failed.collect()),
-            ("00081199", stored.collect()),
-            ("0008119A", others.collect()),
+            (FAILED_SOP_SEQUENCE, failed.collect()),
+            (REFERENCED_SOP_SEQUENCE, stored.collect()),
+            (OTHER_FAILURES_SEQUENCE, others.collect()),
         ];
         for (tag, items) in sequences {
             if !items.is_empty() {

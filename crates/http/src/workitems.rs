@@ -21,6 +21,10 @@ use serde_json::{Map, Value};
 use std::time::{Duration, Instant};
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
+use ventriform_service::dicom_tags::{
+    PROCEDURE_STEP_STATE, SOP_INSTANCE_UID, TRANSACTION_UID,
+    UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
+};
 use ventriform_service::records::Timestamp;
 use ventriform_service::worklist::{
     AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
@@ -31,10 +35,6 @@ const MEDIA_TYPE: &str = "application/dicom+json";
 
 /// Media types of DICOM JSON.
 const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
-
-const TRANSACTION: &str = "00081195";
-const STATE: &str = "00741000";
-const SOP_INSTANCE: &str = "00080018";
 
 /// Names under which clients send the Transaction UID in the query.
 const TRANSACTION_NAMES: [&str; 2] = ["transaction-uid", "transaction"];
@@ -92,7 +92,7 @@ pub async fn create_workitem(
     };
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let attributes = data_set(request).await?;
-    let named = named.or_else(|| attributes.text(SOP_INSTANCE).map(str::to_owned));
+    let named = named.or_else(|| attributes.text(SOP_INSTANCE_UID).map(str::to_owned));
     let uid = named.unwrap_or_else(new_uid);
     require_uid("workitem", &uid)?;
     let size = text_of(&attributes)?.len() as u64;
@@ -195,7 +195,9 @@ pub async fn search_workitems(
         }
     }
     charge(SEARCH_MEMORY).await?;
-    let state = matching.wanted(STATE).and_then(WorkitemState::parse);
+    let state = matching
+        .wanted(PROCEDURE_STEP_STATE)
+        .and_then(WorkitemState::parse);
     let late = Instant::now() + LONGEST_SEARCH;
     let (mut found, mut count, mut after) = (String::new(), 0, 0);
     let mut more = false;
@@ -334,15 +336,17 @@ pub async fn change_workitem_state(
 ) -> Answer {
     let (wanted, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
     if let Some(uid) = &stated {
-        require_uid("00081195", uid)?;
+        require_uid(TRANSACTION_UID, uid)?;
     }
-    let state = wanted.text(STATE).and_then(WorkitemState::parse);
+    let state = wanted
+        .text(PROCEDURE_STEP_STATE)
+        .and_then(WorkitemState::parse);
     let state = state.ok_or_else(|| {
         Problem::bad_request(
             "invalid-field",
             "Procedure Step State (0074,1000) is missing or unknown.",
         )
-        .at(STATE)
+        .at(PROCEDURE_STEP_STATE)
         .fix("Give IN PROGRESS, COMPLETED or CANCELED.")
     })?;
     let done = change(&app, &caller, &uid, |item, now| {
@@ -488,7 +492,7 @@ async fn claimed_data_set(
 ) -> Answer<(DataSetJson, Option<String>)> {
     let stated = transaction(query, headers)?;
     let body = data_set(request).await?;
-    let stated = stated.or_else(|| body.text(TRANSACTION).map(str::to_owned));
+    let stated = stated.or_else(|| body.text(TRANSACTION_UID).map(str::to_owned));
     Ok((body, stated))
 }
 
@@ -538,17 +542,18 @@ fn refused(refusal: Refusal) -> Problem {
             "Correct the attribute.".to_owned(),
         ),
         Refusal::NoTransaction | Refusal::OtherTransaction => (
-            Problem::new(StatusCode::CONFLICT, "transaction-uid", &text).at("00081195"),
+            Problem::new(StatusCode::CONFLICT, "transaction-uid", &text).at(TRANSACTION_UID),
             "Send the Transaction UID under which the item was claimed; whoever lost it cannot \
              change the item."
                 .into(),
         ),
         Refusal::State { state } => (
-            Problem::new(StatusCode::CONFLICT, "workitem-state", &text).at(STATE),
+            Problem::new(StatusCode::CONFLICT, "workitem-state", &text).at(PROCEDURE_STEP_STATE),
             format!("The item is {}.", state.as_str()),
         ),
         Refusal::Unfinished(_) => (
-            Problem::new(StatusCode::CONFLICT, "workitem-unfinished", &text).at("00741216"),
+            Problem::new(StatusCode::CONFLICT, "workitem-unfinished", &text)
+                .at(UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE),
             "Add what was performed by POST to the item, then complete it.".into(),
         ),
     };

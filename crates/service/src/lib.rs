@@ -13,6 +13,7 @@ pub mod background;
 pub mod client;
 pub mod config;
 pub mod decoding;
+pub mod dicom_tags;
 pub mod error;
 pub mod filing;
 pub mod hooks;

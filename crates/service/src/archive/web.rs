@@ -6,6 +6,7 @@
 use super::parts::{PartLimits, SeriesParts};
 use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
+use crate::dicom_tags::{FAILED_SOP_SEQUENCE, FAILURE_REASON, SOP_INSTANCE_UID};
 use crate::hooks::{Pin, PinnedNames, UrlGuard, retry_after};
 use crate::records::{Failure, Fault, Timestamp};
 use futures::StreamExt;
@@ -29,11 +30,6 @@ const MAX_REDIRECTS: usize = 3;
 
 const DICOM_JSON: &str = "application/dicom+json";
 const PART_BOUNDARY: &str = "ventriform-dicom-object";
-
-/// SOP Instance UID, as DICOM JSON names it.
-const SOP_INSTANCE_UID: &str = "00080018";
-const FAILED_SOP_SEQUENCE: &str = "00081198";
-const FAILURE_REASON: &str = "00081197";
 
 /// Connects to DICOMweb services.
 pub struct WebClients {

@@ -1,14 +1,20 @@
 //! Performing a work item: claim, progress, result, giving up.
 
 use super::dataset::DataSetJson;
-use super::procedure::WORK;
-use super::workitem::{PERFORMED, PRIORITY, PROGRESS, Performer, Refusal, Workitem, WorkitemState};
+use super::workitem::{Performer, Refusal, Workitem, WorkitemState};
+use crate::dicom_tags::{
+    CODE_MEANING, CODE_VALUE, CODING_SCHEME_DESIGNATOR, DICOM_RETRIEVAL_SEQUENCE,
+    OUTPUT_INFORMATION_SEQUENCE, PERFORMED_PROCEDURE_STEP_END_DATE_TIME,
+    PERFORMED_PROCEDURE_STEP_START_DATE_TIME, PERFORMED_STATION_NAME_CODE_SEQUENCE,
+    PERFORMED_WORKITEM_CODE_SEQUENCE, PROCEDURE_STEP_CANCELLATION_DATE_TIME,
+    PROCEDURE_STEP_PROGRESS, PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE, REASON_FOR_CANCELLATION,
+    REFERENCED_SOP_CLASS_UID, REFERENCED_SOP_INSTANCE_UID, REFERENCED_SOP_SEQUENCE,
+    RETRIEVE_AE_TITLE, RETRIEVE_URL, SCHEDULED_PROCEDURE_STEP_PRIORITY,
+    SCHEDULED_WORKITEM_CODE_SEQUENCE, SERIES_INSTANCE_UID, STUDY_INSTANCE_UID, TYPE_OF_INSTANCES,
+    UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE, WADORS_RETRIEVAL_SEQUENCE,
+};
 use crate::records::{Priority, Timestamp};
 use serde_json::{Map, Value, json};
-
-const STEP_PROGRESS: &str = "00741004";
-const CANCELLED_AT: &str = "00404052";
-const REASON: &str = "00741238";
 
 /// An object that was made and stored in an archive.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +46,7 @@ impl Workitem {
 
     /// How urgent its job is, by its Scheduled Procedure Step Priority.
     pub fn priority(&self) -> Priority {
-        match self.attributes.text(PRIORITY) {
+        match self.attributes.text(SCHEDULED_PROCEDURE_STEP_PRIORITY) {
             Some("HIGH") => Priority::Urgent,
             Some("LOW") => Priority::Bulk,
             _ => Priority::Routine,
@@ -49,23 +55,25 @@ impl Workitem {
 
     /// Whether somebody has asked to cancel it since it was claimed.
     pub fn is_to_be_cancelled(&self) -> bool {
-        let mut progress = self.attributes.items(PROGRESS);
-        progress.any(|item| item.contains_key(CANCELLED_AT))
+        let mut progress = self
+            .attributes
+            .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE);
+        progress.any(|item| item.contains_key(PROCEDURE_STEP_CANCELLATION_DATE_TIME))
     }
 
     /// The progress of the work that was noted last, 0 to 100.
     pub fn progress_percent(&self) -> Option<u8> {
-        self.progress().text(STEP_PROGRESS)?.parse().ok()
+        self.progress().text(PROCEDURE_STEP_PROGRESS)?.parse().ok()
     }
 
     /// Notes the progress of the work, 0 to 100. Returns whether that is new.
     pub fn note_progress(&mut self, percent: u8, now: (Timestamp, &str)) -> bool {
         let mut progress = self.progress();
         let percent = percent.to_string();
-        if progress.text(STEP_PROGRESS) == Some(percent.as_str()) {
+        if progress.text(PROCEDURE_STEP_PROGRESS) == Some(percent.as_str()) {
             return false;
         }
-        progress.put(STEP_PROGRESS, "DS", &percent);
+        progress.put(PROCEDURE_STEP_PROGRESS, "DS", &percent);
         self.put_progress(progress, now);
         true
     }
@@ -81,24 +89,31 @@ impl Workitem {
         now: (Timestamp, &str),
     ) -> Result<(), Refusal> {
         let station = json!({
-            "00080100": {"vr": "SH", "Value": ["VENTRIFORM"]},
-            "00080102": {"vr": "SH", "Value": ["99VENTRIFORM"]},
-            "00080104": {"vr": "LO", "Value": ["ventriform"]},
+            CODE_VALUE: {"vr": "SH", "Value": ["VENTRIFORM"]},
+            CODING_SCHEME_DESIGNATOR: {"vr": "SH", "Value": ["99VENTRIFORM"]},
+            CODE_MEANING: {"vr": "LO", "Value": ["ventriform"]},
         });
-        let code: Vec<_> = self.attributes.items(WORK).cloned().collect();
+        let code: Vec<_> = self
+            .attributes
+            .items(SCHEDULED_WORKITEM_CODE_SEQUENCE)
+            .cloned()
+            .collect();
         let outputs: Vec<Value> = outputs.iter().map(output).collect();
         let performed = json!({
-            "00404028": {"vr": "SQ", "Value": [station]},
-            "00404050": {"vr": "DT", "Value": [began]},
-            "00404019": {"vr": "SQ", "Value": code},
-            "00404051": {"vr": "DT", "Value": [now.1]},
-            "00404033": {"vr": "SQ", "Value": outputs},
+            PERFORMED_STATION_NAME_CODE_SEQUENCE: {"vr": "SQ", "Value": [station]},
+            PERFORMED_PROCEDURE_STEP_START_DATE_TIME: {"vr": "DT", "Value": [began]},
+            PERFORMED_WORKITEM_CODE_SEQUENCE: {"vr": "SQ", "Value": code},
+            PERFORMED_PROCEDURE_STEP_END_DATE_TIME: {"vr": "DT", "Value": [now.1]},
+            OUTPUT_INFORMATION_SEQUENCE: {"vr": "SQ", "Value": outputs},
         });
         let Value::Object(performed) = performed else {
             return Ok(());
         };
         self.note_progress(100, now);
-        self.attributes.put_item(PERFORMED, performed);
+        self.attributes.put_item(
+            UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
+            performed,
+        );
         let transaction = self.transaction.clone();
         self.change_state(transaction.as_deref(), WorkitemState::Completed, now)?;
         Ok(())
@@ -110,9 +125,9 @@ impl Workitem {
     /// [`Refusal`] if it is not claimed.
     pub fn give_up(&mut self, reason: &str, now: (Timestamp, &str)) -> Result<(), Refusal> {
         let mut progress = self.progress();
-        if !progress.has(CANCELLED_AT) {
-            progress.put(CANCELLED_AT, "DT", now.1);
-            progress.put(REASON, "LT", reason);
+        if !progress.has(PROCEDURE_STEP_CANCELLATION_DATE_TIME) {
+            progress.put(PROCEDURE_STEP_CANCELLATION_DATE_TIME, "DT", now.1);
+            progress.put(REASON_FOR_CANCELLATION, "LT", reason);
         }
         self.put_progress(progress, now);
         let transaction = self.transaction.clone();
@@ -121,13 +136,19 @@ impl Workitem {
     }
 
     fn progress(&self) -> DataSetJson {
-        let known: Option<Map<String, Value>> = self.attributes.items(PROGRESS).next().cloned();
+        let known: Option<Map<String, Value>> = self
+            .attributes
+            .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE)
+            .next()
+            .cloned();
         DataSetJson::of(known.unwrap_or_default()).unwrap_or_default()
     }
 
     fn put_progress(&mut self, progress: DataSetJson, now: (Timestamp, &str)) {
-        self.attributes
-            .put_item(PROGRESS, progress.object().clone());
+        self.attributes.put_item(
+            PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE,
+            progress.object().clone(),
+        );
         self.stamp(now);
     }
 }
@@ -135,23 +156,23 @@ impl Workitem {
 /// An item of the Output Information Sequence.
 fn output(object: &WorkOutputObject) -> Value {
     let mut item = json!({
-        "0040E020": {"vr": "CS", "Value": ["DICOM"]},
-        "0020000D": {"vr": "UI", "Value": [object.study]},
-        "0020000E": {"vr": "UI", "Value": [object.series]},
-        "00081199": {"vr": "SQ", "Value": [{
-            "00081150": {"vr": "UI", "Value": [object.class]},
-            "00081155": {"vr": "UI", "Value": [object.instance]},
+        TYPE_OF_INSTANCES: {"vr": "CS", "Value": ["DICOM"]},
+        STUDY_INSTANCE_UID: {"vr": "UI", "Value": [object.study]},
+        SERIES_INSTANCE_UID: {"vr": "UI", "Value": [object.series]},
+        REFERENCED_SOP_SEQUENCE: {"vr": "SQ", "Value": [{
+            REFERENCED_SOP_CLASS_UID: {"vr": "UI", "Value": [object.class]},
+            REFERENCED_SOP_INSTANCE_UID: {"vr": "UI", "Value": [object.instance]},
         }]},
     });
     if let Some(title) = &object.ae_title {
-        let retrieval = json!({"00080054": {"vr": "AE", "Value": [title]}});
-        item["0040E021"] = json!({"vr": "SQ", "Value": [retrieval]});
+        let retrieval = json!({RETRIEVE_AE_TITLE: {"vr": "AE", "Value": [title]}});
+        item[DICOM_RETRIEVAL_SEQUENCE] = json!({"vr": "SQ", "Value": [retrieval]});
     }
     if let Some(base) = &object.dicomweb {
         let (study, series) = (&object.study, &object.series);
         let url = format!("{base}/studies/{study}/series/{series}");
-        let retrieval = json!({"00081190": {"vr": "UR", "Value": [url]}});
-        item["0040E025"] = json!({"vr": "SQ", "Value": [retrieval]});
+        let retrieval = json!({RETRIEVE_URL: {"vr": "UR", "Value": [url]}});
+        item[WADORS_RETRIEVAL_SEQUENCE] = json!({"vr": "SQ", "Value": [retrieval]});
     }
     item
 }
@@ -194,7 +215,11 @@ mod tests {
         item.complete("20261123045900+0000", &[object], NOW)
             .unwrap();
         assert_eq!(item.state, WorkitemState::Completed);
-        let performed = item.attributes.items(PERFORMED).next().unwrap();
+        let performed = item
+            .attributes
+            .items(UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE)
+            .next()
+            .unwrap();
         assert_eq!(performed["00404050"]["Value"][0], "20261123045900+0000");
         assert_eq!(
             performed["00404019"]["Value"][0]["00080100"]["Value"][0],
@@ -207,7 +232,7 @@ mod tests {
         );
         let url = &output["0040E025"]["Value"][0]["00081190"]["Value"][0];
         assert_eq!(url, "http://pacs/dicom-web/studies/1.3/series/1.4");
-        assert_eq!(item.progress().text(STEP_PROGRESS), Some("100"));
+        assert_eq!(item.progress().text(PROCEDURE_STEP_PROGRESS), Some("100"));
     }
 
     #[test]
@@ -217,7 +242,7 @@ mod tests {
         item.give_up("There is no such series.", NOW).unwrap();
         assert_eq!(item.state, WorkitemState::Canceled);
         assert_eq!(
-            item.progress().text(REASON),
+            item.progress().text(REASON_FOR_CANCELLATION),
             Some("There is no such series.")
         );
         // Who asked for it has said why.
@@ -227,6 +252,9 @@ mod tests {
         item.request_cancel(&reason, NOW).unwrap();
         assert!(item.is_to_be_cancelled());
         item.give_up("The job was cancelled.", NOW).unwrap();
-        assert_eq!(item.progress().text(REASON), Some("wrong patient"));
+        assert_eq!(
+            item.progress().text(REASON_FOR_CANCELLATION),
+            Some("wrong patient")
+        );
     }
 }

@@ -2,18 +2,13 @@
 
 use super::dataset::text_in;
 use super::workitem::Workitem;
+use crate::dicom_tags::{
+    CODE_VALUE, CODING_SCHEME_DESIGNATOR, INPUT_INFORMATION_SEQUENCE, INPUT_READINESS_STATE,
+    SCHEDULED_WORKITEM_CODE_SEQUENCE, SERIES_INSTANCE_UID, STUDY_INSTANCE_UID,
+};
 use crate::records::Tenant;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-
-/// Scheduled Workitem Code Sequence.
-pub(super) const WORK: &str = "00404018";
-const INPUT: &str = "00404021";
-const READINESS: &str = "00404041";
-const CODE_VALUE: &str = "00080100";
-const CODE_SCHEME: &str = "00080102";
-const STUDY: &str = "0020000D";
-const SERIES: &str = "0020000E";
 
 /// The work that a code asks for: a job on a series of an archive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,15 +40,18 @@ impl Procedure {
     /// Whether `item` is ready and asks for this work.
     pub fn is_asked_by(&self, item: &Workitem) -> bool {
         let text = |code, tag| text_in(code, tag).map(str::trim);
-        let named = item.attributes.items(WORK).any(|code| {
-            text(code, CODE_VALUE) == Some(self.code.as_str())
-                && text(code, CODE_SCHEME) == Some(self.scheme.as_str())
-        });
+        let named = item
+            .attributes
+            .items(SCHEDULED_WORKITEM_CODE_SEQUENCE)
+            .any(|code| {
+                text(code, CODE_VALUE) == Some(self.code.as_str())
+                    && text(code, CODING_SCHEME_DESIGNATOR) == Some(self.scheme.as_str())
+            });
         named
             && item.tenant == self.tenant
             && item
                 .attributes
-                .text(READINESS)
+                .text(INPUT_READINESS_STATE)
                 .is_none_or(|state| state == "READY")
     }
 }
@@ -65,12 +63,13 @@ impl Workitem {
     /// Why no series can be told from it.
     pub fn input(&self) -> Result<(String, String), &'static str> {
         let mut found: Option<(String, String)> = None;
-        for item in self.attributes.items(INPUT) {
+        for item in self.attributes.items(INPUT_INFORMATION_SEQUENCE) {
             let uid = |tag: &str| {
                 let uid = text_in(item, tag)?.trim_matches(['\0', ' ']);
                 (!uid.is_empty()).then(|| uid.to_owned())
             };
-            let (Some(study), Some(series)) = (uid(STUDY), uid(SERIES)) else {
+            let (Some(study), Some(series)) = (uid(STUDY_INSTANCE_UID), uid(SERIES_INSTANCE_UID))
+            else {
                 return Err("An input names no Study and Series Instance UID.");
             };
             let named = (study, series);

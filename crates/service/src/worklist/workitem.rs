@@ -1,21 +1,19 @@
 //! One work item and what may be done to it in each state.
 
 use super::dataset::DataSetJson;
+use crate::dicom_tags::{
+    CONTACT_DISPLAY_NAME, CONTACT_URI, INPUT_INFORMATION_SEQUENCE, INPUT_READINESS_STATE,
+    OUTPUT_INFORMATION_SEQUENCE, PERFORMED_PROCEDURE_STEP_END_DATE_TIME,
+    PERFORMED_PROCEDURE_STEP_START_DATE_TIME, PERFORMED_STATION_NAME_CODE_SEQUENCE,
+    PERFORMED_WORKITEM_CODE_SEQUENCE, PROCEDURE_STEP_CANCELLATION_DATE_TIME,
+    PROCEDURE_STEP_DISCONTINUATION_REASON_CODE_SEQUENCE, PROCEDURE_STEP_LABEL,
+    PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE, PROCEDURE_STEP_STATE, REASON_FOR_CANCELLATION,
+    SCHEDULED_PROCEDURE_STEP_MODIFICATION_DATE_TIME, SCHEDULED_PROCEDURE_STEP_PRIORITY,
+    SOP_CLASS_UID, SOP_INSTANCE_UID, TRANSACTION_UID,
+    UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
+};
 use crate::records::{Tenant, Timestamp};
 use serde_json::{Map, Value};
-
-const SOP_CLASS: &str = "00080016";
-const SOP_INSTANCE: &str = "00080018";
-const TRANSACTION: &str = "00081195";
-const STATE: &str = "00741000";
-pub(super) const PRIORITY: &str = "00741200";
-pub(super) const PROGRESS: &str = "00741002";
-const LABEL: &str = "00741204";
-pub(super) const PERFORMED: &str = "00741216";
-const READINESS: &str = "00404041";
-const CANCELLED_AT: &str = "00404052";
-const MODIFIED_AT: &str = "00404010";
-const INPUT: &str = "00404021";
 
 /// The SOP class Unified Procedure Step Push.
 const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
@@ -23,15 +21,32 @@ const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
 /// Attributes that an item of the Performed Procedure Sequence must have when the work is completed
 /// (PS3.4 table CC.2.5-3, final state).
 const FINAL: [(&str, &str); 5] = [
-    ("00404028", "Performed Station Name Code Sequence"),
-    ("00404050", "Performed Procedure Step Start DateTime"),
-    ("00404019", "Performed Workitem Code Sequence"),
-    ("00404051", "Performed Procedure Step End DateTime"),
-    ("00404033", "Output Information Sequence"),
+    (
+        PERFORMED_STATION_NAME_CODE_SEQUENCE,
+        "Performed Station Name Code Sequence",
+    ),
+    (
+        PERFORMED_PROCEDURE_STEP_START_DATE_TIME,
+        "Performed Procedure Step Start DateTime",
+    ),
+    (
+        PERFORMED_WORKITEM_CODE_SEQUENCE,
+        "Performed Workitem Code Sequence",
+    ),
+    (
+        PERFORMED_PROCEDURE_STEP_END_DATE_TIME,
+        "Performed Procedure Step End DateTime",
+    ),
+    (OUTPUT_INFORMATION_SEQUENCE, "Output Information Sequence"),
 ];
 
 /// The attributes of a cancellation request that are passed on to the performer.
-const CANCELLATION: [&str; 4] = ["00741238", "0074100E", "0074100A", "0074100C"];
+const CANCELLATION: [&str; 4] = [
+    REASON_FOR_CANCELLATION,
+    PROCEDURE_STEP_DISCONTINUATION_REASON_CODE_SEQUENCE,
+    CONTACT_URI,
+    CONTACT_DISPLAY_NAME,
+];
 
 /// The state of a work item.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,59 +179,77 @@ impl Workitem {
         now: (Timestamp, &str),
     ) -> Result<(Self, bool), Refusal> {
         let wrong = |tag, name, reason| Err(Refusal::Attribute { tag, name, reason });
-        match attributes.text(STATE) {
+        match attributes.text(PROCEDURE_STEP_STATE) {
             Some("SCHEDULED") => {}
-            _ => return wrong(STATE, "Procedure Step State", "must be SCHEDULED"),
+            _ => {
+                return wrong(
+                    PROCEDURE_STEP_STATE,
+                    "Procedure Step State",
+                    "must be SCHEDULED",
+                );
+            }
         }
-        if attributes.has_value(TRANSACTION) {
+        if attributes.has_value(TRANSACTION_UID) {
             return wrong(
-                TRANSACTION,
+                TRANSACTION_UID,
                 "Transaction UID",
                 "must be empty in a new item",
             );
         }
-        if attributes.has_value(PERFORMED) {
+        if attributes.has_value(UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE) {
             let name = "Performed Procedure Sequence";
-            return wrong(PERFORMED, name, "must be empty in a new item");
+            return wrong(
+                UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
+                name,
+                "must be empty in a new item",
+            );
         }
-        if attributes.text(SOP_INSTANCE).is_some_and(|own| own != uid) {
+        if attributes
+            .text(SOP_INSTANCE_UID)
+            .is_some_and(|own| own != uid)
+        {
             let reason = "differs from the UID in the path";
-            return wrong(SOP_INSTANCE, "SOP Instance UID", reason);
+            return wrong(SOP_INSTANCE_UID, "SOP Instance UID", reason);
         }
-        match attributes.text(PRIORITY) {
+        match attributes.text(SCHEDULED_PROCEDURE_STEP_PRIORITY) {
             None | Some("HIGH" | "MEDIUM" | "LOW") => {}
             _ => {
                 let name = "Scheduled Procedure Step Priority";
-                return wrong(PRIORITY, name, "must be HIGH, MEDIUM or LOW");
+                return wrong(
+                    SCHEDULED_PROCEDURE_STEP_PRIORITY,
+                    name,
+                    "must be HIGH, MEDIUM or LOW",
+                );
             }
         }
-        match attributes.text(READINESS) {
+        match attributes.text(INPUT_READINESS_STATE) {
             None | Some("READY" | "UNAVAILABLE" | "INCOMPLETE") => {}
             _ => {
                 let reason = "must be READY, UNAVAILABLE or INCOMPLETE";
-                return wrong(READINESS, "Input Readiness State", reason);
+                return wrong(INPUT_READINESS_STATE, "Input Readiness State", reason);
             }
         }
         let mut completed = false;
         for (tag, vr, neutral) in [
-            (PRIORITY, "CS", "MEDIUM"),
-            (READINESS, "CS", "READY"),
-            (LABEL, "LO", "Work item"),
+            (SCHEDULED_PROCEDURE_STEP_PRIORITY, "CS", "MEDIUM"),
+            (INPUT_READINESS_STATE, "CS", "READY"),
+            (PROCEDURE_STEP_LABEL, "LO", "Work item"),
         ] {
             if attributes.text(tag).is_none() {
                 attributes.put(tag, vr, neutral);
                 completed = true;
             }
         }
-        if !attributes.has(INPUT) {
+        if !attributes.has(INPUT_INFORMATION_SEQUENCE) {
             let empty = Map::from_iter([("vr".to_owned(), Value::from("SQ"))]);
-            let element = Map::from_iter([(INPUT.to_owned(), Value::from(empty))]);
+            let element =
+                Map::from_iter([(INPUT_INFORMATION_SEQUENCE.to_owned(), Value::from(empty))]);
             attributes.replace(DataSetJson::of(element).unwrap_or_default());
             completed = true;
         }
-        attributes.remove(TRANSACTION);
-        attributes.put(SOP_CLASS, "UI", PUSH);
-        attributes.put(SOP_INSTANCE, "UI", uid);
+        attributes.remove(TRANSACTION_UID);
+        attributes.put(SOP_CLASS_UID, "UI", PUSH);
+        attributes.put(SOP_INSTANCE_UID, "UI", uid);
         let mut item = Self {
             tenant: tenant.clone(),
             uid: uid.to_owned(),
@@ -247,9 +280,9 @@ impl Workitem {
             return Err(Refusal::State { state: self.state });
         }
         for (tag, name) in [
-            (STATE, "Procedure Step State"),
-            (SOP_CLASS, "SOP Class UID"),
-            (SOP_INSTANCE, "SOP Instance UID"),
+            (PROCEDURE_STEP_STATE, "Procedure Step State"),
+            (SOP_CLASS_UID, "SOP Class UID"),
+            (SOP_INSTANCE_UID, "SOP Instance UID"),
         ] {
             let same = changes.text(tag) == self.attributes.text(tag);
             if changes.has_value(tag) && !same {
@@ -258,7 +291,7 @@ impl Workitem {
             }
             changes.remove(tag);
         }
-        changes.remove(TRANSACTION);
+        changes.remove(TRANSACTION_UID);
         self.attributes.replace(changes);
         self.stamp(now);
         Ok(())
@@ -311,7 +344,11 @@ impl Workitem {
             WorkitemState::Completed => return Err(Refusal::State { state: self.state }),
             WorkitemState::Scheduled | WorkitemState::InProgress => {}
         }
-        let known = self.attributes.items(PROGRESS).next().cloned();
+        let known = self
+            .attributes
+            .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE)
+            .next()
+            .cloned();
         let mut progress = DataSetJson::of(known.unwrap_or_default()).unwrap_or_default();
         for tag in CANCELLATION {
             if let Some(element) = details.object().get(tag) {
@@ -319,9 +356,11 @@ impl Workitem {
                 progress.replace(DataSetJson::of(element).unwrap_or_default());
             }
         }
-        progress.put(CANCELLED_AT, "DT", now.1);
-        self.attributes
-            .put_item(PROGRESS, progress.object().clone());
+        progress.put(PROCEDURE_STEP_CANCELLATION_DATE_TIME, "DT", now.1);
+        self.attributes.put_item(
+            PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE,
+            progress.object().clone(),
+        );
         match self.state {
             WorkitemState::Scheduled => self.enter(WorkitemState::Canceled, now),
             _ => self.stamp(now),
@@ -344,7 +383,10 @@ impl Workitem {
     }
 
     fn require_results(&self) -> Result<(), Refusal> {
-        let performed = self.attributes.items(PERFORMED).next();
+        let performed = self
+            .attributes
+            .items(UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE)
+            .next();
         let Some(performed) = performed else {
             return Err(Refusal::Unfinished(
                 "Unified Procedure Step Performed Procedure Sequence",
@@ -363,8 +405,10 @@ impl Workitem {
 
     /// Notes state and time in the attributes. `now` is the time, also as DICOM writes it (DT).
     pub(super) fn stamp(&mut self, (now, text): (Timestamp, &str)) {
-        self.attributes.put(STATE, "CS", self.state.as_str());
-        self.attributes.put(MODIFIED_AT, "DT", text);
+        self.attributes
+            .put(PROCEDURE_STEP_STATE, "CS", self.state.as_str());
+        self.attributes
+            .put(SCHEDULED_PROCEDURE_STEP_MODIFICATION_DATE_TIME, "DT", text);
         self.changed_at = now;
     }
 }
@@ -431,7 +475,10 @@ mod tests {
             let result = item.change_state(Some("9.9"), to, NOW);
             if allowed {
                 assert_eq!(result, Ok(Change::Done), "{from:?} {to:?}");
-                assert_eq!(item.attributes.text(STATE), Some(to.as_str()));
+                assert_eq!(
+                    item.attributes.text(PROCEDURE_STEP_STATE),
+                    Some(to.as_str())
+                );
             } else {
                 assert_eq!(
                     result,
@@ -468,7 +515,7 @@ mod tests {
             Err(Refusal::OtherTransaction)
         );
         item.update(Some("9.9"), change(), NOW).unwrap();
-        assert_eq!(item.attributes.text(LABEL), Some("B"));
+        assert_eq!(item.attributes.text(PROCEDURE_STEP_LABEL), Some("B"));
         let done = WorkitemState::Completed;
         let missing = item.change_state(Some("9.9"), done, NOW);
         assert!(
@@ -502,17 +549,27 @@ mod tests {
             .unwrap();
         assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Done));
         assert_eq!(item.state, WorkitemState::InProgress);
-        let noted = item.attributes.items(PROGRESS).next().unwrap();
+        let noted = item
+            .attributes
+            .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE)
+            .next()
+            .unwrap();
         assert_eq!(noted["00741238"]["Value"][0], "wrong patient");
     }
 
     #[test]
     fn a_new_item_must_be_one() {
         for (tag, value) in [
-            (STATE, json!({"vr": "CS", "Value": ["IN PROGRESS"]})),
-            (TRANSACTION, json!({"vr": "UI", "Value": ["1.2.3"]})),
-            (PRIORITY, json!({"vr": "CS", "Value": ["SOON"]})),
-            (SOP_INSTANCE, json!({"vr": "UI", "Value": ["1.3"]})),
+            (
+                PROCEDURE_STEP_STATE,
+                json!({"vr": "CS", "Value": ["IN PROGRESS"]}),
+            ),
+            (TRANSACTION_UID, json!({"vr": "UI", "Value": ["1.2.3"]})),
+            (
+                SCHEDULED_PROCEDURE_STEP_PRIORITY,
+                json!({"vr": "CS", "Value": ["SOON"]}),
+            ),
+            (SOP_INSTANCE_UID, json!({"vr": "UI", "Value": ["1.3"]})),
         ] {
             let mut object = scheduled().attributes.object().clone();
             object.insert(tag.into(), value);
