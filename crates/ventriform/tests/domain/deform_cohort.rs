@@ -5,7 +5,8 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use std::path::{Path, PathBuf};
+use crate::shared_data::shared_data;
+use std::path::Path;
 
 use ventriform::grid::voxelise::Mask;
 use ventriform::model::{Organ, Template};
@@ -16,15 +17,6 @@ use ventriform::segmentation::{NamedTemplate, SegmentationParameters, segment};
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeFile};
-
-fn data(path: &str) -> Option<PathBuf> {
-    let path = Path::new("../shared/data").join(path);
-    if path.exists() {
-        return Some(path);
-    }
-    eprintln!("skipped: {} is not there", path.display());
-    None
-}
 
 fn read(path: &Path) -> Reading {
     volume::read(
@@ -48,7 +40,7 @@ fn template(scan: &Path) -> NamedTemplate {
 
 #[test]
 fn no_patient_of_the_cohort_is_lost() {
-    let Some(cohort) = data("cohort") else {
+    let Some(cohort) = shared_data("cohort") else {
         return;
     };
     let template = template(&cohort.join("t1/spect.nii.gz"));
@@ -88,7 +80,7 @@ fn expert_on(scan: &Volume, path: &Path) -> Mask {
 
 #[test]
 fn a_clinical_scan_is_segmented_where_its_expert_drew_alike_in_every_container() {
-    let (Some(clinical), Some(cohort)) = (data("clinical"), data("cohort")) else {
+    let (Some(clinical), Some(cohort)) = (shared_data("clinical"), shared_data("cohort")) else {
         return;
     };
     let name = "1.2.840.4267.32.118564058634314627767242469443335771432";

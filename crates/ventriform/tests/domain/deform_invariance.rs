@@ -4,7 +4,7 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
+use crate::shared_data::shared_data;
 
 use nalgebra::{Rotation3, Unit};
 use rayon::prelude::*;
@@ -174,11 +174,9 @@ fn a_patient_who_is_tilted_keeps_volumes_and_segments() {
 
 #[test]
 fn so_do_tilted_scans_with_several_defects() {
-    let cohort = Path::new("../shared/data/cohort");
-    if !cohort.exists() {
-        eprintln!("skipped: {} is not there", cohort.display());
+    let Some(cohort) = shared_data("cohort") else {
         return;
-    }
+    };
     let template = template();
     for case in ["p06", "p10"] {
         let file = VolumeFile::at(cohort.join(case).join("spect.nii.gz"));

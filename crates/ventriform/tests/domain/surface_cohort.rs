@@ -4,6 +4,7 @@
 // A test states its expectations by panicking, its helpers too.
 #![allow(clippy::unwrap_used)]
 
+use crate::shared_data::shared_data;
 use std::io::Read;
 use std::path::Path;
 
@@ -90,11 +91,10 @@ fn compare(volume: &Volume, inside: &[bool], truth: &Volume, iso: f32) -> [f64; 
 
 #[test]
 fn every_patients_ventricle_is_found() {
-    let cohort = Path::new("../shared/data/cohort");
-    let Ok(cases) = std::fs::read_dir(cohort) else {
-        println!("skipped: ../shared/data/cohort is absent");
+    let Some(cohort) = shared_data("cohort") else {
         return;
     };
+    let cases = std::fs::read_dir(cohort).unwrap();
     let mut cases: Vec<_> = cases
         .map(|e| e.unwrap().path())
         .filter(|p| p.join("spect.nii.gz").exists())

@@ -1,20 +1,9 @@
 //! Real and odd DICOM files, against what pydicom 3 reads of them.
 
-use std::path::{Path, PathBuf};
+use crate::shared_data::shared_data;
+use std::path::Path;
 use ventriform::progress::Monitor;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, Reading, VolumeFile};
-
-/// A folder of the test data, unless it is absent.
-fn data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data")
-        .join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: ../shared/data/{folder} is absent");
-        return None;
-    }
-    Some(path)
-}
 
 fn read(path: &Path) -> Result<Reading, volume::VolumeError> {
     let options = ReadOptions::default();
@@ -48,7 +37,7 @@ const PATIENTS: &[(&str, f64, [f64; 3])] = &[
 
 #[test]
 fn patients_are_read_with_their_signed_spacing() {
-    let Some(folder) = data("clinical") else {
+    let Some(folder) = shared_data("clinical") else {
         return;
     };
     for (name, sum, position) in PATIENTS {
@@ -68,7 +57,7 @@ fn patients_are_read_with_their_signed_spacing() {
 
 #[test]
 fn the_experts_mask_lies_on_the_heart() {
-    let Some(folder) = data("clinical") else {
+    let Some(folder) = shared_data("clinical") else {
         return;
     };
     let name = PATIENTS[1].0;
@@ -134,7 +123,9 @@ const MR: [f64; 3] = [0.3125, 0.3125, 0.8];
 
 #[test]
 fn odd_files_are_read_as_by_pydicom_or_refused_and_none_panics() {
-    let Some(folder) = data("dicom") else { return };
+    let Some(folder) = shared_data("dicom") else {
+        return;
+    };
     let (mut seen, mut right) = (0, 0);
     for part in ["nm", "odd_pydicom", "odd_fodicom"] {
         for entry in std::fs::read_dir(folder.join(part)).unwrap() {
@@ -169,7 +160,9 @@ fn odd_files_are_read_as_by_pydicom_or_refused_and_none_panics() {
 
 #[test]
 fn refusals_tell_the_reason() {
-    let Some(folder) = data("dicom") else { return };
+    let Some(folder) = shared_data("dicom") else {
+        return;
+    };
     for (file, part) in [
         (
             "nm/tomo_projections_cardiac_stress_GE.dcm",

@@ -2,22 +2,12 @@
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
-use std::path::{Path, PathBuf};
+use crate::shared_data::shared_data;
 use ventriform::progress::Monitor;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 
-/// The folder of the test data, unless it is absent.
-fn data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/nifti-odd");
-    if !folder.is_dir() {
-        eprintln!("skipped: ../shared/data/nifti-odd is absent");
-        return None;
-    }
-    Some(folder)
-}
-
 fn read(names: &[&str], frame: Option<usize>) -> Option<Result<Reading, VolumeError>> {
-    let folder = data()?;
+    let folder = shared_data("nifti-odd")?;
     let files: Vec<_> = names
         .iter()
         .map(|n| VolumeFile::at(folder.join(n)))
