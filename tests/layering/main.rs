@@ -207,6 +207,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
 const SERVICE: &[(&str, &[&str])] = &[
     ("records", &[]),
     ("error", &["records"]),
+    ("dicom_tags", &[]),
     ("client", &[]),
     ("pem", &[]),
     ("items", &["records"]),
@@ -218,10 +219,18 @@ const SERVICE: &[(&str, &[&str])] = &[
     ("hooks", &["records"]),
     (
         "archive",
-        &["records", "error", "pem", "items", "jobs", "hooks"],
+        &[
+            "records",
+            "error",
+            "dicom_tags",
+            "pem",
+            "items",
+            "jobs",
+            "hooks",
+        ],
     ),
     ("intake", &["records", "error", "jobs", "access"]),
-    ("worklist", &["records"]),
+    ("worklist", &["records", "dicom_tags"]),
     (
         "stores",
         &[
