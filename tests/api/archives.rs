@@ -2,20 +2,15 @@
 
 use crate::dicom::{JANE, nm};
 use crate::fake_archive::{FakeArchive, FakeScp, Fault, implicit};
-use crate::helpers::{TestApp, fake_engine, problem, sphere, text};
+use crate::helpers::{TestApp, engine_with, fake_engine, problem, sphere, text};
 use crate::scu::Scu;
 use crate::tls::{Authority, file as pem};
 use rcgen::ExtendedKeyUsagePurpose;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::volume::ReadLimits;
 use ventriform_service::archive::{Archive, Archives, Credentials};
 use ventriform_service::config::Settings;
-use ventriform_service::items::{StoredItem, WorkOutput};
-use ventriform_service::jobs::{GivenParameters, Work, WorkError, WorkInput};
-use ventriform_service::records::{Failure, Resource};
 use ventriform_service::work::Engine;
 
 pub const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
@@ -426,42 +421,9 @@ async fn a_listed_service_is_used_without_credentials() {
 /// What a model can send.
 const OBJECTS: [&str; 4] = ["mask.dcm", "contours.dcm", "mesh.dcm", "surface.dcm"];
 
-/// Work that reads real volumes and makes a sphere of each.
-struct Sphere(Arc<dyn Work>);
-
-impl Work for Sphere {
-    fn makes(&self) -> Resource {
-        self.0.makes()
-    }
-
-    fn plan(&self) -> Plan {
-        self.0.plan()
-    }
-
-    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
-        self.0.check_parameters(given)
-    }
-
-    fn run(&self, _: &WorkInput, _: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
-        Ok(sphere())
-    }
-
-    fn page_files(&self) -> &'static [&'static str] {
-        self.0.page_files()
-    }
-
-    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        self.0.page(product, scan)
-    }
-}
-
+/// Reads real volumes and makes a sphere of each.
 fn engine() -> Engine {
-    let real = Engine::new(ReadLimits::default());
-    let quick = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(Sphere(work.clone())) };
-    Engine {
-        works: real.works.iter().map(quick).collect(),
-        ..real
-    }
+    engine_with(|_, _| Ok(sphere()))
 }
 
 /// A service that reads real volumes, and an archive that holds the scan of a patient.

@@ -3,24 +3,22 @@
 
 use crate::archives::{STUDY, archive};
 use crate::fake_archive::FakeArchive;
-use crate::helpers::{TestApp, fake_engine, mesh_json, problem, text, volume};
+use crate::helpers::{TestApp, engine_with, fake_engine, mesh_json, problem, text, volume};
 use crate::readers::profile;
 use crate::scu::{Scu, nuclear, slice};
 use futures::future::join_all;
 use reqwest::{RequestBuilder, StatusCode};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::net::SocketAddr;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform::mesh::shapes::icosphere;
-use ventriform::progress::{Monitor, Plan, Stage};
-use ventriform::volume::ReadLimits;
+use ventriform::progress::{Monitor, Stage};
 use ventriform_service::archive::Archives;
 use ventriform_service::config::Settings;
-use ventriform_service::items::{StoredItem, WorkOutput};
-use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use ventriform_service::records::{Failure, Resource};
+use ventriform_service::items::WorkOutput;
+use ventriform_service::jobs::{WorkError, WorkInput};
 use ventriform_service::work::Engine;
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -156,48 +154,11 @@ async fn no_way_in_goes_round_the_quota_of_bytes() {
     assert!(import(10 * quota).0);
 }
 
-/// The work of a kind, which takes longer than any test.
-struct EndlessWork(Arc<dyn Work>);
-
-impl Work for EndlessWork {
-    fn makes(&self) -> Resource {
-        self.0.makes()
-    }
-
-    fn plan(&self) -> Plan {
-        self.0.plan()
-    }
-
-    fn needs(&self, parameters: &Map<String, Value>) -> Needs {
-        self.0.needs(parameters)
-    }
-
-    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
-        self.0.check_parameters(given)
-    }
-
-    fn run(&self, _: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
-        loop {
-            monitor.report(Stage::Retile, 0.5)?;
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-
-    fn page_files(&self) -> &'static [&'static str] {
-        self.0.page_files()
-    }
-
-    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        self.0.page(product, scan)
-    }
-}
-
-fn endless_engine() -> Engine {
-    let real = Engine::new(ReadLimits::default());
-    let endless = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(EndlessWork(work.clone())) };
-    Engine {
-        works: real.works.iter().map(endless).collect(),
-        ..real
+/// A computation that takes longer than any test.
+fn compute_endlessly(_: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
+    loop {
+        monitor.report(Stage::Retile, 0.5)?;
+        std::thread::sleep(Duration::from_millis(5));
     }
 }
 
@@ -222,7 +183,7 @@ async fn becomes(app: &TestApp, path: &str, holds: impl Fn(&Value) -> bool) {
 #[tokio::test(flavor = "multi_thread")]
 async fn no_way_in_goes_round_the_quota_of_jobs() {
     let fake = FakeArchive::start(&[b"VOLUME sphere"]).await;
-    let (app, address) = service(endless_engine(), &fake, |settings| {
+    let (app, address) = service(engine_with(compute_endlessly), &fake, |settings| {
         settings.quota_jobs = "1".parse().unwrap();
         settings.workers = "1".parse().unwrap();
     })

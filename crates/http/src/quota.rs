@@ -4,7 +4,8 @@ use super::app::App;
 use super::caller::Caller;
 use super::idempotency;
 use super::problem::Answer;
-use axum::http::{HeaderMap, header};
+use super::upload::announced_length;
+use axum::http::HeaderMap;
 use ventriform_service::quotas::{Addition, Counting};
 
 /// Reserves a request that stores its body, and files `jobs` jobs.
@@ -17,10 +18,8 @@ pub async fn reserve_upload(
     headers: &HeaderMap,
     jobs: u64,
 ) -> Answer<Counting> {
-    let length = headers.get(header::CONTENT_LENGTH);
-    let length: Option<u64> = length.and_then(|length| length.to_str().ok()?.parse().ok());
     // A longer one is refused anyway.
-    let announced = length.unwrap_or(0).min(app.service.settings.body_limit.0);
+    let announced = announced_length(headers).min(app.service.settings.body_limit.0);
     let addition = Addition {
         jobs,
         ..Addition::bytes(announced)

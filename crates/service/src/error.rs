@@ -60,7 +60,7 @@ impl ServiceError {
 
     /// A defect of the program, or of its surroundings. The cause goes to the log only.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
-        tracing::error!(%cause, "internal error");
+        tracing::error!(%cause, "internal error while answering a request");
         let detail =
             "The service failed to answer because of an internal error, which has been logged.";
         Failure::new(Fault::Service, "internal", detail)

@@ -122,12 +122,17 @@ impl Service {
         if let Some(work) = self.engine.works.of_kind(kind) {
             return Ok(&**work);
         }
-        let kinds: Vec<_> = self.engine.works.iter().map(|w| w.makes().noun()).collect();
         let detail = format!("There is no kind of job `{}`.", shorten(kind));
         Err(Failure::new(Fault::Request, "invalid-field", detail)
             .at("kind")
-            .fix(format!("Known kinds: {}.", kinds.join(", ")))
+            .fix(format!("Known kinds: {}.", self.kinds()))
             .into())
+    }
+
+    /// The kinds of jobs, for messages.
+    pub(crate) fn kinds(&self) -> String {
+        let kinds: Vec<_> = self.engine.works.iter().map(|w| w.makes().noun()).collect();
+        kinds.join(", ")
     }
 
     /// Files a job on a stored volume, or on the series of its source. `counting` has counted it.
@@ -291,8 +296,10 @@ pub struct UnattendedJob<'a> {
     pub volume: Option<&'a str>,
     /// The series of its volume in an archive.
     pub source: Option<SeriesSource>,
-    /// The objects of its result that are sent to an archive.
-    pub send: Option<SendOrder>,
+    /// The objects of its result that are sent to an archive; may be none.
+    pub send: &'a [String],
+    /// That archive; the one of the source if absent.
+    pub to: Option<&'a str>,
     /// Its idempotency key.
     pub key: String,
 }
@@ -306,6 +313,8 @@ impl Service {
     pub async fn file_unattended(&self, job: UnattendedJob<'_>) -> Result<String, ServiceError> {
         let work = self.work_of(job.kind)?;
         let parameters = work.parameters_from_json(job.parameters)?;
+        let send =
+            self.listed_send_order(job.tenant, job.kind, job.send, job.to, job.source.as_ref())?;
         let quota = self.quotas.general;
         let reserved = self
             .quotas
@@ -315,7 +324,7 @@ impl Service {
             priority: job.priority,
             key: Some(job.key.clone()),
             source: job.source,
-            send: job.send,
+            send,
             ..JobOrder::new(job.tenant.clone(), quota)
         };
         let volume = job.volume.map(str::to_owned);

@@ -190,19 +190,17 @@ async fn file_by(
     item: &Workitem,
     source: SeriesSource,
 ) -> Result<String, ServiceError> {
-    let (tenant, kind) = (&procedure.tenant, &procedure.kind);
-    let names = Some(procedure.send.clone()).filter(|names| !names.is_empty());
-    let send = service.send_order(tenant, kind, names, procedure.to.as_deref(), Some(&source))?;
     let transaction = item.transaction.clone().unwrap_or_default();
     let job = UnattendedJob {
         ordered_by: "procedure",
-        tenant,
-        kind,
+        tenant: &procedure.tenant,
+        kind: &procedure.kind,
         priority: item.priority(),
         parameters: &procedure.parameters,
         volume: None,
         source: Some(source),
-        send,
+        send: &procedure.send,
+        to: procedure.to.as_deref(),
         key: format!("workitem-{transaction}"),
     };
     service.file_unattended(job).await

@@ -45,8 +45,6 @@ impl VolumeMaker for Service {
         key: String,
     ) -> Result<String, MakeError> {
         let tenant = &group.origin.tenant;
-        let names = Some(rule.send.clone()).filter(|names| !names.is_empty());
-        let send = self.send_order(tenant, &rule.kind, names, rule.to.as_deref(), None);
         let job = UnattendedJob {
             ordered_by: "rule",
             tenant,
@@ -55,7 +53,8 @@ impl VolumeMaker for Service {
             parameters: &rule.parameters,
             volume: Some(volume),
             source: None,
-            send: send.map_err(ServiceError::from)?,
+            send: &rule.send,
+            to: rule.to.as_deref(),
             key,
         };
         Ok(self.file_unattended(job).await?)
@@ -120,16 +119,14 @@ impl Service {
         to: Option<&str>,
     ) -> Result<(), String> {
         let Some(work) = self.engine.work(kind) else {
-            let kinds: Vec<_> = self.engine.works.iter().map(|w| w.makes().noun()).collect();
+            let kinds = self.kinds();
             return Err(format!(
-                "there is no kind of job `{kind}`; known are {}",
-                kinds.join(", ")
+                "there is no kind of job `{kind}`; known are {kinds}"
             ));
         };
         work.parameters_from_json(parameters)
             .map_err(|failure| failure.detail)?;
-        let names = Some(send.to_vec()).filter(|names| !names.is_empty());
-        self.send_order(tenant, kind, names, to, None)
+        self.listed_send_order(tenant, kind, send, to, None)
             .map_err(|failure| failure.detail)?;
         Ok(())
     }

@@ -135,6 +135,22 @@ impl Service {
         }))
     }
 
+    /// [`Service::send_order`] of an entry of the settings, in which no names are an empty list.
+    ///
+    /// # Errors
+    /// As [`Service::send_order`].
+    pub(crate) fn listed_send_order(
+        &self,
+        tenant: &Tenant,
+        kind: &str,
+        names: &[String],
+        to: Option<&str>,
+        source: Option<&SeriesSource>,
+    ) -> Result<Option<SendOrder>, Failure> {
+        let names = (!names.is_empty()).then(|| names.to_vec());
+        self.send_order(tenant, kind, names, to, source)
+    }
+
     fn no_archive(&self, field: &str, tenant: &Tenant, name: &str) -> Failure {
         let detail = format!("There is no archive `{}`.", shorten(name));
         invalid(field, detail).fix(self.known_archives(tenant))

@@ -17,6 +17,7 @@ pub mod not_found;
 mod failure;
 
 pub use failure::from_panic;
+pub use ventriform_service::error::shorten;
 
 use crate::public_base::public_path;
 use axum::Json;
@@ -24,6 +25,7 @@ use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
+use ventriform_service::error::ServiceError;
 
 /// The media type of problem objects.
 pub const MEDIA_TYPE: &str = "application/problem+json";
@@ -102,13 +104,7 @@ impl Problem {
 
     /// 500. The cause goes to the log only.
     pub fn internal(cause: impl std::fmt::Display) -> Self {
-        tracing::error!(%cause, "internal error while answering a request");
-        Self::new(
-            StatusCode::INTERNAL_SERVER_ERROR,
-            "internal",
-            "The service failed to answer because of an internal error, which has been logged.",
-        )
-        .fix("Report it with the x-request-id of this answer.")
+        ServiceError::internal(cause).into()
     }
 
     /// Names the field concerned.
@@ -191,14 +187,6 @@ fn title(code: &str) -> String {
         .next()
         .map(|first| first.to_uppercase().chain(letters).collect())
         .unwrap_or_default()
-}
-
-/// A client's text, cut to 80 characters for use in a message.
-pub fn shorten(text: &str) -> String {
-    match text.char_indices().nth(80) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.to_owned(),
-    }
 }
 
 impl IntoResponse for Problem {

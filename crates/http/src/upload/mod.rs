@@ -34,7 +34,7 @@ pub struct Upload {
 }
 
 /// The length of the body, 0 if it is not announced.
-fn announced_length(headers: &HeaderMap) -> u64 {
+pub fn announced_length(headers: &HeaderMap) -> u64 {
     let length = headers.get(header::CONTENT_LENGTH);
     let length = length.and_then(|value| value.to_str().ok()?.parse().ok());
     length.unwrap_or(0)
