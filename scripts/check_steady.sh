@@ -15,8 +15,15 @@ out=$(mktemp -d)
 busy=()
 trap 'kill "${busy[@]}" 2>/dev/null; rm -rf "$out"' EXIT
 
-# Cargo tells the programs that hold the tests; each is run in the folder in which cargo runs it.
-cargo test --no-run 2>&1 | sed -n 's/^ *Executable .*(\(.*\))$/\1/p' >"$out/programs"
+# Cargo tells the programs that hold the tests; each is run in the folder of its package, as cargo runs it.
+cargo test --no-run --message-format=json |
+  python3 -c '
+import json, os, sys
+for line in sys.stdin:
+    message = json.loads(line)
+    if message.get("profile", {}).get("test") and message.get("executable"):
+        print(os.path.dirname(message["manifest_path"]), message["executable"], sep="\t")
+' >"$out/programs"
 [ -s "$out/programs" ] || { echo "no test was built"; exit 1; }
 
 failed=0
@@ -24,8 +31,8 @@ failed=0
 run() {
   local name=$1 begin=$SECONDS status=0
   shift
-  while read -r program; do
-    "$program" "$@" </dev/null >>"$out/$name" 2>&1 || status=1
+  while IFS=$'\t' read -r folder program; do
+    (cd "$folder" && exec "$program" "$@") </dev/null >>"$out/$name" 2>&1 || status=1
   done <"$out/programs"
   echo "$name: $(grep -c '\.\.\. ok$' "$out/$name") passed, $(grep -c '\.\.\. FAILED$' "$out/$name") failed, $((SECONDS - begin)) s"
   if [ "$status" -ne 0 ]; then
