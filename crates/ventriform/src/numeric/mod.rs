@@ -3,11 +3,13 @@
 //! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
 //! - [`block_matrix`]: such systems of 3×3 blocks;
 //! - [`disjoint_sets`]: union-find on a list of parents;
+//! - [`lbfgs`]: the minimum of a smooth function within bounds;
 //! - [`order`]: order statistics;
 //! - [`round_step`]: round numbers for scales.
 
 pub mod block_matrix;
 pub mod conjugate_gradient;
 pub mod disjoint_sets;
+pub mod lbfgs;
 pub mod order;
 pub mod round_step;
