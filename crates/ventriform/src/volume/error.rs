@@ -125,6 +125,12 @@ pub enum VolumeError {
         /// Why they are not summed as gates of one heart beat, if the file says that they are none.
         why: Option<String>,
     },
+    /// A file of one volume where the gates of a beat are needed.
+    #[error("{file} holds one volume; a beat needs the gates of a study")]
+    NotGated {
+        /// The file's name.
+        file: String,
+    },
     /// The chosen volume does not exist.
     #[error("the file holds {frames} frames, counted from 0; there is no frame {frame}")]
     FrameOutOfRange {

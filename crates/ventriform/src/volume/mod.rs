@@ -50,6 +50,7 @@ pub mod dicom;
 pub mod error;
 pub mod facts;
 mod folder;
+pub mod gates;
 pub mod given_mask;
 mod limits;
 pub mod nifti;
@@ -68,13 +69,14 @@ pub use error::VolumeError;
 pub use facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
 };
+pub use gates::{GateTiming, GatedReading};
 pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
 pub use read::{
-    inspect, labels_are_rounded, preview_files, provenance, read, read_segment, segments, surface,
-    voxels_of_label,
+    inspect, labels_are_rounded, preview_files, provenance, read, read_gates, read_segment,
+    segments, surface, voxels_of_label,
 };
 pub use source::VolumeFile;
 pub use summary::summarise;

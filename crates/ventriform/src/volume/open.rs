@@ -7,6 +7,7 @@ use super::dicom::{Provenance, Segment};
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
+use super::gates::GateTiming;
 use super::limits::ReadOptions;
 use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;
@@ -94,6 +95,11 @@ pub(super) trait OpenVolume {
     /// the format does not say.
     fn why_not_gated(&self) -> Option<&str> {
         None
+    }
+
+    /// What the file says of the beats of gated volumes.
+    fn gate_timing(&self) -> GateTiming {
+        GateTiming::default()
     }
 
     /// The segments of a DICOM Segmentation; empty for all others.

@@ -1,6 +1,7 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
 use super::dicom::{DicomFile, Provenance, Segment};
+use super::gates::{GateTiming, GatedReading};
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
@@ -13,6 +14,9 @@ use crate::mesh::TriMesh;
 use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
 use std::cell::RefCell;
+
+/// Most files that are read as one gate each: no scanner makes more gates.
+const MOST_GATE_FILES: usize = 32;
 
 /// Reads one volume from `files`: a single file, a `.hdr` file and its `.img` file in any order, the
 /// DICOM files of a series, or a zip archive of any of these. Of several files, those that are no
@@ -35,6 +39,90 @@ pub fn read(
         reading.facts.intensity.labels = exact_labels(files, &reading, limits, monitor)?;
     }
     Ok(reading)
+}
+
+/// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
+/// order given. Volumes whose header says that they are no gates are refused unless `gated` says that they are.
+///
+/// # Errors
+/// [`VolumeError`], also for a single volume, and for gates that have together more voxels than a volume may.
+pub fn read_gates(
+    files: &[VolumeFile],
+    gated: bool,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<GatedReading, VolumeError> {
+    let opened = open(files, limits, monitor);
+    // Files of one gate each are not one volume.
+    let apart = (2..=MOST_GATE_FILES).contains(&files.len())
+        && match &opened {
+            Ok(opened) => opened.file.header().frames == 1,
+            Err(VolumeError::Cancelled(_)) => false,
+            Err(_) => true,
+        };
+    if apart {
+        return match one_by_one(files, limits, monitor) {
+            // What the files are together says more than that one of them is no volume.
+            Err(error) if !matches!(error, VolumeError::Cancelled(_)) => {
+                Err(opened.err().unwrap_or(error))
+            }
+            read => GatedReading::of(read?, GateTiming::default()),
+        };
+    }
+    let mut opened = opened?;
+    let header = opened.file.header();
+    let (frames, taken) = (header.frames, header.gated || gated);
+    let voxels = header.shape.iter().product::<usize>() as u64 * frames as u64;
+    if frames == 1 {
+        return Err(VolumeError::NotGated {
+            file: header.file.to_owned(),
+        });
+    }
+    if !taken {
+        let needed = VolumeError::FrameNeeded { frames, why: None };
+        return Err(open::because(needed, opened.file.why_not_gated()));
+    }
+    if voxels > limits.voxels {
+        return Err(VolumeError::TooLarge {
+            file: header.file.to_owned(),
+            what: "voxels in its gates",
+            asked: voxels,
+            limit: limits.voxels,
+        });
+    }
+    let timing = opened.file.gate_timing();
+    let one = |frame: usize| {
+        let options = ReadOptions { frame: Some(frame) };
+        open::read(&mut *opened.file, options, &monitor.part(frame, frames))
+    };
+    let mut readings: Vec<Reading> = (0..frames).map(one).collect::<Result<_, _>>()?;
+    readings[0].facts.warnings.append(&mut opened.notes);
+    GatedReading::of(readings, timing)
+}
+
+/// Reads files that hold one gate each, as long as they have together no more voxels than a volume may.
+fn one_by_one(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Vec<Reading>, VolumeError> {
+    let (mut readings, mut voxels) = (Vec::with_capacity(files.len()), 0);
+    for (index, file) in files.iter().enumerate() {
+        let part = monitor.part(index, files.len());
+        let own = std::slice::from_ref(file);
+        let reading = read(own, &ReadOptions::default(), limits, &part)?.usable()?;
+        voxels += reading.volume.voxels.len() as u64;
+        if voxels > limits.voxels {
+            return Err(VolumeError::TooLarge {
+                file: file.name().to_owned(),
+                what: "voxels in its gates",
+                asked: voxels,
+                limit: limits.voxels,
+            });
+        }
+        readings.push(reading);
+    }
+    Ok(readings)
 }
 
 /// The exact labels of the volume that was read as `reading`; `None` if there are too many.

@@ -48,6 +48,8 @@ const SEGMENT_SEQUENCE: Tag = Tag(0x0062, 0x0002);
 
 const DETECTOR_PATH: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
+/// The first R-R interval of a gated acquisition.
+const GATED_DATA: &[Tag] = &[Tag(0x0054, 0x0062), Tag(0x0054, 0x0063)];
 const PHARMACEUTICAL_PATH: &[Tag] = &[Tag(0x0054, 0x0016)];
 const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
 const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
@@ -113,6 +115,12 @@ attributes! {
     SOFTWARE_VERSIONS = &[], 0x0018, 0x1020, "Software Versions (0018,1020)";
     PROTOCOL_NAME = &[], 0x0018, 0x1030, "Protocol Name (0018,1030)";
     TRIGGER_TIME = &[], 0x0018, 0x1060, "Trigger Time (0018,1060)";
+    GATE_NOMINAL_INTERVAL = GATED_DATA, 0x0018, 0x1062, "Nominal Interval (0018,1062)";
+    GATE_FRAME_TIME = GATED_DATA, 0x0018, 0x1063, "Frame Time (0018,1063)";
+    GATE_LOW_RR = GATED_DATA, 0x0018, 0x1081, "Low R-R Value (0018,1081)";
+    GATE_HIGH_RR = GATED_DATA, 0x0018, 0x1082, "High R-R Value (0018,1082)";
+    GATE_INTERVALS_ACQUIRED = GATED_DATA, 0x0018, 0x1083, "Intervals Acquired (0018,1083)";
+    GATE_INTERVALS_REJECTED = GATED_DATA, 0x0018, 0x1084, "Intervals Rejected (0018,1084)";
     LOW_RR_VALUE = &[], 0x0018, 0x1081, "Low R-R Value (0018,1081)";
     B_VALUE = &[], 0x0018, 0x9087, "Diffusion b-value (0018,9087)";
     FLIP_ANGLE = &[], 0x0018, 0x1314, "Flip Angle (0018,1314)";

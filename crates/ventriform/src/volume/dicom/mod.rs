@@ -38,6 +38,7 @@ mod scan;
 mod segments;
 mod stack;
 mod syntax;
+mod timing;
 mod unknown;
 mod volumes;
 
@@ -64,6 +65,7 @@ use self::volumes::Marks;
 use super::VolumeError;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
+use super::gates::GateTiming;
 use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
@@ -84,6 +86,8 @@ pub(super) struct DicomFile {
     volumes: usize,
     /// Whether the volumes are gates of one heart beat.
     gated: bool,
+    /// What the file says of the beats, if it is gated.
+    timing: GateTiming,
     shape: [usize; 3],
     placement: Placement,
     provenance: Provenance,
@@ -249,6 +253,7 @@ impl DicomFile {
             content,
             volumes,
             gated: volumes > 1 && scan.kind == Kind::Nuclear { gated: true },
+            timing: timing::of(a)?,
             shape: [columns, rows, slices],
             placement,
             provenance: Provenance::of(a),
@@ -332,6 +337,7 @@ impl DicomFile {
             content: Content::Slices(stored.collect()),
             volumes,
             gated: false,
+            timing: GateTiming::default(),
             shape: [extent[0], extent[1], stack.slices],
             placement: stack.placement,
             provenance: first.provenance,
@@ -728,6 +734,10 @@ impl OpenVolume for DicomFile {
             unit: LengthUnit::Millimetre,
             warnings: &self.warnings,
         }
+    }
+
+    fn gate_timing(&self) -> GateTiming {
+        self.timing.clone()
     }
 
     fn provenance(&self, frame: usize) -> Option<Provenance> {
