@@ -2,6 +2,7 @@
 
 mod audit;
 mod bar;
+mod beat;
 mod calibrate;
 mod cohort_args;
 mod data_args;
@@ -58,6 +59,7 @@ enum Command {
     Demo(demo::DemoArgs),
     Generate(Box<generate::GenerateArgs>),
     Segment(Box<segment::SegmentArgs>),
+    Beat(Box<beat::BeatArgs>),
     Inspect(inspect::InspectArgs),
     Measure(measure::MeasureArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
@@ -94,6 +96,7 @@ pub fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Generate(args) => generate::run(&args),
         Command::Segment(args) => segment::run(&args),
+        Command::Beat(args) => beat::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -70,9 +70,9 @@ pub struct SegmentArgs {
 }
 
 /// The word that stands for the built-in hearts.
-const MODEL_AUTO: &str = FitParameters::AUTO;
+pub(super) const MODEL_AUTO: &str = FitParameters::AUTO;
 
-fn parse_format(text: &str) -> Result<Format, String> {
+pub(super) fn parse_format(text: &str) -> Result<Format, String> {
     Format::from_extension(text).ok_or_else(|| {
         let names = Format::ALL.map(Format::extension).join(", ");
         format!("give one of {names}")
@@ -142,7 +142,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
 }
 
 /// Reads a model.
-fn mesh(path: &Path, stated: &MeshStatement, limits: &ReadLimits) -> Result<NamedMesh> {
+pub(super) fn mesh(path: &Path, stated: &MeshStatement, limits: &ReadLimits) -> Result<NamedMesh> {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     Ok(NamedMesh {
         name: stem.to_string_lossy().into_owned(),

@@ -92,6 +92,12 @@ const LIBRARY: &[(&str, &[&str])] = &[
     ("fit", &["progress", "grid", "model", "deform", "judge"]),
     ("polar", &["geometry", "grid", "draw", "locate", "model"]),
     (
+        "beat",
+        &[
+            "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
+        ],
+    ),
+    (
         "reader",
         &["geometry", "mesh", "progress", "grid", "model", "deform"],
     ),
@@ -129,6 +135,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "deform",
             "judge",
             "polar",
+            "beat",
             "reader",
             "parameters",
         ],
@@ -175,6 +182,25 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "report",
             "parameters",
             "pipeline",
+        ],
+    ),
+    (
+        "gated",
+        &[
+            "numeric",
+            "mesh",
+            "progress",
+            "grid",
+            "volume",
+            "locate",
+            "export",
+            "model",
+            "deform",
+            "polar",
+            "beat",
+            "report",
+            "parameters",
+            "segmentation",
         ],
     ),
     (

@@ -135,6 +135,8 @@ pub mod fit;
 
 pub mod polar;
 
+pub mod beat;
+
 pub mod reader;
 
 pub mod parameters;
@@ -146,6 +148,8 @@ pub mod export;
 pub mod pipeline;
 
 pub mod segmentation;
+
+pub mod gated;
 
 pub mod evaluate;
 

@@ -28,6 +28,8 @@ pub enum Stage {
     Align,
     /// Deforming the model until it comes to rest.
     Deform,
+    /// Fitting one wall to all gates of a beat.
+    Beat,
     /// Sampling the wall for the polar map.
     Polar,
     /// Measuring the result.
@@ -38,7 +40,7 @@ pub enum Stage {
 
 impl Stage {
     /// Every stage, in order.
-    pub const ALL: [Stage; 10] = [
+    pub const ALL: [Stage; 11] = [
         Stage::Read,
         Stage::Surface,
         Stage::Retile,
@@ -46,6 +48,7 @@ impl Stage {
         Stage::Localise,
         Stage::Align,
         Stage::Deform,
+        Stage::Beat,
         Stage::Polar,
         Stage::Report,
         Stage::Export,
@@ -61,6 +64,7 @@ impl Stage {
             Stage::Localise => "localise",
             Stage::Align => "align",
             Stage::Deform => "deform",
+            Stage::Beat => "beat",
             Stage::Polar => "polar",
             Stage::Report => "report",
             Stage::Export => "export",
@@ -93,6 +97,20 @@ impl Plan {
         (Stage::Polar, 0.05),
         (Stage::Report, 0.05),
         (Stage::Export, 0.05),
+    ]);
+}
+
+impl Plan {
+    /// A beat: the gates' sum segmented, and one wall fitted to all gates.
+    pub const BEAT: Plan = Plan(&[
+        (Stage::Read, 0.05),
+        (Stage::Localise, 0.08),
+        (Stage::Align, 0.02),
+        (Stage::Deform, 0.08),
+        (Stage::Beat, 0.67),
+        (Stage::Polar, 0.03),
+        (Stage::Report, 0.04),
+        (Stage::Export, 0.03),
     ]);
 }
 
@@ -265,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_completed_fraction_grows_from_zero_to_one() {
-        for plan in [Plan::GENERATION, Plan::SEGMENTATION] {
+        for plan in [Plan::GENERATION, Plan::SEGMENTATION, Plan::BEAT] {
             let total = TotalProgress::new(plan);
             let mut last = 0.0;
             for (stage, _) in plan.0 {

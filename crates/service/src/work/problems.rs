@@ -10,9 +10,11 @@ use crate::jobs::WorkError;
 use crate::records::{Failure, Fault};
 use std::error::Error;
 use std::fmt::Display;
+use ventriform::beat::BeatError;
 use ventriform::deform::DeformError;
 use ventriform::export::dicom::{DicomError, StatedIdentity};
 use ventriform::export::read_json::ReadMeshError;
+use ventriform::gated::GatedError;
 use ventriform::locate::LocateError;
 use ventriform::mesh_files::MeshFileError;
 use ventriform::model::{Organ, TemplateError};
@@ -87,6 +89,7 @@ impl Explain for VolumeError {
             }
             VolumeError::SingleSlice { .. } => (Fault::Content, "single-slice"),
             VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
+            VolumeError::NotGated { .. } => (Fault::Content, "not-gated"),
             VolumeError::FrameOutOfRange { .. } => (Fault::Request, "frame-out-of-range"),
             VolumeError::Unsupported { .. } | VolumeError::NotVolume { .. } => {
                 (Fault::Content, "unsupported-format")
@@ -227,6 +230,60 @@ impl Explain for SegmentationError {
 
     fn is_cancelled(&self) -> bool {
         SegmentationError::is_cancelled(self)
+    }
+}
+
+impl Explain for GatedError {
+    fn explain(&self) -> Failure {
+        match self {
+            GatedError::Volume(error) => error.explain(),
+            GatedError::Segmentation(error) => error.explain(),
+            GatedError::Beat(error) => {
+                let (kind, advice) = beat_advice(error);
+                failure(kind, self, None, advice.into())
+            }
+            GatedError::Files(_) => {
+                failure((Fault::Service, "unwritable"), self, None, String::new())
+            }
+            GatedError::Parameter {
+                name,
+                least,
+                greatest,
+                ..
+            } => {
+                let advice = format!("Give a number from {least} to {greatest}, or leave it out.");
+                failure(
+                    (Fault::Request, "invalid-parameter"),
+                    self,
+                    Some(name),
+                    advice,
+                )
+            }
+            GatedError::Cancelled(_) => failure(CANCELLED_FAILURE, self, None, START_AGAIN.into()),
+        }
+    }
+}
+
+fn beat_advice(error: &BeatError) -> ((Fault, &'static str), &'static str) {
+    match error {
+        BeatError::GateCount { .. } => (
+            (Fault::Content, "gate-count"),
+            "Send the gated series as it was reconstructed, usually with 8 or 16 gates; one volume of the whole beat is \
+             for a segmentation.",
+        ),
+        BeatError::OtherGrid { .. } => (
+            (Fault::Content, "gates-differ"),
+            "Reconstruct all gates on one grid.",
+        ),
+        BeatError::EmptyGate { .. } => (
+            (Fault::Content, "empty-gate"),
+            "Leave the gate out if the study has others, or reconstruct it again.",
+        ),
+        BeatError::NoVentricle => (
+            (Fault::Request, "no-ventricle"),
+            "Give a model of a left ventricle, or leave `model` out.",
+        ),
+        BeatError::Cancelled => (CANCELLED_FAILURE, START_AGAIN),
     }
 }
 
@@ -634,6 +691,9 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::FrameNeeded { frames, .. } | VolumeError::FrameOutOfRange { frames, .. } => {
             let last = frames.saturating_sub(1);
             format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
+        }
+        VolumeError::NotGated { .. } => {
+            "Give the gated series (6 to 32 volumes of one heart beat in one file, or one file for each gate).".into()
         }
         VolumeError::ImageMissing { .. } => {
             "Give the .hdr and the .img together, or a single .nii.".into()

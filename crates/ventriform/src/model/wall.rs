@@ -50,6 +50,27 @@ pub struct WallPlace {
     pub direction: Vec3,
 }
 
+/// Where the rays of a wall start and how they run: a point has an arc (how far from the apex along the wall, mm), an
+/// angle about the axis and a distance from the start of the ray through it.
+///
+/// Apical of the focus the rays fan out from it and the arc is `cap_radius` times the angle from the axis; basal of it
+/// they run across the axis and the arc grows by 1 mm for each along it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RayCoordinates {
+    /// The point on the axis from which the rays of the apical cap start, LPS mm.
+    pub focus: Vec3,
+    /// Unit direction from base to apex.
+    pub axis: Vec3,
+    /// Unit direction to the patient's lateral side, across the axis: angle 0.
+    pub lateral: Vec3,
+    /// Unit direction to the anterior wall, across the axis: a quarter turn.
+    pub anterior: Vec3,
+    /// Distance from the focus to the outer apex, mm.
+    pub cap_radius: f64,
+    /// Arc of the mean rim, mm.
+    pub rim_arc: f64,
+}
+
 /// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VentricleWall {
@@ -152,6 +173,19 @@ impl VentricleWall {
             rays,
             frame,
         })
+    }
+
+    /// The coordinates of the rays.
+    pub fn coordinates(&self) -> RayCoordinates {
+        let frame = &self.frame;
+        RayCoordinates {
+            focus: frame.centre + frame.axis * frame.focus,
+            axis: frame.axis,
+            lateral: frame.lateral,
+            anterior: frame.anterior,
+            cap_radius: frame.apex - frame.focus,
+            rim_arc: frame.arc() + frame.focus - frame.rim,
+        }
     }
 
     /// How far `point` lies from the cup's centre along the axis towards the apex, mm.

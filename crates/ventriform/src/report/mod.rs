@@ -14,6 +14,7 @@
 //! millilitres, as the names' endings say. Everything but `timings_ms` is the same for the
 //! same input, parameters and seed, whatever the number of threads.
 
+mod beat_report;
 pub mod closeness;
 pub mod distance;
 mod distance_pictures;
@@ -33,6 +34,10 @@ mod summaries;
 pub mod summary;
 mod whose;
 
+pub use beat_report::{
+    BeatParts, BeatReport, CurvePoint, GateReport, PhaseReport, RatesReport, SegmentMotionReport,
+    TimingReport,
+};
 pub use closeness::{Closeness, MeasuredSurface};
 pub use distance_pictures::vertex_colours;
 pub use fit_report::{

@@ -191,10 +191,10 @@ pub struct SegmentationParts {
     pub warnings: Vec<String>,
 }
 
-/// Density of the myocardium, g/ml.
-const MYOCARDIAL_DENSITY: f64 = 1.05;
-
 impl SegmentationReport {
+    /// Density of the myocardium, g/ml.
+    pub const MYOCARDIAL_DENSITY_G_PER_ML: f64 = 1.05;
+
     /// Joins the figures of `fit` to the other parts.
     pub fn new(fit: &Fit, parts: SegmentationParts) -> Self {
         let (fit, judgement) = (&fit.model, &fit.judgement);
@@ -209,7 +209,8 @@ impl SegmentationReport {
             fit: FitReport::of(fit, judgement),
             evidence: EvidenceReport::of(judgement),
             volumes_ml: FittedVolumes::of(fit),
-            mass_g: anatomical.map(|surface| round(MYOCARDIAL_DENSITY * surface.wall_ml)),
+            mass_g: anatomical
+                .map(|surface| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),
             thickness_mm: Thicknesses::of(fit),
             uncertainty_mm: Uncertainties::of(judgement),

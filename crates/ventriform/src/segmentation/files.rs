@@ -388,6 +388,17 @@ impl SegmentedVolume {
     }
 }
 
+impl SegmentationFilesError {
+    /// A file of labels, or why it cannot be written.
+    pub(crate) fn nifti(
+        name: String,
+        bytes: Result<Vec<u8>, MaskError>,
+    ) -> Result<NamedFile, Self> {
+        let file = nifti_file(LABELS_FILE, bytes)?;
+        Ok(NamedFile { name, ..file })
+    }
+}
+
 fn nifti_file(
     name: &'static str,
     bytes: Result<Vec<u8>, MaskError>,
@@ -402,7 +413,7 @@ fn nifti_file(
     })
 }
 
-fn json_file(name: &str, document: &impl Serialize) -> NamedFile {
+pub(crate) fn json_file(name: &str, document: &impl Serialize) -> NamedFile {
     let text = serde_json::to_string_pretty(document).expect("every key of a document is a text");
     NamedFile {
         name: name.into(),

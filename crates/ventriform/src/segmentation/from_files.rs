@@ -96,7 +96,7 @@ pub fn from_files(
         reader: order.reader.clone(),
     };
     check_reader(order)?;
-    let (templates, refused) = prepare(order, monitor)?;
+    let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
     let (expert, mask) = expert.unzip();
     let mut segmentation = segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor)?;
     segmentation.refused.splice(0..0, refused);

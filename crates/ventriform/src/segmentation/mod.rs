@@ -44,9 +44,11 @@ mod error;
 
 pub use cavity::cavity;
 pub use error::SegmentationError;
+pub(crate) use files::json_file;
 pub use files::{NamedFile, SegmentationFilesError};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use order::{NamedMesh, NamedReader, SegmentationOrder};
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
+pub use templates::prepare;

@@ -3,26 +3,27 @@
 use super::built_in;
 use super::error::SegmentationError;
 use super::named_template::{NamedTemplate, RefusedTemplate};
-use super::order::{NamedMesh, SegmentationOrder};
+use super::order::NamedMesh;
 use crate::model::{Organ, Template, TemplateError};
 use crate::progress::Monitor;
 
-/// The built-in hearts and the templates of the order's models, and the models that were left out.
+/// The built-in hearts, if `auto`, and the templates of `models`, and the models that were left out.
 ///
 /// # Errors
 /// [`SegmentationError::NoModel`] without any model; [`SegmentationError::UnsuitableModel`] where
 /// none can be used, or one that must be; [`SegmentationError::Cancelled`].
 pub fn prepare(
-    order: &SegmentationOrder<'_>,
+    auto: bool,
+    models: &[NamedMesh],
+    organ: Organ,
     monitor: &Monitor<'_>,
 ) -> Result<(Vec<NamedTemplate>, Vec<RefusedTemplate>), SegmentationError> {
-    let organ = order.parameters.organ;
-    let mut templates = if order.auto && organ == Organ::LeftVentricle {
+    let mut templates = if auto && organ == Organ::LeftVentricle {
         built_in::templates(monitor)?
     } else {
         Vec::new()
     };
-    if templates.is_empty() && order.models.is_empty() {
+    if templates.is_empty() && models.is_empty() {
         return Err(SegmentationError::NoModel {
             organ: organ.as_str(),
         });
@@ -33,7 +34,7 @@ pub fn prepare(
         name,
         mesh,
         required,
-    } in &order.models
+    } in models
     {
         let name = name.clone();
         match Template::new(mesh.clone(), organ, monitor) {

@@ -35,4 +35,6 @@ mod quality;
 
 mod reader;
 
+mod beat;
+
 mod evaluate_reference;

@@ -1,0 +1,85 @@
+//! A mesh of the summed image's wall, carried through the beat.
+//!
+//! In: a mesh whose nodes lie in the wall of the summed image. Out: the same nodes and triangles at any moment. A node
+//! keeps its ray and the share of the wall's thickness at which it lies, so the order of nodes along a ray never
+//! changes, and the mesh encloses the muscle that the fit keeps.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between};
+use super::fit::rim_at;
+use super::start::StillWall;
+use crate::geometry::Vec3;
+use crate::model::wall::{self, RayCoordinates, VentricleWall};
+
+/// Shares of the thickness beyond the wall that a node may have: nodes of a smooth surface lie a little beside the
+/// rays' means.
+const SHARES: [f64; 2] = [-0.5, 1.5];
+
+/// The nodes of a mesh in the coordinates of the wall.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CarriedNodes(Vec<CarriedNode>);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct CarriedNode {
+    /// Arc as a share of the rim's.
+    arc_share: f64,
+    /// Turns about the axis from the lateral side.
+    turn: f64,
+    /// Share of the thickness between the inner (0) and the outer surface (1).
+    depth: f64,
+}
+
+impl CarriedNodes {
+    /// `vertices` lie in `wall`, whose distances at the nodes of the fields are `still`.
+    pub fn of(vertices: &[Vec3], wall: &VentricleWall, still: &StillWall, rows: usize) -> Self {
+        let [inner, outer]: [Vec<f64>; 2] =
+            [0, 1].map(|side| still.walls.iter().map(|ends| ends[side]).collect());
+        let node = |point: &Vec3| {
+            let place = wall.place(point);
+            let arc = (place.row + 0.5) * wall.row_spacing;
+            // The ray of column n lies in the middle of its sector.
+            let turn = (place.column + 0.5) / wall::COLUMNS as f64;
+            let column = turn * COLUMNS as f64 % COLUMNS as f64;
+            let nodes = between(rows, arc / ROW_SPACING_MM, column);
+            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
+            let (enters, leaves) = (value(&inner), value(&outer));
+            let depth = (place.distance - enters) / (leaves - enters).max(1e-6);
+            CarriedNode {
+                arc_share: arc / rim_at(&still.rim, column).max(1e-6),
+                turn,
+                depth: depth.clamp(SHARES[0], SHARES[1]),
+            }
+        };
+        Self(vertices.iter().map(node).collect())
+    }
+
+    /// The nodes in a wall, LPS mm.
+    pub fn at(
+        &self,
+        coordinates: &RayCoordinates,
+        layout: &Layout,
+        state: &WallState,
+        rim: &[f64],
+    ) -> Vec<Vec3> {
+        let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
+        let place = |node: &CarriedNode| {
+            let column = node.turn * COLUMNS as f64 % COLUMNS as f64;
+            let arc = node.arc_share * rim_at(rim, column);
+            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
+            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
+            let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
+            let distance = (mid + (node.depth - 0.5) * thick).max(0.0);
+            let (sin, cos) = (TAU * node.turn).sin_cos();
+            let across = coordinates.lateral * cos + coordinates.anterior * sin;
+            if arc < cap_arc {
+                let (s, c) = (arc / coordinates.cap_radius).sin_cos();
+                coordinates.focus + (coordinates.axis * c + across * s) * distance
+            } else {
+                let basal = (arc - cap_arc) * state.stretch;
+                coordinates.focus - coordinates.axis * basal + across * distance
+            }
+        };
+        self.0.iter().map(place).collect()
+    }
+}

@@ -1,0 +1,531 @@
+//! The fit of one wall to all gates.
+//!
+//! In: a [`GatedStudy`], the anatomical wall of its summed image, the image's resolution. Out: a [`BeatFit`]: the wall
+//! at every moment of the beat. The steps:
+//!
+//! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis.
+//! 2. The fit starts from the summed image's wall, which stands still, with its calibrated thickness.
+//! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's stretch,
+//!    activity beside the wall, the gates' factors. It ends when EF has come to rest: the value falls by 95 per cent
+//!    in 60 steps while the motion is still a fifth too small.
+//!
+//! Guaranteed: the muscle of every column is the same at every moment; the same study gives the same figures on any
+//! number of threads.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
+
+use super::carried::CarriedNodes;
+use super::error::BeatError;
+use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, harmonics};
+use super::image::HeartGrid;
+use super::moment::WallMoment;
+use super::objective::{Objective, Observed, Priors};
+use super::order::share_as_smooth;
+use super::start::StillWall;
+use super::study::GatedStudy;
+use crate::geometry::Vec3;
+use crate::grid::Volume;
+use crate::grid::field::Field;
+use crate::mesh::TriMesh;
+use crate::model::wall::VentricleWall;
+use crate::numeric::lbfgs;
+use crate::progress::{Cancelled, Monitor, Stage};
+use rayon::prelude::*;
+
+/// Grid beyond the apex, the base and the wall, mm.
+const GRID_MARGIN_MM: f64 = 20.0;
+/// Distance from the middle of the wall up to which voxels count, and from which they count half, mm.
+const REACH_MM: [f64; 2] = [14.0, 10.0];
+/// Arc beyond the rim up to which voxels count, mm.
+const BEYOND_RIM_MM: f64 = 8.0;
+/// Steps after which EF is looked at, and the change of EF between two looks that counts as rest.
+const STEPS_BETWEEN_LOOKS: usize = 20;
+const EF_AT_REST: f64 = 0.002;
+/// Fits until a known volume of muscle is met, and the deviation of the thickness in them, mm.
+const MUSCLE_FITS: usize = 2;
+const KNOWN_THICKNESS_SD_MM: f64 = 0.1;
+/// Moments of the curve from which EF is taken.
+const CURVE_MOMENTS: usize = 48;
+
+/// Parameters of [`fit`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeatParameters {
+    /// Weights of what is known of walls.
+    pub priors: Priors,
+    /// Harmonics of the motion; `None`: 3, or 4 from 16 gates on.
+    pub harmonics: Option<usize>,
+    /// Most steps, 1..=2000. Default 400.
+    pub max_steps: usize,
+    /// Volume of the muscle, ml, where it is known. Default: that of the summed image's anatomical wall.
+    pub muscle_ml: Option<f64>,
+}
+
+impl Default for BeatParameters {
+    fn default() -> Self {
+        Self {
+            priors: Priors::default(),
+            harmonics: None,
+            max_steps: 400,
+            muscle_ml: None,
+        }
+    }
+}
+
+/// A wall that was fitted to all gates.
+#[derive(Debug)]
+pub struct BeatFit {
+    objective: Objective,
+    unknowns: Vec<f64>,
+    row_spacing: f64,
+    still: StillWall,
+    /// Share of the orders of the gates that are as smooth as theirs ([`super::order`]).
+    pub orders_as_smooth: f64,
+    /// Share of the voxels about the wall that lie outside of the volume.
+    pub share_outside: f64,
+    /// Steps made.
+    pub steps: usize,
+    /// The function's value at the start and at the end, and the part of the latter that the images make.
+    pub values: [f64; 3],
+}
+
+/// Volumes at a moment, ml.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Volumes {
+    /// The cavity, up to the rim.
+    pub cavity_ml: f64,
+    /// The muscle.
+    pub wall_ml: f64,
+}
+
+/// Fits the wall of the summed image to all gates of `study`. `resolution_mm` is the full width at half maximum of a
+/// point in the gates.
+///
+/// # Errors
+/// [`BeatError::Cancelled`].
+pub fn fit(
+    study: &GatedStudy,
+    wall: &VentricleWall,
+    resolution_mm: f64,
+    parameters: &BeatParameters,
+    monitor: &Monitor,
+) -> Result<BeatFit, BeatError> {
+    monitor.report(Stage::Beat, 0.0)?;
+    let coordinates = wall.coordinates();
+    let count = study.gates.len();
+    let usual = if count < 16 { 3 } else { 4 };
+    let harmonic_count = parameters.harmonics.unwrap_or(usual);
+    let layout = Layout::new(&coordinates, harmonic_count, count);
+    let still = StillWall::of(
+        wall,
+        &layout,
+        &Field::cut_out(&study.sum, None, 0.0, monitor)?,
+    );
+    let outermost = still.walls.iter().map(|w| w[1]).fold(0.0, f64::max);
+    let basal = coordinates.rim_arc - FRAC_PI_2 * coordinates.cap_radius;
+    let grid = HeartGrid::new(
+        &coordinates,
+        basal + GRID_MARGIN_MM,
+        GRID_MARGIN_MM,
+        outermost + GRID_MARGIN_MM,
+    );
+    let scale = bright(&still.peaks) / count as f64;
+    let images = (study.gates.par_iter().zip(&study.factors))
+        .map(|(gate, factor)| {
+            monitor.check()?;
+            let value = |p: &Vec3| (cubic(gate, p) * factor / scale) as f32;
+            Ok(grid.points.iter().map(value).collect())
+        })
+        .collect::<Result<Vec<Vec<f32>>, Cancelled>>()?;
+    let weights = (grid.positions())
+        .map(|(arc, column, distance)| {
+            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
+            let mid: f64 = nodes.iter().map(|(n, w)| w * still.mid_wall(*n)).sum();
+            let far = distance - mid;
+            if far >= REACH_MM[0] || arc >= coordinates.rim_arc + BEYOND_RIM_MM {
+                0.0
+            } else if far > REACH_MM[1] {
+                0.5
+            } else {
+                1.0
+            }
+        })
+        .collect();
+    let width = 1.0 / count as f64;
+    let bases = (0..count)
+        .map(|gate| harmonics(harmonic_count, (gate as f64 + 0.5) * width, width))
+        .collect();
+    let priors = &parameters.priors;
+    let relative: Vec<f64> = (still.peaks.iter())
+        .map(|peak| peak / (scale * count as f64))
+        .collect();
+    let start = start_of(&layout, &still, &relative, resolution_mm, priors);
+    let observed = Observed {
+        images,
+        gate_weights: (study.counted().iter())
+            .map(|counted| f64::from(u8::from(*counted)))
+            .collect(),
+        weights,
+        bases,
+        rim: still.rim.clone(),
+        dark: dark_nodes(&layout, &still, &relative),
+    };
+    let orders_as_smooth = share_as_smooth(&observed.images, &observed.weights);
+    let share_outside = share_outside(&study.sum, &grid.points, &observed.weights);
+    let objective = Objective::new(
+        layout,
+        coordinates,
+        grid,
+        resolution_mm,
+        observed,
+        priors.clone(),
+    );
+    let mut made = minimise(objective, start, parameters.max_steps, monitor)?;
+    if let Some(muscle_ml) = parameters.muscle_ml {
+        for _ in 0..MUSCLE_FITS {
+            let Minimised {
+                objective,
+                unknowns,
+                ..
+            } = made;
+            let still = vec![0.0; 2 * harmonic_count];
+            let found_ml = volumes(&objective, &unknowns, &still).wall_ml;
+            let mean = objective.mean_thickness(&unknowns) * muscle_ml / found_ml;
+            let objective = objective.with_mean_thickness(mean, KNOWN_THICKNESS_SD_MM);
+            made = minimise(objective, unknowns, parameters.max_steps, monitor)?;
+        }
+    }
+    let Minimised {
+        objective,
+        unknowns,
+        steps,
+        values,
+    } = made;
+    Ok(BeatFit {
+        objective,
+        unknowns,
+        row_spacing: wall.row_spacing,
+        still,
+        orders_as_smooth,
+        share_outside,
+        steps,
+        values,
+    })
+}
+
+/// Share of the weight of `points` that lies outside of the volume.
+fn share_outside(volume: &Volume, points: &[Vec3], weights: &[f32]) -> f64 {
+    let outside = |point: &Vec3| {
+        let index = volume.frame.to_voxel(point);
+        (0..3).any(|axis| index[axis] < -0.5 || index[axis] > volume.shape[axis] as f64 - 0.5)
+    };
+    let (mut whole, mut beyond) = (0.0, 0.0);
+    for (point, weight) in points
+        .iter()
+        .zip(weights)
+        .filter(|(_, weight)| **weight > 0.0)
+    {
+        whole += f64::from(*weight);
+        beyond += if outside(point) {
+            f64::from(*weight)
+        } else {
+            0.0
+        };
+    }
+    beyond / f64::max(whole, 1.0)
+}
+
+/// The unknowns at the lowest value found.
+struct Minimised {
+    objective: Objective,
+    unknowns: Vec<f64>,
+    steps: usize,
+    values: [f64; 3],
+}
+
+fn minimise(
+    objective: Objective,
+    start: Vec<f64>,
+    max_steps: usize,
+    monitor: &Monitor,
+) -> Result<Minimised, BeatError> {
+    let (scales, bounds) = scales_and_bounds(&objective.layout, &start);
+    let unscaled =
+        |point: &[f64]| -> Vec<f64> { point.iter().zip(&scales).map(|(y, s)| y * s).collect() };
+    let mut first = None;
+    let mut last_ef = f64::NAN;
+    let found = lbfgs::minimise(
+        start.iter().zip(&scales).map(|(x, s)| x / s).collect(),
+        &bounds,
+        |point, gradient| {
+            let value = objective.evaluate(&unscaled(point), gradient, monitor)?;
+            gradient.iter_mut().zip(&scales).for_each(|(g, s)| *g *= s);
+            first.get_or_insert(value);
+            Ok::<_, Cancelled>(value)
+        },
+        |point, steps| {
+            monitor.report(Stage::Beat, steps as f64 / max_steps as f64)?;
+            if steps % STEPS_BETWEEN_LOOKS == 0 {
+                let ef = ejection_fraction(&curve(&objective, &unscaled(point), CURVE_MOMENTS));
+                if (ef - last_ef).abs() < EF_AT_REST {
+                    return Ok(true);
+                }
+                last_ef = ef;
+            }
+            Ok(steps >= max_steps)
+        },
+    )?;
+    let unknowns = unscaled(&found.point);
+    monitor.report(Stage::Beat, 1.0)?;
+    Ok(Minimised {
+        values: [
+            first.unwrap_or(f64::NAN),
+            found.value,
+            objective.misfit(&unknowns, monitor)?,
+        ],
+        unknowns,
+        steps: found.steps,
+        objective,
+    })
+}
+
+/// A value that a tenth of the wall exceeds.
+fn bright(peaks: &[f64]) -> f64 {
+    let mut sorted = peaks.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() * 9 / 10].max(1e-9)
+}
+
+/// Uptake of the wall where it is as thick as in the mean, from the largest value on the way through it: blur spreads
+/// a wall thinner than the resolution.
+fn start_of(
+    layout: &Layout,
+    still: &StillWall,
+    relative: &[f64],
+    resolution_mm: f64,
+    priors: &Priors,
+) -> Vec<f64> {
+    /// Activity outside of the wall and in the cavity, as shares of the wall's.
+    const OUTSIDE: f64 = 0.15;
+    const BLOOD: f64 = 0.12;
+    let thickness = priors.mean_thickness_mm;
+    let recovered = (thickness / (0.95 * resolution_mm)).min(1.0);
+    let mut unknowns = vec![0.0; layout.len()];
+    for node in 0..layout.nodes() {
+        unknowns[layout.mid_wall().start + node] = still.mid_wall(node);
+        unknowns[layout.thickness().start + node] = thickness;
+        let peak = relative[node].clamp(0.05, 1.5);
+        unknowns[layout.uptake().start + node] = (peak / recovered).ln();
+        unknowns[layout.outside().start + node] = OUTSIDE.ln();
+    }
+    unknowns[layout.rim()].copy_from_slice(&still.rim);
+    unknowns[layout.blood()] = BLOOD.ln();
+    unknowns
+}
+
+/// How far each node lies in wall too dark to show its motion, 0..=1. The rim looks dark because it ends there.
+fn dark_nodes(layout: &Layout, still: &StillWall, relative: &[f64]) -> Vec<f64> {
+    const DARK_UPTAKE: f64 = 0.45;
+    const DARK_BLEND: f64 = 0.1;
+    const RIM_MARGIN_MM: f64 = 15.0;
+    (0..layout.nodes())
+        .map(|node| {
+            let arc = (node / COLUMNS) as f64 * ROW_SPACING_MM;
+            let from_rim = still.rim[node % COLUMNS] - RIM_MARGIN_MM - arc;
+            let inside = (from_rim / ROW_SPACING_MM).clamp(0.0, 1.0);
+            inside * ((DARK_UPTAKE - relative[node]) / DARK_BLEND).clamp(0.0, 1.0)
+        })
+        .collect()
+}
+
+/// By what each unknown is divided so that all change about equally, and its bounds after that.
+fn scales_and_bounds(layout: &Layout, start: &[f64]) -> (Vec<f64>, Vec<[f64; 2]>) {
+    let mut scales = vec![1.0; layout.len()];
+    let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; layout.len()];
+    let mut set = |range: Range<usize>, scale: f64, bound: [f64; 2]| {
+        scales[range.clone()].fill(scale);
+        bounds[range].fill(bound.map(|bound| bound / scale));
+    };
+    let rim = start[layout.rim()].iter().sum::<f64>() / COLUMNS as f64;
+    set(layout.mid_wall(), 1.0, [5.0, 60.0]);
+    set(layout.thickness(), 1.0, [3.0, 18.0]);
+    set(layout.uptake(), 0.15, [-4.0, 1.5]);
+    set(layout.outside(), 0.3, [-5.0, 0.5]);
+    for index in 0..2 * layout.harmonics {
+        set(layout.motion(index), 1.0, [-8.0, 8.0]);
+    }
+    set(layout.rim(), 2.0, [rim - 15.0, rim + 15.0]);
+    set(layout.stretch(), 0.03, [-0.2, 0.2]);
+    set(layout.blood()..layout.blood() + 1, 0.3, [-4.0, -0.5]);
+    set(layout.gains(), 0.02, [-0.2, 0.2]);
+    (scales, bounds)
+}
+
+/// The share of the largest volume of a curve that is ejected.
+pub(super) fn ejection_fraction(curve: &[Volumes]) -> f64 {
+    let cavities = curve.iter().map(|volumes| volumes.cavity_ml);
+    let (least, most) = cavities.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+    1.0 - least / most
+}
+
+fn curve(objective: &Objective, unknowns: &[f64], moments: usize) -> Vec<Volumes> {
+    (0..moments)
+        .map(|moment| {
+            let turns = moment as f64 / moments as f64;
+            let basis = harmonics(objective.layout.harmonics, turns, 0.0);
+            volumes(objective, unknowns, &basis)
+        })
+        .collect()
+}
+
+impl BeatFit {
+    /// Volumes at `moments` equal steps of the beat, the first at the beginning of the first gate.
+    pub fn curve(&self, moments: usize) -> Vec<Volumes> {
+        curve(&self.objective, &self.unknowns, moments)
+    }
+
+    /// Volumes of each gate, in the mean over its width.
+    pub fn gates(&self) -> Vec<Volumes> {
+        let bases = self.objective.bases().iter();
+        bases
+            .map(|basis| volumes(&self.objective, &self.unknowns, basis))
+            .collect()
+    }
+
+    /// The factor of each gate's counts that the fit found beyond equal totals.
+    pub fn gains(&self) -> Vec<f64> {
+        let gains = self.unknowns[self.objective.layout.gains()].iter();
+        gains.map(|gain| gain.exp()).collect()
+    }
+
+    /// The wall at `turns` of the beat, on the rays of the summed image's wall.
+    pub fn moment(&self, turns: f64) -> WallMoment {
+        let basis = harmonics(self.objective.layout.harmonics, turns, 0.0);
+        self.wall_of(&basis)
+    }
+
+    /// The wall in the mean over a gate, from 0.
+    pub fn gate(&self, gate: usize) -> WallMoment {
+        self.wall_of(&self.objective.bases()[gate])
+    }
+
+    /// Number of gates.
+    pub fn gate_count(&self) -> usize {
+        self.objective.layout.gates
+    }
+
+    /// `mesh`, whose nodes lie in `wall`, the summed image's, in the mean over each gate.
+    pub fn carried(&self, mesh: &TriMesh, wall: &VentricleWall) -> Vec<TriMesh> {
+        let layout = &self.objective.layout;
+        let nodes = CarriedNodes::of(&mesh.vertices, wall, &self.still, layout.rows);
+        let rim = &self.unknowns[layout.rim()];
+        let moved = |basis: &Vec<f64>| {
+            let state = self
+                .objective
+                .conservation
+                .state(layout, &self.unknowns, basis);
+            TriMesh {
+                vertices: nodes.at(&self.objective.coordinates, layout, &state, rim),
+                ..mesh.clone()
+            }
+        };
+        self.objective.bases().iter().map(moved).collect()
+    }
+
+    fn wall_of(&self, basis: &[f64]) -> WallMoment {
+        let layout = &self.objective.layout;
+        let state = self
+            .objective
+            .conservation
+            .state(layout, &self.unknowns, basis);
+        WallMoment::of(
+            &self.objective.coordinates,
+            layout,
+            &state,
+            &self.unknowns[layout.rim()],
+            self.row_spacing,
+        )
+    }
+
+    /// Share of the wall that is too dark to show its motion, 0..=1.
+    pub fn dark_share(&self) -> f64 {
+        self.objective.dark_share()
+    }
+}
+
+fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
+    /// Distance of the strips of wall that are added up, mm, and their pieces about the axis.
+    const STRIP_MM: f64 = 1.0;
+    const PIECES: usize = 48;
+    let layout = &objective.layout;
+    let state: WallState = objective.conservation.state(layout, unknowns, basis);
+    let rim = &unknowns[layout.rim()];
+    let radius = objective.coordinates.cap_radius;
+    let angle = TAU / PIECES as f64;
+    let (mut cavity, mut wall) = (0.0, 0.0);
+    let strips = ((layout.rows - 1) as f64 * ROW_SPACING_MM / STRIP_MM) as usize;
+    for strip in 0..strips {
+        let arc = (strip as f64 + 0.5) * STRIP_MM;
+        let volume = |r: f64| {
+            if arc < FRAC_PI_2 * radius {
+                r.powi(3) / 3.0 * (arc / radius).sin() * STRIP_MM / radius * angle
+            } else {
+                r * r / 2.0 * angle * STRIP_MM * state.stretch
+            }
+        };
+        for piece in 0..PIECES {
+            let column = piece as f64 / PIECES as f64 * COLUMNS as f64;
+            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
+            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
+            let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
+            let on = ((rim_at(rim, column) - arc) / STRIP_MM + 0.5).clamp(0.0, 1.0);
+            let inner = volume((mid - thick / 2.0).max(0.0));
+            cavity += on * inner;
+            wall += on * (volume(mid + thick / 2.0) - inner);
+        }
+    }
+    Volumes {
+        cavity_ml: cavity / 1e3,
+        wall_ml: wall / 1e3,
+    }
+}
+
+/// The rim's arc at a column with a fraction, mm.
+pub(super) fn rim_at(rim: &[f64], column: f64) -> f64 {
+    let left = column as usize % COLUMNS;
+    let right = (left + 1) % COLUMNS;
+    rim[left] * (1.0 - column.fract()) + rim[right] * column.fract()
+}
+
+/// The value of a volume at a point by cubic convolution (Keys, IEEE Transactions on Acoustics, Speech, and Signal
+/// Processing 29, 1981, a = -1/2); beyond the border the value there continues. Values that are not finite count as 0.
+fn cubic(volume: &Volume, point: &Vec3) -> f64 {
+    let index = volume.frame.to_voxel(point);
+    let taps = [0, 1, 2].map(|axis: usize| {
+        let low = index[axis].floor();
+        let t = index[axis] - low;
+        let weights = [
+            ((-0.5 * t + 1.0) * t - 0.5) * t,
+            (1.5 * t - 2.5) * t * t + 1.0,
+            ((-1.5 * t + 2.0) * t + 0.5) * t,
+            (0.5 * t - 0.5) * t * t,
+        ];
+        let last = volume.shape[axis] as i64 - 1;
+        let at = |n: usize| (low as i64 + n as i64 - 1).clamp(0, last) as usize;
+        [0, 1, 2, 3].map(|n| (at(n), weights[n]))
+    });
+    let [nx, ny, _] = volume.shape;
+    let mut sum = 0.0;
+    for (k, of_slice) in taps[2] {
+        for (j, of_row) in taps[1] {
+            let row = nx * (j + ny * k);
+            let line: f64 = (taps[0].iter())
+                .map(|(i, w)| (volume.voxels[row + i], w))
+                .filter(|(value, _)| value.is_finite())
+                .map(|(value, w)| w * f64::from(value))
+                .sum();
+            sum += of_slice * of_row * line;
+        }
+    }
+    sum
+}

@@ -1,0 +1,159 @@
+//! Reasons to look closer at a beat.
+
+use super::figures::Beat;
+use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE, GatedStudy};
+
+/// Share of the orders of the gates that may be as smooth as theirs.
+const ORDERS_AS_SMOOTH: f64 = 0.1;
+/// EF below which noise alone would show as much, per cent.
+const LEAST_EF_PERCENT: f64 = 5.0;
+/// Share of the wall that may be too dark to show its motion.
+const DARK_SHARE: f64 = 0.03;
+/// End-systolic volume below which blur fills the cavity, ml.
+const SMALL_ESV_ML: f64 = 20.0;
+/// Share of the wall that must have a phase.
+const MOVING_SHARE: f64 = 2.0 / 3.0;
+/// Share of the voxels about the wall that may lie outside of the volume.
+const OUTSIDE_SHARE: f64 = 0.01;
+/// Motion of a segment outward that is told, mm.
+const OUTWARD_MOTION_MM: f64 = -1.0;
+
+/// A reason to look closer at a beat.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BeatFlag {
+    /// The gates are not moments of one beat.
+    #[error(
+        "the gates show no beat: {:.0} % of their orders follow each other as smoothly as theirs, and the cavity \
+         changes by {ef_percent:.0} %. They may be shuffled, repeated or not gated; EF is not given",
+        100.0 * orders_as_smooth
+    )]
+    NoContraction {
+        /// Share of the orders that are as smooth.
+        orders_as_smooth: f64,
+        /// Change of the cavity, per cent of the largest.
+        ef_percent: f64,
+    },
+    /// Gates lack counts.
+    #[error(
+        "gates lack counts, as after irregular beats: {}; each was scaled to the usual counts of a gate{}",
+        losses_text(losses),
+        if losses.iter().any(|(_, loss)| *loss > COUNT_LOSS_LEFT_OUT_SHARE) {
+            ", and those that lack more than 30 % were left out of the curve"
+        } else {
+            ""
+        }
+    )]
+    CountLoss {
+        /// Gates, from 1, and the share that each lacks.
+        losses: Vec<(usize, f64)>,
+    },
+    /// A part of the wall is too dark to show its motion.
+    #[error(
+        "{:.0} % of the wall takes up too little to show how it moves; its motion follows the wall beside it, so EF \
+         and the figures of these segments are less certain",
+        100.0 * share
+    )]
+    DarkWall {
+        /// Share of the wall.
+        share: f64,
+    },
+    /// The cavity is so small that blur fills it at end systole.
+    #[error(
+        "the end-systolic volume is {esv_ml:.0} ml: blur fills so small a cavity, and EF is less certain"
+    )]
+    SmallHeart {
+        /// End-systolic volume, ml.
+        esv_ml: f64,
+    },
+    /// Much of the wall has no phase.
+    #[error(
+        "{:.0} % of the wall moves too little to have a phase; mean, deviation and bandwidth are those of the rest",
+        100.0 * (1.0 - moving_share)
+    )]
+    PhaseUnreliable {
+        /// Share of the wall that has a phase.
+        moving_share: f64,
+    },
+    /// The wall's surroundings leave the volume.
+    #[error(
+        "{:.0} % of the heart's surroundings lie outside of the volume; the beat is seen in part only",
+        100.0 * share
+    )]
+    LeavesField {
+        /// Share of the voxels about the wall.
+        share: f64,
+    },
+    /// Segments move outward.
+    #[error(
+        "segments move outward from end diastole to end systole: {}",
+        motions_text(segments)
+    )]
+    OutwardMotion {
+        /// Segments and their motion inward, mm.
+        segments: Vec<(usize, f64)>,
+    },
+}
+
+impl BeatFlag {
+    /// The flag's name in reports.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NoContraction { .. } => "no_contraction",
+            Self::CountLoss { .. } => "count_loss",
+            Self::DarkWall { .. } => "dark_wall",
+            Self::SmallHeart { .. } => "small_heart",
+            Self::PhaseUnreliable { .. } => "phase_unreliable",
+            Self::LeavesField { .. } => "leaves_field",
+            Self::OutwardMotion { .. } => "outward_motion",
+        }
+    }
+
+    /// Whether the gates are no beat, so that no EF is given.
+    pub fn denies_a_beat(&self) -> bool {
+        matches!(self, Self::NoContraction { .. })
+    }
+}
+
+/// The flags of a beat.
+pub(super) fn of(beat: &Beat, study: &GatedStudy) -> Vec<BeatFlag> {
+    let ef_percent = 100.0 * beat.stroke_ml() / beat.end_diastole.cavity_ml;
+    let orders_as_smooth = beat.fit.orders_as_smooth;
+    let no_beat = orders_as_smooth > ORDERS_AS_SMOOTH || ef_percent < LEAST_EF_PERCENT;
+    let losses: Vec<(usize, f64)> = (study.losses.iter().enumerate())
+        .filter(|(_, loss)| **loss > COUNT_LOSS_FLAG_SHARE)
+        .map(|(gate, loss)| (gate + 1, *loss))
+        .collect();
+    let dark = beat.fit.dark_share();
+    let esv_ml = beat.end_systole.cavity_ml;
+    let moving_share = beat.phases.moving_share;
+    let outside = beat.fit.share_outside;
+    let outward: Vec<(usize, f64)> = (beat.segments.iter())
+        .filter(|segment| segment.motion_mm < OUTWARD_MOTION_MM)
+        .map(|segment| (segment.segment, segment.motion_mm))
+        .collect();
+    [
+        no_beat.then_some(BeatFlag::NoContraction {
+            orders_as_smooth,
+            ef_percent,
+        }),
+        (!losses.is_empty()).then_some(BeatFlag::CountLoss { losses }),
+        (dark > DARK_SHARE).then_some(BeatFlag::DarkWall { share: dark }),
+        (esv_ml < SMALL_ESV_ML).then_some(BeatFlag::SmallHeart { esv_ml }),
+        (moving_share < MOVING_SHARE).then_some(BeatFlag::PhaseUnreliable { moving_share }),
+        (outside > OUTSIDE_SHARE).then_some(BeatFlag::LeavesField { share: outside }),
+        (!outward.is_empty()).then_some(BeatFlag::OutwardMotion { segments: outward }),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn losses_text(losses: &[(usize, f64)]) -> String {
+    let text = |(gate, loss): &(usize, f64)| format!("gate {gate} {:.0} %", 100.0 * loss);
+    losses.iter().map(text).collect::<Vec<_>>().join(", ")
+}
+
+fn motions_text(segments: &[(usize, f64)]) -> String {
+    let text = |(segment, motion): &(usize, f64)| format!("segment {segment} {:.1} mm", -motion);
+    segments.iter().map(text).collect::<Vec<_>>().join(", ")
+}

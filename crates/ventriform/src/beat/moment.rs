@@ -1,0 +1,126 @@
+//! The wall at one moment of the beat, as the rays of [`VentricleWall`] meet it.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::fields::{COLUMNS as NODE_COLUMNS, Layout, ROW_SPACING_MM, WallState, between};
+use super::fit::rim_at;
+use crate::geometry::Vec3;
+use crate::model::wall::{COLUMNS, ROWS, RayCoordinates};
+
+/// Both surfaces of the wall at a moment; each ray follows the same muscle through the beat.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WallMoment {
+    /// Points of the inner surface, LPS mm, [`ROWS`] × [`COLUMNS`], apex first; also of rays beyond the rim.
+    pub inner: Vec<Vec3>,
+    /// Points of the outer surface, LPS mm.
+    pub outer: Vec<Vec3>,
+    /// Thickness along the rays, mm.
+    pub thickness: Vec<f64>,
+    /// Whether each ray lies apical of the rim.
+    pub on: Vec<bool>,
+}
+
+impl WallMoment {
+    pub(super) fn of(
+        coordinates: &RayCoordinates,
+        layout: &Layout,
+        state: &WallState,
+        rim: &[f64],
+        row_spacing: f64,
+    ) -> Self {
+        let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
+        let (mut inner, mut outer) = (Vec::new(), Vec::new());
+        let (mut thickness, mut on) = (Vec::new(), Vec::new());
+        for row in 0..ROWS {
+            let arc = (row as f64 + 0.5) * row_spacing;
+            for column in 0..COLUMNS {
+                let turn = (column as f64 + 0.5) / COLUMNS as f64;
+                let nodes = between(
+                    layout.rows,
+                    arc / ROW_SPACING_MM,
+                    turn * NODE_COLUMNS as f64,
+                );
+                let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
+                let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
+                let (sin, cos) = (TAU * turn).sin_cos();
+                let across = coordinates.lateral * cos + coordinates.anterior * sin;
+                let (start, direction) = if arc < cap_arc {
+                    let (s, c) = (arc / coordinates.cap_radius).sin_cos();
+                    (coordinates.focus, coordinates.axis * c + across * s)
+                } else {
+                    let basal = (arc - cap_arc) * state.stretch;
+                    (coordinates.focus - coordinates.axis * basal, across)
+                };
+                inner.push(start + direction * (mid - thick / 2.0).max(0.0));
+                outer.push(start + direction * (mid + thick / 2.0));
+                thickness.push(thick);
+                on.push(arc < rim_at(rim, turn * NODE_COLUMNS as f64));
+            }
+        }
+        Self {
+            inner,
+            outer,
+            thickness,
+            on,
+        }
+    }
+}
+
+/// The area vector (outward) that each point of a surface of [`ROWS`] × [`COLUMNS`] points stands for, mm².
+pub(super) fn area_vectors(points: &[Vec3]) -> Vec<Vec3> {
+    let at = |row: usize, column: usize| points[row * COLUMNS + column % COLUMNS];
+    let mut areas = Vec::with_capacity(points.len());
+    for row in 0..ROWS {
+        let (up, down) = (row.saturating_sub(1), (row + 1).min(ROWS - 1));
+        for column in 0..COLUMNS {
+            let along = (at(down, column) - at(up, column)) / (down - up) as f64;
+            let around = (at(row, column + 1) - at(row, column + COLUMNS - 1)) / 2.0;
+            areas.push(around.cross(&along));
+        }
+    }
+    let middle = points.iter().sum::<Vec3>() / points.len() as f64;
+    let outward: f64 = (points.iter().zip(&areas))
+        .map(|(p, a)| a.dot(&(p - middle)))
+        .sum();
+    if outward < 0.0 {
+        areas.iter_mut().for_each(|a| *a = -*a);
+    }
+    areas
+}
+
+/// Motion and thickening of each ray between two moments.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contraction {
+    /// Motion of the inner surface along its inward normal, the shift of the whole outer surface taken off, mm.
+    pub motion_mm: Vec<f64>,
+    /// Thickening, per cent.
+    pub thickening_percent: Vec<f64>,
+    /// Area of the inner surface at the first moment, mm²; 0 beyond the rim.
+    pub areas: Vec<f64>,
+}
+
+impl Contraction {
+    /// From `before` (end diastole) to `after` (end systole).
+    pub fn between(before: &WallMoment, after: &WallMoment) -> Self {
+        let on = &before.on;
+        let normals = area_vectors(&before.inner);
+        let weight = |i: usize| if on[i] { normals[i].norm() } else { 0.0 };
+        let total: f64 = (0..on.len()).map(weight).sum();
+        let shift = (0..on.len())
+            .map(|i| (after.outer[i] - before.outer[i]) * weight(i))
+            .sum::<Vec3>()
+            / total.max(1e-9);
+        Self {
+            motion_mm: (0..on.len())
+                .map(|i| {
+                    let normal = normals[i].try_normalize(1e-12).unwrap_or_default();
+                    -(after.inner[i] - before.inner[i] - shift).dot(&normal)
+                })
+                .collect(),
+            thickening_percent: (before.thickness.iter().zip(&after.thickness))
+                .map(|(before, after)| 100.0 * (after / before - 1.0))
+                .collect(),
+            areas: (0..on.len()).map(weight).collect(),
+        }
+    }
+}

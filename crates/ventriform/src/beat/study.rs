@@ -1,0 +1,104 @@
+//! The gates of one study: checked, and scaled to equal counts.
+//!
+//! In: one volume for each gate, in their order, all on one grid. Out: the gates with the factor that brings each to
+//! the mean counts of a gate, and their sum, of which the first fit is made. An irregular beat takes counts from the
+//! last gates; without the factor the wall looks thinner there, and EF rises by 7 points where a quarter is lost.
+
+use super::error::BeatError;
+use crate::geometry::Vec3;
+use crate::grid::Volume;
+use crate::progress::{Cancelled, Monitor};
+use std::ops::RangeInclusive;
+
+/// Gates that a study may have: fewer do not show a beat, more no scanner makes.
+pub const GATES: RangeInclusive<usize> = 6..=32;
+
+/// Share of its counts whose loss is told of a gate.
+pub const COUNT_LOSS_FLAG_SHARE: f64 = 0.10;
+
+/// Share of its counts whose loss leaves a gate out of the curve.
+pub const COUNT_LOSS_LEFT_OUT_SHARE: f64 = 0.30;
+
+/// The gates of one study.
+#[derive(Debug, Clone)]
+pub struct GatedStudy {
+    /// The gates, as they were read.
+    pub gates: Vec<Volume>,
+    /// The sum of the gates, each scaled by its factor.
+    pub sum: Volume,
+    /// The factor that brings each gate to the usual counts of a gate.
+    pub factors: Vec<f64>,
+    /// Share of the usual counts that each gate lacks; negative where it has more.
+    pub losses: Vec<f64>,
+}
+
+impl GatedStudy {
+    /// The study of these gates.
+    ///
+    /// # Errors
+    /// [`BeatError`]: fewer gates than 6 or more than 32, gates on different grids, a gate without counts.
+    pub fn new(gates: Vec<Volume>, monitor: &Monitor) -> Result<Self, BeatError> {
+        if !GATES.contains(&gates.len()) {
+            return Err(BeatError::GateCount {
+                found: gates.len(),
+                least: *GATES.start(),
+                most: *GATES.end(),
+            });
+        }
+        let first = &gates[0];
+        for (index, gate) in gates.iter().enumerate() {
+            if gate.shape != first.shape || !same_place(gate, first) {
+                return Err(BeatError::OtherGrid {
+                    gate: index + 1,
+                    found: gate.shape,
+                    first: first.shape,
+                });
+            }
+        }
+        let counts: Vec<f64> = gates.iter().map(total).collect();
+        if let Some(empty) = counts.iter().position(|counts| *counts <= 0.0) {
+            return Err(BeatError::EmptyGate { gate: empty + 1 });
+        }
+        // The upper half of the gates lost nothing: the mean would be drawn down by those that did.
+        let mut sorted = counts.clone();
+        sorted.sort_by(f64::total_cmp);
+        let upper = &sorted[sorted.len() / 2..];
+        let usual = upper.iter().sum::<f64>() / upper.len() as f64;
+        let factors: Vec<f64> = counts.iter().map(|counts| usual / counts).collect();
+        let mut sum = first.clone();
+        sum.integral = false;
+        sum.voxels.fill(0.0);
+        for (gate, factor) in gates.iter().zip(&factors) {
+            monitor.check().map_err(|Cancelled| BeatError::Cancelled)?;
+            for (sum, value) in sum.voxels.iter_mut().zip(&gate.voxels) {
+                *sum += *factor as f32 * value;
+            }
+        }
+        Ok(Self {
+            losses: counts.iter().map(|counts| 1.0 - counts / usual).collect(),
+            gates,
+            sum,
+            factors,
+        })
+    }
+
+    /// Whether each gate has counts enough to tell something of the curve.
+    pub fn counted(&self) -> Vec<bool> {
+        let enough = |loss: &f64| *loss <= COUNT_LOSS_LEFT_OUT_SHARE;
+        self.losses.iter().map(enough).collect()
+    }
+}
+
+/// Whether the corners of both grids lie within a hundredth of a millimetre.
+fn same_place(a: &Volume, b: &Volume) -> bool {
+    let last = a.shape.map(|n| (n - 1) as f64);
+    (0..8).all(|corner| {
+        let index = Vec3::from_fn(|axis, _| f64::from(corner >> axis & 1) * last[axis]);
+        (a.frame.to_patient(&index) - b.frame.to_patient(&index)).norm() < 0.01
+    })
+}
+
+fn total(gate: &Volume) -> f64 {
+    let known = gate.voxels.iter().filter(|v| v.is_finite());
+    known.map(|v| f64::from(*v)).sum()
+}

@@ -1,0 +1,152 @@
+//! A beat from files: read, segment the sum, fit all gates, keep what the output needs.
+
+use super::error::GatedError;
+use super::order::{BeatChoice, GatedOrder};
+use crate::beat::{self, Beat, BeatError, BeatParameters, GatedStudy};
+use crate::deform::WallSurface;
+use crate::parameters::{FitParameters, Parameters};
+use crate::polar::SEGMENT_NAMES;
+use crate::progress::Monitor;
+use crate::report::{
+    BeatParts, BeatReport, FileFacts, LongAxis, RaisedFlag, Resolution, SegmentationReport,
+};
+use crate::segmentation::{Segmentation, SegmentationParameters, prepare, segment};
+use crate::volume::{GatedReading, ReadLimits, read_gates};
+
+/// The beat of a study with what it was made from.
+#[derive(Debug)]
+pub struct GatedHeart {
+    /// The gates and the facts of their files.
+    pub reading: GatedReading,
+    /// The segmentation of the gates' sum.
+    pub segmentation: Segmentation,
+    /// The anatomical wall of the gates' sum.
+    pub wall: WallSurface,
+    /// The beat.
+    pub beat: Beat,
+    /// The parameters of the fit to the gates' sum.
+    pub parameters: FitParameters,
+    /// The parameters of the beat.
+    pub choice: BeatChoice,
+}
+
+/// Makes the beat of the study of `order`.
+///
+/// # Errors
+/// [`GatedError`].
+pub fn from_files(
+    order: &GatedOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<GatedHeart, GatedError> {
+    if let Some((name, value, [least, greatest])) = order.choice.out_of_range() {
+        return Err(GatedError::Parameter {
+            name,
+            value,
+            least,
+            greatest,
+        });
+    }
+    let mut reading = read_gates(order.gates, order.choice.gated, limits, monitor)?;
+    let study = GatedStudy::new(std::mem::take(&mut reading.gates), monitor)?;
+    let parameters = order.parameters.clone();
+    let fit = SegmentationParameters {
+        deform: parameters
+            .on(&study.sum)
+            .map_err(crate::segmentation::SegmentationError::from)?,
+        polar: parameters.polar,
+        reader: None,
+    };
+    let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
+    let mut segmentation = segment(&study.sum, &templates, &fit, None, monitor)?;
+    segmentation.refused.splice(0..0, refused);
+    let model = &segmentation.fit.model;
+    let surfaces = model.surfaces.as_ref().ok_or(BeatError::NoVentricle)?;
+    let wall = surfaces.anatomical.clone();
+    let (Some(map), Some(resolution)) = (&segmentation.polar, segmentation.resolution) else {
+        return Err(BeatError::NoVentricle.into());
+    };
+    let density = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML;
+    let beat_parameters = BeatParameters {
+        muscle_ml: order.choice.mass_g.map(|mass| mass / density),
+        ..BeatParameters::default()
+    };
+    let fitted = beat::fit(
+        &study,
+        &wall.wall,
+        resolution.value,
+        &beat_parameters,
+        monitor,
+    )?;
+    let rr_ms = order
+        .choice
+        .rr_ms
+        .or_else(|| reading.timing.rr_of(study.gates.len()));
+    let beat = Beat::of(fitted, &study, map, rr_ms);
+    reading.gates = study.gates;
+    Ok(GatedHeart {
+        reading,
+        wall,
+        beat,
+        parameters,
+        choice: order.choice,
+        segmentation,
+    })
+}
+
+impl GatedHeart {
+    /// The R-R interval, ms: as given, or as the file states it.
+    pub fn rr_ms(&self) -> Option<f64> {
+        let stated = || self.reading.timing.rr_of(self.reading.gates.len());
+        self.choice.rr_ms.or_else(stated)
+    }
+
+    /// Warnings about the files.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = self.reading.facts.warnings.clone();
+        if let Some(share) = self
+            .reading
+            .timing
+            .rejected_share()
+            .filter(|share| *share > 0.2)
+        {
+            warnings.push(format!(
+                "{:.0} % of the beats were rejected: the heart beat irregularly, and the gates show the rest.",
+                100.0 * share
+            ));
+        }
+        warnings
+    }
+
+    /// The report.
+    pub fn report(&self) -> BeatReport {
+        let segmentation = &self.segmentation;
+        let names = match &segmentation.polar {
+            Some(map) => (1..=17).map(|segment| map.name_of(segment)).collect(),
+            None => SEGMENT_NAMES.map(str::to_owned).to_vec(),
+        };
+        let mut parameters = self.parameters.to_json();
+        parameters.extend(self.choice.to_json());
+        let parts = BeatParts {
+            segment_names: names,
+            rr_ms: self.rr_ms(),
+            timing: self.reading.timing.clone(),
+            long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),
+            resolution: segmentation
+                .resolution
+                .map(|r| Resolution::new(r.value, r.given)),
+            template: segmentation.candidates[segmentation.chosen].name.clone(),
+            confidence: segmentation.fit.judgement.confidence,
+            flags: (segmentation.fit.judgement.flags.iter())
+                .map(|flag| RaisedFlag {
+                    code: flag.code().to_owned(),
+                    reason: flag.to_string(),
+                })
+                .collect(),
+            parameters,
+            input: FileFacts::of(&self.reading.facts),
+            warnings: self.warnings(),
+        };
+        BeatReport::new(&self.beat, parts)
+    }
+}

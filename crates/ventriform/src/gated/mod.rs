@@ -1,0 +1,17 @@
+//! A gated study from beginning to end: files in, the beat's report and files out.
+//!
+//! 1. [`GatedOrder`]: the files, the models for the gates' sum, and the parameters.
+//! 2. [`from_files`](mod@from_files) reads the gates ([`crate::volume::read_gates`]), checks and scales them
+//!    ([`GatedStudy`](crate::beat::GatedStudy)), segments their sum as
+//!    [`segmentation`](mod@crate::segmentation) does, and fits one wall to all gates ([`crate::beat`]).
+//! 3. [`GatedHeart::report`] is the report; [`GatedHeart::files`] are the files written.
+
+mod error;
+mod files;
+mod from_files;
+mod order;
+mod pictures;
+
+pub use error::GatedError;
+pub use from_files::{GatedHeart, from_files};
+pub use order::{BeatChoice, GatedOrder, MASS_G, RR_MS};

@@ -1,0 +1,139 @@
+//! `ventriform beat`: one model in motion of a gated study.
+
+use super::limit_args::LimitArgs;
+use super::output::{create_folder, note, write_file};
+use super::segment::{MODEL_AUTO, mesh, parse_format};
+use super::volume_args::volume_files;
+use super::{Bar, FitArgs, UnusableArgument};
+use anyhow::{Result, anyhow};
+use clap::Args;
+use std::path::PathBuf;
+use ventriform::export::Format;
+use ventriform::gated::{BeatChoice, GatedHeart, GatedOrder, from_files};
+use ventriform::mesh_files::MeshStatement;
+use ventriform::progress::{CancelToken, Monitor, Plan};
+use ventriform_service::work::problems::Explain;
+
+/// Fit one model in motion to the gates of a study: volumes, ejection fraction, motion of the wall
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform beat gated.nii.gz -o out
+  ventriform beat gated.dcm -o out --mass-g 130
+  ventriform beat gate1.nii.gz gate2.nii.gz ... gate8.nii.gz -o out --rr-ms 850
+Writes beat.json (EDV, ESV, EF, curve, motion, thickening and phase of each segment, flags), curve.svg, phase.svg, gates.csv,
+segments.csv, mesh_ed.glb and mesh_es.glb (end diastole and end systole), mesh_gate01.glb, ... (or the formats given by
+--format; all have the same nodes and triangles) and labels_gate01.nii.gz, ... (wall 1, cavity 2).
+Gates and segments are counted from 1.")]
+pub struct BeatArgs {
+    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in their order
+    #[arg(value_name = "IN", required = true, num_args = 1..)]
+    input: Vec<PathBuf>,
+    /// Folder to write to (created if missing)
+    #[arg(short, long = "output", value_name = "OUTDIR")]
+    output: PathBuf,
+    /// Model to fit to the gates' sum: a closed mesh, or auto for the built-in hearts (repeatable: the fit with the
+    /// greatest confidence is kept)
+    #[arg(long, value_name = "MODEL", default_value = MODEL_AUTO)]
+    model: Vec<PathBuf>,
+    /// The volumes of the file are gates of one heart beat, although its header says otherwise
+    #[arg(long)]
+    gated: bool,
+    /// Mass of the left ventricle's muscle, g, where it is known (20 to 600); the image does not tell how thick the wall is
+    #[arg(long, value_name = "G")]
+    mass_g: Option<f64>,
+    /// The R-R interval, ms (300 to 2500) [default: as the file states it]
+    #[arg(long, value_name = "MS")]
+    rr_ms: Option<f64>,
+    /// Format of the meshes (repeatable)
+    #[arg(
+        long = "format",
+        value_name = "FORMAT",
+        value_parser = parse_format,
+        default_values = ["glb"]
+    )]
+    formats: Vec<Format>,
+    #[command(flatten)]
+    fit: FitArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// Parameters of a segmentation that a beat has no use for, and why.
+const WITHOUT_USE: &[(&str, &str)] = &[
+    ("frame", "all gates are fitted together"),
+    ("label", "a beat is compared with no expert's mask"),
+    ("resample", "a beat is compared with no expert's mask"),
+    ("mesh_unit", "a beat is compared with no expert's mask"),
+    ("mesh_frame", "a beat is compared with no expert's mask"),
+    ("edge", "a beat has the anatomical wall"),
+    ("organ", "only the left ventricle has a beat"),
+    ("mask_grid", "labels lie on the gates' grid"),
+];
+
+/// Runs the command.
+///
+/// # Errors
+/// If a file cannot be read, the gates are no beat, or a file cannot be written. Nothing is written unless the fit is
+/// complete.
+pub fn run(args: &BeatArgs) -> Result<()> {
+    for (name, _) in args.fit.pairs() {
+        if let Some((_, why)) = WITHOUT_USE.iter().find(|(unused, _)| unused == name) {
+            let flag = name.replace('_', "-");
+            let message = format!("--{flag} has no use here: {why}. Leave it out.");
+            return Err(UnusableArgument::new(message).into());
+        }
+    }
+    let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
+    let limits = args.limits.limits()?;
+    let gates = volume_files(&args.input, &limits)?;
+    let named: Vec<&PathBuf> = (args.model.iter())
+        .filter(|model| model.as_os_str() != MODEL_AUTO)
+        .collect();
+    let order = GatedOrder {
+        gates: &gates,
+        auto: named.len() < args.model.len(),
+        models: (named.into_iter())
+            .map(|path| mesh(path, &MeshStatement::default(), &limits))
+            .collect::<Result<_>>()?,
+        parameters: &parameters,
+        choice: BeatChoice {
+            gated: args.gated,
+            mass_g: args.mass_g,
+            rr_ms: args.rr_ms,
+        },
+    };
+    if let Some((name, value, [least, greatest])) = order.choice.out_of_range() {
+        let flag = name.replace('_', "-");
+        let message = format!("--{flag} is {value}; give {least} to {greatest}");
+        return Err(UnusableArgument::new(message).into());
+    }
+    let bar = Bar::over(Plan::BEAT);
+    let monitor = Monitor::new(&bar, CancelToken::new());
+    let made = from_files(&order, &limits, &monitor)
+        .map_err(|error| anyhow!(error.with_advice()))
+        .and_then(|made| Ok((made.files(&args.formats, &monitor)?, made)));
+    bar.finish();
+    let (files, made) = made?;
+    create_folder(&args.output)?;
+    for file in &files {
+        write_file(&args.output.join(&file.name), &file.bytes)?;
+    }
+    note!("{}", headline(&made));
+    let report = made.report();
+    for warning in &report.warnings {
+        note!("warning: {warning}");
+    }
+    for flag in &report.flags {
+        note!("warning: {}", flag.reason);
+    }
+    Ok(())
+}
+
+fn headline(made: &GatedHeart) -> String {
+    let beat = &made.beat;
+    let [diastole, systole] = [beat.end_diastole, beat.end_systole].map(|e| e.cavity_ml);
+    match beat.ef_percent {
+        Some(ef) => format!("EDV {diastole:.0} ml, ESV {systole:.0} ml, EF {ef:.0} %"),
+        None => format!("no beat: the cavity has {systole:.0} to {diastole:.0} ml"),
+    }
+}
