@@ -5,14 +5,15 @@ use super::app::App;
 use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
 use super::links::rfc3339;
-use super::openapi::{ListProblems, LookupProblems, PageParameters, UploadProblems};
-use super::pagination::{list_query, next_cursor};
+use super::openapi::{ListProblems, LookupProblems, UploadProblems};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
+use super::query::{NoQuery, Query};
+use super::request::{PathSegments, json_object, unknown};
 use crate::public_base::public_path;
 use axum::Extension;
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -148,10 +149,9 @@ pub async fn create_key(
     State(app): State<App>,
     caller: Caller,
     Extension(by): Extension<Agent>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.service.now();
     let wanted = read(&json_object(request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
@@ -180,14 +180,14 @@ pub async fn create_key(
 ///
 /// Those of the caller's tenant, revoked ones included.
 #[utoipa::path(get, path = "/v1/keys", tag = "access", operation_id = "list_keys",
-    params(PageParameters),
+    params(PageQuery),
     responses((status = 200, description = "A page, newest first", body = KeyList), ListProblems))]
 pub async fn list_keys(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query(page): Query<PageQuery>,
 ) -> Answer<Json<KeyList>> {
-    let (page, []) = list_query(query.as_deref(), []).await?;
+    let page = page.charged().await?;
     let now = app.service.now();
     let page = app.service.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
@@ -209,9 +209,8 @@ pub async fn revoke_key(
     caller: Caller,
     Extension(by): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let key = app.service.access.key(&id).await?;
     if key.is_none_or(|key| key.tenant != caller.tenant) {
         return Err(Problem::new(

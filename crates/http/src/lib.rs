@@ -61,6 +61,7 @@ mod pagination;
 mod problem;
 mod products;
 mod public_base;
+mod query;
 mod quota;
 mod readers;
 mod request;

@@ -4,12 +4,24 @@ use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{text, unknown};
 use axum::http::{HeaderMap, HeaderName};
+use serde::Deserialize;
 use serde_json::{Map, Value};
+use utoipa::IntoParams;
 use ventriform_service::hooks::{HookEvent, SigningSecret, UrlGuard};
 use ventriform_service::records::JobWebhook;
 
 /// The header with the signing secret of a job's webhook.
 pub const SECRET_HEADER: HeaderName = HeaderName::from_static("webhook-secret");
+
+/// The webhook of a job that is filed with an upload.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct WebhookQuery {
+    /// URL to be told when the job has ended
+    webhook: Option<String>,
+    /// What to tell, separated by commas: `started`, `succeeded`, `failed`, `cancelled`
+    webhook_events: Option<String>,
+}
 
 /// A webhook as it was given: none of it is checked.
 #[derive(Default)]
@@ -41,17 +53,12 @@ impl GivenWebhook {
         })
     }
 
-    /// The webhook among the parameters and headers of an upload, which it takes out of `pairs`:
-    /// `webhook`, `webhook_events`, and the header `Webhook-Secret`.
-    pub fn take_from(
-        pairs: &mut Vec<(String, String)>,
-        headers: &HeaderMap,
-    ) -> Answer<Option<Self>> {
-        let mut take = |name: &str| {
-            let at = pairs.iter().position(|(other, _)| other == name)?;
-            Some(pairs.remove(at).1)
-        };
-        let (url, events) = (take("webhook"), take("webhook_events"));
+    /// The webhook of an upload, with the secret in the header `Webhook-Secret`.
+    ///
+    /// # Errors
+    /// 422 if there is no URL.
+    pub fn of_upload(query: WebhookQuery, headers: &HeaderMap) -> Answer<Option<Self>> {
+        let (url, events) = (query.webhook, query.webhook_events);
         let secret = headers.get(SECRET_HEADER).map(|value| {
             let text = value.to_str().unwrap_or_default();
             text.to_owned()

@@ -1,13 +1,14 @@
-//! `priority` of a request for a job, and of a search for jobs.
+//! `priority` of a request for a job.
 
+use crate::openapi::PriorityField;
 use crate::problem::{Answer, Problem, shorten};
 use crate::request::text;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::records::Priority;
 
-/// The parameter of a query string or form, and the field of a JSON object.
+/// The field of a JSON object.
 pub const FIELD: &str = "priority";
 
 /// How urgent a job is.
@@ -33,20 +34,24 @@ impl From<Priority> for PriorityName {
     }
 }
 
-/// Takes the priority out of the pairs of a query string or form; the last one counts.
-///
-/// # Errors
-/// 422 if there is no such priority.
-pub fn take(pairs: &mut Vec<(String, String)>) -> Answer<Priority> {
-    let mut given = Ok(Priority::default());
-    pairs.retain(|(name, value)| {
-        let own = name == FIELD;
-        if own && given.is_ok() {
-            given = parse(value);
-        }
-        !own
-    });
-    given
+/// The priority of a job that is filed with an upload.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct PriorityQuery {
+    /// How urgent the job is
+    #[param(value_type = Option<PriorityField>, inline)]
+    priority: Option<String>,
+}
+
+impl PriorityQuery {
+    /// The priority of the job.
+    ///
+    /// # Errors
+    /// 422 if there is no such priority.
+    pub fn priority(&self) -> Answer<Priority> {
+        let given = self.priority.as_deref();
+        given.map_or(Ok(Priority::default()), parse)
+    }
 }
 
 /// The priority of a JSON object that may have other fields.
@@ -59,7 +64,7 @@ pub fn of_object(object: &Map<String, Value>) -> Answer<Priority> {
 
 /// # Errors
 /// 422 if there is no such priority.
-pub fn parse(name: &str) -> Answer<Priority> {
+fn parse(name: &str) -> Answer<Priority> {
     Priority::parse(name).ok_or_else(|| {
         let known = Priority::ALL.map(Priority::as_str).join(", ");
         let what = format!("There is no priority `{}`.", shorten(name));

@@ -1,6 +1,6 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
-use super::inputs::priority_field;
+use super::inputs::PriorityField;
 use crate::tags;
 use serde_json::json;
 use std::borrow::Cow;
@@ -71,7 +71,7 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
         .property("external_id", external_id)
         .property("labels", labels)
         .property("kind", Schema::from(kind))
-        .property("priority", priority_field())
+        .property("priority", PriorityField::schema())
         .property(input, schema)
         .property("parameters", Ref::from_schema_name(JobParameters::name()))
         .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
