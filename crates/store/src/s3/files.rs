@@ -165,6 +165,24 @@ impl S3Blobs {
         Some((Shared::cached(id, place), path))
     }
 
+    /// The length of a file of an item; `None` if it is missing or was stored in a folder.
+    pub(crate) async fn size(&self, id: &str, file: &FileRecord) -> Result<Option<u64>, BlobError> {
+        match Self::address(id, file) {
+            Some((_, path)) => self.shared.bucket.size(&path).await,
+            None => Ok(None),
+        }
+    }
+
+    /// Whether the file of a received object is there.
+    pub(crate) async fn has_received(&self, name: &str) -> Result<bool, BlobError> {
+        let size = self
+            .shared
+            .bucket
+            .size(&format!("{RECEIVED}/{name}"))
+            .await?;
+        Ok(size.is_some())
+    }
+
     async fn copy(&self, id: &str, file: &FileRecord) -> Result<Option<Found>, BlobError> {
         let Some((place, path)) = Self::address(id, file) else {
             return Ok(None);
