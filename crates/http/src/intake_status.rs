@@ -7,15 +7,16 @@ use super::links::{path_of, rfc3339};
 use super::openapi::{ListProblems, LookupProblems};
 use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::query::{NoQuery, Query, Word};
+use super::query::{NoQuery, Query};
 use super::request::PathSegments;
+use super::words::{ReceivedState, Word};
 use crate::public_base::public_path;
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::intake::{GroupState, IntakeGroup};
+use ventriform_service::intake::IntakeGroup;
 
 /// Objects that make up one volume.
 #[derive(Serialize, ToSchema)]
@@ -62,20 +63,6 @@ pub struct ReceivedBody {
     links: ReceivedLinks,
 }
 
-/// What became of received objects.
-#[derive(Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ReceivedState {
-    /// More may come, or they wait to be read.
-    Gathering,
-    /// The volume is stored; its job is to be started.
-    Filing,
-    /// The volume is stored.
-    Stored,
-    /// They make up no volume; `error` says why.
-    Failed,
-}
-
 /// Paths of received objects.
 #[derive(Serialize, ToSchema)]
 struct ReceivedLinks {
@@ -103,12 +90,7 @@ pub struct ReceivedList {
 impl From<IntakeGroup> for ReceivedBody {
     fn from(group: IntakeGroup) -> Self {
         Self {
-            state: match group.state {
-                GroupState::Gathering => ReceivedState::Gathering,
-                GroupState::Filing => ReceivedState::Filing,
-                GroupState::Stored => ReceivedState::Stored,
-                GroupState::Failed => ReceivedState::Failed,
-            },
+            state: Word(group.state),
             study: group.study,
             series: group.series,
             instance: group.instance,
@@ -141,8 +123,7 @@ impl From<IntakeGroup> for ReceivedBody {
 #[into_params(parameter_in = Query)]
 pub struct ReceivedQuery {
     /// Only what is in this state
-    #[param(value_type = Option<ReceivedState>)]
-    state: Option<Word<GroupState>>,
+    state: Option<ReceivedState>,
 }
 
 /// List what other systems have sent

@@ -10,6 +10,7 @@ use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, shorten};
 use super::query::{NoQuery, Query};
 use super::request::{PathSegments, json_object, unknown};
+use super::words::{ScopeName, Word};
 use crate::public_base::public_path;
 use axum::Extension;
 use axum::Json;
@@ -64,19 +65,6 @@ pub struct KeyBody {
     /// The key itself, to be sent as `Authorization: Bearer KEY`. Only in the answer that makes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     key: Option<String>,
-}
-
-/// What a key allows.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Scope)]
-#[serde(rename_all = "snake_case")]
-enum ScopeName {
-    /// Reading.
-    Read,
-    /// Also uploading, filing jobs and erasing.
-    Submit,
-    /// Also keys and the audit trail.
-    Admin,
 }
 
 /// Whether a key opens the service.
@@ -331,11 +319,7 @@ impl KeyBody {
                 KeyState::Expired => KeyStateName::Expired,
                 KeyState::Revoked => KeyStateName::Revoked,
             },
-            scope: match key.scope {
-                Scope::Read => ScopeName::Read,
-                Scope::Submit => ScopeName::Submit,
-                Scope::Admin => ScopeName::Admin,
-            },
+            scope: Word(key.scope),
             id: key.id,
             name: key.name,
             tenant: key.tenant.to_string(),

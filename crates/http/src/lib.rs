@@ -81,6 +81,7 @@ mod volumes;
 mod voxels;
 mod webhook_request;
 mod webhooks;
+mod words;
 mod workitems;
 
 pub use app::App;

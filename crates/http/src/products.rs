@@ -16,10 +16,11 @@ use super::openapi::{
 };
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
-use super::query::{NoQuery, PartName, Query, QueryReader, Word};
+use super::query::{NoQuery, Query, QueryReader};
 use super::request::PathSegments;
 use super::response_cache::Keep;
 use super::scans::{self, ScanUidsBody};
+use super::words::{PartName, Word};
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
@@ -559,7 +560,11 @@ async fn send_object(
     let id = &product.id;
     let size: u64 = product.files.iter().map(|file| file.bytes).sum();
     charge(size).await?;
-    let result = app.service.items().result(tenant, id, dicom::FILES).await?;
+    let result = app
+        .service
+        .items()
+        .result(tenant, id, dicom::FILES)
+        .await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = if deidentify {
         Some(

@@ -18,14 +18,7 @@ use serde::{Deserialize, forward_to_deserialize_any};
 use std::convert::Infallible;
 use std::fmt::{self, Display};
 use std::str::FromStr;
-use utoipa::openapi::RefOr;
-use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
-use utoipa::{PartialSchema, ToSchema};
-use ventriform::export::Part;
-use ventriform::mesh_files::{MeshFrame, MeshUnit};
-use ventriform::model::Organ;
-use ventriform_service::intake::GroupState;
-use ventriform_service::records::{JobState, Priority, Timestamp, parse_rfc3339};
+use ventriform_service::records::{Timestamp, parse_rfc3339};
 
 /// The query of a route: a struct, or a tuple of structs.
 pub struct Query<T>(pub T);
@@ -311,66 +304,6 @@ pub fn moment<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Times
     let expected = "a moment as RFC 3339 writes it, such as 2026-11-22T08:00:00Z";
     parsed(deserializer, parse_rfc3339, expected).map(Some)
 }
-
-/// A type whose values have names.
-pub trait Named: Copy + 'static {
-    /// All values.
-    const ALL: &'static [Self];
-
-    /// The name of a value.
-    fn as_str(self) -> &'static str;
-}
-
-macro_rules! named {
-    ($($type:ty),+) => {$(
-        impl Named for $type {
-            const ALL: &'static [Self] = &<$type>::ALL;
-
-            fn as_str(self) -> &'static str {
-                self.as_str()
-            }
-        }
-    )+};
-}
-
-named!(
-    GroupState, JobState, MeshFrame, MeshUnit, Organ, Part, Priority
-);
-
-/// A value that a parameter gives by its name.
-#[derive(Debug, Clone, Copy)]
-pub struct Word<T>(pub T);
-
-/// The name of an organ.
-pub type OrganName = Word<Organ>;
-/// The name of a part of a mesh.
-pub type PartName = Word<Part>;
-/// The name of a unit of a mesh.
-pub type MeshUnitName = Word<MeshUnit>;
-/// The name of a frame of a mesh.
-pub type MeshFrameName = Word<MeshFrame>;
-
-fn words<T: Named>() -> impl Iterator<Item = &'static str> {
-    T::ALL.iter().map(|value| value.as_str())
-}
-
-impl<'de, T: Named> Deserialize<'de> for Word<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let named = |text: &str| T::ALL.iter().find(|value| value.as_str() == text);
-        let expected: Vec<_> = words::<T>().collect();
-        let expected = format!("one of {}", expected.join(", "));
-        parsed(deserializer, named, &expected).map(|value| Self(*value))
-    }
-}
-
-impl<T: Named> PartialSchema for Word<T> {
-    fn schema() -> RefOr<Schema> {
-        let word = ObjectBuilder::new().schema_type(Type::String);
-        Schema::from(word.enum_values(Some(words::<T>()))).into()
-    }
-}
-
-impl<T: Named> ToSchema for Word<T> {}
 
 /// The names of the fields of a struct.
 pub fn fields_of<T: DeserializeOwned>() -> Vec<&'static str> {

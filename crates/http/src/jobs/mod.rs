@@ -8,7 +8,7 @@ mod body;
 mod priority;
 
 pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
-pub use priority::{PriorityName, PriorityQuery};
+pub use priority::PriorityQuery;
 
 use super::app::App;
 use super::caller::Caller;
@@ -18,18 +18,18 @@ use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{PageQuery, next_cursor};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody};
-use super::query::{NoQuery, Query, Word, moment};
+use super::query::{NoQuery, Query, moment};
 use super::quota::reserve_job;
 use super::request::{PathSegments, json_object, text, unknown};
 use super::scans::ScanQuery;
 use super::tags::{self, TagQuery};
 use super::validators::ValidatedJson;
 use super::webhook_request::webhook_of;
+use super::words::{JobStateName, PriorityName};
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
-use body::JobStateName;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::ops::ControlFlow;
@@ -37,7 +37,7 @@ use utoipa::{IntoParams, ToSchema};
 use ventriform_service::filing::JobOrder;
 use ventriform_service::jobs::Work;
 use ventriform_service::records::{
-    Deleted, Interrupted, Job, JobFilter, JobState, Priority, Resource, Tenant, Timestamp,
+    Deleted, Interrupted, Job, JobFilter, Resource, Tenant, Timestamp,
 };
 
 /// A page of jobs.
@@ -150,13 +150,11 @@ async fn read_job<'a>(
 #[into_params(parameter_in = Query)]
 pub struct JobQuery {
     /// Only jobs in this state
-    #[param(value_type = Option<JobStateName>)]
-    state: Option<Word<JobState>>,
+    state: Option<JobStateName>,
     /// Only jobs of this kind: model, segmentation
     kind: Option<String>,
     /// Only jobs of this priority
-    #[param(value_type = Option<PriorityName>)]
-    priority: Option<Word<Priority>>,
+    priority: Option<PriorityName>,
     /// Only jobs on this volume
     volume: Option<String>,
     /// Only jobs filed after this moment (RFC 3339)

@@ -3,36 +3,13 @@
 use crate::openapi::PriorityField;
 use crate::problem::{Answer, Problem, shorten};
 use crate::request::text;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::{Map, Value};
-use utoipa::{IntoParams, ToSchema};
+use utoipa::IntoParams;
 use ventriform_service::records::Priority;
 
 /// The field of a JSON object.
 pub const FIELD: &str = "priority";
-
-/// How urgent a job is.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Priority)]
-#[serde(rename_all = "snake_case")]
-pub enum PriorityName {
-    /// It starts before every job of another priority.
-    Urgent,
-    /// The usual one.
-    Routine,
-    /// It starts when nothing else waits.
-    Bulk,
-}
-
-impl From<Priority> for PriorityName {
-    fn from(priority: Priority) -> Self {
-        match priority {
-            Priority::Urgent => PriorityName::Urgent,
-            Priority::Routine => PriorityName::Routine,
-            Priority::Bulk => PriorityName::Bulk,
-        }
-    }
-}
 
 /// The priority of a job that is filed with an upload.
 #[derive(Deserialize, IntoParams)]

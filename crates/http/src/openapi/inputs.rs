@@ -109,54 +109,26 @@ macro_rules! headers {
 
 headers! {
     /// The header of a request on a claimed work item.
-    TransactionHeader: (
-        "Transaction-UID",
-        "The Transaction UID under which the item is claimed; it may also be in the body",
-        text()
-    );
+    TransactionHeader: ("Transaction-UID", "The Transaction UID under which the item is claimed; it may also be in the body",
+        text());
     /// The header of an erasure.
-    ErasureHeader: (
-        "Prefer",
-        "`return=representation` asks for the receipt in the answer",
-        text()
-    );
+    ErasureHeader: ("Prefer", "`return=representation` asks for the receipt in the answer", text());
     /// The header of a request for what the client may have already.
     CachedHeaders: ("If-None-Match", "Answer 304 if the `ETag` is among these", text());
     /// The headers of a download.
     ConditionalHeaders:
-        (
-            "If-None-Match",
-            "Validators (`ETag`) of the client's copies; 304 if one is current",
-            text()
-        ),
+        ("If-None-Match", "Validators (`ETag`) of the client's copies; 304 if one is current", text()),
         ("Range", "`bytes=FIRST-LAST`: a part of the file", text()),
-        (
-            "If-Range",
-            "Apply `Range` only if this validator is current, else send the whole file",
-            text()
-        );
+        ("If-Range", "Apply `Range` only if this validator is current, else send the whole file", text());
     /// The header of a request for a job that may be repeated.
-    IdempotencyHeader: (
-        "Idempotency-Key",
-        "A random text. Repeating a request under the same key returns the first job",
-        text().min_length(Some(1)).max_length(Some(255)).pattern(Some("^[!#-~]+$"))
-    );
+    IdempotencyHeader: ("Idempotency-Key", "A random text. Repeating a request under the same key returns the first job",
+        text().min_length(Some(1)).max_length(Some(255)).pattern(Some("^[!#-~]+$")));
     /// The header with the secret of a job's webhook.
-    WebhookSecretHeader: (
-        "Webhook-Secret",
-        "What signs the deliveries: `whsec_` and base64",
-        text()
-    );
+    WebhookSecretHeader: ("Webhook-Secret", "What signs the deliveries: `whsec_` and base64", text());
     /// The header of a stream of events that is resumed.
-    EventHeader: (
-        "Last-Event-ID",
-        "The revision of the job that the client received last",
-        ObjectBuilder::new().schema_type(Type::Integer).minimum(Some(0))
-    );
+    EventHeader: ("Last-Event-ID", "The revision of the job that the client received last",
+        ObjectBuilder::new().schema_type(Type::Integer).minimum(Some(0)));
     /// The header of an upload that waits for the result.
-    PreferHeader: (
-        "Prefer",
-        "`wait=SECONDS`: how long to wait for the result",
-        text().schema_type(SchemaType::from_iter([Type::String, Type::Null]))
-    );
+    PreferHeader: ("Prefer", "`wait=SECONDS`: how long to wait for the result",
+        text().schema_type(SchemaType::from_iter([Type::String, Type::Null])));
 }
