@@ -23,7 +23,7 @@ pub struct Models;
 impl ProductCollection for Models {
     const RESOURCE: Resource = Resource::Model;
     type Body = ModelBody;
-    const FILES: &'static [&'static str] = &["report.json", files::PAGE, "distance.json"];
+    const FILES: &'static [&'static str] = &["report.json", files::REPORT_PAGE, "distance.json"];
     const FILE_SCHEMA: &'static str = "FileName";
     const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
         (signed distances of the model's vertices and triangles to the surface) and \
@@ -68,7 +68,7 @@ impl ModelLinks {
         Self {
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
-            page: format!("{itself}/{}", files::PAGE),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
             dicom: object_paths(model),
             volume: path_of(model.volume.as_deref().unwrap_or_default()),
             itself,

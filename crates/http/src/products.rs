@@ -329,7 +329,7 @@ impl Offer {
     fn reports() -> [Self; 2] {
         [
             Self::new("application/json", REPORT_FILE),
-            Self::new("text/html", files::PAGE),
+            Self::new("text/html", files::REPORT_PAGE),
         ]
     }
 }
@@ -520,7 +520,7 @@ async fn get_file<P: ProductCollection>(
 ) -> Answer {
     let object = dicom::object_named(P::RESOURCE, &name);
     let (mut part, mut deidentify) = (None, false);
-    if object.is_some() || name == files::PAGE {
+    if object.is_some() || name == files::REPORT_PAGE {
         deidentify = query.all::<DeidentifyQuery>()?.deidentify.unwrap_or(false);
     } else if mesh_names::<P>().any(|mesh| mesh == name) {
         part = query.all::<PartQuery>()?.part;
@@ -563,7 +563,7 @@ async fn send_object(
     let result = app
         .service
         .items()
-        .result(tenant, id, dicom::FILES)
+        .result(tenant, id, dicom::SOURCE_FILES)
         .await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = if deidentify {
@@ -674,7 +674,7 @@ async fn send_named(
         return files::send(app, product, file, headers).await;
     }
     let work = app.service.engine.work(product.resource().noun());
-    match work.filter(|_| name == files::PAGE).cloned() {
+    match work.filter(|_| name == files::REPORT_PAGE).cloned() {
         Some(work) => {
             let files = product.files.iter();
             let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));

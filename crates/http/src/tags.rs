@@ -24,7 +24,7 @@ pub const LABEL_VALUE_LENGTH: usize = 256;
 
 /// What this module reads: parameters of a query string or form, fields of a JSON object. (`label`
 /// is a parameter of models: the label of an object in a label map.)
-pub const FIELDS: [&str; 2] = ["external_id", "labels"];
+pub const TAG_FIELDS: [&str; 2] = ["external_id", "labels"];
 
 /// The tags of a request or of a search, in a query string or a form.
 #[derive(Default, Deserialize, IntoParams)]
@@ -90,7 +90,7 @@ impl TagQuery {
 pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
     let fields = object
         .iter()
-        .filter(|(name, _)| FIELDS.contains(&name.as_str()));
+        .filter(|(name, _)| TAG_FIELDS.contains(&name.as_str()));
     let mut tags = Tags::default();
     for (name, value) in fields {
         merge_field(&mut tags, name, value)?;
@@ -125,8 +125,8 @@ pub async fn change(
 /// 400 for a field that is not a tag, 422 for one that is malformed.
 fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
     for (name, value) in patch {
-        if !FIELDS.contains(&name.as_str()) {
-            return Err(unknown("field", name, &FIELDS));
+        if !TAG_FIELDS.contains(&name.as_str()) {
+            return Err(unknown("field", name, &TAG_FIELDS));
         }
         merge_field(&mut tags, name, value)?;
     }

@@ -313,7 +313,7 @@ pub async fn create_volume(
     let mut given = QueryReader::of_pairs(given);
     let tags = given.take::<TagQuery>()?.tags(&app)?;
     if let Some((name, _)) = given.rest().first() {
-        return Err(unknown("form field", name, &tags::FIELDS));
+        return Err(unknown("form field", name, &tags::TAG_FIELDS));
     }
     let stored = app
         .service

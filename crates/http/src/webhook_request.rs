@@ -32,12 +32,15 @@ pub struct GivenWebhook {
 }
 
 impl GivenWebhook {
-    const FIELDS: [&'static str; 3] = ["url", "events", "secret"];
+    const WEBHOOK_FIELDS: [&'static str; 3] = ["url", "events", "secret"];
 
     /// The webhook in a JSON object.
     pub fn from_json(object: &Map<String, Value>) -> Answer<Self> {
-        if let Some(name) = object.keys().find(|n| !Self::FIELDS.contains(&n.as_str())) {
-            return Err(unknown("field", name, &Self::FIELDS));
+        if let Some(name) = object
+            .keys()
+            .find(|n| !Self::WEBHOOK_FIELDS.contains(&n.as_str()))
+        {
+            return Err(unknown("field", name, &Self::WEBHOOK_FIELDS));
         }
         let events = match object.get("events") {
             None => None,

@@ -566,7 +566,7 @@ async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
 /// Whether a folder for items or received objects holds anything.
 fn has_items(folder: &Path) -> std::io::Result<bool> {
     let shelves = Resource::WITH_FILES.map(Resource::plural);
-    for shelf in shelves.into_iter().chain([blobs::RECEIVED]) {
+    for shelf in shelves.into_iter().chain([blobs::RECEIVED_FOLDER]) {
         match std::fs::read_dir(folder.join(shelf)) {
             Ok(mut entries) => {
                 if entries.next().is_some() {

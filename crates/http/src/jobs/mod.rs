@@ -89,7 +89,7 @@ pub async fn create_job(
 
 const JOB_FIELDS: [&str; 10] = [
     "kind",
-    priority::FIELD,
+    priority::PRIORITY_FIELD,
     "volume",
     "source",
     "parameters",

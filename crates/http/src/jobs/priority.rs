@@ -9,7 +9,7 @@ use utoipa::IntoParams;
 use ventriform_service::records::Priority;
 
 /// The field of a JSON object.
-pub const FIELD: &str = "priority";
+pub const PRIORITY_FIELD: &str = "priority";
 
 /// The priority of a job that is filed with an upload.
 #[derive(Deserialize, IntoParams)]
@@ -36,7 +36,7 @@ impl PriorityQuery {
 /// # Errors
 /// 422 if there is no such priority.
 pub fn of_object(object: &Map<String, Value>) -> Answer<Priority> {
-    text(object, FIELD)?.map_or(Ok(Priority::default()), parse)
+    text(object, PRIORITY_FIELD)?.map_or(Ok(Priority::default()), parse)
 }
 
 /// # Errors
@@ -45,6 +45,6 @@ fn parse(name: &str) -> Answer<Priority> {
     Priority::parse(name).ok_or_else(|| {
         let known = Priority::ALL.map(Priority::as_str).join(", ");
         let what = format!("There is no priority `{}`.", shorten(name));
-        Problem::invalid_field(FIELD, what).fix(format!("Give one of {known}."))
+        Problem::invalid_field(PRIORITY_FIELD, what).fix(format!("Give one of {known}."))
     })
 }

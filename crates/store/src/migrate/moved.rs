@@ -6,9 +6,9 @@
 //! Every file that a row names must be there in its full length, and the place must not be that of another store. The
 //! contents are not read. Nothing is written before all is checked, and doing it again ends the same.
 
-use super::source::PAGE;
+use super::source::PAGE_ROWS;
 use super::{MigrateError, write};
-use crate::blobs::{RECEIVED, STAGING, shelf_path};
+use crate::blobs::{RECEIVED_FOLDER, STAGING_FOLDER, shelf_path};
 use crate::database::SqlStore;
 use crate::s3::{S3Blobs, S3Location};
 use crate::{
@@ -103,7 +103,7 @@ async fn note_bucket(
     location: &S3Location,
 ) -> Result<u64, MigrateError> {
     require_placed(rows, server).await?;
-    let scratch = folder.join(STAGING).join(random_id("moved-"));
+    let scratch = folder.join(STAGING_FOLDER).join(random_id("moved-"));
     fs::create_dir_all(&scratch)?;
     let gauge = DiskGauge::new(folder, Some(0));
     let opened = S3Blobs::open(location, &scratch, gauge, 0).await;
@@ -207,7 +207,7 @@ impl Files<'_> {
     async fn has_received(&self, name: &str) -> Result<bool, BlobError> {
         match self {
             Files::Bucket(blobs) => blobs.has_received(name).await,
-            Files::Folder(folder) => Ok(length(&folder.join(RECEIVED).join(name)).is_some()),
+            Files::Folder(folder) => Ok(length(&folder.join(RECEIVED_FOLDER).join(name)).is_some()),
         }
     }
 }
@@ -223,7 +223,7 @@ async fn require_files(
     place: &str,
 ) -> Result<u64, MigrateError> {
     let (mut items, mut missing) = (0, Vec::new());
-    let mut pages = RecordPages::new(rows, PAGE);
+    let mut pages = RecordPages::new(rows, PAGE_ROWS);
     while let Some(page) = pages.next().await? {
         items += page.len() as u64;
         let looked = page.iter().map(|record| files.lacks(record));
@@ -235,7 +235,7 @@ async fn require_files(
     let received = rows.waiting_files().await?;
     for (name, _) in &received {
         if !files.has_received(name).await? {
-            missing.push(format!("{RECEIVED}/{name}"));
+            missing.push(format!("{RECEIVED_FOLDER}/{name}"));
         }
     }
     if !missing.is_empty() {
