@@ -151,7 +151,7 @@ pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer
     }
 }
 
-/// What one upload may hold (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
+/// The header with the limits of one upload (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
 /// refused.
 const UPLOAD_LIMIT: HeaderName = HeaderName::from_static("upload-limit");
 

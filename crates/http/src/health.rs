@@ -31,7 +31,7 @@ pub struct Ready {
     status: String,
     /// The program's version.
     version: String,
-    /// What the service depends on.
+    /// Parts that the service depends on.
     checks: Vec<Dependency>,
 }
 
@@ -41,7 +41,7 @@ pub struct NotReady {
     /// The problem.
     #[serde(flatten)]
     problem: ProblemBody,
-    /// What the service depends on.
+    /// A part that the service depends on.
     checks: Vec<Dependency>,
 }
 
@@ -56,7 +56,7 @@ pub struct Dependency {
     status: &'static str,
     /// Whether no work can be accepted without it.
     required: bool,
-    /// What is wrong with it.
+    /// The reason why it does not work.
     #[serde(skip_serializing_if = "Option::is_none")]
     detail: Option<&'static str>,
 }

@@ -25,7 +25,7 @@ pub struct ReceivedBody {
     /// Its id.
     #[schema(example = "rcv_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// What became of it.
+    /// How far it has come.
     state: ReceivedState,
     /// Study Instance UID.
     study: String,

@@ -33,13 +33,13 @@ pub struct KeyBody {
     /// Its id.
     #[schema(example = "0123456789abcdef")]
     id: String,
-    /// What it is for.
+    /// Its name, which says what it is for.
     #[schema(example = "scanner 2")]
     name: String,
     /// Whose items and jobs it opens.
     #[schema(example = "default")]
     tenant: String,
-    /// What it allows.
+    /// The acts that it allows.
     scope: ScopeName,
     /// Whether it opens the service.
     state: KeyStateName,
@@ -97,10 +97,10 @@ pub struct KeyList {
     reason = "it documents the body, which is read field by field"
 )]
 pub struct NewKey {
-    /// What it is for.
+    /// Its name, which says what it is for.
     #[schema(min_length = 1, max_length = 80, example = "scanner 2")]
     name: String,
-    /// What it allows: `read`, `submit` or `admin`.
+    /// The acts that it allows: `read`, `submit` or `admin`.
     #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
     scope: String,
     /// From when on it is refused (RFC 3339); never if absent.

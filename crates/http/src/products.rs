@@ -66,7 +66,7 @@ pub trait ProductCollection: 'static {
     /// The name of the schema that lists all names of files.
     const FILE_SCHEMA: &'static str;
 
-    /// What the document says about downloading a file.
+    /// The description of a download in the document.
     const FILE_HELP: &'static str;
 
     /// How the document describes a downloaded file.
@@ -647,7 +647,7 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// What the page of `product` names of the scan.
+    /// The fields of the scan that the page of `product` names.
     async fn sees(self, app: &App, product: &Product) -> Answer<Map<String, Value>> {
         let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
             return Ok(Map::new());

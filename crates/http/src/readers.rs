@@ -50,7 +50,7 @@ pub struct ReaderBody {
     created_at: String,
     /// Its name.
     name: String,
-    /// What the profile holds.
+    /// The content of the profile.
     #[schema(value_type = ventriform::report::ReaderSummary)]
     summary: Map<String, Value>,
     /// The program that added it.

@@ -22,7 +22,7 @@ pub const LABEL_NAME_LENGTH: usize = 64;
 /// Longest value of a label, characters.
 pub const LABEL_VALUE_LENGTH: usize = 256;
 
-/// What this module reads: parameters of a query string or form, fields of a JSON object. (`label`
+/// The names that this module reads: parameters of a query string or form, fields of a JSON object. (`label`
 /// is a parameter of models: the label of an object in a label map.)
 pub const TAG_FIELDS: [&str; 2] = ["external_id", "labels"];
 

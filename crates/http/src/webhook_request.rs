@@ -131,7 +131,7 @@ pub struct CheckedWebhook {
     pub url: String,
     /// Scheme, host and port of the URL.
     pub destination: String,
-    /// What to tell.
+    /// The events that it is told.
     pub events: Vec<HookEvent>,
     /// The secret that signs the deliveries.
     pub secret: Option<SigningSecret>,

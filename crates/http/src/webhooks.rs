@@ -28,7 +28,7 @@ const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
 /// Most deliveries in one answer.
 const MOST_DELIVERIES: u32 = 100;
 
-/// What ids of deliveries to archives begin with.
+/// The beginning of ids of deliveries to archives.
 const OBJECT_PREFIX: &str = "snd_";
 
 /// A registered receiver.
@@ -41,7 +41,7 @@ pub struct WebhookBody {
     /// Where it is.
     #[schema(example = "https://ris.example.org/hooks/ventriform")]
     url: String,
-    /// What it is told.
+    /// The events that it is told.
     events: Vec<String>,
     /// When it was registered (RFC 3339).
     #[schema(format = DateTime)]
@@ -215,7 +215,7 @@ pub struct DeliveryBody {
     webhook: Option<String>,
     /// Where it goes.
     url: String,
-    /// What it tells.
+    /// The event that it tells.
     #[schema(example = "succeeded")]
     event: String,
     /// `pending`, `delivered`, or `dead` if it was given up.

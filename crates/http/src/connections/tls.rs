@@ -174,7 +174,7 @@ impl Tls {
         self.files.client_authorities.is_some()
     }
 
-    /// What a handshake that begins now goes by.
+    /// The settings of a handshake that begins now.
     pub fn config(&self) -> Arc<ServerConfig> {
         self.lock().0.clone()
     }

@@ -46,7 +46,7 @@ impl PartialSchema for JobRequest {
     }
 }
 
-/// What both kinds of job requests have, before and after what they work on.
+/// The fields that both kinds of job requests have, before and after what they work on.
 fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
     let text = || ObjectBuilder::new().schema_type(Type::String);
     let kind = text()
