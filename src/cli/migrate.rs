@@ -30,7 +30,9 @@ fails, give the same command again: it goes on where it stopped, and no service 
 unfinished.
 
 With --moved-files nothing is copied: other tools have moved the files of a store, and its database is told
-where they are. Every file that it names must be there, in its full length. Passwords and credentials come from the environment, as for the service.")]
+where they are. Every file that it names must be there, in its full length.
+
+Passwords and credentials come from the environment, as for the service.")]
 pub struct MigrateArgs {
     /// Data folder of the service, with its records in `ventriform.db` and its files beside it
     #[arg(

@@ -52,7 +52,14 @@ pub async fn note_moved_files(
         MovedFiles::Bucket(location) => (data_dir, Some(location)),
         MovedFiles::Folder(folder) => (folder.as_path(), None),
     };
-    if bucket.is_none() || database.is_none() {
+    if database.is_none() && (bucket.is_none() || noted_place(folder)?.is_none()) {
+        require_file(folder)?;
+        return Err(MigrateError::Destination(
+            "files beside `ventriform.db` belong to it wherever the whole folder is moved; only files in a bucket, or \
+             beside records in PostgreSQL (--database), are moved alone",
+        ));
+    }
+    if bucket.is_none() {
         // A folder that is made now has no files.
         fs::metadata(folder).map_err(|error| unusable(folder, &error))?;
     }
@@ -64,7 +71,7 @@ pub async fn note_moved_files(
             let rows = SqlStore::connect(server, wait, gauge).await;
             rows.map_err(OpenError::from)?
         }
-        None => rows_of(folder, bucket, &mut lock).await?,
+        None => rows_of(folder, &mut lock).await?,
     };
     let noted = match bucket {
         Some(location) => note_bucket(&rows, database, folder, location).await,
@@ -76,18 +83,7 @@ pub async fn note_moved_files(
 }
 
 /// The records of a data folder whose files are in a bucket.
-async fn rows_of(
-    folder: &Path,
-    bucket: Option<&S3Location>,
-    lock: &mut FolderLock,
-) -> Result<SqlStore, MigrateError> {
-    require_file(folder)?;
-    if bucket.is_none() || noted_place(folder)?.is_none() {
-        return Err(MigrateError::Destination(
-            "files beside `ventriform.db` belong to it wherever the whole folder is moved; only files in a bucket, or \
-             beside records in PostgreSQL (--database), are moved alone",
-        ));
-    }
+async fn rows_of(folder: &Path, lock: &mut FolderLock) -> Result<SqlStore, MigrateError> {
     let database = folder.join(DATABASE_FILE);
     if !database.exists() {
         return Err(unusable(&database, &"there is no such database").into());
