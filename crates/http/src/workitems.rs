@@ -196,20 +196,15 @@ pub async fn search_workitems(
     mut query: QueryReader,
 ) -> Answer {
     let search: SearchQuery = query.take()?;
-    let limit = search
-        .limit
-        .map_or(PAGE_ITEMS.0, |limit| limit.min(PAGE_ITEMS.1));
+    let limit = search.limit.unwrap_or(PAGE_ITEMS.0).min(PAGE_ITEMS.1);
     let mut skip = search.offset.unwrap_or(0);
     let mut matching = Matching::default();
-    let state = search
-        .state
-        .map(|state| ("ProcedureStepState".to_owned(), state));
+    let state = search.state.map(|it| ("ProcedureStepState".to_owned(), it));
     // All attributes are answered, and names are compared without regard to case.
-    let others = query
-        .rest()
-        .into_iter()
-        .filter(|(name, _)| !["includefield", "fuzzymatching"].contains(&name.as_str()));
-    for (name, value) in others.chain(state) {
+    let needless = ["includefield", "fuzzymatching"];
+    let mut wanted = query.rest();
+    wanted.retain(|(name, _)| !needless.contains(&name.as_str()));
+    for (name, value) in wanted.into_iter().chain(state) {
         matching.add(&name, &value).map_err(|error| {
             Problem::bad_request("unknown-parameter", format!("{error}."))
                 .at(&error.name)
