@@ -1,9 +1,10 @@
-//! `ventriform migrate`: moving a data folder to PostgreSQL and an S3 store.
+//! `ventriform migrate`: moving a data folder to PostgreSQL and an S3 store, and noting that files were moved.
 
+use super::data_args::DataArgs;
 use super::output::{note, say};
 use super::serve::variable;
 use crate::server::s3_location;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -11,34 +12,51 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use ventriform_service::access::verify;
 use ventriform_service::config::{BlobPlace, DatabaseUrl, Flags, Settings};
-use ventriform_store::{Destination, Migrated, Progress, open_database};
+use ventriform_store::{Destination, Migrated, MovedFiles, Progress, open_database};
 
 /// Time between two lines about the progress.
 const TOLD_EVERY: Duration = Duration::from_secs(2);
 
-/// Copy a data folder to PostgreSQL, to an S3 store, or to both (stop the service first)
+/// Copy a data folder to PostgreSQL, to an S3 store, or to both, or note that files were moved (stop the service first)
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform migrate --from data --to postgres://ventriform@db/ventriform,s3://hearts/prod
   ventriform migrate --from data --to postgres://ventriform@db/ventriform,new-data
   ventriform migrate --from data --to s3://hearts/prod,new-data
+  ventriform migrate --moved-files s3://hearts/restored --database postgres://ventriform@db/ventriform
 
 Every file is hashed on both sides, every row is read back. The folder stays as it is. If it is stopped or
 fails, give the same command again: it goes on where it stopped, and no service starts on what is
-unfinished. Passwords and credentials come from the environment, as for the service.")]
+unfinished.
+
+With --moved-files nothing is copied: other tools have moved the files of a store, and its database is told
+where they are. Every file that it names must be there, in its full length.
+
+Passwords and credentials come from the environment, as for the service.")]
 pub struct MigrateArgs {
     /// Data folder of the service, with its records in `ventriform.db` and its files beside it
-    #[arg(long, value_name = "DIR")]
-    from: PathBuf,
+    #[arg(
+        long,
+        value_name = "DIR",
+        required_unless_present = "moved_files",
+        conflicts_with = "moved_files"
+    )]
+    from: Option<PathBuf>,
     /// Where to: postgres://USER@HOST:PORT/NAME, s3://BUCKET/PREFIX, or both; with one alone, also the new
     /// data folder for the rest. A comma in a password is written %2C
     #[arg(
         long,
         value_name = "TARGET,...",
         value_delimiter = ',',
-        required = true
+        required_unless_present = "moved_files",
+        conflicts_with = "moved_files"
     )]
     to: Vec<String>,
+    /// The place of files that were moved: s3://BUCKET/PREFIX, or with records in PostgreSQL a data folder
+    #[arg(long, value_name = "PLACE")]
+    moved_files: Option<String>,
+    #[command(flatten)]
+    records: DataArgs,
 }
 
 /// Copies a data folder.
@@ -46,7 +64,16 @@ pub struct MigrateArgs {
 /// # Errors
 /// If it was not copied as a whole.
 pub fn run(args: &MigrateArgs) -> Result<()> {
+    if let Some(place) = &args.moved_files {
+        return note_moved(place, &args.records);
+    }
+    if args.records.is_given() {
+        bail!(
+            "--data-dir and --database belong to --moved-files; --from and --to say what is copied where"
+        );
+    }
     let to = args.destination()?;
+    let from = args.from.clone().unwrap_or_default();
     ventriform_http::install_cryptography();
     let told = Mutex::new(Instant::now());
     let tell = |progress: Progress| {
@@ -57,10 +84,38 @@ pub fn run(args: &MigrateArgs) -> Result<()> {
         }
     };
     Runtime::new()?.block_on(async {
-        let done = ventriform_store::migrate(&args.from, &to, tell).await?;
+        let done = ventriform_store::migrate(&from, &to, tell).await?;
         print(&done);
         check_trail(&to).await
     })
+}
+
+/// Notes in the database that its files are at `place`.
+fn note_moved(place: &str, records: &DataArgs) -> Result<()> {
+    let settings = records.settings()?;
+    let files = match place.split_once("://") {
+        Some(("s3", _)) => {
+            let blobs: BlobPlace = place.parse().map_err(anyhow::Error::msg)?;
+            let mut settings = Settings {
+                blobs,
+                ..settings.clone()
+            };
+            settings.read_aws(variable);
+            MovedFiles::Bucket(s3_location(&settings).context("--moved-files names no bucket")?)
+        }
+        Some((scheme, _)) => {
+            bail!(
+                "--moved-files: {scheme}:// is no place of files: give s3://BUCKET/PREFIX or a folder"
+            )
+        }
+        None => MovedFiles::Folder(PathBuf::from(place)),
+    };
+    ventriform_http::install_cryptography();
+    let database = settings.postgres();
+    let noted = ventriform_store::note_moved_files(&settings.data_dir, database.as_ref(), &files);
+    let items = Runtime::new()?.block_on(noted)?;
+    say!("the files of {items} items are in {place}, as the records say now");
+    Ok(())
 }
 
 impl MigrateArgs {

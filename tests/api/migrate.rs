@@ -14,8 +14,8 @@ use ventriform_service::access::{Quota, Scope, verify};
 use ventriform_service::config::{AwsVariables, Settings};
 use ventriform_service::records::{Resource, random_id};
 use ventriform_store::{
-    Destination, MigrateError, Migrated, OpenError, Progress, Store, StoreSettings, migrate,
-    open_database, open_rows,
+    Destination, MigrateError, Migrated, MovedFiles, OpenError, Progress, Store, StoreSettings,
+    migrate, note_moved_files, open_database, open_rows,
 };
 
 /// Lists whose answers must not change.
@@ -348,7 +348,7 @@ async fn a_dump_and_a_later_copy_of_the_bucket_are_a_backup() {
     let file = dump.path().join("ventriform.dump");
     let dumped = server()
         .program("pg_dump")
-        .args(["--format=custom", "--file"])
+        .args(["--format=custom", "--no-unlogged-table-data", "--file"])
         .args([file.as_os_str(), url.as_ref()])
         .status();
     assert!(dumped.unwrap().success());
@@ -362,13 +362,10 @@ async fn a_dump_and_a_later_copy_of_the_bucket_are_a_backup() {
         .status();
     assert!(filled.unwrap().success());
     let to = at(&fresh, &restored);
-    let place = format!(
-        "UPDATE store_place SET place = '{}'",
-        to.s3.as_ref().unwrap()
-    );
-    server()
-        .run(fresh.rsplit('/').next().unwrap(), &place)
-        .await;
+    let files = MovedFiles::Bucket(to.s3.clone().unwrap());
+    let scratch = tempfile::tempdir().unwrap();
+    let noted = note_moved_files(scratch.path(), to.database.as_ref(), &files).await;
+    assert_eq!(noted.unwrap(), 2, "a volume and a model");
     let app = TestApp::with(on(&to, &fresh)).await;
     assert!(seen(&app).await == before);
     let gone = app
@@ -378,4 +375,105 @@ async fn a_dump_and_a_later_copy_of_the_bucket_are_a_backup() {
         .unwrap();
     assert_eq!(gone.status(), 404);
     app.model("sphere afterwards").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bucket_that_was_moved_is_noted_if_it_has_all_files() {
+    let store = S3Server::start().await;
+    let url = server().database().await;
+    for database in [None, Some(reached(&url))] {
+        let (old, new) = (random_id("old-"), random_id("new-"));
+        let at = |prefix: &str| Destination {
+            database: database.clone(),
+            s3: Some(store.location(prefix)),
+            folder: None,
+        };
+        let note = async |data: &Path, prefix: &str| {
+            let files = MovedFiles::Bucket(store.location(prefix));
+            note_moved_files(data, database.as_ref(), &files).await
+        };
+        let app = TestApp::with(on(&at(&old), &url)).await;
+        app.model("sphere").await;
+        let before = seen(&app).await;
+        let running = note(app.data.path(), &old).await.unwrap_err();
+        let in_use = matches!(running, MigrateError::Open(OpenError::InUse(_)));
+        assert!(in_use, "{running}");
+        if database.is_some() {
+            let other = tempfile::tempdir().unwrap();
+            let running = note(other.path(), &old).await.unwrap_err();
+            assert!(matches!(running, MigrateError::Running(_)), "{running}");
+        }
+        let data = app.stop().await;
+        let lacking = note(data.path(), &new).await.unwrap_err();
+        assert!(
+            matches!(lacking, MigrateError::FilesMissing { .. }),
+            "{lacking}"
+        );
+        store.copy_all(&old, &new).await;
+        assert_eq!(note(data.path(), &new).await.unwrap(), 2);
+        let app = TestApp::on(data, fake_engine(), on(&at(&new), &url)).await;
+        assert!(seen(&app).await == before);
+        let data = app.stop().await;
+        let settings = StoreSettings {
+            database: database.clone(),
+            s3: Some(store.location(&old)),
+            ..StoreSettings::default()
+        };
+        let refused = Store::open_with(data.path(), settings).await.err().unwrap();
+        assert!(refused.to_string().contains("--moved-files"), "{refused}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_of_files_that_was_moved_is_noted_if_it_is_of_no_other_database() {
+    let url = server().database().await;
+    let at = Destination {
+        database: Some(reached(&url)),
+        s3: None,
+        folder: None,
+    };
+    let new = tempfile::tempdir().unwrap();
+    let files = MovedFiles::Folder(new.path().to_owned());
+    let note = || note_moved_files(Path::new("unused"), at.database.as_ref(), &files);
+    let early = note().await.unwrap_err();
+    assert!(matches!(early, MigrateError::NoPlace(_)), "{early}");
+    let app = TestApp::with(on(&at, &url)).await;
+    app.model("sphere").await;
+    let before = seen(&app).await;
+    let old = app.stop().await;
+    let lacking = note().await.unwrap_err();
+    assert!(lacking.to_string().contains("volumes/vol_"), "{lacking}");
+    let from = format!("{}/.", old.path().display());
+    let copied = std::process::Command::new("cp")
+        .args(["-a", &from])
+        .arg(new.path())
+        .status();
+    assert!(copied.unwrap().success());
+    let marker = new.path().join("database");
+    std::fs::write(&marker, "postgres://elsewhere/other\nfolder 1\n").unwrap();
+    let other = note().await.unwrap_err();
+    assert!(matches!(other, MigrateError::OtherStore { .. }), "{other}");
+    std::fs::remove_file(marker).unwrap();
+    std::fs::write(new.path().join("ventriform.db"), "").unwrap();
+    let beside = note().await.unwrap_err();
+    assert!(
+        matches!(beside, MigrateError::Open(OpenError::InFile(_))),
+        "{beside}"
+    );
+    let beside = note_moved_files(new.path(), None, &files)
+        .await
+        .unwrap_err();
+    assert!(matches!(beside, MigrateError::Destination(_)), "{beside}");
+    std::fs::remove_file(new.path().join("ventriform.db")).unwrap();
+    for _ in 0..2 {
+        assert_eq!(note().await.unwrap(), 2);
+    }
+    let app = TestApp::on(Arc::new(new), fake_engine(), on(&at, &url)).await;
+    assert!(seen(&app).await == before);
+    let settings = StoreSettings {
+        database: at.database.clone(),
+        ..StoreSettings::default()
+    };
+    let refused = Store::open_with(old.path(), settings).await.err().unwrap();
+    assert!(refused.to_string().contains("--moved-files"), "{refused}");
 }

@@ -1,7 +1,7 @@
 //! The published document.
 
 use crate::helpers::{TestApp, text};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::path::Path;
 use ventriform::parameters::{FIT_SPECS, SPECS};
 use ventriform_http::document_json;
@@ -119,6 +119,69 @@ fn no_name_means_two_parameters_of_an_operation() {
             );
         }
     }
+}
+
+/// Queries that an operation refuses, the parameter at fault, and the code of the problem.
+fn wrong_queries(document: &Value, operation: &Value) -> Vec<(String, String, &'static str)> {
+    let name = "no_such_parameter".to_owned();
+    let mut wrong = vec![(format!("{name}=1"), name, "unknown-parameter")];
+    let parameters = operation["parameters"].as_array().into_iter().flatten();
+    for parameter in parameters.filter(|parameter| parameter["in"] == "query") {
+        let name = text(&parameter["name"]);
+        let schema = &parameter["schema"];
+        let reference = schema["$ref"]
+            .as_str()
+            .unwrap_or("#")
+            .trim_start_matches('#');
+        let target = document.pointer(reference).unwrap();
+        let schema = if reference.is_empty() { schema } else { target };
+        if schema["type"] != "array" {
+            let twice = format!("{name}=1&{name}=1");
+            wrong.push((twice, name.clone(), "repeated-parameter"));
+        }
+        let listed = schema["enum"].is_array() || schema["format"] == "date-time";
+        let kind = schema["type"].as_str().unwrap_or_default();
+        if listed || ["boolean", "integer", "number"].contains(&kind) {
+            wrong.push((format!("{name}=wrong"), name, "invalid-"));
+        }
+    }
+    wrong
+}
+
+#[tokio::test]
+async fn every_operation_refuses_unknown_repeated_and_malformed_parameters() {
+    let app = TestApp::start().await;
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let mut refused = std::collections::BTreeMap::new();
+    for (path, method, operation) in operations(&document) {
+        let filled = path.replace(['{', '}'], "");
+        let method: reqwest::Method = method.to_uppercase().parse().unwrap();
+        for (query, name, code) in wrong_queries(&document, operation) {
+            let url = format!("{}{filled}?{query}", app.url);
+            let answer = app
+                .client
+                .request(method.clone(), url)
+                .send()
+                .await
+                .unwrap();
+            let status = answer.status().as_u16();
+            let problem: Value = answer.json().await.unwrap_or_default();
+            let what = format!("{method} {path}?{query}: {status} {problem}");
+            // The parameters of a job are checked by its work, for JSON and forms alike.
+            let of_job = ["/v1/models", "/v1/segmentations"].contains(&path) && status == 422;
+            assert!(
+                of_job || status == 400 && text(&problem["type"]).contains(code),
+                "{what}"
+            );
+            assert_eq!(problem["field"], json!(name), "{what}");
+            assert!(problem["fix"].is_string(), "{what}");
+            *refused.entry(code).or_insert(0) += 1;
+        }
+    }
+    assert!(
+        refused["unknown-parameter"] > 100 && refused["invalid-"] > 50,
+        "{refused:?}"
+    );
 }
 
 #[test]

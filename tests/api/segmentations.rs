@@ -390,12 +390,12 @@ async fn a_mesh_that_cannot_be_fitted_is_rejected_as_template() {
         let refused = post("?organ=generic", body).await.unwrap();
         problem(refused, 422, "unsuitable-model").await;
     }
-    for (query, code, field) in [
-        ("?organ=spleen", "invalid-parameter", "organ"),
-        ("?name=", "invalid-field", "name"),
+    for (query, status, code, field) in [
+        ("?organ=spleen", 400, "invalid-parameter", "organ"),
+        ("?name=", 422, "invalid-field", "name"),
     ] {
         let refused = post(query, mesh_json(&sphere)).await.unwrap();
-        assert_eq!(problem(refused, 422, code).await["field"], field);
+        assert_eq!(problem(refused, status, code).await["field"], field);
     }
     let unknown = post("?model=mdl_00", Vec::new()).await.unwrap();
     assert_eq!(

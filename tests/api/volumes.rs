@@ -263,12 +263,12 @@ async fn the_voxels_of_a_volume_can_be_read_in_one_format() {
     );
     let first = app.get(&format!("{path}?frame=0")).send().await.unwrap();
     assert_ne!(first.headers()["etag"], etag);
-    for (query, code) in [
-        ("frame=7", "frame-out-of-range"),
-        ("frame=x", "invalid-parameter"),
+    for (query, status, code) in [
+        ("frame=7", 422, "frame-out-of-range"),
+        ("frame=x", 400, "invalid-parameter"),
     ] {
         let answer = app.get(&format!("{path}?{query}")).send().await.unwrap();
-        let body = problem(answer, 422, code).await;
+        let body = problem(answer, status, code).await;
         assert_eq!(body["field"], "frame");
     }
 }

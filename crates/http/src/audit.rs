@@ -2,16 +2,17 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::openapi::{ListProblems, PageParameters};
-use super::pagination::{list_query, next_cursor};
-use super::problem::{Answer, Problem};
+use super::openapi::ListProblems;
+use super::pagination::{PageQuery, next_cursor};
+use super::problem::Answer;
+use super::query::{Query, moment};
 use axum::Json;
-use axum::extract::{RawQuery, State};
-use serde::Serialize;
+use axum::extract::State;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::access::{AuditFilter, fhir};
-use ventriform_service::records::{Timestamp, parse_rfc3339};
+use ventriform_service::records::Timestamp;
 
 /// A page of the audit trail.
 #[derive(Serialize, ToSchema)]
@@ -24,30 +25,43 @@ pub struct AuditPage {
     next_cursor: Option<String>,
 }
 
+/// A search of the audit trail.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct AuditQuery {
+    /// Only what this caller did
+    agent: Option<String>,
+    /// Only what concerns the item with this id
+    object: Option<String>,
+    /// Only from this time on (RFC 3339)
+    #[serde(default, deserialize_with = "moment")]
+    #[param(value_type = Option<String>)]
+    since: Option<Timestamp>,
+    /// Only before this time (RFC 3339)
+    #[serde(default, deserialize_with = "moment")]
+    #[param(value_type = Option<String>)]
+    until: Option<Timestamp>,
+}
+
 /// Read the audit trail
 ///
 /// Who did what to which item, and when. Reads of the same item by the same caller within one
 /// second are one event with a count.
 #[utoipa::path(get, path = "/v1/audit", tag = "access", operation_id = "list_audit_events",
-    params(PageParameters,
-        ("agent" = Option<String>, Query, description = "Only what this caller did"),
-        ("object" = Option<String>, Query, description = "Only what concerns the item with this id"),
-        ("since" = Option<String>, Query, description = "Only from this time on (RFC 3339)"),
-        ("until" = Option<String>, Query, description = "Only before this time (RFC 3339)")),
+    params(PageQuery, AuditQuery),
     responses((status = 200, description = "A page, newest first", body = AuditPage), ListProblems))]
 pub async fn list_audit_events(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query((page, search)): Query<(PageQuery, AuditQuery)>,
 ) -> Answer<Json<AuditPage>> {
-    let names = ["agent", "object", "since", "until"];
-    let (page, [agent, object, since, until]) = list_query(query.as_deref(), names).await?;
+    let page = page.charged().await?;
     let filter = AuditFilter {
         tenant: Some(caller.tenant),
-        agent,
-        object,
-        since: since.map(|text| time("since", &text)).transpose()?,
-        until: until.map(|text| time("until", &text)).transpose()?,
+        agent: search.agent,
+        object: search.object,
+        since: search.since,
+        until: search.until,
     };
     // What was noted within the last second belongs to the answer.
     app.service.recorder.flush().await;
@@ -58,12 +72,4 @@ pub async fn list_audit_events(
         events,
         next_cursor,
     }))
-}
-
-fn time(field: &str, text: &str) -> Answer<Timestamp> {
-    parse_rfc3339(text).ok_or_else(|| {
-        Problem::bad_request("invalid-parameter", format!("`{field}` is no time."))
-            .at(field)
-            .fix("Give a time such as 2026-11-22T00:00:00Z.")
-    })
 }

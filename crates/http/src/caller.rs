@@ -17,7 +17,7 @@ pub struct Caller {
     pub name: String,
     /// Its scope.
     pub scope: Scope,
-    /// What its tenant may store and queue by its requests; those of its key, or the general limits.
+    /// Limits on what its tenant may store and queue by its requests; those of its key, or the general limits.
     pub quota: Quota,
     /// Limits of its own key, and when that expires.
     pub own: (Quota, Option<Timestamp>),

@@ -6,19 +6,21 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::erasures::{self, ReceiptBody};
+use super::erasures::{self, CascadeQuery, ReceiptBody};
 use super::guard::Agent;
 use super::openapi::{
-    CachedHeaders, CascadeParameter, Documented, EraseProblems, ErasureParameters, ListProblems,
-    LookupProblems, PageParameters, ScanParameters, TagParameters, UnchangedAnswer,
+    CachedHeaders, Documented, EraseProblems, ErasureHeader, ListProblems, LookupProblems,
+    UnchangedAnswer,
 };
-use super::pagination::{next_cursor, page_of};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::Answer;
 use super::problem::not_found::missing;
-use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::query::{NoQuery, QueryReader};
+use super::request::PathSegments;
+use super::scans::{self, ScanQuery};
+use super::tags::TagQuery;
 use super::validators::ValidatedJson;
-use super::{scans, tags};
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::routing::{delete, get};
 use axum::{Extension, Json};
@@ -34,8 +36,7 @@ use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
-    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, ScanFilter, StoreError,
-    TagFilter, Tenant,
+    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, StoreError, Tenant,
 };
 
 /// One kind of stored thing.
@@ -89,14 +90,14 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
         format!("list_{plural}"),
         format!("List {plural}"),
     )
-    .parameters::<PageParameters>()
+    .parameters::<PageQuery>()
     .json::<ListBody<C>>("A page, newest first")
     .answers::<ListProblems>();
     if C::TAGGED {
-        listing = listing.parameters::<TagParameters>();
+        listing = listing.parameters::<TagQuery>();
     }
     if C::SCANNED {
-        listing = listing.parameters::<ScanParameters>();
+        listing = listing.parameters::<ScanQuery>();
     }
     let lookup = operation(
         HttpMethod::Get,
@@ -121,13 +122,13 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
          answer.",
     )
     .id(noun)
-    .parameters::<ErasureParameters>()
+    .parameters::<ErasureHeader>()
     .json::<ReceiptBody>("Erased; the receipt")
     .empty_answer("204", "Erased")
     .answers::<EraseProblems>()
     .answers::<LookupProblems>();
     if C::RESOURCE == Resource::Volume {
-        erasure = erasure.parameters::<CascadeParameter>();
+        erasure = erasure.parameters::<CascadeQuery>();
     }
     [
         listing.served_by(get(list::<C>)),
@@ -150,28 +151,23 @@ pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer
     }
 }
 
-/// What one upload may hold (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
+/// The header with the limits of one upload (draft-ietf-httpbis-resumable-upload), so that clients need not send what will be
 /// refused.
 const UPLOAD_LIMIT: HeaderName = HeaderName::from_static("upload-limit");
 
 async fn list<C: Collection>(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    mut query: QueryReader,
 ) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
-    let pairs = query_pairs(query.as_deref());
-    let (tags, pairs) = if C::TAGGED {
-        tags::take_filter(&app, pairs)?
-    } else {
-        (TagFilter::default(), pairs)
-    };
-    let (scan, pairs) = if C::SCANNED {
-        scans::take_filter(pairs)?
-    } else {
-        (ScanFilter::default(), pairs)
-    };
-    let filter = ItemFilter { tags, scan };
-    let (page, []) = page_of(pairs, []).await?;
+    let mut filter = ItemFilter::default();
+    if C::TAGGED {
+        filter.tags = query.take::<TagQuery>()?.filter(&app)?;
+    }
+    if C::SCANNED {
+        filter.scan = query.take::<ScanQuery>()?.into();
+    }
+    let page = query.all::<PageQuery>()?.charged().await?;
     let page = C::rows(
         app.service.items().catalogue(),
         &caller.tenant,
@@ -198,10 +194,9 @@ async fn show<C: Collection>(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let read = async || {
         let row = find::<C>(&app, &caller.tenant, &id).await?;
         Ok(ControlFlow::Continue(ValidatedJson::of(&C::body(
@@ -222,16 +217,12 @@ async fn erase<C: Collection>(
     caller: Caller,
     Extension(agent): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     headers: HeaderMap,
 ) -> Answer {
-    let pairs = query_pairs(query.as_deref());
     let cascade = match C::RESOURCE {
-        Resource::Volume => erasures::cascade(&pairs)?,
-        _ => {
-            refuse_unknown(&pairs, &[])?;
-            false
-        }
+        Resource::Volume => query.all::<CascadeQuery>()?.cascade.unwrap_or(false),
+        _ => query.all().map(|()| false)?,
     };
     erasures::erase(&app, (&caller, &agent), C::RESOURCE, id, cascade, &headers).await
 }

@@ -4,19 +4,20 @@ use super::app::App;
 use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
 use super::links::{path_of, rfc3339};
-use super::openapi::{ListProblems, LookupProblems, PageParameters};
-use super::pagination::{list_query, next_cursor};
+use super::openapi::{ListProblems, LookupProblems};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::not_found::{missing, no_receipt};
-use super::problem::{Answer, Problem, shorten};
-use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::problem::{Answer, Problem};
+use super::query::{NoQuery, Query};
+use super::request::PathSegments;
 use super::{negotiate, validators};
 use crate::public_base::public_path;
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::{Extension, Json};
-use serde::Serialize;
-use utoipa::ToSchema;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::records::{Erased, ErasureOrder, ErasureReason, Receipt, Resource};
 
 /// The receipt of an erasure. It stays when what it names is gone, and holds no name that was given
@@ -151,22 +152,21 @@ fn path(id: &str) -> String {
     public_path(&format!("/v1/erasures/{id}"))
 }
 
-/// Reads the query of a request to erase a volume: whether what was made of it goes too.
-///
-/// # Errors
-/// 400 for another parameter or value.
-pub fn cascade(pairs: &[(String, String)]) -> Answer<bool> {
-    refuse_unknown(pairs, &["cascade"])?;
-    match pairs.first().map(|(_, value)| value.as_str()) {
-        None | Some("false") => Ok(false),
-        Some("true") => Ok(true),
-        Some(other) => Err(Problem::bad_request(
-            "invalid-parameter",
-            format!("`cascade` must be true or false, not `{}`.", shorten(other)),
-        )
-        .at("cascade")
-        .fix("Give `cascade=true` to erase also what was made of the volume.")),
-    }
+/// Whether more than a volume is erased.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct CascadeQuery {
+    /// Whether to erase also the models, segmentations and templates that were made of the volume, and the records of its jobs
+    #[param(default = false)]
+    pub cascade: Option<bool>,
+}
+
+/// A search for receipts.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ReceiptQuery {
+    /// Only receipts of erasing this item
+    item: Option<String>,
 }
 
 /// Erases an item. 204, or 200 with the receipt if the client prefers it; `Location` is the
@@ -234,19 +234,18 @@ pub fn on_hold(id: &str, what: &str) -> Problem {
 
 /// List receipts of erasures
 #[utoipa::path(get, path = "/v1/erasures", tag = "erasures", operation_id = "list_erasures",
-    params(PageParameters,
-        ("item" = Option<String>, Query, description = "Only receipts of erasing this item")),
+    params(PageQuery, ReceiptQuery),
     responses((status = 200, description = "A page, newest first", body = ReceiptList),
         ListProblems))]
 pub async fn list_erasures(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query((page, search)): Query<(PageQuery, ReceiptQuery)>,
 ) -> Answer<Json<ReceiptList>> {
-    let (page, [item]) = list_query(query.as_deref(), ["item"]).await?;
+    let page = page.charged().await?;
     let catalogue = app.service.items().catalogue();
     let page = catalogue
-        .receipts(&caller.tenant, item.as_deref(), page)
+        .receipts(&caller.tenant, search.item.as_deref(), page)
         .await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceiptList {
@@ -263,10 +262,9 @@ pub async fn get_erasure(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     match app
         .service
         .items()

@@ -15,7 +15,7 @@ use ventriform_service::items::OutputFile;
 use ventriform_service::records::{FileRecord, Product, ProductFile, hex};
 
 /// The report as an HTML page. It is made on request, of the other files.
-pub const PAGE: &str = "report.html";
+pub const REPORT_PAGE: &str = "report.html";
 
 /// Results never change; only the client that asked may cache them.
 const CACHE_CONTROL: &str = "private, max-age=31536000, immutable";
@@ -77,7 +77,7 @@ pub async fn send_file(app: &App, file: &Download<'_>, headers: &HeaderMap) -> A
 /// Answers with the page of a product in the same way.
 pub async fn send_page(product: &Product, page: String, headers: &HeaderMap) -> Answer {
     let file = OutputFile {
-        name: PAGE.into(),
+        name: REPORT_PAGE.into(),
         media_type: "text/html; charset=utf-8".into(),
         bytes: page.into_bytes(),
     };

@@ -34,7 +34,7 @@ const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'sel
 const FOR_EVER: &str = "public, max-age=31536000, immutable";
 
 /// Cache control of files that are asked for again each time.
-const REVALIDATE: &str = "no-cache";
+const REVALIDATED_CACHE_CONTROL: &str = "no-cache";
 
 /// The page if the client prefers HTML_TYPE, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
@@ -70,11 +70,15 @@ fn index(root: &str, headers: &HeaderMap) -> Option<Response> {
         Some(prefix) => format!("{prefix}/"),
     };
     if root == PAGE_ROOT {
-        return file(INDEX_FILE, HTML_TYPE, REVALIDATE, headers);
+        return file(INDEX_FILE, HTML_TYPE, REVALIDATED_CACHE_CONTROL, headers);
     }
     let page = BUNDLE.get_file(INDEX_FILE)?.contents_utf8()?;
     let page = page.replace(&format!("\"{PAGE_ROOT}"), &format!("\"{root}"));
-    Some(described(page.into_response(), HTML_TYPE, REVALIDATE))
+    Some(described(
+        page.into_response(),
+        HTML_TYPE,
+        REVALIDATED_CACHE_CONTROL,
+    ))
 }
 
 /// A program, style or picture of the page.
@@ -96,7 +100,7 @@ pub async fn icon(headers: HeaderMap) -> Response {
     let assets = BUNDLE.get_dir("assets").into_iter().flat_map(Dir::files);
     let mut names = assets.filter_map(|file| file.path().to_str());
     let name = names.find(|name| name.contains("/icon-") && name.ends_with(".svg"));
-    match name.and_then(|name| file(name, "image/svg+xml", REVALIDATE, &headers)) {
+    match name.and_then(|name| file(name, "image/svg+xml", REVALIDATED_CACHE_CONTROL, &headers)) {
         Some(response) => response,
         None => no_such_path().await.into_response(),
     }

@@ -3,9 +3,9 @@
 use super::app::App;
 use super::openapi::ListProblems;
 use super::problem::{Answer, MEDIA_TYPE, Problem, ProblemBody};
-use super::request::{query_pairs, refuse_unknown};
+use super::query::NoQuery;
 use axum::Json;
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -31,7 +31,7 @@ pub struct Ready {
     status: String,
     /// The program's version.
     version: String,
-    /// What the service depends on.
+    /// Parts that the service depends on.
     checks: Vec<Dependency>,
 }
 
@@ -41,7 +41,7 @@ pub struct NotReady {
     /// The problem.
     #[serde(flatten)]
     problem: ProblemBody,
-    /// What the service depends on.
+    /// A part that the service depends on.
     checks: Vec<Dependency>,
 }
 
@@ -56,7 +56,7 @@ pub struct Dependency {
     status: &'static str,
     /// Whether no work can be accepted without it.
     required: bool,
-    /// What is wrong with it.
+    /// The reason why it does not work.
     #[serde(skip_serializing_if = "Option::is_none")]
     detail: Option<&'static str>,
 }
@@ -85,8 +85,7 @@ fn healthy() -> Health {
 /// Check that the process runs
 #[utoipa::path(get, path = "/healthz", tag = "operations",
     responses((status = 200, description = "It runs", body = Health), ListProblems))]
-pub async fn alive(RawQuery(query): RawQuery) -> Answer<Json<Health>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+pub async fn alive(_: NoQuery) -> Answer<Json<Health>> {
     Ok(Json(healthy()))
 }
 
@@ -99,8 +98,7 @@ pub async fn alive(RawQuery(query): RawQuery) -> Answer<Json<Health>> {
         (status = 503, description = "It cannot", body = NotReady,
             content_type = "application/problem+json"),
         ListProblems))]
-pub async fn ready(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+pub async fn ready(State(app): State<App>, _: NoQuery) -> Answer {
     let found = app.service.readiness.check(app.service.queue()).await;
     let checks = found.iter().map(Dependency::from).collect();
     let closing = app.service.closing.is_cancelled();
@@ -131,8 +129,7 @@ fn unready(why: &str, checks: Vec<Dependency>) -> Response {
 #[utoipa::path(get, path = "/metrics", tag = "operations",
     responses((status = 200, description = "The metrics in the text format of Prometheus", body = String,
         content_type = "text/plain"), ListProblems))]
-pub async fn metrics(State(app): State<App>, RawQuery(query): RawQuery) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+pub async fn metrics(State(app): State<App>, _: NoQuery) -> Answer {
     let reading = MetricReadings {
         load: app.service.queue().table().load().await?,
         figures: app.service.figures.queue_figures().await?,

@@ -4,13 +4,13 @@ use super::problem::{Answer, Problem};
 use axum::http::{HeaderMap, HeaderName};
 
 /// The header's name.
-pub const HEADER: HeaderName = HeaderName::from_static("idempotency-key");
+pub const KEY_HEADER: HeaderName = HeaderName::from_static("idempotency-key");
 
 const KEY_LENGTH: usize = 255;
 
 /// The key of a request, if it has one. The draft's quoted form and a bare token are equal.
 pub fn key(headers: &HeaderMap) -> Answer<Option<String>> {
-    let Some(value) = headers.get(HEADER) else {
+    let Some(value) = headers.get(KEY_HEADER) else {
         return Ok(None);
     };
     let key = value.to_str().unwrap_or_default().trim().trim_matches('"');

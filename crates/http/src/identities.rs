@@ -8,11 +8,12 @@ use super::collection::find;
 use super::erasures::on_hold;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
+use super::query::NoQuery;
+use super::request::{PathSegments, json_object};
 use super::validators::json;
 use super::volumes::Volumes;
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use serde_json::{Map, Value};
 use ventriform_service::records::ScanFields;
@@ -31,10 +32,9 @@ pub async fn get_identity(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     json(&headers, &volume.ownership.scan.whole())
 }
@@ -54,10 +54,9 @@ pub async fn state_identity(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer<Json<Map<String, Value>>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let stated = json_object(request).await?;
     let catalogue = app.service.items().catalogue();
@@ -92,9 +91,8 @@ pub async fn erase_identity(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<StatusCode> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     find::<Volumes>(&app, &caller.tenant, &id).await?;
     if app.service.items().erase_scan(&caller.tenant, &id).await? {
         return Ok(StatusCode::NO_CONTENT);

@@ -4,17 +4,19 @@
 use super::app::App;
 use super::caller::Caller;
 use super::links::{path_of, rfc3339};
-use super::openapi::{ListProblems, LookupProblems, PageParameters};
-use super::pagination::{list_query, next_cursor};
+use super::openapi::{ListProblems, LookupProblems};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
-use super::request::{PathSegments, query_pairs, refuse_unknown, unknown_state};
+use super::query::{NoQuery, Query};
+use super::request::PathSegments;
+use super::words::{ReceivedState, Word};
 use crate::public_base::public_path;
 use axum::Json;
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::StatusCode;
-use serde::Serialize;
-use utoipa::ToSchema;
-use ventriform_service::intake::{GroupState, IntakeGroup};
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+use ventriform_service::intake::IntakeGroup;
 
 /// Objects that make up one volume.
 #[derive(Serialize, ToSchema)]
@@ -23,7 +25,7 @@ pub struct ReceivedBody {
     /// Its id.
     #[schema(example = "rcv_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// What became of it.
+    /// How far it has come.
     state: ReceivedState,
     /// Study Instance UID.
     study: String,
@@ -61,20 +63,6 @@ pub struct ReceivedBody {
     links: ReceivedLinks,
 }
 
-/// What became of received objects.
-#[derive(Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ReceivedState {
-    /// More may come, or they wait to be read.
-    Gathering,
-    /// The volume is stored; its job is to be started.
-    Filing,
-    /// The volume is stored.
-    Stored,
-    /// They make up no volume; `error` says why.
-    Failed,
-}
-
 /// Paths of received objects.
 #[derive(Serialize, ToSchema)]
 struct ReceivedLinks {
@@ -102,12 +90,7 @@ pub struct ReceivedList {
 impl From<IntakeGroup> for ReceivedBody {
     fn from(group: IntakeGroup) -> Self {
         Self {
-            state: match group.state {
-                GroupState::Gathering => ReceivedState::Gathering,
-                GroupState::Filing => ReceivedState::Filing,
-                GroupState::Stored => ReceivedState::Stored,
-                GroupState::Failed => ReceivedState::Failed,
-            },
+            state: Word(group.state),
             study: group.study,
             series: group.series,
             instance: group.instance,
@@ -135,21 +118,27 @@ impl From<IntakeGroup> for ReceivedBody {
     }
 }
 
+/// A search for what was received.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ReceivedQuery {
+    /// Only what is in this state
+    state: Option<ReceivedState>,
+}
+
 /// List what other systems have sent
 ///
 /// The series and objects that came by C-STORE or STOW-RS, what became of them, and why those that failed
 /// are no volume.
 #[utoipa::path(get, path = "/v1/intake", tag = "dicomweb", operation_id = "list_received",
-    params(PageParameters,
-        ("state" = Option<ReceivedState>, Query, description = "Only what is in this state")),
+    params(PageQuery, ReceivedQuery),
     responses((status = 200, description = "A page, newest first", body = ReceivedList), ListProblems))]
 pub async fn list_received(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query((page, search)): Query<(PageQuery, ReceivedQuery)>,
 ) -> Answer<Json<ReceivedList>> {
-    let (page, [state]) = list_query(query.as_deref(), ["state"]).await?;
-    let state = state.map(|name| parse_state(&name)).transpose()?;
+    let (page, state) = (page.charged().await?, search.state.map(|word| word.0));
     let page = app
         .service
         .intake
@@ -163,11 +152,6 @@ pub async fn list_received(
     }))
 }
 
-fn parse_state(name: &str) -> Answer<GroupState> {
-    GroupState::parse(name)
-        .ok_or_else(|| unknown_state(name, &GroupState::ALL.map(GroupState::as_str)))
-}
-
 /// Forget what was sent
 ///
 /// Erases the objects that are not part of a volume, and what is known of those that are: sent again, they
@@ -179,9 +163,8 @@ pub async fn forget_received(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<StatusCode> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let removed = app.service.intake.store.remove(&caller.tenant, &id).await?;
     let files = removed.ok_or_else(|| {
         Problem::new(

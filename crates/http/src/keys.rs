@@ -5,14 +5,16 @@ use super::app::App;
 use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
 use super::links::rfc3339;
-use super::openapi::{ListProblems, LookupProblems, PageParameters, UploadProblems};
-use super::pagination::{list_query, next_cursor};
+use super::openapi::{ListProblems, LookupProblems, UploadProblems};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
+use super::query::{NoQuery, Query};
+use super::request::{PathSegments, json_object, unknown};
+use super::words::{ScopeName, Word};
 use crate::public_base::public_path;
 use axum::Extension;
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -31,13 +33,13 @@ pub struct KeyBody {
     /// Its id.
     #[schema(example = "0123456789abcdef")]
     id: String,
-    /// What it is for.
+    /// Its name, which says what it is for.
     #[schema(example = "scanner 2")]
     name: String,
     /// Whose items and jobs it opens.
     #[schema(example = "default")]
     tenant: String,
-    /// What it allows.
+    /// The acts that it allows.
     scope: ScopeName,
     /// Whether it opens the service.
     state: KeyStateName,
@@ -63,19 +65,6 @@ pub struct KeyBody {
     /// The key itself, to be sent as `Authorization: Bearer KEY`. Only in the answer that makes it.
     #[serde(skip_serializing_if = "Option::is_none")]
     key: Option<String>,
-}
-
-/// What a key allows.
-#[derive(Serialize, ToSchema)]
-#[schema(as = Scope)]
-#[serde(rename_all = "snake_case")]
-enum ScopeName {
-    /// Reading.
-    Read,
-    /// Also uploading, filing jobs and erasing.
-    Submit,
-    /// Also keys and the audit trail.
-    Admin,
 }
 
 /// Whether a key opens the service.
@@ -108,10 +97,10 @@ pub struct KeyList {
     reason = "it documents the body, which is read field by field"
 )]
 pub struct NewKey {
-    /// What it is for.
+    /// Its name, which says what it is for.
     #[schema(min_length = 1, max_length = 80, example = "scanner 2")]
     name: String,
-    /// What it allows: `read`, `submit` or `admin`.
+    /// The acts that it allows: `read`, `submit` or `admin`.
     #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
     scope: String,
     /// From when on it is refused (RFC 3339); never if absent.
@@ -148,10 +137,9 @@ pub async fn create_key(
     State(app): State<App>,
     caller: Caller,
     Extension(by): Extension<Agent>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.service.now();
     let wanted = read(&json_object(request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
@@ -180,14 +168,14 @@ pub async fn create_key(
 ///
 /// Those of the caller's tenant, revoked ones included.
 #[utoipa::path(get, path = "/v1/keys", tag = "access", operation_id = "list_keys",
-    params(PageParameters),
+    params(PageQuery),
     responses((status = 200, description = "A page, newest first", body = KeyList), ListProblems))]
 pub async fn list_keys(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query(page): Query<PageQuery>,
 ) -> Answer<Json<KeyList>> {
-    let (page, []) = list_query(query.as_deref(), []).await?;
+    let page = page.charged().await?;
     let now = app.service.now();
     let page = app.service.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
@@ -209,9 +197,8 @@ pub async fn revoke_key(
     caller: Caller,
     Extension(by): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let key = app.service.access.key(&id).await?;
     if key.is_none_or(|key| key.tenant != caller.tenant) {
         return Err(Problem::new(
@@ -332,11 +319,7 @@ impl KeyBody {
                 KeyState::Expired => KeyStateName::Expired,
                 KeyState::Revoked => KeyStateName::Revoked,
             },
-            scope: match key.scope {
-                Scope::Read => ScopeName::Read,
-                Scope::Submit => ScopeName::Submit,
-                Scope::Admin => ScopeName::Admin,
-            },
+            scope: Word(key.scope),
             id: key.id,
             name: key.name,
             tenant: key.tenant.to_string(),

@@ -6,10 +6,11 @@ use super::caller::Caller;
 use super::collection::find;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown, unknown};
+use super::query::NoQuery;
+use super::request::{PathSegments, json_object, unknown};
 use super::volumes::{LegalHoldBody, Volumes};
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 use ventriform::text::is_printable;
@@ -28,10 +29,9 @@ pub async fn hold_volume(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer<Json<LegalHoldBody>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     find::<Volumes>(&app, &caller.tenant, &id).await?;
     let object = json_object(request).await?;
     if let Some(name) = object.keys().find(|name| *name != "reason") {
@@ -58,9 +58,8 @@ pub async fn release_volume(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<StatusCode> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     find::<Volumes>(&app, &caller.tenant, &id).await?;
     set(&app, &caller, &id, None).await?;
     Ok(StatusCode::NO_CONTENT)

@@ -61,6 +61,7 @@ mod pagination;
 mod problem;
 mod products;
 mod public_base;
+mod query;
 mod quota;
 mod readers;
 mod request;
@@ -80,6 +81,7 @@ mod volumes;
 mod voxels;
 mod webhook_request;
 mod webhooks;
+mod words;
 mod workitems;
 
 pub use app::App;

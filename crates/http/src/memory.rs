@@ -1,6 +1,6 @@
 //! The memory of answers: an answer holds its own size until it has been read.
 //!
-//! What a request holds before is charged by [`charge`]; see [`ventriform_service::memory`].
+//! The memory that a request holds before is charged by [`charge`]; see [`ventriform_service::memory`].
 
 use super::held_body::HeldBody;
 use super::problem::Answer;

@@ -3,12 +3,16 @@
 use super::app::App;
 use super::caller::Caller;
 use super::files;
+use super::jobs::PriorityQuery;
 use super::jobs::filing::{self, UploadJob};
 use super::links::path_of;
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
 use super::products::{Offer, ProductCollection, body_of_product, object_paths};
-use axum::extract::{RawQuery, Request, State};
+use super::query::QueryReader;
+use super::tags::TagQuery;
+use super::webhook_request::WebhookQuery;
+use axum::extract::{Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
 use ventriform_service::records::{Product, Resource};
@@ -19,7 +23,7 @@ pub struct Models;
 impl ProductCollection for Models {
     const RESOURCE: Resource = Resource::Model;
     type Body = ModelBody;
-    const FILES: &'static [&'static str] = &["report.json", files::PAGE, "distance.json"];
+    const FILES: &'static [&'static str] = &["report.json", files::REPORT_PAGE, "distance.json"];
     const FILE_SCHEMA: &'static str = "FileName";
     const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
         (signed distances of the model's vertices and triangles to the surface) and \
@@ -64,7 +68,7 @@ impl ModelLinks {
         Self {
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
-            page: format!("{itself}/{}", files::PAGE),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
             dicom: object_paths(model),
             volume: path_of(model.volume.as_deref().unwrap_or_default()),
             itself,
@@ -87,14 +91,14 @@ impl ModelLinks {
         (openapi::UploadForm = "multipart/form-data"),
         (Vec<u8> = "multipart/related"),
     )),
-    params(openapi::ModelQuery, openapi::TagParameters, openapi::PriorityParameter,
+    params(openapi::ModelQuery, TagQuery, PriorityQuery,
         openapi::IdempotencyHeader,
-        openapi::PreferHeader, openapi::WebhookInputs),
+        openapi::PreferHeader, WebhookQuery, openapi::WebhookSecretHeader),
     responses(openapi::MeshAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_model(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     request: Request,
 ) -> Answer {
     let job = UploadJob {
@@ -102,5 +106,5 @@ pub async fn create_model(
         apart: &[],
         offers: Offer::meshes(),
     };
-    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
+    filing::file_upload(&app, &caller, job, query, request).await
 }

@@ -11,18 +11,20 @@ use super::links::path_of;
 use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
-    ConditionalHeaders, DeidentifyParameter, DicomProblems, Documented, DownloadAnswers,
-    LookupProblems, MeshAnswer, PartParameter, ReportAnswer,
+    ConditionalHeaders, DicomProblems, Documented, DownloadAnswers, LookupProblems, MeshAnswer,
+    ReportAnswer,
 };
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, flag, query_pairs, refuse_unknown};
+use super::query::{NoQuery, Query, QueryReader};
+use super::request::PathSegments;
 use super::response_cache::Keep;
 use super::scans::{self, ScanUidsBody};
-use axum::extract::{RawQuery, State};
+use super::words::{PartName, Word};
+use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::routing::get;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::convert::Infallible;
@@ -32,7 +34,7 @@ use std::sync::Arc;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
-use utoipa::{IntoResponses, PartialSchema, ToSchema};
+use utoipa::{IntoParams, IntoResponses, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, Part};
@@ -64,7 +66,7 @@ pub trait ProductCollection: 'static {
     /// The name of the schema that lists all names of files.
     const FILE_SCHEMA: &'static str;
 
-    /// What the document says about downloading a file.
+    /// The description of a download in the document.
     const FILE_HELP: &'static str;
 
     /// How the document describes a downloaded file.
@@ -137,7 +139,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         format!("Download a {noun}'s mesh"),
     )
     .description("In the format that `Accept` asks for; GLB if it allows any.")
-    .parameters::<PartParameter>()
+    .parameters::<PartQuery>()
     .parameters::<ConditionalHeaders>()
     .answers::<MeshAnswer>();
     let mut file = download(
@@ -152,11 +154,11 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         .parameters::<ConditionalHeaders>()
         .answers::<P::FileAnswer>();
     if !P::MESHES.is_empty() {
-        file = file.parameters::<PartParameter>();
+        file = file.parameters::<PartQuery>();
     }
     if !dicom::objects(P::RESOURCE).is_empty() {
         file = file
-            .parameters::<DeidentifyParameter>()
+            .parameters::<DeidentifyQuery>()
             .answers::<DicomProblems>();
     }
     let shared = |operation: Documented| {
@@ -327,7 +329,7 @@ impl Offer {
     fn reports() -> [Self; 2] {
         [
             Self::new("application/json", REPORT_FILE),
-            Self::new("text/html", files::PAGE),
+            Self::new("text/html", files::REPORT_PAGE),
         ]
     }
 }
@@ -403,49 +405,41 @@ pub async fn send(
 }
 
 async fn get_mesh<P: ProductCollection>(
-    state: State<App>,
+    State(app): State<App>,
     caller: Caller,
-    id: PathSegments<String>,
-    query: RawQuery,
+    PathSegments(id): PathSegments<String>,
+    Query(query): Query<PartQuery>,
     headers: HeaderMap,
 ) -> Answer {
-    let PathSegments(id_text) = &id;
-    let pairs = query_pairs(query.0.as_deref());
-    let Some(part) = wanted_part(&pairs)? else {
-        return get_offered::<P>(state, caller, id, query, headers, &Offer::meshes()).await;
+    let Some(Word(part)) = query.part else {
+        return get_offered::<P>(&app, &caller, &id, &headers, &Offer::meshes()).await;
     };
-    refuse_unknown(&pairs, &[PART_PARAMETER])?;
-    let State(app) = &state;
-    let product = kept::<P>(app, &caller.tenant, id_text).await?;
+    let product = kept::<P>(&app, &caller.tenant, &id).await?;
     let offers = Offer::meshes();
     let offer = choose(&headers, &offers)?;
-    let mut response = send_part(app, &product, &offer.file, part, &headers).await?;
+    let mut response = send_part(&app, &product, &offer.file, part, &headers).await?;
     response
         .headers_mut()
         .insert(header::VARY, HeaderValue::from_static("accept"));
     Ok(response)
 }
 
-/// The query parameter that asks for one part of a mesh.
-const PART_PARAMETER: &str = "part";
+/// The part of a mesh that is asked for.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct PartQuery {
+    /// Of meshes of a left ventricle: only this part of the wall, as an open surface
+    #[param(inline)]
+    part: Option<PartName>,
+}
 
-/// The part that a request asks for.
-fn wanted_part(pairs: &[(String, String)]) -> Answer<Option<Part>> {
-    let Some((_, name)) = pairs.iter().find(|(name, _)| name == PART_PARAMETER) else {
-        return Ok(None);
-    };
-    let part = Part::named(name).ok_or_else(|| {
-        let names = Part::ALL.map(Part::as_str).join(", ");
-        Problem::bad_request(
-            "invalid-parameter",
-            "`part` names no part of a ventricle's wall.",
-        )
-        .at(PART_PARAMETER)
-        .fix(format!(
-            "Give one of {names}, or leave it out for the closed mesh."
-        ))
-    });
-    part.map(Some)
+/// Whether a file names the patient.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct DeidentifyQuery {
+    /// Of DICOM objects: whether to remove the patient's identity (PS3.15, basic profile); of report.html: whether it names nobody
+    #[param(default = false)]
+    deidentify: Option<bool>,
 }
 
 /// Answers with one part of the mesh `name` of `product`, cut out of it now.
@@ -479,7 +473,7 @@ async fn send_part(
             "not-found",
             format!("The triangles of this mesh do not say which are {}.", part.as_str()),
         )
-        .at(PART_PARAMETER)
+        .at("part")
         .fix(
             "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
              job is started again.",
@@ -491,28 +485,26 @@ async fn send_part(
 const MEMORY_PER_MESH_BYTE: u64 = 16;
 
 async fn get_report<P: ProductCollection>(
-    state: State<App>,
+    State(app): State<App>,
     caller: Caller,
-    id: PathSegments<String>,
-    query: RawQuery,
+    PathSegments(id): PathSegments<String>,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    get_offered::<P>(state, caller, id, query, headers, &Offer::reports()).await
+    get_offered::<P>(&app, &caller, &id, &headers, &Offer::reports()).await
 }
 
 /// The file among `offers` that `Accept` rates highest.
 async fn get_offered<P: ProductCollection>(
-    State(app): State<App>,
-    caller: Caller,
-    PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
-    headers: HeaderMap,
+    app: &App,
+    caller: &Caller,
+    id: &str,
+    headers: &HeaderMap,
     offers: &[Offer],
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
-    let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    let asker = Asker::of(&caller);
-    let mut response = send(&app, asker, &product, choose(&headers, offers)?, &headers).await?;
+    let product = kept::<P>(app, &caller.tenant, id).await?;
+    let asker = Asker::of(caller);
+    let mut response = send(app, asker, &product, choose(headers, offers)?, headers).await?;
     response
         .headers_mut()
         .insert(header::VARY, HeaderValue::from_static("accept"));
@@ -523,30 +515,26 @@ async fn get_file<P: ProductCollection>(
     State(app): State<App>,
     caller: Caller,
     PathSegments((id, name)): PathSegments<(String, String)>,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     headers: HeaderMap,
 ) -> Answer {
-    let pairs = query_pairs(query.as_deref());
     let object = dicom::object_named(P::RESOURCE, &name);
-    let mesh = mesh_names::<P>().any(|mesh| mesh == name);
-    let known: &[&str] = match object.is_some() || name == files::PAGE {
-        true => &["deidentify"],
-        false if mesh => &[PART_PARAMETER],
-        false => &[],
-    };
-    refuse_unknown(&pairs, known)?;
+    let (mut part, mut deidentify) = (None, false);
+    if object.is_some() || name == files::REPORT_PAGE {
+        deidentify = query.all::<DeidentifyQuery>()?.deidentify.unwrap_or(false);
+    } else if mesh_names::<P>().any(|mesh| mesh == name) {
+        part = query.all::<PartQuery>()?.part;
+    } else {
+        query.all::<()>()?;
+    }
     let names = file_names::<P>();
     if !names.contains(&name) {
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    if let Some(part) = wanted_part(&pairs)?.filter(|_| mesh) {
+    if let Some(Word(part)) = part {
         return send_part(&app, &product, &name, part, &headers).await;
     }
-    let deidentify = match pairs.first() {
-        Some((_, value)) => flag("deidentify", value)?,
-        None => false,
-    };
     let Some(object) = object else {
         let asker = Asker {
             deidentify,
@@ -572,7 +560,11 @@ async fn send_object(
     let id = &product.id;
     let size: u64 = product.files.iter().map(|file| file.bytes).sum();
     charge(size).await?;
-    let result = app.service.items().result(tenant, id, dicom::FILES).await?;
+    let result = app
+        .service
+        .items()
+        .result(tenant, id, dicom::SOURCE_FILES)
+        .await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = if deidentify {
         Some(
@@ -655,7 +647,7 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// What the page of `product` names of the scan.
+    /// The fields of the scan that the page of `product` names.
     async fn sees(self, app: &App, product: &Product) -> Answer<Map<String, Value>> {
         let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
             return Ok(Map::new());
@@ -682,7 +674,7 @@ async fn send_named(
         return files::send(app, product, file, headers).await;
     }
     let work = app.service.engine.work(product.resource().noun());
-    match work.filter(|_| name == files::PAGE).cloned() {
+    match work.filter(|_| name == files::REPORT_PAGE).cloned() {
         Some(work) => {
             let files = product.files.iter();
             let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));

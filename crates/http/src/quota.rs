@@ -40,7 +40,7 @@ pub async fn reserve_item(app: &App, caller: &Caller, headers: &HeaderMap) -> An
 /// # Errors
 /// 429 if too many jobs wait, 507 if the tenant's quota of bytes is full.
 pub async fn reserve_job(app: &App, caller: &Caller, headers: &HeaderMap) -> Answer<Counting> {
-    reserve(app, caller, headers, Addition::JOB).await
+    reserve(app, caller, headers, Addition::ONE_JOB).await
 }
 
 async fn reserve(

@@ -6,12 +6,13 @@ use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, UploadProblems};
 use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::query::Query;
 use super::quota::reserve_item;
-use super::request::{json_bytes, query_pairs, refuse_unknown};
-use axum::extract::{RawQuery, Request, State};
-use serde::Serialize;
+use super::request::json_bytes;
+use axum::extract::{Request, State};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::config::Size;
 use ventriform_service::error::ServiceError;
 use ventriform_service::items::check_name;
@@ -49,7 +50,7 @@ pub struct ReaderBody {
     created_at: String,
     /// Its name.
     name: String,
-    /// What the profile holds.
+    /// The content of the profile.
     #[schema(value_type = ventriform::report::ReaderSummary)]
     summary: Map<String, Value>,
     /// The program that added it.
@@ -90,6 +91,15 @@ impl From<Presented> for ReaderBody {
     }
 }
 
+/// The query of a new reader.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ReaderQuery {
+    /// The name that reports show; not a person's name, if results leave the house
+    #[param(min_length = 1, max_length = 80)]
+    name: Option<String>,
+}
+
 /// Add a reader
 ///
 /// The body is a reader's profile, as `ventriform calibrate` writes it. `reader=ID` of a segmentation then
@@ -97,7 +107,7 @@ impl From<Presented> for ReaderBody {
 /// readers.
 #[utoipa::path(post, path = "/v1/readers", tag = "readers",
     request_body(content = ventriform::reader::ProfileDocument, content_type = "application/json"),
-    params(openapi::ReaderQuery),
+    params(ReaderQuery),
     responses(
         (status = 201, description = "Added", body = ReaderBody,
             headers(("Location" = String, description = "The reader's path"))),
@@ -110,13 +120,11 @@ impl From<Presented> for ReaderBody {
 pub async fn create_reader(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query(query): Query<ReaderQuery>,
     request: Request,
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
-    let pairs = query_pairs(query.as_deref());
-    refuse_unknown(&pairs, &["name"])?;
-    let name = pairs.first().map_or("reader", |(_, value)| value.as_str());
+    let name = query.name.as_deref().unwrap_or("reader");
     check_name(name).map_err(ServiceError::from)?;
     let tenant = &caller.tenant;
     let service = &app.service;

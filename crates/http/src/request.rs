@@ -1,5 +1,4 @@
-//! Strict reading of paths, query strings and JSON bodies: what is unknown or given twice is
-//! refused.
+//! Strict reading of paths and JSON bodies: what is unknown is refused.
 
 use super::limits::BodyLimits;
 use super::memory::charge;
@@ -33,78 +32,6 @@ where
             .fix("Use the paths in `links` unchanged.")),
         }
     }
-}
-
-/// The names and values of a query string, decoded, in their order.
-pub fn query_pairs(query: Option<&str>) -> Vec<(String, String)> {
-    form_urlencoded::parse(query.unwrap_or_default().as_bytes())
-        .into_owned()
-        .collect()
-}
-
-/// Refuses a name that is not among `known`, and a name that is given twice.
-pub fn refuse_unknown(pairs: &[(String, String)], known: &[&str]) -> Answer<()> {
-    for (index, (name, _)) in pairs.iter().enumerate() {
-        if !known.contains(&name.as_str()) {
-            return Err(unknown("query parameter", name, known));
-        }
-        if pairs[..index].iter().any(|(earlier, _)| earlier == name) {
-            return Err(Problem::bad_request(
-                "repeated-parameter",
-                format!("`{name}` is given more than once."),
-            )
-            .at(name)
-            .fix("Give it only once."));
-        }
-    }
-    Ok(())
-}
-
-/// The value of the parameter `name`: `true` or `false`.
-///
-/// # Errors
-/// 400 for another text.
-pub fn flag(name: &str, text: &str) -> Answer<bool> {
-    text.parse().map_err(|_| {
-        Problem::bad_request(
-            "invalid-parameter",
-            format!("`{name}` must be `true` or `false`."),
-        )
-        .at(name)
-        .fix("Give `true` or `false`, or leave it out for `false`.")
-    })
-}
-
-/// What `text`, the value of the parameter `field`, names; `known` lists what it may.
-///
-/// # Errors
-/// 400 for another text.
-pub fn word<T>(
-    text: Option<&str>,
-    field: &str,
-    named: impl Fn(&str) -> Option<T>,
-    known: &str,
-) -> Answer<Option<T>> {
-    let Some(text) = text else {
-        return Ok(None);
-    };
-    named(text).map(Some).ok_or_else(|| {
-        Problem::bad_request("invalid-parameter", format!("`{field}` must be {known}."))
-            .at(field)
-            .fix(format!(
-                "Give {known}, or leave it out if the file says it."
-            ))
-    })
-}
-
-/// 400: the parameter `state` names none of the `known` states.
-pub fn unknown_state(name: &str, known: &[&str]) -> Problem {
-    Problem::bad_request(
-        "invalid-parameter",
-        format!("There is no state `{}`.", shorten(name)),
-    )
-    .at("state")
-    .fix(format!("Give one of {}.", known.join(", ")))
 }
 
 /// 400 for an unknown name, with the most similar known one.

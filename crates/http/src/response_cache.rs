@@ -61,7 +61,7 @@ impl<V: Keep> ResponseCache<V> {
         }
     }
 
-    /// What is known of a tenant's item: the kept value, or what `read` makes. `read` gives a value
+    /// The answer about a tenant's item: the kept value, or what `read` makes. `read` gives a value
     /// that follows from the database alone, which is kept, or breaks off with one that is not.
     ///
     /// # Errors

@@ -144,7 +144,7 @@ pub fn router(app: App) -> Router {
             header::AUTHORIZATION,
             header::PROXY_AUTHORIZATION,
             header::COOKIE,
-            idempotency::HEADER,
+            idempotency::KEY_HEADER,
             webhook_request::SECRET_HEADER,
         ]))
         .map_request(observe::drop_unusable_id)

@@ -5,19 +5,54 @@
 //! scope `submit` and `admin`; `read` sees identifiers of DICOM, the acquisition and the equipment.
 //! None of it gets into a path, a header or the log.
 
-use super::problem::{Answer, Problem};
-use super::request::refuse_unknown;
-use serde::Serialize;
+use super::query::parsed;
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform::text::is_printable;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{ScanFilter, ScanIdentity};
 
-/// The parameters of a search by scan.
-pub const FIELDS: [&str; 3] = ["study", "series", "accession"];
+/// A search by scan.
+#[derive(Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct ScanQuery {
+    /// Only of the study with this Study Instance UID
+    #[serde(default, deserialize_with = "value")]
+    #[param(pattern = "^.{1,64}$")]
+    study: Option<String>,
+    /// Only of the series with this Series Instance UID
+    #[serde(default, deserialize_with = "value")]
+    #[param(pattern = "^.{1,64}$")]
+    series: Option<String>,
+    /// Only of scans with this Accession Number
+    #[serde(default, deserialize_with = "value")]
+    #[param(pattern = "^.{1,64}$")]
+    accession: Option<String>,
+}
 
-/// Longest value of such a parameter, characters: that of a UID.
+impl From<ScanQuery> for ScanFilter {
+    fn from(query: ScanQuery) -> Self {
+        Self {
+            study: query.study,
+            series: query.series,
+            accession: query.accession,
+        }
+    }
+}
+
+fn value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    let usable = |text: &str| {
+        let length = text.chars().count();
+        (1..=VALUE_LENGTH).contains(&length) && text.chars().all(is_printable)
+    };
+    let expected =
+        format!("1 to {VALUE_LENGTH} printable characters, as the DICOM header has them");
+    let read = |text: &str| usable(text).then(|| text.to_owned());
+    parsed(deserializer, read, &expected).map(Some)
+}
+
+/// Longest value of a parameter, characters: that of a UID.
 const VALUE_LENGTH: usize = 64;
 
 /// The fields that callers of the scope `read` see: identifiers that DICOM systems exchange, the
@@ -88,33 +123,4 @@ pub fn shown(scan: &ScanIdentity, scope: Scope) -> Option<Map<String, Value>> {
 /// Whether callers of that scope see whose scan a volume is.
 pub fn sees_patients(scope: Scope) -> bool {
     scope.includes(Scope::Submit)
-}
-
-/// Takes a search by scan out of the pairs of a query string.
-///
-/// # Errors
-/// 400 if a value is given twice, empty or too long.
-pub fn take_filter(pairs: Vec<(String, String)>) -> Answer<(ScanFilter, Vec<(String, String)>)> {
-    let own = |(name, _): &(String, String)| FIELDS.contains(&name.as_str());
-    let (own, others): (Vec<_>, Vec<_>) = pairs.into_iter().partition(own);
-    refuse_unknown(&own, &FIELDS)?;
-    let mut filter = ScanFilter::default();
-    for (name, value) in own {
-        let length = value.chars().count();
-        if !(1..=VALUE_LENGTH).contains(&length) || !value.chars().all(is_printable) {
-            return Err(Problem::bad_request(
-                "invalid-parameter",
-                format!("`{name}` must have 1 to {VALUE_LENGTH} printable characters."),
-            )
-            .at(&name)
-            .fix("Give the UID or number as the DICOM header has it."));
-        }
-        let field = match name.as_str() {
-            "study" => &mut filter.study,
-            "series" => &mut filter.series,
-            _ => &mut filter.accession,
-        };
-        *field = Some(value);
-    }
-    Ok((filter, others))
 }

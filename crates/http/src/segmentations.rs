@@ -4,12 +4,16 @@
 use super::app::App;
 use super::caller::Caller;
 use super::files;
+use super::jobs::PriorityQuery;
 use super::jobs::filing::{self, UploadJob};
 use super::links::path_of;
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
 use super::products::{Offer, ProductCollection, body_of_product, object_paths};
-use axum::extract::{RawQuery, Request, State};
+use super::query::QueryReader;
+use super::tags::TagQuery;
+use super::webhook_request::WebhookQuery;
+use axum::extract::{Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
 use ventriform_service::records::{Product, Resource};
@@ -30,7 +34,7 @@ impl ProductCollection for Segmentations {
         "labels.nii.gz",
         "labels.seg.nrrd",
         "report.json",
-        files::PAGE,
+        files::REPORT_PAGE,
         "slices.png",
         "region.nii.gz",
         "polar.json",
@@ -92,7 +96,7 @@ impl SegmentationLinks {
             mask: format!("{itself}/{MASK_FILE}"),
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
-            page: format!("{itself}/{}", files::PAGE),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
             polar: polar.map(|file| format!("{itself}/{}", file.name)),
             dicom: object_paths(segmentation),
             volume: path_of(segmentation.volume.as_deref().unwrap_or_default()),
@@ -135,14 +139,14 @@ fn offers() -> Vec<Offer> {
         (openapi::SegmentationForm = "multipart/form-data"),
         (Vec<u8> = "multipart/related"),
     )),
-    params(openapi::SegmentationQuery, openapi::TagParameters, openapi::PriorityParameter,
+    params(openapi::SegmentationQuery, TagQuery, PriorityQuery,
         openapi::IdempotencyHeader,
-        openapi::PreferHeader, openapi::WebhookInputs),
+        openapi::PreferHeader, WebhookQuery, openapi::WebhookSecretHeader),
     responses(openapi::SegmentationAnswer, WaitAnswers, FileProblems, UploadProblems))]
 pub async fn create_segmentation(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     request: Request,
 ) -> Answer {
     let job = UploadJob {
@@ -150,5 +154,5 @@ pub async fn create_segmentation(
         apart: &["expert"],
         offers: offers(),
     };
-    filing::file_upload(&app, &caller, job, query.as_deref(), request).await
+    filing::file_upload(&app, &caller, job, query, request).await
 }

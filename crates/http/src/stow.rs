@@ -13,13 +13,12 @@ use super::memory::charge;
 use super::negotiate::require_offer;
 use super::openapi::{StowAnswers, UploadProblems};
 use super::problem::{Answer, Problem, body};
+use super::query::NoQuery;
 use super::quota::reserve_upload;
-use super::request::{
-    PathSegments, media_type, query_pairs, refuse_content_encoding, refuse_unknown,
-};
+use super::request::{PathSegments, media_type, refuse_content_encoding};
 use axum::Extension;
 use axum::body::{Body, Bytes};
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
 use futures::{Stream, StreamExt, TryStreamExt};
@@ -64,10 +63,9 @@ pub async fn store_instances(
     State(app): State<App>,
     caller: Caller,
     Extension(agent): Extension<Agent>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     store(&app, &caller, &agent, None, request).await
 }
 
@@ -86,10 +84,9 @@ pub async fn store_study_instances(
     caller: Caller,
     Extension(agent): Extension<Agent>,
     PathSegments(study): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     store(&app, &caller, &agent, Some(study), request).await
 }
 

@@ -8,8 +8,10 @@ use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
 use axum::extract::Request;
+use serde::Deserialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use utoipa::{IntoParams, ToSchema};
 use ventriform::text::is_printable;
 use ventriform_service::records::{TagFilter, Tags, Tenant};
 
@@ -20,49 +22,65 @@ pub const LABEL_NAME_LENGTH: usize = 64;
 /// Longest value of a label, characters.
 pub const LABEL_VALUE_LENGTH: usize = 256;
 
-/// What this module reads: parameters of a query string or form, fields of a JSON object. (`label`
+/// The names that this module reads: parameters of a query string or form, fields of a JSON object. (`label`
 /// is a parameter of models: the label of an object in a label map.)
-pub const FIELDS: [&str; 2] = ["external_id", "labels"];
+pub const TAG_FIELDS: [&str; 2] = ["external_id", "labels"];
 
-/// Pairs of name and value.
-type Pairs = Vec<(String, String)>;
-
-/// Takes the tags out of the pairs of a query string or form.
-///
-/// # Errors
-/// 422 if they are malformed, given twice or too many.
-pub fn take(app: &App, pairs: Pairs) -> Answer<(Tags, Pairs)> {
-    let (own, others): (Pairs, Pairs) = pairs
-        .into_iter()
-        .partition(|(name, _)| FIELDS.contains(&name.as_str()));
-    let mut tags = Tags::default();
-    for (name, value) in own {
-        if name == "external_id" {
-            if tags.external_id.replace(external_id(&value)?).is_some() {
-                return Err(twice("external_id"));
-            }
-            continue;
-        }
-        let (name, value) = label(&value)?;
-        if tags.labels.insert(name, value).is_some() {
-            return Err(twice("labels"));
-        }
-    }
-    limit_labels(app, &tags.labels)?;
-    Ok((tags, others))
+/// The tags of a request or of a search, in a query string or a form.
+#[derive(Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct TagQuery {
+    /// The id in the caller's own system
+    #[param(pattern = "^.{1,128}$")]
+    external_id: Option<String>,
+    /// A name and a value with a colon between them; repeat for several
+    #[serde(default)]
+    #[param(inline, style = Form, explode = true, max_items = 16)]
+    labels: Vec<LabelText>,
 }
 
-/// Takes a filter out of the pairs of a query string.
-///
-/// # Errors
-/// 400 where [`take`] has 422.
-pub fn take_filter(app: &App, pairs: Pairs) -> Answer<(TagFilter, Pairs)> {
-    let (tags, others) = take(app, pairs).map_err(Problem::of_search)?;
-    let filter = TagFilter {
-        external_id: tags.external_id,
-        labels: tags.labels,
-    };
-    Ok((filter, others))
+#[derive(Deserialize, ToSchema)]
+#[serde(transparent)]
+#[schema(pattern = "^[A-Za-z0-9_./-]{1,64}:.{1,256}$", examples("study:42"))]
+struct LabelText(String);
+
+impl TagQuery {
+    /// The tags that were given with a request.
+    ///
+    /// # Errors
+    /// 422 if they are malformed or too many, 400 if the name of a label is given twice.
+    pub fn tags(self, app: &App) -> Answer<Tags> {
+        let external_id = self.external_id.as_deref().map(external_id).transpose()?;
+        let mut labels = BTreeMap::new();
+        for LabelText(text) in &self.labels {
+            let (name, value) = label(text)?;
+            if labels.insert(name, value).is_some() {
+                return Err(Problem::bad_request(
+                    "repeated-parameter",
+                    "A label is given more than once.",
+                )
+                .at("labels")
+                .fix("Give each name only once."));
+            }
+        }
+        limit_labels(app, &labels)?;
+        Ok(Tags {
+            external_id,
+            labels,
+        })
+    }
+
+    /// The tags that are searched for.
+    ///
+    /// # Errors
+    /// 400 where [`TagQuery::tags`] has 422.
+    pub fn filter(self, app: &App) -> Answer<TagFilter> {
+        let tags = self.tags(app).map_err(Problem::of_search)?;
+        Ok(TagFilter {
+            external_id: tags.external_id,
+            labels: tags.labels,
+        })
+    }
 }
 
 /// The tags of a JSON object that may have other fields.
@@ -72,7 +90,7 @@ pub fn take_filter(app: &App, pairs: Pairs) -> Answer<(TagFilter, Pairs)> {
 pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
     let fields = object
         .iter()
-        .filter(|(name, _)| FIELDS.contains(&name.as_str()));
+        .filter(|(name, _)| TAG_FIELDS.contains(&name.as_str()));
     let mut tags = Tags::default();
     for (name, value) in fields {
         merge_field(&mut tags, name, value)?;
@@ -107,8 +125,8 @@ pub async fn change(
 /// 400 for a field that is not a tag, 422 for one that is malformed.
 fn merged(app: &App, mut tags: Tags, patch: &Map<String, Value>) -> Answer<Tags> {
     for (name, value) in patch {
-        if !FIELDS.contains(&name.as_str()) {
-            return Err(unknown("field", name, &FIELDS));
+        if !TAG_FIELDS.contains(&name.as_str()) {
+            return Err(unknown("field", name, &TAG_FIELDS));
         }
         merge_field(&mut tags, name, value)?;
     }
@@ -144,15 +162,6 @@ fn merge_field(tags: &mut Tags, name: &str, value: &Value) -> Answer<()> {
 
 fn not_text(field: &str, what: &str) -> Problem {
     Problem::invalid_field(field, format!("{what} must be a string.")).fix("Give a JSON string.")
-}
-
-fn twice(name: &str) -> Problem {
-    Problem::bad_request(
-        "repeated-parameter",
-        format!("`{name}` is given more than once."),
-    )
-    .at(name)
-    .fix("Give each name only once.")
 }
 
 fn external_id(text: &str) -> Answer<String> {

@@ -7,19 +7,20 @@ use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::query::{NoQuery, Query};
 use super::quota::reserve_item;
-use super::request::{
-    PathSegments, bytes_of, merge_patch, query_pairs, refuse_unknown, unknown, word,
-};
+use super::request::{PathSegments, bytes_of, merge_patch, unknown};
 use super::upload::media_types::MESH_TYPES;
+use super::words::{MeshFrameName, MeshUnitName, OrganName};
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use futures::TryStreamExt;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use utoipa::ToSchema;
-use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
+use utoipa::{IntoParams, ToSchema};
+use ventriform::mesh_files::MeshStatement;
+use ventriform::model::Organ;
 use ventriform_service::config::Size;
 use ventriform_service::error::ServiceError;
 use ventriform_service::items::{TemplateSource, check_name};
@@ -105,6 +106,29 @@ impl From<Presented> for TemplateBody {
     }
 }
 
+/// The query of a new template.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct TemplateQuery {
+    /// The organ that the model shows
+    #[param(value_type = Option<openapi::OrganField>, inline)]
+    organ: Option<OrganName>,
+    /// The name that reports show
+    #[param(min_length = 1, max_length = 80)]
+    name: Option<String>,
+    /// Unit of the mesh, if its file does not state it. Default: mm (of glTF m), if the size is that of an organ
+    #[param(inline)]
+    mesh_unit: Option<MeshUnitName>,
+    /// Frame of the mesh, if its file does not state it. Default: lps
+    #[param(inline)]
+    mesh_frame: Option<MeshFrameName>,
+    /// The stored model or segmentation whose mesh is copied
+    #[param(pattern = "^(mdl_|seg_)[0-9a-f]{1,64}$")]
+    model: Option<String>,
+    /// Whether every `model=auto` fits the template, beside the built-in hearts
+    library: Option<bool>,
+}
+
 /// Add a template
 ///
 /// The body is a closed mesh: JSON (`mesh.json` of a model, or a file written by `ventriform templates
@@ -115,7 +139,7 @@ impl From<Presented> for TemplateBody {
 /// templates.
 #[utoipa::path(post, path = "/v1/templates", tag = "templates",
     request_body(content = openapi::MeshDocument, content_type = "application/json"),
-    params(openapi::TemplateQuery),
+    params(TemplateQuery),
     responses(
         (status = 201, description = "Added", body = TemplateBody,
             headers(("Location" = String, description = "The template's path"))),
@@ -128,46 +152,17 @@ impl From<Presented> for TemplateBody {
 pub async fn create_template(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query(query): Query<TemplateQuery>,
     request: Request,
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
-    let pairs = query_pairs(query.as_deref());
-    let known = [
-        "name",
-        "organ",
-        "model",
-        "mesh_unit",
-        "mesh_frame",
-        LIBRARY_FIELD,
-    ];
-    refuse_unknown(&pairs, &known)?;
-    let value = |name: &str| {
-        let found = pairs.iter().find(|(n, _)| n == name);
-        found.map(|(_, value)| value.as_str())
-    };
-    let organ = value("organ").unwrap_or("left_ventricle").to_owned();
-    let name = value("name").or(value("model")).unwrap_or("template");
+    let organ = query.organ.map_or(Organ::LeftVentricle, |word| word.0);
+    let model = query.model.as_deref();
+    let name = query.name.as_deref().or(model).unwrap_or("template");
     check_name(name).map_err(ServiceError::from)?;
-    let library = match value(LIBRARY_FIELD) {
-        None => None,
-        Some("true") => Some(true),
-        Some("false") => Some(false),
-        Some(_) => return Err(not_a_flag()),
-    };
     let stated = MeshStatement {
-        unit: word(
-            value("mesh_unit"),
-            "mesh_unit",
-            MeshUnit::named,
-            "mm, cm or m",
-        )?,
-        frame: word(
-            value("mesh_frame"),
-            "mesh_frame",
-            MeshFrame::named,
-            "lps or ras",
-        )?,
+        unit: query.mesh_unit.map(|word| word.0),
+        frame: query.mesh_frame.map(|word| word.0),
     };
     let tenant = &caller.tenant;
     let service = &app.service;
@@ -175,15 +170,21 @@ pub async fn create_template(
         .require_product_room(tenant, Resource::Template)
         .await?;
     let body = bytes_of(request, &MESH_TYPES).await?;
-    let (mesh, volume) = given_mesh(&app, tenant, value("model"), body).await?;
+    let (mesh, volume) = given_mesh(&app, tenant, model, body).await?;
     let source = TemplateSource {
         tenant,
         name,
         volume: volume.as_deref(),
-        library,
+        library: query.library,
     };
-    let added_template =
-        service.add_template(source, &organ, mesh, stated, caller.quota, &counting);
+    let added_template = service.add_template(
+        source,
+        organ.as_str(),
+        mesh,
+        stated,
+        caller.quota,
+        &counting,
+    );
     let (template, new) = added_template.await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))
@@ -205,17 +206,22 @@ pub async fn update_template(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer<Json<TemplateBody>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let tenant = &caller.tenant;
     find::<Templates>(&app, tenant, &id).await?;
     for (field, value) in &merge_patch(request).await? {
         let library = match (field.as_str(), value) {
             (LIBRARY_FIELD, Value::Bool(library)) => *library,
             (LIBRARY_FIELD, Value::Null) => false,
-            (LIBRARY_FIELD, _) => return Err(not_a_flag()),
+            (LIBRARY_FIELD, _) => {
+                return Err(Problem::invalid_field(
+                    LIBRARY_FIELD,
+                    "`library` must be true or false.",
+                )
+                .fix("Give true if every `model=auto` is to fit the template."));
+            }
             (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
         app.service
@@ -230,11 +236,6 @@ pub async fn update_template(
 
 /// The setting that [`TemplateBody`] shows.
 const LIBRARY_FIELD: &str = "library";
-
-fn not_a_flag() -> Problem {
-    Problem::invalid_field(LIBRARY_FIELD, "`library` must be true or false.")
-        .fix("Give true if every `model=auto` is to fit the template.")
-}
 
 /// The mesh to be added: the body, or that of the stored `model`, with the id of its volume.
 async fn given_mesh(

@@ -12,9 +12,10 @@ use super::links::path_of;
 use super::openapi::{self, ConditionalHeaders, DownloadAnswers, LookupProblems};
 use super::problem::not_found::no_such_file;
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, query_pairs, refuse_unknown};
+use super::query::NoQuery;
+use super::request::PathSegments;
 use super::volumes::{Volumes, media_type};
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
@@ -33,10 +34,9 @@ pub async fn download_volume(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     match &volume.files[..] {
         [file] => send(&app, &caller, &volume, file, &headers).await,
@@ -63,10 +63,9 @@ pub async fn download_volume_file(
     State(app): State<App>,
     caller: Caller,
     PathSegments((id, name)): PathSegments<(String, String)>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     match volume.files.iter().find(|file| file.name == name) {
         Some(file) => send(&app, &caller, &volume, file, &headers).await,

@@ -6,12 +6,14 @@ use super::collection::{Collection, find};
 use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem};
+use super::query::{NoQuery, QueryReader};
 use super::quota::reserve_upload;
-use super::request::{PathSegments, query_pairs, refuse_unknown, unknown};
+use super::request::{PathSegments, unknown};
+use super::tags::{self, TagQuery};
 use super::validators::not_modified;
-use super::{scans, tags, upload};
+use super::{scans, upload};
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -289,7 +291,7 @@ impl VolumeBody {
         (openapi::UploadForm = "multipart/form-data"),
         (Vec<u8> = "multipart/related"),
     )),
-    params(openapi::TagParameters),
+    params(TagQuery),
     responses(
         (status = 201, description = "Stored", body = VolumeBody,
             headers(("Location" = String, description = "The volume's path"))),
@@ -300,18 +302,18 @@ impl VolumeBody {
 pub async fn create_volume(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     request: Request,
 ) -> Answer {
     let counting = reserve_upload(&app, &caller, request.headers(), 0).await?;
-    let mut pairs = query_pairs(query.as_deref());
-    let (_, others) = tags::take(&app, pairs.clone())?;
-    refuse_unknown(&others, &tags::FIELDS)?;
+    query.clone().all::<TagQuery>()?.tags(&app)?;
     let upload = upload::receive(&app, counting, request, &[]).await?;
-    pairs.extend(upload.fields);
-    let (tags, others) = tags::take(&app, pairs)?;
-    if let Some((name, _)) = others.first() {
-        return Err(unknown("form field", name, &tags::FIELDS));
+    let mut given = query.rest();
+    given.extend(upload.fields);
+    let mut given = QueryReader::of_pairs(given);
+    let tags = given.take::<TagQuery>()?.tags(&app)?;
+    if let Some((name, _)) = given.rest().first() {
+        return Err(unknown("form field", name, &tags::TAG_FIELDS));
     }
     let stored = app
         .service
@@ -337,10 +339,9 @@ pub async fn update_volume(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer<Json<VolumeBody>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     tags::change(&app, &caller.tenant, &id, volume.ownership.tags, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
@@ -358,10 +359,9 @@ pub async fn preview_volume(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     // The drawing follows from the volume and the program, so it need not be made to be compared.
     let version = env!("CARGO_PKG_VERSION");

@@ -6,13 +6,18 @@ use super::caller::Caller;
 use super::collection::find;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem};
-use super::request::{PathSegments, flag, query_pairs, refuse_unknown, word};
+use super::query::{Query, fields_of};
+use super::request::PathSegments;
 use super::validators::not_modified;
 use super::volumes::{Volumes, files_of};
-use axum::extract::{RawQuery, State};
+use super::words::{MeshFrameName, MeshUnitName};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
-use ventriform::mesh_files::{MeshFrame, MeshUnit};
+use serde::Deserialize;
+use utoipa::IntoParams;
+use utoipa::openapi::path::{Parameter, ParameterIn};
+use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::Monitor;
 use ventriform::volume::given_mask::MaskChoice;
 use ventriform_service::records::content_id;
@@ -20,6 +25,50 @@ use ventriform_service::work::{UploadFacts, voxels_memory};
 
 /// A later version of the program may read a file differently.
 const CACHE_CONTROL: &str = "private, max-age=3600";
+
+/// The voxels that are asked for.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct VoxelQuery {
+    /// The frame, counted from 0
+    frame: Option<u32>,
+    /// Whether the volume is read as an expert's mask
+    mask: Option<bool>,
+}
+
+/// The structure of an expert's mask that is asked for, by the parameters of a job.
+#[derive(Debug, Deserialize)]
+pub struct MaskQuery {
+    label: Option<String>,
+    mesh_unit: Option<MeshUnitName>,
+    mesh_frame: Option<MeshFrameName>,
+}
+
+impl IntoParams for MaskQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        openapi::fit_parameters(&fields_of::<Self>())
+    }
+}
+
+impl MaskQuery {
+    fn is_given(&self) -> bool {
+        self.label.is_some() || self.mesh_unit.is_some() || self.mesh_frame.is_some()
+    }
+
+    fn choice(self) -> MaskChoice {
+        MaskChoice {
+            label: self.label.map(|label| {
+                let Ok(label) = label.parse();
+                label
+            }),
+            mesh: MeshStatement {
+                unit: self.mesh_unit.map(|word| word.0),
+                frame: self.mesh_frame.map(|word| word.0),
+            },
+            ..MaskChoice::default()
+        }
+    }
+}
 
 /// Download a volume's voxels
 ///
@@ -30,9 +79,7 @@ const CACHE_CONTROL: &str = "private, max-age=3600";
 /// grid of the upload (of a mesh, on a grid about it). `label`, `mesh_unit` and `mesh_frame` are those of the job.
 #[utoipa::path(get, path = "/v1/volumes/{id}/voxels.nii.gz", tag = "volumes",
     params(("id" = String, Path, description = "The volume's id"),
-        ("frame" = inline(Option<u32>), Query, description = "The frame, counted from 0"),
-        ("mask" = inline(Option<bool>), Query, description = "Whether the volume is read as an expert's mask"),
-        openapi::MaskParameters,
+        VoxelQuery, MaskQuery,
         openapi::CachedHeaders),
     responses((status = 200, description = "The voxels", body = Vec<u8>, content_type = "application/gzip"),
         (status = 422, description = "There is no such frame or structure, or one must be named",
@@ -42,37 +89,21 @@ pub async fn download_voxels(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    Query((query, of_mask)): Query<(VoxelQuery, MaskQuery)>,
     headers: HeaderMap,
 ) -> Answer {
-    let pairs = query_pairs(query.as_deref());
-    refuse_unknown(
-        &pairs,
-        &["frame", "mask", "label", "mesh_unit", "mesh_frame"],
-    )?;
-    let value = |name: &str| {
-        let found = pairs.iter().find(|(n, _)| n == name);
-        found.map(|(_, text)| text.as_str())
-    };
-    let frame = value("frame").map(number).transpose()?;
-    let mask = value("mask").map(|text| flag("mask", text)).transpose()?;
-    let mask = mask.unwrap_or(false).then(|| choice(&value)).transpose()?;
-    let of_mask = ["label", "mesh_unit", "mesh_frame"];
-    let stray = match mask {
-        Some(_) => frame.is_some(),
-        None => of_mask.iter().any(|name| value(name).is_some()),
+    let asked = format!("{query:?} {of_mask:?}");
+    let frame = query.frame.map(|frame| frame as usize);
+    let stray = match query.mask {
+        Some(true) => frame.is_some(),
+        _ => of_mask.is_given(),
     };
     if stray {
         return Err(contradiction());
     }
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     // The voxels follow from the upload and the program, so they need not be read to be compared.
-    let named: Vec<String> = pairs
-        .iter()
-        .map(|(name, text)| format!("{name}={text}"))
-        .collect();
-    let named = named.join("\n");
-    let parts = ["voxels", env!("CARGO_PKG_VERSION"), &id, &named];
+    let parts = ["voxels", env!("CARGO_PKG_VERSION"), &id, &asked];
     let etag = format!("\"{}\"", content_id("", parts.map(str::as_bytes)));
     if let Some(unchanged) = not_modified(&headers, &etag, CACHE_CONTROL) {
         return Ok(unchanged);
@@ -80,6 +111,7 @@ pub async fn download_voxels(
     let files = files_of(&app, &volume).await?;
     let reader = app.service.engine.reader.clone();
     let memory = voxels_memory(UploadFacts::of(&volume)?.shape);
+    let mask = query.mask.unwrap_or(false).then(|| of_mask.choice());
     let read = move |monitor: &Monitor<'_>| match &mask {
         Some(choice) => reader.mask(&files, choice, monitor),
         None => reader.voxels(&files, frame, monitor),
@@ -93,28 +125,6 @@ pub async fn download_voxels(
     Ok((headers, bytes).into_response())
 }
 
-/// Which structure is asked for.
-fn choice<'a>(value: &dyn Fn(&str) -> Option<&'a str>) -> Answer<MaskChoice> {
-    let mut choice = MaskChoice::default();
-    if let Some(label) = value("label") {
-        let Ok(label) = label.parse();
-        choice.label = Some(label);
-    }
-    choice.mesh.unit = word(
-        value("mesh_unit"),
-        "mesh_unit",
-        MeshUnit::named,
-        "mm, cm or m",
-    )?;
-    choice.mesh.frame = word(
-        value("mesh_frame"),
-        "mesh_frame",
-        MeshFrame::named,
-        "lps or ras",
-    )?;
-    Ok(choice)
-}
-
 fn contradiction() -> Problem {
     Problem::new(
         StatusCode::UNPROCESSABLE_ENTITY,
@@ -123,16 +133,4 @@ fn contradiction() -> Problem {
     )
     .at("mask")
     .fix("Set `mask` to true for a mask, or leave these parameters out.")
-}
-
-fn number(text: &str) -> Answer<usize> {
-    text.parse().map_err(|_| {
-        Problem::new(
-            StatusCode::UNPROCESSABLE_ENTITY,
-            "invalid-parameter",
-            format!("`frame`: `{text}` is no number of a frame."),
-        )
-        .at("frame")
-        .fix("Give a whole number, counted from 0.")
-    })
 }

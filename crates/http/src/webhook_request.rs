@@ -4,12 +4,24 @@ use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{text, unknown};
 use axum::http::{HeaderMap, HeaderName};
+use serde::Deserialize;
 use serde_json::{Map, Value};
+use utoipa::IntoParams;
 use ventriform_service::hooks::{HookEvent, SigningSecret, UrlGuard};
 use ventriform_service::records::JobWebhook;
 
 /// The header with the signing secret of a job's webhook.
 pub const SECRET_HEADER: HeaderName = HeaderName::from_static("webhook-secret");
+
+/// The webhook of a job that is filed with an upload.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct WebhookQuery {
+    /// URL to be told when the job has ended
+    webhook: Option<String>,
+    /// What to tell, separated by commas: `started`, `succeeded`, `failed`, `cancelled`
+    webhook_events: Option<String>,
+}
 
 /// A webhook as it was given: none of it is checked.
 #[derive(Default)]
@@ -20,12 +32,15 @@ pub struct GivenWebhook {
 }
 
 impl GivenWebhook {
-    const FIELDS: [&'static str; 3] = ["url", "events", "secret"];
+    const WEBHOOK_FIELDS: [&'static str; 3] = ["url", "events", "secret"];
 
     /// The webhook in a JSON object.
     pub fn from_json(object: &Map<String, Value>) -> Answer<Self> {
-        if let Some(name) = object.keys().find(|n| !Self::FIELDS.contains(&n.as_str())) {
-            return Err(unknown("field", name, &Self::FIELDS));
+        if let Some(name) = object
+            .keys()
+            .find(|n| !Self::WEBHOOK_FIELDS.contains(&n.as_str()))
+        {
+            return Err(unknown("field", name, &Self::WEBHOOK_FIELDS));
         }
         let events = match object.get("events") {
             None => None,
@@ -41,17 +56,12 @@ impl GivenWebhook {
         })
     }
 
-    /// The webhook among the parameters and headers of an upload, which it takes out of `pairs`:
-    /// `webhook`, `webhook_events`, and the header `Webhook-Secret`.
-    pub fn take_from(
-        pairs: &mut Vec<(String, String)>,
-        headers: &HeaderMap,
-    ) -> Answer<Option<Self>> {
-        let mut take = |name: &str| {
-            let at = pairs.iter().position(|(other, _)| other == name)?;
-            Some(pairs.remove(at).1)
-        };
-        let (url, events) = (take("webhook"), take("webhook_events"));
+    /// The webhook of an upload, with the secret in the header `Webhook-Secret`.
+    ///
+    /// # Errors
+    /// 422 if there is no URL.
+    pub fn of_upload(query: WebhookQuery, headers: &HeaderMap) -> Answer<Option<Self>> {
+        let (url, events) = (query.webhook, query.webhook_events);
         let secret = headers.get(SECRET_HEADER).map(|value| {
             let text = value.to_str().unwrap_or_default();
             text.to_owned()
@@ -121,7 +131,7 @@ pub struct CheckedWebhook {
     pub url: String,
     /// Scheme, host and port of the URL.
     pub destination: String,
-    /// What to tell.
+    /// The events that it is told.
     pub events: Vec<HookEvent>,
     /// The secret that signs the deliveries.
     pub secret: Option<SigningSecret>,

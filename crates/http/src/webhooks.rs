@@ -9,10 +9,11 @@ use super::jobs::{self, ObjectDeliveryBody};
 use super::links::rfc3339;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::problem::{Answer, Problem, shorten};
-use super::request::{PathSegments, json_object, query_pairs, refuse_unknown};
+use super::query::NoQuery;
+use super::request::{PathSegments, json_object};
 use super::webhook_request::GivenWebhook;
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -27,7 +28,7 @@ const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
 /// Most deliveries in one answer.
 const MOST_DELIVERIES: u32 = 100;
 
-/// What ids of deliveries to archives begin with.
+/// The beginning of ids of deliveries to archives.
 const OBJECT_PREFIX: &str = "snd_";
 
 /// A registered receiver.
@@ -40,7 +41,7 @@ pub struct WebhookBody {
     /// Where it is.
     #[schema(example = "https://ris.example.org/hooks/ventriform")]
     url: String,
-    /// What it is told.
+    /// The events that it is told.
     events: Vec<String>,
     /// When it was registered (RFC 3339).
     #[schema(format = DateTime)]
@@ -102,10 +103,9 @@ pub struct WebhookSecret {
 pub async fn create_webhook(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let object = json_object(request).await?;
     let checked = GivenWebhook::from_json(&object)?
         .check(&app.service.hooks.guard)
@@ -146,9 +146,8 @@ pub async fn create_webhook(
 pub async fn list_webhooks(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<Json<WebhookList>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let endpoints = app.service.hooks.store.endpoints(&caller.tenant).await?;
     let webhooks = endpoints.into_iter().map(|e| WebhookBody::of(e, None));
     Ok(Json(WebhookList {
@@ -166,9 +165,8 @@ pub async fn delete_webhook(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<StatusCode> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.service.now();
     if app
         .service
@@ -189,12 +187,7 @@ pub async fn delete_webhook(
 /// day, so that receivers can change over. No later answer shows it.
 #[utoipa::path(post, path = "/v1/webhooks/secret", tag = "webhooks",
     responses((status = 200, description = "The new secret", body = WebhookSecret), ListProblems))]
-pub async fn create_webhook_secret(
-    State(app): State<App>,
-    caller: Caller,
-    RawQuery(query): RawQuery,
-) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
+pub async fn create_webhook_secret(State(app): State<App>, caller: Caller, _: NoQuery) -> Answer {
     let secret = SigningSecret::random();
     let until = app.service.now() + SECRET_OVERLAP.as_millis() as i64;
     app.service
@@ -222,7 +215,7 @@ pub struct DeliveryBody {
     webhook: Option<String>,
     /// Where it goes.
     url: String,
-    /// What it tells.
+    /// The event that it tells.
     #[schema(example = "succeeded")]
     event: String,
     /// `pending`, `delivered`, or `dead` if it was given up.
@@ -281,9 +274,8 @@ pub async fn list_deliveries(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer<Json<DeliveryList>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let store = &app.service.hooks.store;
     let found = store
         .deliveries(&caller.tenant, &id, MOST_DELIVERIES)
@@ -320,9 +312,8 @@ pub async fn redeliver(
     State(app): State<App>,
     caller: Caller,
     PathSegments((id, delivery)): PathSegments<(String, String)>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let now = app.service.now();
     if delivery.starts_with(OBJECT_PREFIX) {
         return redeliver_object(&app, &caller, &id, &delivery, now).await;

@@ -10,15 +10,18 @@ use super::caller::Caller;
 use super::memory::charge;
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
+use super::query::{NoQuery, QueryReader};
 use super::quota::reserve_item;
-use super::request::{PathSegments, bytes_of, charge_parsed, query_pairs, refuse_unknown};
+use super::request::{PathSegments, bytes_of, charge_parsed};
 use crate::public_base::public_path;
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse};
+use serde::Deserialize;
 use serde_json::{Map, Value};
 use std::time::{Duration, Instant};
+use utoipa::IntoParams;
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
 use ventriform_service::dicom_tags::{
@@ -35,9 +38,6 @@ const MEDIA_TYPE: &str = "application/dicom+json";
 
 /// Media types of DICOM JSON.
 const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
-
-/// Names under which clients send the Transaction UID in the query.
-const TRANSACTION_NAMES: [&str; 2] = ["transaction-uid", "transaction"];
 
 /// Most items of a tenant.
 const MAX_WORKITEMS: u64 = 100_000;
@@ -60,6 +60,19 @@ const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 /// How often a change is tried again that another one came before.
 const CHANGE_TRIES: usize = 20;
 
+/// The query of a new work item.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct WorkitemQuery {
+    /// SOP Instance UID of the item
+    workitem: Option<String>,
+}
+
+/// The UID that is the whole query: PS3.18 writes `?workitem=UID`, but many clients write `?UID`.
+fn bare_uid(query: &QueryReader) -> Option<String> {
+    query.bare().filter(|uid| is_uid(uid)).map(str::to_owned)
+}
+
 /// Create a work item
 ///
 /// A scheduled Unified Procedure Step. Its UID is given in the query, in the body (0008,0018), or
@@ -67,7 +80,7 @@ const CHANGE_TRIES: usize = 20;
 /// `Warning` says.
 #[utoipa::path(post, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "create_workitem",
-    params(("workitem" = Option<String>, Query, description = "SOP Instance UID of the item")),
+    params(WorkitemQuery),
     request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
     responses(
         (status = 201, description = "Created",
@@ -78,17 +91,12 @@ const CHANGE_TRIES: usize = 20;
 pub async fn create_workitem(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     request: Request,
 ) -> Answer {
-    let pairs = query_pairs(query.as_deref());
-    // PS3.18 writes `?workitem=UID`; many clients write `?UID`.
-    let named = match &pairs[..] {
-        [(uid, value)] if value.is_empty() && is_uid(uid) => Some(uid.clone()),
-        _ => {
-            refuse_unknown(&pairs, &["workitem"])?;
-            pairs.into_iter().next().map(|(_, uid)| uid)
-        }
+    let named = match bare_uid(&query) {
+        None => query.all::<WorkitemQuery>()?.workitem,
+        uid => uid,
     };
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let attributes = data_set(request).await?;
@@ -147,11 +155,23 @@ pub async fn get_workitem(
     State(app): State<App>,
     caller: Caller,
     PathSegments(uid): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let item = find(&app, &caller, &uid).await?;
     Ok(shown(StatusCode::OK, &[item.shown()]))
+}
+
+/// A search for work items, besides the attributes that are matched.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct SearchQuery {
+    /// Greatest number of items
+    limit: Option<usize>,
+    /// Number of matching items to skip
+    offset: Option<usize>,
+    /// Only items in this state; any other attribute can be given likewise
+    #[serde(rename = "ProcedureStepState")]
+    state: Option<String>,
 }
 
 /// Search work items
@@ -162,11 +182,7 @@ pub async fn get_workitem(
 /// says that there are more than one answer holds, to be asked for by `offset`.
 #[utoipa::path(get, path = "/dicom-web/workitems", tag = "workitems",
     operation_id = "search_workitems",
-    params(
-        ("limit" = Option<usize>, Query, description = "Greatest number of items"),
-        ("offset" = Option<usize>, Query, description = "Number of matching items to skip"),
-        ("ProcedureStepState" = Option<String>, Query,
-            description = "Only items in this state; any other attribute can be given likewise")),
+    params(SearchQuery),
     responses(
         (status = 200, description = "The items", body = openapi::WorkitemBody,
             content_type = "application/dicom+json"),
@@ -177,22 +193,23 @@ pub async fn get_workitem(
 pub async fn search_workitems(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    mut query: QueryReader,
 ) -> Answer {
-    let (mut limit, mut skip) = (PAGE_ITEMS.0, 0);
+    let search: SearchQuery = query.take()?;
+    let limit = search.limit.unwrap_or(PAGE_ITEMS.0).min(PAGE_ITEMS.1);
+    let mut skip = search.offset.unwrap_or(0);
     let mut matching = Matching::default();
-    for (name, value) in query_pairs(query.as_deref()) {
-        match name.as_str() {
-            "limit" => limit = number(&name, &value)?.min(PAGE_ITEMS.1),
-            "offset" => skip = number(&name, &value)?,
-            // All attributes are answered, and names are compared without regard to case.
-            "includefield" | "fuzzymatching" => {}
-            _ => matching.add(&name, &value).map_err(|error| {
-                Problem::bad_request("unknown-parameter", format!("{error}."))
-                    .at(&error.name)
-                    .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
-            })?,
-        }
+    let state = search.state.map(|it| ("ProcedureStepState".to_owned(), it));
+    // All attributes are answered, and names are compared without regard to case.
+    let needless = ["includefield", "fuzzymatching"];
+    let mut wanted = query.rest();
+    wanted.retain(|(name, _)| !needless.contains(&name.as_str()));
+    for (name, value) in wanted.into_iter().chain(state) {
+        matching.add(&name, &value).map_err(|error| {
+            Problem::bad_request("unknown-parameter", format!("{error}."))
+                .at(&error.name)
+                .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
+        })?;
     }
     charge(SEARCH_MEMORY).await?;
     let state = matching
@@ -290,7 +307,7 @@ fn too_broad() -> Problem {
 #[utoipa::path(post, path = "/dicom-web/workitems/{uid}", tag = "workitems",
     operation_id = "update_workitem",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
-        openapi::TransactionParameters),
+        TransactionQuery, openapi::TransactionHeader),
     request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
     responses((status = 200, description = "Changed"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
@@ -298,12 +315,12 @@ pub async fn update_workitem(
     State(app): State<App>,
     caller: Caller,
     PathSegments(uid): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
-    let (changes, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
+    let (changes, stated) = claimed_data_set(query, &headers, request).await?;
     counting.arrived(text_of(&changes)?.len() as u64).await?;
     change(&app, &caller, &uid, |item, now| {
         item.update(stated.as_deref(), changes.clone(), now)?;
@@ -322,7 +339,7 @@ pub async fn update_workitem(
 #[utoipa::path(put, path = "/dicom-web/workitems/{uid}/state", tag = "workitems",
     operation_id = "change_workitem_state",
     params(("uid" = String, Path, description = "SOP Instance UID of the item"),
-        openapi::TransactionParameters),
+        TransactionQuery, openapi::TransactionHeader),
     request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
     responses((status = 200, description = "The item is in this state"),
         openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
@@ -330,11 +347,11 @@ pub async fn change_workitem_state(
     State(app): State<App>,
     caller: Caller,
     PathSegments(uid): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    query: QueryReader,
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let (wanted, stated) = claimed_data_set(query.as_deref(), &headers, request).await?;
+    let (wanted, stated) = claimed_data_set(query, &headers, request).await?;
     if let Some(uid) = &stated {
         require_uid(TRANSACTION_UID, uid)?;
     }
@@ -375,10 +392,9 @@ pub async fn cancel_workitem(
     State(app): State<App>,
     caller: Caller,
     PathSegments(uid): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let bytes = bytes_of(request, &JSON_TYPES).await?;
     let details = if bytes.is_empty() {
         DataSetJson::default()
@@ -459,34 +475,34 @@ fn require_uid(field: &str, uid: &str) -> Answer<()> {
     }
 }
 
-fn number(name: &str, text: &str) -> Answer<usize> {
-    text.parse().map_err(|_| {
-        Problem::bad_request("invalid-parameter", format!("`{name}` must be a number."))
-            .at(name)
-            .fix("Give a whole number.")
-    })
+/// The Transaction UID under which an item is claimed, under the names that clients give it.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(rename_all = "kebab-case")]
+pub struct TransactionQuery {
+    /// The Transaction UID under which the item is claimed; it may also be in the body
+    transaction_uid: Option<String>,
+    /// The Transaction UID under which the item is claimed; it may also be in the body
+    transaction: Option<String>,
 }
 
 /// The Transaction UID of the query or of the header.
-fn transaction(query: Option<&str>, headers: &HeaderMap) -> Answer<Option<String>> {
-    let pairs = query_pairs(query);
-    if let [(uid, value)] = &pairs[..]
-        && value.is_empty()
-        && is_uid(uid)
-    {
-        return Ok(Some(uid.clone()));
+fn transaction(query: QueryReader, headers: &HeaderMap) -> Answer<Option<String>> {
+    let bare = bare_uid(&query);
+    if bare.is_some() {
+        return Ok(bare);
     }
-    refuse_unknown(&pairs, &TRANSACTION_NAMES)?;
-    let header = headers.get("transaction-uid");
-    let header = header
-        .and_then(|value| value.to_str().ok())
-        .map(str::to_owned);
-    Ok(pairs.into_iter().next().map(|(_, uid)| uid).or(header))
+    let query: TransactionQuery = query.all()?;
+    let header = headers
+        .get("transaction-uid")
+        .and_then(|value| value.to_str().ok());
+    let header = header.map(str::to_owned);
+    Ok(query.transaction_uid.or(query.transaction).or(header))
 }
 
 /// The data set of the body, and the Transaction UID wherever the client states it.
 async fn claimed_data_set(
-    query: Option<&str>,
+    query: QueryReader,
     headers: &HeaderMap,
     request: Request,
 ) -> Answer<(DataSetJson, Option<String>)> {

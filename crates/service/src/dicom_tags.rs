@@ -7,12 +7,12 @@ use dicom_dictionary_std::tags;
 
 /// The eight digits of a tag.
 const fn digits(tag: Tag) -> [u8; 8] {
-    const HEX: &[u8; 16] = b"0123456789ABCDEF";
+    const HEX_DIGITS: &[u8; 16] = b"0123456789ABCDEF";
     let number = ((tag.0 as u32) << 16) | tag.1 as u32;
     let mut digits = [0; 8];
     let mut place = 0;
     while place < 8 {
-        digits[place] = HEX[(number >> (28 - 4 * place)) as usize & 15];
+        digits[place] = HEX_DIGITS[(number >> (28 - 4 * place)) as usize & 15];
         place += 1;
     }
     digits
@@ -23,8 +23,8 @@ macro_rules! json_tags {
         $(
             #[doc = concat!("The tag `", stringify!($name), "`.")]
             pub const $name: &str = {
-                const DIGITS: [u8; 8] = digits(tags::$name);
-                match str::from_utf8(&DIGITS) {
+                const TAG_DIGITS: [u8; 8] = digits(tags::$name);
+                match str::from_utf8(&TAG_DIGITS) {
                     Ok(text) => text,
                     Err(_) => panic!("hexadecimal digits are ASCII"),
                 }

@@ -318,7 +318,7 @@ impl Service {
         let quota = self.quotas.general;
         let reserved = self
             .quotas
-            .reserve(job.tenant, quota, Addition::JOB, Some(&job.key));
+            .reserve(job.tenant, quota, Addition::ONE_JOB, Some(&job.key));
         let counting = reserved.await?;
         let order = JobOrder {
             priority: job.priority,

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The versions of TLS that are spoken.
-pub const VERSIONS: [&rustls::SupportedProtocolVersion; 2] =
+pub const TLS_VERSIONS: [&rustls::SupportedProtocolVersion; 2] =
     [&rustls::version::TLS13, &rustls::version::TLS12];
 
 /// The implementation of the algorithms.

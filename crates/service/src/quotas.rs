@@ -35,7 +35,7 @@ pub struct Addition {
 
 impl Addition {
     /// A job on what is stored already.
-    pub const JOB: Self = Self {
+    pub const ONE_JOB: Self = Self {
         announced_bytes: Some(0),
         jobs: 1,
     };

@@ -9,7 +9,7 @@
 //! So at every moment the target is a whole backup: the last one until step 4, the new one after.
 //! To restore, copy the target to the data folder, or start the service on it.
 
-use super::blobs::{self, RECEIVED, RECORD, STAGING};
+use super::blobs::{self, RECEIVED_FOLDER, RECORD_FILE, STAGING_FOLDER};
 use super::content;
 use super::copied::Copied;
 use super::database::SqlStore;
@@ -67,13 +67,13 @@ pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError>
     fs::create_dir_all(target)?;
     let _lock = FolderLock::take(target)?;
     let shelves = Resource::WITH_FILES.map(Resource::plural);
-    for shelf in shelves.into_iter().chain([RECEIVED]) {
+    for shelf in shelves.into_iter().chain([RECEIVED_FOLDER]) {
         fs::create_dir_all(target.join(shelf))?;
     }
-    let _ = fs::remove_dir_all(target.join(STAGING));
-    fs::create_dir_all(target.join(STAGING))?;
+    let _ = fs::remove_dir_all(target.join(STAGING_FOLDER));
+    fs::create_dir_all(target.join(STAGING_FOLDER))?;
 
-    let snapshot = target.join(STAGING).join(DATABASE_FILE);
+    let snapshot = target.join(STAGING_FOLDER).join(DATABASE_FILE);
     SqlStore::snapshot(&source, &snapshot).await?;
     let gauge = DiskGauge::new(target, Some(0));
     let rows = SqlStore::open(&snapshot, StoreSettings::default().write_wait, gauge)
@@ -105,9 +105,9 @@ pub(super) fn keep_only(target: &Path, is_kept: impl Fn(&str) -> bool) -> io::Re
             }
         }
     }
-    for name in names(&target.join(RECEIVED))? {
+    for name in names(&target.join(RECEIVED_FOLDER))? {
         if !is_kept(&name) {
-            fs::remove_file(target.join(RECEIVED).join(name))?;
+            fs::remove_file(target.join(RECEIVED_FOLDER).join(name))?;
         }
     }
     Ok(())
@@ -161,7 +161,7 @@ async fn copy_received(
             }
         }
     }
-    blobs::sync(&target.join(RECEIVED))?;
+    blobs::sync(&target.join(RECEIVED_FOLDER))?;
     Ok(kept)
 }
 
@@ -176,12 +176,12 @@ pub(super) fn copy_object(
         let hash = File::open(place).and_then(|file| content::hash(&file));
         hash.is_ok_and(|hash| hash == sha256)
     };
-    let place = target.join(RECEIVED).join(name);
+    let place = target.join(RECEIVED_FOLDER).join(name);
     if is_whole(&place) {
         return Ok(Copied::Before);
     }
-    let draft = target.join(STAGING).join(name);
-    match fs::copy(folder.join(RECEIVED).join(name), &draft) {
+    let draft = target.join(STAGING_FOLDER).join(name);
+    match fs::copy(folder.join(RECEIVED_FOLDER).join(name), &draft) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Ok(Copied::Not("it is missing".into()));
         }
@@ -204,7 +204,7 @@ pub(super) fn copy_item(folder: &Path, target: &Path, record: &ItemRecord) -> io
     if is_whole(&to, record) {
         return Ok(Copied::Before);
     }
-    let draft = target.join(STAGING).join(record.id());
+    let draft = target.join(STAGING_FOLDER).join(record.id());
     fs::create_dir_all(&draft)?;
     for file in record.files() {
         let copy = draft.join(&file.name);
@@ -221,8 +221,8 @@ pub(super) fn copy_item(folder: &Path, target: &Path, record: &ItemRecord) -> io
         blobs::sync(&copy)?;
     }
     let text = serde_json::to_vec_pretty(record)?;
-    fs::write(draft.join(RECORD), text)?;
-    blobs::sync(&draft.join(RECORD))?;
+    fs::write(draft.join(RECORD_FILE), text)?;
+    blobs::sync(&draft.join(RECORD_FILE))?;
     blobs::sync(&draft)?;
     if to.exists() {
         fs::remove_dir_all(&to)?;

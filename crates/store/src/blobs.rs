@@ -29,21 +29,21 @@ use ventriform_service::records::{
 };
 
 /// The name of the copy of an item's row.
-pub(super) const RECORD: &str = "record.json";
+pub(super) const RECORD_FILE: &str = "record.json";
 
 /// Files that are not published yet.
-pub(super) const STAGING: &str = "staging";
+pub(super) const STAGING_FOLDER: &str = "staging";
 /// Received objects, which are not volumes yet.
-pub(super) const RECEIVED: &str = "received";
+pub(super) const RECEIVED_FOLDER: &str = "received";
 /// The folder of files that are to be deleted.
-pub(super) const DISCARDED: &str = "discarded";
+pub(super) const DISCARDED_FOLDER: &str = "discarded";
 /// The folder of files without a row, by day.
-pub(super) const QUARANTINE: &str = "quarantine";
+pub(super) const QUARANTINE_FOLDER: &str = "quarantine";
 
 const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-[day]");
 
 /// Content that [`BlobStore::check`] writes: more than the free rest of a block.
-pub(super) const CHECK: &[u8] = &[b'v'; 8192];
+pub(super) const PROBE_BYTES: &[u8] = &[b'v'; 8192];
 
 /// Files below one folder.
 pub struct FileBlobs {
@@ -60,16 +60,19 @@ impl FileBlobs {
     /// # Errors
     /// If the folder cannot be written.
     pub fn open(folder: &Path, gauge: DiskGauge) -> io::Result<Self> {
-        fs::create_dir_all(folder.join(DISCARDED))?;
+        fs::create_dir_all(folder.join(DISCARDED_FOLDER))?;
         match fs::rename(
-            folder.join(STAGING),
-            folder.join(DISCARDED).join(random_id("")),
+            folder.join(STAGING_FOLDER),
+            folder.join(DISCARDED_FOLDER).join(random_id("")),
         ) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
         let kinds = Resource::WITH_FILES.map(Resource::plural);
-        for name in kinds.into_iter().chain([STAGING, QUARANTINE, RECEIVED]) {
+        for name in kinds
+            .into_iter()
+            .chain([STAGING_FOLDER, QUARANTINE_FOLDER, RECEIVED_FOLDER])
+        {
             fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
@@ -82,7 +85,7 @@ impl FileBlobs {
 
     /// A new path under `staging/`.
     pub(super) fn new_staging_folder(&self) -> PathBuf {
-        self.folder.join(STAGING).join(random_id(""))
+        self.folder.join(STAGING_FOLDER).join(random_id(""))
     }
 
     /// Runs `work` on a thread that may block.
@@ -217,9 +220,9 @@ impl StagingFolder {
     fn publish_blocking(&self, record: &ItemRecord) -> Result<(), BlobError> {
         let text = serde_json::to_vec_pretty(record)
             .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
-        fs::write(self.folder.join(RECORD), text)?;
+        fs::write(self.folder.join(RECORD_FILE), text)?;
         if self.settled.load(Ordering::Acquire) {
-            sync(&self.folder.join(RECORD))?;
+            sync(&self.folder.join(RECORD_FILE))?;
             sync(&self.folder)?;
         } else {
             sync_all(&self.folder)?;
@@ -252,7 +255,7 @@ impl StagingFolder {
                     ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists
                 ) =>
             {
-                let discarded = self.root.join(DISCARDED).join(random_id(""));
+                let discarded = self.root.join(DISCARDED_FOLDER).join(random_id(""));
                 fs::rename(place, &discarded)?;
                 fs::rename(&self.folder, place)?;
                 // What is left of it is deleted by the next `tidy`.
@@ -350,7 +353,7 @@ impl BlobStore for FileBlobs {
             places.push(folder.join(shelf_path(&id)));
             for place in places {
                 // Renamed first, so that half the files are never seen as all of them.
-                let doomed = folder.join(DISCARDED).join(random_id(""));
+                let doomed = folder.join(DISCARDED_FOLDER).join(random_id(""));
                 match fs::rename(place, &doomed) {
                     Err(error) if is_absent(&error) => continue,
                     other => other?,
@@ -384,15 +387,15 @@ impl BlobStore for FileBlobs {
         let record = record.clone();
         let written = self.blocking(move |folder, _| {
             let place = folder.join(shelf_path(record.id()));
-            if fs::exists(place.join(RECORD))? {
+            if fs::exists(place.join(RECORD_FILE))? {
                 return Ok(());
             }
             let text = serde_json::to_vec_pretty(&record)
                 .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
-            let draft = place.join(format!("{RECORD}.new"));
+            let draft = place.join(format!("{RECORD_FILE}.new"));
             fs::write(&draft, text)?;
             sync(&draft)?;
-            Ok(fs::rename(&draft, place.join(RECORD))?)
+            Ok(fs::rename(&draft, place.join(RECORD_FILE))?)
         });
         written.await
     }
@@ -419,13 +422,13 @@ impl BlobStore for FileBlobs {
 
     async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError> {
         let tidied = self.blocking(move |folder, _| {
-            for entry in fs::read_dir(folder.join(DISCARDED))? {
+            for entry in fs::read_dir(folder.join(DISCARDED_FOLDER))? {
                 fs::remove_dir_all(entry?.path())?;
             }
             let Some(first_kept) = set_aside_before else {
                 return Ok(());
             };
-            for entry in fs::read_dir(folder.join(QUARANTINE))? {
+            for entry in fs::read_dir(folder.join(QUARANTINE_FOLDER))? {
                 let entry = entry?;
                 let name = entry.file_name();
                 if name
@@ -444,10 +447,10 @@ impl BlobStore for FileBlobs {
         self.require_room(0)?;
         let path = self.new_staging_folder();
         let checked = self.blocking(move |_, _| {
-            fs::write(&path, CHECK)?;
+            fs::write(&path, PROBE_BYTES)?;
             let read = fs::read(&path);
             fs::remove_file(&path)?;
-            if read? == CHECK {
+            if read? == PROBE_BYTES {
                 Ok(())
             } else {
                 Err(BlobError::new(
@@ -472,7 +475,7 @@ fn day(at: Timestamp) -> Option<Date> {
 /// The folders in the quarantine that hold files of an item.
 fn set_aside_of(folder: &Path, id: &str) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
-    for shelf in fs::read_dir(folder.join(QUARANTINE))? {
+    for shelf in fs::read_dir(folder.join(QUARANTINE_FOLDER))? {
         let shelf = shelf?;
         if !shelf.file_type()?.is_dir() {
             continue;
@@ -503,7 +506,7 @@ pub(super) fn is_of_shelf_before(name: &str, first_kept: Timestamp) -> bool {
 
 /// The quarantine of the day, which is made if it does not exist.
 pub(super) fn quarantine_shelf(folder: &Path, now: Timestamp) -> io::Result<PathBuf> {
-    let shelf = folder.join(QUARANTINE).join(shelf_name(now));
+    let shelf = folder.join(QUARANTINE_FOLDER).join(shelf_name(now));
     fs::create_dir_all(&shelf)?;
     Ok(shelf)
 }

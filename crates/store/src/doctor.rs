@@ -21,7 +21,9 @@
 //! that the caller names, unless the database still says who holds the item: the record beside the
 //! files does not name tenants. Jobs, keys and receipts live in the database only.
 
-use super::blobs::{self, DISCARDED, QUARANTINE, RECEIVED, RECORD, STAGING};
+use super::blobs::{
+    self, DISCARDED_FOLDER, QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, STAGING_FOLDER,
+};
 use super::content;
 use super::database::SqlStore;
 use super::findings::Examination;
@@ -178,7 +180,10 @@ impl Doctor<'_> {
         if self.heirs.is_none() {
             return Ok(None);
         }
-        let aside = self.folder.join(QUARANTINE).join(random_id("database-"));
+        let aside = self
+            .folder
+            .join(QUARANTINE_FOLDER)
+            .join(random_id("database-"));
         fs::create_dir_all(&aside)?;
         for end in ["", "-wal", "-shm"] {
             let name = format!("{DATABASE_FILE}{end}");
@@ -251,7 +256,7 @@ impl Doctor<'_> {
 
     /// Checks the files of received objects against their rows.
     async fn received(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
-        let shelf = self.folder.join(RECEIVED);
+        let shelf = self.folder.join(RECEIVED_FOLDER);
         let mut known = BTreeSet::new();
         for (name, sha256) in rows.waiting_files().await? {
             let wrong = match File::open(shelf.join(&name)) {
@@ -293,7 +298,7 @@ impl Doctor<'_> {
         let place = self.folder.join(blobs::shelf_path(id));
         let wrong = self.wrong_files(&place, record)?;
         if wrong.is_empty() {
-            if self.heirs.is_some() && !place.join(RECORD).exists() {
+            if self.heirs.is_some() && !place.join(RECORD_FILE).exists() {
                 write_record(&place, record)?;
             }
             return Ok(());
@@ -380,7 +385,7 @@ impl Doctor<'_> {
     /// The record beside the files at `place`, if it is that of `id` and the files are what it
     /// says.
     fn whole_record(&mut self, place: &Path, id: &str) -> io::Result<Option<ItemRecord>> {
-        let text = match fs::read(place.join(RECORD)) {
+        let text = match fs::read(place.join(RECORD_FILE)) {
             Ok(text) => text,
             Err(_) => return Ok(None),
         };
@@ -394,7 +399,7 @@ impl Doctor<'_> {
 
     /// Brings back what was set aside and is whole.
     async fn quarantine(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
-        let shelf = self.folder.join(QUARANTINE);
+        let shelf = self.folder.join(QUARANTINE_FOLDER);
         for day in names(&shelf)? {
             if day.starts_with("database-") {
                 continue;
@@ -414,7 +419,7 @@ impl Doctor<'_> {
                     rows.restore(&record, heirs).await?;
                     repair = Some("it was brought back");
                 }
-                let subject = format!("{QUARANTINE}/{day}/{name}");
+                let subject = format!("{QUARANTINE_FOLDER}/{day}/{name}");
                 let detail = "It was set aside, because it had no row or was damaged.";
                 self.found
                     .remark("quarantined-item", subject, detail, repair);
@@ -425,7 +430,7 @@ impl Doctor<'_> {
 
     /// Deletes what writes and deletions have left behind.
     fn leftovers(&mut self) -> Result<(), DoctorError> {
-        for shelf in [STAGING, DISCARDED] {
+        for shelf in [STAGING_FOLDER, DISCARDED_FOLDER] {
             for name in names(&self.folder.join(shelf))? {
                 let place = self.folder.join(shelf).join(&name);
                 if self.heirs.is_some() {
@@ -446,10 +451,10 @@ impl Doctor<'_> {
 }
 
 fn write_record(place: &Path, record: &ItemRecord) -> io::Result<()> {
-    let draft = place.join(format!("{RECORD}.new"));
+    let draft = place.join(format!("{RECORD_FILE}.new"));
     fs::write(&draft, serde_json::to_vec_pretty(record)?)?;
     blobs::sync(&draft)?;
-    fs::rename(&draft, place.join(RECORD))
+    fs::rename(&draft, place.join(RECORD_FILE))
 }
 
 /// The names in a folder, in order; none if it does not exist.

@@ -50,7 +50,10 @@ pub use blobs::FileBlobs;
 pub use database::SqlStore;
 pub use doctor::{DoctorError, examine};
 pub use findings::{Examination, Finding};
-pub use migrate::{Destination, MigrateError, Migrated, Progress, TableCount, migrate};
+pub use migrate::{
+    Destination, MigrateError, Migrated, MovedFiles, Progress, TableCount, migrate,
+    note_moved_files,
+};
 pub use postgres::PostgresError;
 pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
@@ -134,7 +137,8 @@ pub enum OpenError {
     /// Its files are in a bucket, and another place was given.
     #[error(
         "the files of {folder} are in {blobs}: start the service with `--blobs {blobs}`, or on another \
-         folder. Commands that work on the files of a folder cannot be used on it",
+         folder. If they were moved to another bucket, note it: ventriform migrate --moved-files \
+         s3://BUCKET/PREFIX --data-dir {folder}. Commands that work on the files of a folder cannot be used on it",
         folder = .folder.display(),
     )]
     FilesElsewhere {
@@ -188,7 +192,7 @@ pub enum OpenError {
     #[error(
         "the files of the records in {url} are in {place}, not in {own}. Give every process on a database \
          the same `blobs`; a database whose files are in a folder is used with that folder alone. If the \
-         files were moved, say so in the database: UPDATE store_place SET place = '...'"
+         files were moved, note it: ventriform migrate --moved-files {own} --database {url}"
     )]
     OtherFiles {
         /// The database.
@@ -562,7 +566,7 @@ async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
 /// Whether a folder for items or received objects holds anything.
 fn has_items(folder: &Path) -> std::io::Result<bool> {
     let shelves = Resource::WITH_FILES.map(Resource::plural);
-    for shelf in shelves.into_iter().chain([blobs::RECEIVED]) {
+    for shelf in shelves.into_iter().chain([blobs::RECEIVED_FOLDER]) {
         match std::fs::read_dir(folder.join(shelf)) {
             Ok(mut entries) => {
                 if entries.next().is_some() {

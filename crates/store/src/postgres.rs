@@ -55,7 +55,7 @@ const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWOR
 const OLDEST_SERVER_VERSION: i32 = 150_000;
 
 /// The key of the lock for writing, in any schema of its own.
-pub(super) const BEGIN: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
+pub(super) const BEGIN_WRITING: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
 
 /// How the driver reaches the database at `url`.
 ///
@@ -471,7 +471,7 @@ impl PgWriter {
             connection: self.acquire().await?,
             ended: false,
         };
-        sqlx::raw_sql(BEGIN)
+        sqlx::raw_sql(BEGIN_WRITING)
             .execute(&mut *transaction)
             .await
             .map_err(faults::of_postgres)?;

@@ -1,7 +1,7 @@
 //! The files of received objects: `received/NAME`, each written under `staging/`, forced to disk and
 //! moved to its place.
 
-use super::blobs::{FileBlobs, RECEIVED, UploadFile, is_absent, quarantine_shelf, sync};
+use super::blobs::{FileBlobs, RECEIVED_FOLDER, UploadFile, is_absent, quarantine_shelf, sync};
 use super::space::DiskGauge;
 use async_trait::async_trait;
 use std::fs;
@@ -56,11 +56,11 @@ impl IncomingFile for Incoming {
     }
 
     async fn keep(self: Box<Self>, name: &str) -> Result<(), BlobError> {
-        let place = self.root.join(RECEIVED).join(name);
+        let place = self.root.join(RECEIVED_FOLDER).join(name);
         let kept = tokio::task::spawn_blocking(move || {
             sync(&self.file.path)?;
             fs::rename(&self.file.path, &place)?;
-            sync(&self.root.join(RECEIVED))
+            sync(&self.root.join(RECEIVED_FOLDER))
         });
         Ok(kept.await.map_err(io::Error::other)??)
     }
@@ -76,14 +76,14 @@ impl ReceivedFiles for FileBlobs {
     }
 
     async fn received(&self, name: &str, _sha256: &str) -> Result<Option<LocalFile>, BlobError> {
-        let path = self.folder.join(RECEIVED).join(name);
+        let path = self.folder.join(RECEIVED_FOLDER).join(name);
         let there = tokio::fs::try_exists(&path).await?;
         Ok(there.then(|| LocalFile::in_place(path)))
     }
 
     async fn discard(&self, names: &[String]) -> Result<(), BlobError> {
         for name in names {
-            match tokio::fs::remove_file(self.folder.join(RECEIVED).join(name)).await {
+            match tokio::fs::remove_file(self.folder.join(RECEIVED_FOLDER).join(name)).await {
                 Err(error) if !is_absent(&error) => return Err(error.into()),
                 _ => {}
             }
@@ -92,7 +92,7 @@ impl ReceivedFiles for FileBlobs {
     }
 
     async fn kept(&self, age: Duration) -> Result<Vec<String>, BlobError> {
-        let folder = self.folder.join(RECEIVED);
+        let folder = self.folder.join(RECEIVED_FOLDER);
         let listed = tokio::task::spawn_blocking(move || {
             let mut names = Vec::new();
             for entry in fs::read_dir(folder)? {
@@ -123,7 +123,7 @@ impl ReceivedFiles for FileBlobs {
 pub(super) fn set_aside(root: &Path, name: &str, now: Timestamp) -> io::Result<()> {
     let place = quarantine_shelf(root, now)?.join(random_id("received."));
     fs::create_dir(&place)?;
-    match fs::rename(root.join(RECEIVED).join(name), place.join(name)) {
+    match fs::rename(root.join(RECEIVED_FOLDER).join(name), place.join(name)) {
         Err(error) if is_absent(&error) => fs::remove_dir(&place),
         other => {
             other?;

@@ -146,7 +146,7 @@ export interface components {
              */
             attempts: number;
             /**
-             * @description What it tells.
+             * @description The event that it tells.
              * @example succeeded
              */
             event: string;
@@ -198,7 +198,7 @@ export interface components {
         };
         /** @description Something that the service depends on. */
         Dependency: {
-            /** @description What is wrong with it. */
+            /** @description The reason why it does not work. */
             detail?: string | null;
             /**
              * @description `database`, `files`, `disk`, or `workers`: processes that compute jobs.
@@ -981,7 +981,7 @@ export interface components {
              */
             made_by?: string | null;
             /**
-             * @description What it is for.
+             * @description Its name, which says what it is for.
              * @example scanner 2
              */
             name: string;
@@ -1000,7 +1000,7 @@ export interface components {
              * @description When it was revoked (RFC 3339).
              */
             revoked_at?: string | null;
-            /** @description What it allows. */
+            /** @description The acts that it allows. */
             scope: components["schemas"]["Scope"];
             /** @description Whether it opens the service. */
             state: components["schemas"]["KeyState"];
@@ -1554,7 +1554,7 @@ export interface components {
              */
             expires_at?: string | null;
             /**
-             * @description What it is for.
+             * @description Its name, which says what it is for.
              * @example scanner 2
              */
             name: string;
@@ -1569,7 +1569,7 @@ export interface components {
              */
             requests_per_minute?: number | null;
             /**
-             * @description What it allows: `read`, `submit` or `admin`.
+             * @description The acts that it allows: `read`, `submit` or `admin`.
              * @example submit
              */
             scope: string;
@@ -1581,7 +1581,7 @@ export interface components {
         };
         /** @description Why the service cannot accept work. */
         NotReady: components["schemas"]["Problem"] & {
-            /** @description What the service depends on. */
+            /** @description A part that the service depends on. */
             checks: components["schemas"]["Dependency"][];
         };
         /** @description The delivery of a DICOM object to an archive. */
@@ -1850,7 +1850,7 @@ export interface components {
             name: string;
             /** @description The program that added it. */
             software: components["schemas"]["Software"];
-            /** @description What the profile holds. */
+            /** @description The content of the profile. */
             summary: components["schemas"]["ReaderSummary"];
         };
         WebhookRequest: {
@@ -1935,7 +1935,7 @@ export interface components {
         };
         /** @description Whether the service can accept work. */
         Ready: {
-            /** @description What the service depends on. */
+            /** @description Parts that the service depends on. */
             checks: components["schemas"]["Dependency"][];
             /**
              * @description Always `ok`.
@@ -2032,7 +2032,7 @@ export interface components {
             sender: string;
             /** @description Series Instance UID. */
             series: string;
-            /** @description What became of it. */
+            /** @description How far it has come. */
             state: components["schemas"]["ReceivedState"];
             /** @description Study Instance UID. */
             study: string;
@@ -2946,7 +2946,7 @@ export interface components {
              * @description When it was registered (RFC 3339).
              */
             created_at: string;
-            /** @description What it is told. */
+            /** @description The events that it is told. */
             events: string[];
             /**
              * Format: date-time

@@ -87,12 +87,12 @@ fn is_refusal(error: &(dyn Error + 'static)) -> bool {
     false
 }
 
-/// What an error of the system's kind was made of.
+/// The cause of an error of the system's kind.
 fn inner<'a, E: Error + 'static>(error: &'a (dyn Error + 'static)) -> Option<&'a E> {
     error.downcast_ref::<io::Error>()?.get_ref()?.downcast_ref()
 }
 
-/// What an error and its causes say, once each.
+/// The texts of an error and its causes, once each.
 fn reason(error: &(dyn Error + 'static)) -> String {
     let mut said = error.to_string();
     let mut cause = error.source();

@@ -174,7 +174,7 @@ impl Tls {
         self.files.client_authorities.is_some()
     }
 
-    /// What a handshake that begins now goes by.
+    /// The settings of a handshake that begins now.
     pub fn config(&self) -> Arc<ServerConfig> {
         self.lock().0.clone()
     }
@@ -270,7 +270,7 @@ impl TlsFiles {
         let pair = |error| TlsError::Pair(self.names.certificate, error);
         let provider = pem::provider();
         let builder = ServerConfig::builder_with_provider(provider.clone())
-            .with_protocol_versions(&pem::VERSIONS)
+            .with_protocol_versions(&pem::TLS_VERSIONS)
             .map_err(pair)?;
         let builder = match &self.client_authorities {
             None => builder.with_no_client_auth(),

@@ -24,7 +24,7 @@ use ventriform_service::config::Words;
 const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 /// Stands for every name in `hosts`, and for every site in `cors_origins`.
-pub const ANY: &str = "*";
+pub const ANY_HOST: &str = "*";
 
 /// Which `Host` headers are answered.
 #[derive(Debug, Clone)]
@@ -49,7 +49,7 @@ impl HostPolicy {
         if self
             .names
             .iter()
-            .any(|n| n == ANY || n.eq_ignore_ascii_case(&name))
+            .any(|n| n == ANY_HOST || n.eq_ignore_ascii_case(&name))
         {
             return true;
         }
@@ -78,7 +78,7 @@ impl HostPolicy {
         }
         let origin = request.headers.get(header::ORIGIN);
         let origin = origin.and_then(|value| value.to_str().ok()).unwrap_or("?");
-        if self.origins.iter().any(|o| o == ANY || o == origin) {
+        if self.origins.iter().any(|o| o == ANY_HOST || o == origin) {
             return Ok(());
         }
         Err(Problem::new(

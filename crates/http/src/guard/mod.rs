@@ -218,7 +218,7 @@ fn add_limits(response: &mut Response, allowance: &Allowance) {
     let Allowance {
         quota, remaining, ..
     } = allowance;
-    let window = ventriform_service::access::WINDOW.as_secs();
+    let window = ventriform_service::access::QUOTA_WINDOW.as_secs();
     let resets_in = seconds(allowance);
     let values = [
         (

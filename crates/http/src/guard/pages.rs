@@ -1,7 +1,7 @@
 //! Headers that tell browsers what a page of this service may do, and who may use the service from
 //! another site.
 
-use super::hosts::ANY;
+use super::hosts::ANY_HOST;
 use axum::extract::{Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::Next;
@@ -26,7 +26,7 @@ const PICTURE_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; fra
 const STRICT_TRANSPORT: &str = "max-age=31536000";
 
 /// The headers of requests that a page of another site may set: all that the service reads.
-pub const ACCEPTED: [&str; 16] = [
+pub const ACCEPTED_HEADERS: [&str; 16] = [
     "accept",
     "authorization",
     "cache-control",
@@ -46,7 +46,7 @@ pub const ACCEPTED: [&str; 16] = [
 ];
 
 /// The headers of answers that such a page may read: all that the service sets for clients.
-pub const EXPOSED: [&str; 19] = [
+pub const EXPOSED_HEADERS: [&str; 19] = [
     "accept-ranges",
     "allow",
     "content-disposition",
@@ -123,14 +123,14 @@ pub fn cors(settings: &Settings) -> Option<CorsLayer> {
                 Method::PATCH,
                 Method::DELETE,
             ])
-            .allow_headers(ACCEPTED.map(HeaderName::from_static))
-            .expose_headers(EXPOSED.map(HeaderName::from_static))
+            .allow_headers(ACCEPTED_HEADERS.map(HeaderName::from_static))
+            .expose_headers(EXPOSED_HEADERS.map(HeaderName::from_static))
             .max_age(PREFLIGHT_AGE),
     )
 }
 
 fn allowed(origins: &Words) -> Option<AllowOrigin> {
-    if origins.iter().any(|origin| origin == ANY) {
+    if origins.iter().any(|origin| origin == ANY_HOST) {
         return Some(AllowOrigin::any());
     }
     let values: Vec<_> = origins

@@ -1,10 +1,10 @@
 //! A job as JSON.
 
-use super::priority::PriorityName;
 use crate::app::App;
 use crate::links::{path_of, rfc3339};
 use crate::openapi::JobParameters;
 use crate::problem::{Answer, Problem, ProblemBody};
+use crate::words::{JobStateName, PriorityName, Word};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -78,23 +78,6 @@ pub struct JobBody {
     segmentation: Option<String>,
     /// Related paths.
     links: JobLinks,
-}
-
-/// The state of a job.
-#[derive(Serialize, ToSchema)]
-#[schema(as = JobState)]
-#[serde(rename_all = "snake_case")]
-pub enum JobStateName {
-    /// It waits for a worker.
-    Queued,
-    /// A worker computes it.
-    Running,
-    /// Its result is stored.
-    Succeeded,
-    /// `error` says why.
-    Failed,
-    /// A client cancelled it.
-    Cancelled,
 }
 
 /// A series in an archive.
@@ -247,18 +230,6 @@ struct JobLinks {
     report: Option<String>,
 }
 
-impl From<JobState> for JobStateName {
-    fn from(state: JobState) -> Self {
-        match state {
-            JobState::Queued => JobStateName::Queued,
-            JobState::Running => JobStateName::Running,
-            JobState::Succeeded => JobStateName::Succeeded,
-            JobState::Failed => JobStateName::Failed,
-            JobState::Cancelled => JobStateName::Cancelled,
-        }
-    }
-}
-
 /// The JSON of a job, with its place in the queue if it waits.
 pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
     let context = Context::of(app, std::slice::from_ref(&job)).await?;
@@ -325,7 +296,7 @@ fn body(job: Job, context: &Context) -> JobBody {
         deliveries(order, made, job.state)
     });
     JobBody {
-        state: job.state.into(),
+        state: Word(job.state),
         queue_position: standing.map(|s| s.position),
         estimated_start: standing
             .and_then(|s| s.starts_in_ms)
@@ -348,7 +319,7 @@ fn body(job: Job, context: &Context) -> JobBody {
         external_id: job.tags.external_id,
         labels: job.tags.labels,
         kind: job.kind,
-        priority: job.priority.into(),
+        priority: Word(job.priority),
         volume: job.volume,
         source,
         deliveries,

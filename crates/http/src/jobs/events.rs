@@ -11,9 +11,10 @@ use crate::caller::Caller;
 use crate::openapi::{self, LookupProblems};
 use crate::problem::{Answer, Problem, ProblemBody};
 use crate::public_base::PublicBase;
-use crate::request::{PathSegments, query_pairs, refuse_unknown};
+use crate::query::NoQuery;
+use crate::request::PathSegments;
 use crate::streams::StreamPlace;
-use axum::extract::{RawQuery, State};
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
@@ -44,10 +45,9 @@ pub async fn follow_job(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let seen = last_event_id(&headers)?;
     // Subscribing comes before reading, so that no change is missed in between.
     let changes = app.service.queue().changes();

@@ -3,17 +3,19 @@
 //! `POST /v1/jobs` names a stored volume; [`file_upload`] takes a request that carries the volume
 //! itself, and may wait for the result (`Prefer: wait`).
 
-use super::{describe, priority};
+use super::describe;
+use super::priority::PriorityQuery;
 use crate::app::App;
 use crate::caller::Caller;
 use crate::links::path_of;
 use crate::problem::{Answer, Problem};
 use crate::products::{self, Offer};
+use crate::query::QueryReader;
 use crate::quota::reserve_upload;
-use crate::request::query_pairs;
+use crate::tags::TagQuery;
 use crate::upload::{self, Upload};
 use crate::webhook_request::GivenWebhook;
-use crate::{idempotency, negotiate, observe, tags};
+use crate::{idempotency, negotiate, observe};
 use axum::Json;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
@@ -21,7 +23,7 @@ use axum::response::{IntoResponse, Response};
 use std::time::Duration;
 use ventriform_service::filing::JobOrder;
 use ventriform_service::jobs::Work;
-use ventriform_service::records::{Job, JobState, Resource};
+use ventriform_service::records::{Job, JobState, Priority, Resource, Tags};
 
 /// Least and greatest `Retry-After`, seconds.
 const RETRY_AFTER_S: (f64, f64) = (1.0, 60.0);
@@ -43,7 +45,7 @@ pub async fn file_upload(
     app: &App,
     caller: &Caller,
     job: UploadJob,
-    query: Option<&str>,
+    mut query: QueryReader,
     request: Request,
 ) -> Answer {
     let (service, tenant) = (&app.service, &caller.tenant);
@@ -57,23 +59,21 @@ pub async fn file_upload(
     let key = idempotency::key(&headers)?;
     let work = service.work_of(job.makes.noun())?;
     // Whatever can be refused without the body is refused before the body is read.
-    let mut pairs = query_pairs(query);
-    let webhook = match GivenWebhook::take_from(&mut pairs, &headers)? {
+    let webhook = match GivenWebhook::of_upload(query.take()?, &headers)? {
         Some(given) => Some(given.of_job(app).await?),
         None => None,
     };
-    let mut given = pairs.clone();
-    let priority = priority::take(&mut pairs)?;
-    let (tags, mut pairs) = tags::take(app, pairs)?;
+    let mut given = query.rest();
+    let mut stated = Stated::of(app, given.clone())?;
     let mut order = JobOrder {
-        tags,
-        priority,
+        tags: stated.tags,
+        priority: stated.priority,
         key,
         webhook,
         trace_parent: observe::trace_parent(&request),
         ..JobOrder::new(tenant.clone(), caller.quota)
     };
-    let mut parameters = work.parameters_from_text(&pairs)?;
+    let mut parameters = work.parameters_from_text(&stated.parameters)?;
     // A repeated request gets its job, whatever has become of the queue and of what it names.
     if !service.is_filed(tenant, order.key.as_deref()).await? {
         let needs = work.needs(&parameters).items;
@@ -83,9 +83,10 @@ pub async fn file_upload(
     let fields = !upload.fields.is_empty();
     if fields {
         given.append(&mut upload.fields);
-        order.priority = priority::take(&mut given)?;
-        (order.tags, pairs) = tags::take(app, given)?;
+        stated = Stated::of(app, given)?;
+        (order.tags, order.priority) = (stated.tags, stated.priority);
     }
+    let mut pairs = stated.parameters;
     if let Some(filed) = filed_earlier(app, work, &pairs, &mut upload, &order).await? {
         return answer(app, filed, patience, &headers, &job.offers).await;
     }
@@ -110,6 +111,24 @@ pub async fn file_upload(
         .await?;
     drop(pins);
     answer(app, filed, patience, &headers, &job.offers).await
+}
+
+/// The statements of an upload about its job, in the query or the form.
+struct Stated {
+    priority: Priority,
+    tags: Tags,
+    parameters: Vec<(String, String)>,
+}
+
+impl Stated {
+    fn of(app: &App, pairs: Vec<(String, String)>) -> Answer<Self> {
+        let mut reader = QueryReader::of_pairs(pairs);
+        Ok(Self {
+            priority: reader.take::<PriorityQuery>()?.priority()?,
+            tags: reader.take::<TagQuery>()?.tags(app)?,
+            parameters: reader.rest(),
+        })
+    }
 }
 
 /// The job that an earlier request of the same upload got under the same key.

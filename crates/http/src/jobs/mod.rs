@@ -8,36 +8,36 @@ mod body;
 mod priority;
 
 pub use body::{JobBody, ObjectDeliveryBody, describe, describe_all};
-pub use priority::PriorityName;
+pub use priority::PriorityQuery;
 
 use super::app::App;
 use super::caller::Caller;
 use super::idempotency;
 use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
-use super::pagination::{next_cursor, page_of};
+use super::pagination::{PageQuery, next_cursor};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody};
+use super::query::{NoQuery, Query, moment};
 use super::quota::reserve_job;
-use super::request::{
-    PathSegments, flag, json_object, query_pairs, refuse_unknown, text, unknown, unknown_state,
-};
+use super::request::{PathSegments, json_object, text, unknown};
+use super::scans::ScanQuery;
+use super::tags::{self, TagQuery};
 use super::validators::ValidatedJson;
 use super::webhook_request::webhook_of;
-use super::{scans, tags};
+use super::words::{JobStateName, PriorityName};
 use axum::Json;
-use axum::extract::{RawQuery, Request, State};
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
-use body::JobStateName;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::ops::ControlFlow;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::filing::JobOrder;
 use ventriform_service::jobs::Work;
 use ventriform_service::records::{
-    Deleted, Interrupted, Job, JobFilter, JobState, Resource, Tenant, Timestamp, parse_rfc3339,
+    Deleted, Interrupted, Job, JobFilter, Resource, Tenant, Timestamp,
 };
 
 /// A page of jobs.
@@ -66,10 +66,9 @@ pub struct JobList {
 pub async fn create_job(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let counting = reserve_job(&app, &caller, request.headers()).await?;
     let key = idempotency::key(request.headers())?;
     let trace_parent = observe::trace_parent(&request);
@@ -90,7 +89,7 @@ pub async fn create_job(
 
 const JOB_FIELDS: [&str; 10] = [
     "kind",
-    priority::FIELD,
+    priority::PRIORITY_FIELD,
     "volume",
     "source",
     "parameters",
@@ -146,55 +145,48 @@ async fn read_job<'a>(
     Ok((work, volume, parameters))
 }
 
+/// A search for jobs.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct JobQuery {
+    /// Only jobs in this state
+    state: Option<JobStateName>,
+    /// Only jobs of this kind: model, segmentation
+    kind: Option<String>,
+    /// Only jobs of this priority
+    priority: Option<PriorityName>,
+    /// Only jobs on this volume
+    volume: Option<String>,
+    /// Only jobs filed after this moment (RFC 3339)
+    #[serde(default, deserialize_with = "moment")]
+    #[param(value_type = Option<String>, format = DateTime)]
+    created_after: Option<Timestamp>,
+}
+
 /// List jobs
 #[utoipa::path(get, path = "/v1/jobs", tag = "jobs",
-    params(openapi::PageParameters, openapi::TagParameters, openapi::ScanParameters,
-        ("state" = Option<JobStateName>, Query, description = "Only jobs in this state"),
-        ("kind" = Option<String>, Query, description = "Only jobs of this kind: model, segmentation"),
-        ("priority" = Option<PriorityName>, Query, description = "Only jobs of this priority"),
-        ("volume" = Option<String>, Query, description = "Only jobs on this volume"),
-        ("created_after" = Option<String>, Query, format = DateTime,
-            description = "Only jobs filed after this moment (RFC 3339)")),
+    params(PageQuery, TagQuery, ScanQuery, JobQuery),
     responses((status = 200, description = "A page, newest first", body = JobList), ListProblems))]
 pub async fn list_jobs(
     State(app): State<App>,
     caller: Caller,
-    RawQuery(query): RawQuery,
+    Query((page, tags, scan, search)): Query<(PageQuery, TagQuery, ScanQuery, JobQuery)>,
 ) -> Answer<Json<JobList>> {
-    let (tags, pairs) = tags::take_filter(&app, query_pairs(query.as_deref()))?;
-    let (scan, pairs) = scans::take_filter(pairs)?;
-    let own = ["state", "kind", priority::FIELD, "volume", "created_after"];
-    let (page, [state, kind, priority, volume, created_after]) = page_of(pairs, own).await?;
-    let priority = priority.map(|name| priority::parse(&name).map_err(Problem::of_search));
     let filter = JobFilter {
         tenant: caller.tenant,
-        state: state.map(|name| parse_state(&name)).transpose()?,
-        kind,
-        priority: priority.transpose()?,
-        volume,
-        tags,
-        scan,
-        created_after: created_after.map(|text| parse_moment(&text)).transpose()?,
+        state: search.state.map(|word| word.0),
+        kind: search.kind,
+        priority: search.priority.map(|word| word.0),
+        volume: search.volume,
+        tags: tags.filter(&app)?,
+        scan: scan.into(),
+        created_after: search.created_after,
     };
+    let page = page.charged().await?;
     let page = app.service.queue().table().jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
-}
-
-fn parse_moment(text: &str) -> Answer<Timestamp> {
-    parse_rfc3339(text).ok_or_else(|| {
-        Problem::bad_request(
-            "invalid-parameter",
-            "`created_after` must be a moment as RFC 3339 writes it.",
-        )
-        .at("created_after")
-        .fix("Give a moment such as 2026-11-22T08:00:00Z.")
-    })
-}
-
-fn parse_state(name: &str) -> Answer<JobState> {
-    JobState::parse(name).ok_or_else(|| unknown_state(name, &JobState::ALL.map(JobState::as_str)))
 }
 
 /// Show a job
@@ -209,10 +201,9 @@ pub async fn get_job(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let read = async || {
         let job = find(&app, &caller.tenant, &id).await?;
         let ended = job.state.is_final();
@@ -252,14 +243,21 @@ pub async fn update_job(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    _: NoQuery,
     request: Request,
 ) -> Answer<Json<JobBody>> {
-    refuse_unknown(&query_pairs(query.as_deref()), &[])?;
     let job = find(&app, &caller.tenant, &id).await?;
     tags::change(&app, &caller.tenant, &id, job.tags, request).await?;
     let job = find(&app, &caller.tenant, &id).await?;
     Ok(Json(describe(&app, job).await?))
+}
+
+/// Whether a job is erased.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct EraseQuery {
+    /// Whether to erase a job that was cancelled
+    erase: Option<bool>,
 }
 
 /// Cancel or erase a job
@@ -271,7 +269,7 @@ pub async fn update_job(
 /// unfinished one is refused.
 #[utoipa::path(delete, path = "/v1/jobs/{id}", tag = "jobs",
     params(("id" = String, Path, description = "The job's id"),
-        ("erase" = Option<bool>, Query, description = "Whether to erase a job that was cancelled")),
+        EraseQuery),
     responses(
         (status = 200, description = "It is cancelled, or ended before it could be", body = JobBody),
         (status = 202, description = "It is running and was asked to stop", body = JobBody),
@@ -283,14 +281,9 @@ pub async fn delete_job(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
-    RawQuery(query): RawQuery,
+    Query(query): Query<EraseQuery>,
 ) -> Answer {
-    let pairs = query_pairs(query.as_deref());
-    refuse_unknown(&pairs, &["erase"])?;
-    let erase = match pairs.first() {
-        Some((_, value)) => flag("erase", value)?,
-        None => false,
-    };
+    let erase = query.erase.unwrap_or(false);
     let tenant = &caller.tenant;
     let job = find(&app, tenant, &id).await?;
     if erase && !job.state.is_final() {

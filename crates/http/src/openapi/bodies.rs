@@ -1,6 +1,6 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
-use super::inputs::priority_field;
+use super::inputs::PriorityField;
 use crate::tags;
 use serde_json::json;
 use std::borrow::Cow;
@@ -46,7 +46,7 @@ impl PartialSchema for JobRequest {
     }
 }
 
-/// What both kinds of job requests have, before and after what they work on.
+/// The fields that both kinds of job requests have, before and after what they work on.
 fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
     let text = || ObjectBuilder::new().schema_type(Type::String);
     let kind = text()
@@ -71,7 +71,7 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
         .property("external_id", external_id)
         .property("labels", labels)
         .property("kind", Schema::from(kind))
-        .property("priority", priority_field())
+        .property("priority", PriorityField::schema())
         .property(input, schema)
         .property("parameters", Ref::from_schema_name(JobParameters::name()))
         .property("webhook", Ref::from_schema_name(WebhookRequest::name()))

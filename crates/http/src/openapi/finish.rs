@@ -12,7 +12,7 @@
 //! 5. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;
-use crate::files::PAGE;
+use crate::files::REPORT_PAGE;
 use crate::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 use ventriform::export::dicom::DicomObject;
@@ -54,11 +54,11 @@ pub fn finish(document: &mut Value) {
 
 /// Documents with a part that serde flattens. utoipa describes them as `allOf`, of which generators of clients make
 /// several types.
-const FLATTENED: [&str; 2] = ["MeshFacts", "PolarMap"];
+const FLATTENED_SCHEMAS: [&str; 2] = ["MeshFacts", "PolarMap"];
 
-/// Joins the parts of the [`FLATTENED`] schemas, and drops parts that nothing else names.
+/// Joins the parts of the [`FLATTENED_SCHEMAS`] schemas, and drops parts that nothing else names.
 fn flatten(schemas: &mut Value) {
-    for name in FLATTENED {
+    for name in FLATTENED_SCHEMAS {
         let mut whole = json!({
             "type": "object",
             "description": schemas[name]["description"],
@@ -189,11 +189,16 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
     let stem = stem.strip_suffix("file").unwrap_or(stem);
     one["operationId"] = format!("{stem}{}", name.replace(['.', '-'], "_")).into();
     one["summary"] = format!("Download {name}").into();
-    if let Some(parameters) = one["parameters"].as_array_mut() {
-        parameters.retain(|parameter| parameter["name"] != "file");
-    }
     let media_type = media_type_of(name);
     let is_object = media_type == DicomObject::MEDIA_TYPE;
+    if let Some(parameters) = one["parameters"].as_array_mut() {
+        parameters.retain(|parameter| match parameter["name"].as_str() {
+            Some("file") => false,
+            Some("deidentify") => is_object || name == REPORT_PAGE,
+            Some("part") => !is_object && name.starts_with("mesh"),
+            _ => true,
+        });
+    }
     if let Some(answers) = one["responses"].as_object_mut() {
         // The name says the format; `Accept` is not looked at.
         answers.shift_remove("406");
@@ -202,12 +207,6 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
                 answers.shift_remove(status);
             }
         }
-    }
-    if !is_object
-        && name != PAGE
-        && let Some(parameters) = one["parameters"].as_array_mut()
-    {
-        parameters.retain(|parameter| parameter["name"] != "deidentify");
     }
     let schema = match (name, media_type) {
         ("mesh.json" | "mesh_apparent.json" | "mesh_anatomical.json", _) => {

@@ -5,7 +5,7 @@
 //!
 //! | file | what it describes |
 //! |---|---|
-//! | [`inputs`] | parameters: those of a model and a fit come from the tables of [`ventriform::parameters`], so a new one needs no change here |
+//! | [`inputs`] | headers; parameters of a model and a fit, which come from the tables of [`ventriform::parameters`], so a new one needs no change here |
 //! | [`bodies`] | request bodies that handlers read piece by piece |
 //! | [`answers`] | answers and problems that several handlers share |
 //! | [`access`] | credentials, and how requests are refused before any handler |
@@ -33,10 +33,9 @@ pub use bodies::{
     TagsPatch, TemplatePatch, UploadForm, WebhookRequest, WorkitemBody,
 };
 pub use inputs::{
-    CachedHeaders, CascadeParameter, ConditionalHeaders, DeidentifyParameter, ErasureParameters,
-    EventHeader, IdempotencyHeader, MaskParameters, ModelQuery, PageParameters, PartParameter,
-    PreferHeader, PriorityParameter, ReaderQuery, ScanParameters, SegmentationQuery, TagParameters,
-    TemplateQuery, TransactionParameters, WebhookInputs,
+    CachedHeaders, ConditionalHeaders, ErasureHeader, EventHeader, IdempotencyHeader, ModelQuery,
+    OrganField, PreferHeader, PriorityField, SegmentationQuery, TransactionHeader,
+    WebhookSecretHeader, fit_parameters,
 };
 pub use operation::Documented;
 

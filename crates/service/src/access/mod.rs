@@ -40,6 +40,6 @@ pub use gate::{FRESH_FOR, Gate, MOST_MAKERS, Refusal};
 pub use identity::{Identity, Makers};
 pub use key::{ApiKey, KeyError, KeyRequest, KeyState, Maker, PresentedKey};
 pub use oidc::{Issuer, IssuerError, IssuerSettings};
-pub use quota::{Allowance, Quota, RequestCounter, Usage, WINDOW};
+pub use quota::{Allowance, QUOTA_WINDOW, Quota, RequestCounter, Usage};
 pub use scope::{InvalidScope, Scope};
 pub use storage::AccessStore;

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// The length of a window.
-pub const WINDOW: Duration = Duration::from_secs(60);
+pub const QUOTA_WINDOW: Duration = Duration::from_secs(60);
 
 /// Callers whose windows are kept at the same time. Beyond it, windows that are over are dropped,
 /// and if none is, all are.
@@ -101,7 +101,7 @@ impl RequestCounter {
     fn update(&self, caller: &str, quota: u64, now: Instant, add: u64) -> Allowance {
         // A panic cannot leave the map half changed: each use is a few plain statements.
         let mut windows = self.windows.lock().unwrap_or_else(PoisonError::into_inner);
-        let over = |window: &Window| now.duration_since(window.begun) >= WINDOW;
+        let over = |window: &Window| now.duration_since(window.begun) >= QUOTA_WINDOW;
         if windows.len() >= MOST_CALLERS && !windows.contains_key(caller) {
             windows.retain(|_, window| !over(window));
             if windows.len() >= MOST_CALLERS {
@@ -112,7 +112,7 @@ impl RequestCounter {
             return Allowance {
                 quota,
                 remaining: quota,
-                resets_in: WINDOW,
+                resets_in: QUOTA_WINDOW,
                 allowed: quota > 0,
             };
         }
@@ -131,7 +131,7 @@ impl RequestCounter {
         Allowance {
             quota,
             remaining: quota.saturating_sub(window.count),
-            resets_in: WINDOW.saturating_sub(now.duration_since(window.begun)),
+            resets_in: QUOTA_WINDOW.saturating_sub(now.duration_since(window.begun)),
             allowed,
         }
     }
@@ -159,7 +159,7 @@ mod tests {
             "others are not affected"
         );
         assert!(!counter.look("a", 2, later).allowed);
-        assert!(counter.count("a", 2, start + WINDOW).allowed);
+        assert!(counter.count("a", 2, start + QUOTA_WINDOW).allowed);
     }
 
     #[test]

@@ -108,7 +108,7 @@ type Given<'a> = Option<&'a str>;
 
 impl Archive {
     /// The keys of an entry that hold a text.
-    pub const KEYS: [&'static str; 12] = [
+    pub const SETTING_KEYS: [&'static str; 12] = [
         "name",
         "dicomweb",
         "username_env",
@@ -234,7 +234,7 @@ impl Archive {
             certificate.map(path),
             key.map(path),
         ];
-        let given = Self::KEYS.into_iter().zip(values);
+        let given = Self::SETTING_KEYS.into_iter().zip(values);
         given
             .filter_map(|(key, value)| Some((key, value?)))
             .collect()

@@ -27,7 +27,7 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 const RESPONSE_BYTES: usize = 64 << 10;
 
 const STORE_REQUEST: u16 = 0x0001;
-const MESSAGE: u16 = 1;
+const MESSAGE_NUMBER: u16 = 1;
 
 /// Stores an object by C-STORE.
 ///
@@ -129,7 +129,7 @@ fn client_config(files: &DicomTls) -> Result<ClientConfig, Trouble> {
     let authorities = pem::authorities(&files.ca_file)
         .map_err(|reason| unusable("dicom_ca_file", &files.ca_file, reason))?;
     let builder = ClientConfig::builder_with_provider(pem::provider())
-        .with_protocol_versions(&pem::VERSIONS)
+        .with_protocol_versions(&pem::TLS_VERSIONS)
         .map_err(|error| Trouble::passing(format!("TLS cannot be used: {error}.")))?
         .with_root_certificates(authorities);
     let Some((certificate, key)) = &files.own else {
@@ -185,7 +185,7 @@ fn command(object: &ArchiveObject) -> Result<Vec<u8>, Trouble> {
     let command = InMemDicomObject::command_from_element_iter([
         text(tags::AFFECTED_SOP_CLASS_UID, &object.class),
         number(tags::COMMAND_FIELD, STORE_REQUEST),
-        number(tags::MESSAGE_ID, MESSAGE),
+        number(tags::MESSAGE_ID, MESSAGE_NUMBER),
         number(tags::PRIORITY, 0),
         // A data set follows.
         number(tags::COMMAND_DATA_SET_TYPE, 0),

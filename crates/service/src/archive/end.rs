@@ -17,11 +17,11 @@ pub enum ExchangeEnd {
 
 impl ExchangeEnd {
     /// The names of all ends.
-    pub const NAMES: [&'static str; 4] = ["done", "present", "failed", "given-up"];
+    pub const END_NAMES: [&'static str; 4] = ["done", "present", "failed", "given-up"];
 
     /// Its name in metrics.
     pub fn as_str(self) -> &'static str {
-        Self::NAMES[self.index()]
+        Self::END_NAMES[self.index()]
     }
 
     fn index(self) -> usize {
@@ -36,13 +36,13 @@ impl ExchangeEnd {
 
 /// Counts of attempts since the start, by how they ended.
 #[derive(Debug, Default)]
-pub struct ExchangeCounts([AtomicU64; ExchangeEnd::NAMES.len()]);
+pub struct ExchangeCounts([AtomicU64; ExchangeEnd::END_NAMES.len()]);
 
 impl ExchangeCounts {
     /// The attempts by how they ended.
     pub fn all(&self) -> impl Iterator<Item = (&'static str, u64)> {
         let counts = self.0.iter().map(|count| count.load(Ordering::Relaxed));
-        ExchangeEnd::NAMES.into_iter().zip(counts)
+        ExchangeEnd::END_NAMES.into_iter().zip(counts)
     }
 
     pub(super) fn add(&self, end: ExchangeEnd) {

@@ -6,7 +6,7 @@ use crate::records::Tenant;
 use std::path::Path;
 
 /// The key of the file.
-pub(super) const KEY: &str = "archives";
+pub(super) const ARCHIVES_KEY: &str = "archives";
 
 /// The key of an entry that holds a list.
 const TENANTS_KEY: &str = "tenants";
@@ -23,11 +23,13 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
     };
     let toml::Value::Array(entries) = value else {
         let reason = "write each archive under a heading `[[archives]]`";
-        return Err(error(KEY.into(), reason.into()));
+        return Err(error(ARCHIVES_KEY.into(), reason.into()));
     };
     let mut archives = Archives::default();
     for (number, entry) in entries.iter().enumerate() {
-        let at = |field: &str, reason: String| error(format!("{KEY}[{number}].{field}"), reason);
+        let at = |field: &str, reason: String| {
+            error(format!("{ARCHIVES_KEY}[{number}].{field}"), reason)
+        };
         let toml::Value::Table(entry) = entry else {
             return Err(at("name", "write `[[archives]]` before its keys".into()));
         };
@@ -46,12 +48,12 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
                 _ if key == TENANTS_KEY => {
                     return Err(at(key, "it must be a list of names".into()));
                 }
-                toml::Value::String(_) if Archive::KEYS.contains(&key.as_str()) => {}
-                _ if Archive::KEYS.contains(&key.as_str()) => {
+                toml::Value::String(_) if Archive::SETTING_KEYS.contains(&key.as_str()) => {}
+                _ if Archive::SETTING_KEYS.contains(&key.as_str()) => {
                     return Err(at(key, "it must be a text in quotes".into()));
                 }
                 _ => {
-                    let known = Archive::KEYS.join(", ");
+                    let known = Archive::SETTING_KEYS.join(", ");
                     let reason = format!("there is no such key; known are {known}, {TENANTS_KEY}");
                     return Err(at(key, reason));
                 }
@@ -73,7 +75,7 @@ pub(super) fn read(path: &Path, value: toml::Value) -> Result<Archives, ConfigEr
 pub(super) fn print(archives: &Archives) -> String {
     let mut text = String::new();
     for archive in &archives.0 {
-        text += &format!("\n[[{KEY}]]\n");
+        text += &format!("\n[[{ARCHIVES_KEY}]]\n");
         for (key, value) in archive.entry() {
             text += &format!("{key} = {value:?}\n");
         }

@@ -596,7 +596,7 @@ impl Settings {
             archive
                 .read_credentials(&variable)
                 .map_err(|fault| ConfigError::NoCredentials {
-                    field: format!("{}[{number}].{}", archives::KEY, fault.field),
+                    field: format!("{}[{number}].{}", archives::ARCHIVES_KEY, fault.field),
                     reason: fault.reason,
                 })?;
         }
@@ -695,7 +695,7 @@ fn read_file(path: &Path) -> Result<FileContent, ConfigError> {
         .map_err(|e: toml::de::Error| unreadable(e.to_string()))?;
     let mut content = FileContent::default();
     for (key, value) in table {
-        if key == archives::KEY {
+        if key == archives::ARCHIVES_KEY {
             content.archives = archives::read(path, value)?;
             continue;
         }
@@ -716,7 +716,7 @@ fn read_file(path: &Path) -> Result<FileContent, ConfigError> {
 }
 
 fn nearest(key: &str) -> Option<String> {
-    let names = Settings::NAMES.iter().chain(&[archives::KEY]);
+    let names = Settings::NAMES.iter().chain(&[archives::ARCHIVES_KEY]);
     names
         .map(|name| (strsim::jaro_winkler(key, name), *name))
         .filter(|(likeness, _)| *likeness > 0.75)

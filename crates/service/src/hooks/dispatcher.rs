@@ -36,7 +36,7 @@ pub struct HookSettings {
 /// Counts since the start, for operators.
 #[derive(Debug, Default)]
 pub struct DeliveryCounts {
-    attempts: [AtomicU64; AttemptOutcome::NAMES.len()],
+    attempts: [AtomicU64; AttemptOutcome::OUTCOME_NAMES.len()],
     given_up: AtomicU64,
 }
 
@@ -47,7 +47,7 @@ impl DeliveryCounts {
             .attempts
             .iter()
             .map(|count| count.load(Ordering::Relaxed));
-        AttemptOutcome::NAMES.into_iter().zip(counts)
+        AttemptOutcome::OUTCOME_NAMES.into_iter().zip(counts)
     }
 
     /// The deliveries that were given up.

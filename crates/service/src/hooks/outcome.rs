@@ -21,7 +21,7 @@ pub enum AttemptOutcome {
 
 impl AttemptOutcome {
     /// The names of all outcomes.
-    pub const NAMES: [&'static str; 6] = [
+    pub const OUTCOME_NAMES: [&'static str; 6] = [
         "delivered",
         "gone",
         "rejected",
@@ -30,7 +30,7 @@ impl AttemptOutcome {
         "refused",
     ];
 
-    /// Its place among [`AttemptOutcome::NAMES`].
+    /// Its place among [`AttemptOutcome::OUTCOME_NAMES`].
     pub(super) fn index(self) -> usize {
         match self {
             AttemptOutcome::Delivered(_) => 0,
@@ -44,7 +44,7 @@ impl AttemptOutcome {
 
     /// Its name in answers, metrics and the database.
     pub fn as_str(self) -> &'static str {
-        Self::NAMES[self.index()]
+        Self::OUTCOME_NAMES[self.index()]
     }
 
     /// The status of the receiver's answer.

@@ -16,7 +16,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 /// The table is read at least this often.
-pub(super) const IDLE: Duration = Duration::from_secs(5);
+pub(super) const IDLE_WAIT: Duration = Duration::from_secs(5);
 
 /// How often what is too old is given up or deleted.
 const EXPIRE_EVERY: Duration = Duration::from_secs(30);
@@ -96,7 +96,7 @@ impl<E: Errands> Rounds<E> {
                 Ok(pause) => pause,
                 Err(error) => {
                     tracing::error!(%error, "what is due could not be read; tried again");
-                    IDLE
+                    IDLE_WAIT
                 }
             };
             let idle = tokio::time::sleep(pause);
@@ -133,7 +133,7 @@ impl<E: Errands> Rounds<E> {
         let pending = self.errands.destinations().await?;
         self.lanes.keep(&pending);
         let now = self.clock.now();
-        let mut next = now.saturating_add(milliseconds(IDLE));
+        let mut next = now.saturating_add(milliseconds(IDLE_WAIT));
         for (destination, due_at) in self.lanes.in_turn(pending) {
             let room = self.lanes.room(&destination, now);
             if due_at > now || room == 0 {
@@ -170,7 +170,7 @@ impl<E: Errands> Rounds<E> {
         let failed = match ended.end {
             AttemptEnd::Fine => None,
             AttemptEnd::Failing(asked) => Some(asked),
-            AttemptEnd::NotWritten => Some(Some(IDLE)),
+            AttemptEnd::NotWritten => Some(Some(IDLE_WAIT)),
         };
         let now = self.clock.now();
         self.lanes.leave(&ended.destination, &ended.id, now, failed);

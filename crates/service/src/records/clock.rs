@@ -3,7 +3,7 @@
 //! [`SteadyClock`] is the system's clock without its steps. Somebody who sets the clock to a wrong
 //! year for five minutes must not expire every stored item, and a step back must not turn the
 //! order of a job's stamps. Small corrections are followed at once. A step is followed only after
-//! it has lasted for [`SETTLING`]; until then time goes on as the monotonic clock says.
+//! it has lasted for [`SETTLING_TIME`]; until then time goes on as the monotonic clock says.
 
 use std::num::NonZero;
 use std::sync::{Mutex, PoisonError};
@@ -61,7 +61,7 @@ pub fn parse_rfc3339(text: &str) -> Option<Timestamp> {
 const CLOCK_STEP_MS: i64 = 2_000;
 
 /// How long a step of the system's clock must last until it is followed.
-pub const SETTLING: Duration = Duration::from_secs(600);
+pub const SETTLING_TIME: Duration = Duration::from_secs(600);
 
 /// The system clock without its steps.
 pub struct SteadyClock {
@@ -111,7 +111,7 @@ impl Course {
 
     fn now(&mut self, wall: Timestamp, monotonic: i64) -> Timestamp {
         let shown = wall - monotonic;
-        let settling = SETTLING.as_millis() as i64;
+        let settling = SETTLING_TIME.as_millis() as i64;
         if (shown - self.offset).abs() <= CLOCK_STEP_MS {
             (self.offset, self.doubt) = (shown, None);
             self.last = self.last.max(wall);

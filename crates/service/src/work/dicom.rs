@@ -1,7 +1,7 @@
 //! Stored results as DICOM objects, for the archive.
 //!
 //! In: a stored result with its volume and whose scan that is, as
-//! [`Items::result`](crate::items::Items::result) returns them for [`FILES`]. Out: the file of one
+//! [`Items::result`](crate::items::Items::result) returns them for [`SOURCE_FILES`]. Out: the file of one
 //! [`DicomObject`]. To be called on a blocking thread, from a request, a job or a delivery alike.
 //!
 //! Objects are not stored: the same result, scan and secret give the same bytes, UIDs included.
@@ -33,7 +33,7 @@ use ventriform::volume::dicom::Provenance;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
 
 /// The files of a result of which objects are made.
-pub const FILES: &[&str] = &[
+pub const SOURCE_FILES: &[&str] = &[
     MASK_FILE,
     "mesh.json",
     "report.json",

@@ -186,14 +186,14 @@ mod tests {
     use super::*;
     use crate::records::Tenant;
 
-    const NOW: (Timestamp, &str) = (7, "20261123050000+0000");
+    const TEST_MOMENT: (Timestamp, &str) = (7, "20261123050000+0000");
 
     fn claimed() -> Workitem {
         let set = json!({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
             "00404018": {"vr": "SQ", "Value": [{"00080100": {"vr": "SH", "Value": ["LVSEG"]}}]}});
         let set = DataSetJson::of(set.as_object().unwrap().clone()).unwrap();
-        let (mut item, _) = Workitem::create(&Tenant::default(), "1.2", set, NOW).unwrap();
-        item.claim("9.9", NOW).unwrap();
+        let (mut item, _) = Workitem::create(&Tenant::default(), "1.2", set, TEST_MOMENT).unwrap();
+        item.claim("9.9", TEST_MOMENT).unwrap();
         item
     }
 
@@ -201,9 +201,9 @@ mod tests {
     fn an_item_is_claimed_once_and_completed_with_its_outputs() {
         let mut item = claimed();
         assert_eq!(item.performer, Performer::Claimed);
-        assert!(item.claim("9.8", NOW).is_err());
-        assert!(item.note_progress(40, NOW));
-        assert!(!item.note_progress(40, NOW));
+        assert!(item.claim("9.8", TEST_MOMENT).is_err());
+        assert!(item.note_progress(40, TEST_MOMENT));
+        assert!(!item.note_progress(40, TEST_MOMENT));
         let object = WorkOutputObject {
             class: "1.1".into(),
             instance: "1.2".into(),
@@ -212,7 +212,7 @@ mod tests {
             dicomweb: Some("http://pacs/dicom-web".into()),
             ae_title: None,
         };
-        item.complete("20261123045900+0000", &[object], NOW)
+        item.complete("20261123045900+0000", &[object], TEST_MOMENT)
             .unwrap();
         assert_eq!(item.state, WorkitemState::Completed);
         let performed = item
@@ -239,7 +239,8 @@ mod tests {
     fn what_is_given_up_says_why() {
         let mut item = claimed();
         assert!(!item.is_to_be_cancelled());
-        item.give_up("There is no such series.", NOW).unwrap();
+        item.give_up("There is no such series.", TEST_MOMENT)
+            .unwrap();
         assert_eq!(item.state, WorkitemState::Canceled);
         assert_eq!(
             item.progress().text(REASON_FOR_CANCELLATION),
@@ -249,9 +250,9 @@ mod tests {
         let mut item = claimed();
         let reason = json!({"00741238": {"vr": "LT", "Value": ["wrong patient"]}});
         let reason = DataSetJson::of(reason.as_object().unwrap().clone()).unwrap();
-        item.request_cancel(&reason, NOW).unwrap();
+        item.request_cancel(&reason, TEST_MOMENT).unwrap();
         assert!(item.is_to_be_cancelled());
-        item.give_up("The job was cancelled.", NOW).unwrap();
+        item.give_up("The job was cancelled.", TEST_MOMENT).unwrap();
         assert_eq!(
             item.progress().text(REASON_FOR_CANCELLATION),
             Some("wrong patient")

@@ -20,7 +20,7 @@ const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
 
 /// Attributes that an item of the Performed Procedure Sequence must have when the work is completed
 /// (PS3.4 table CC.2.5-3, final state).
-const FINAL: [(&str, &str); 5] = [
+const FINAL_ATTRIBUTES: [(&str, &str); 5] = [
     (
         PERFORMED_STATION_NAME_CODE_SEQUENCE,
         "Performed Station Name Code Sequence",
@@ -41,7 +41,7 @@ const FINAL: [(&str, &str); 5] = [
 ];
 
 /// The attributes of a cancellation request that are passed on to the performer.
-const CANCELLATION: [&str; 4] = [
+const CANCELLATION_TAGS: [&str; 4] = [
     REASON_FOR_CANCELLATION,
     PROCEDURE_STEP_DISCONTINUATION_REASON_CODE_SEQUENCE,
     CONTACT_URI,
@@ -350,7 +350,7 @@ impl Workitem {
             .next()
             .cloned();
         let mut progress = DataSetJson::of(known.unwrap_or_default()).unwrap_or_default();
-        for tag in CANCELLATION {
+        for tag in CANCELLATION_TAGS {
             if let Some(element) = details.object().get(tag) {
                 let element = Map::from_iter([(tag.to_owned(), element.clone())]);
                 progress.replace(DataSetJson::of(element).unwrap_or_default());
@@ -392,7 +392,10 @@ impl Workitem {
                 "Unified Procedure Step Performed Procedure Sequence",
             ));
         };
-        match FINAL.iter().find(|(tag, _)| !performed.contains_key(*tag)) {
+        match FINAL_ATTRIBUTES
+            .iter()
+            .find(|(tag, _)| !performed.contains_key(*tag))
+        {
             Some((_, name)) => Err(Refusal::Unfinished(name)),
             None => Ok(()),
         }
@@ -422,7 +425,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    const NOW: (Timestamp, &str) = (7, "20261123050000");
+    const TEST_MOMENT: (Timestamp, &str) = (7, "20261123050000");
 
     fn set(value: Value) -> DataSetJson {
         let Value::Object(object) = value else {
@@ -433,13 +436,13 @@ mod tests {
 
     fn scheduled() -> Workitem {
         let attributes = set(json!({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}));
-        Workitem::create(&Tenant::default(), "1.2", attributes, NOW)
+        Workitem::create(&Tenant::default(), "1.2", attributes, TEST_MOMENT)
             .unwrap()
             .0
     }
 
     fn finished() -> DataSetJson {
-        let item: Map<String, Value> = FINAL
+        let item: Map<String, Value> = FINAL_ATTRIBUTES
             .iter()
             .map(|(tag, _)| ((*tag).to_owned(), json!({"vr": "SQ"})))
             .collect();
@@ -465,14 +468,15 @@ mod tests {
         ] {
             let mut item = scheduled();
             if from != Scheduled {
-                item.change_state(Some("9.9"), InProgress, NOW).unwrap();
-                item.update(Some("9.9"), finished(), NOW).unwrap();
+                item.change_state(Some("9.9"), InProgress, TEST_MOMENT)
+                    .unwrap();
+                item.update(Some("9.9"), finished(), TEST_MOMENT).unwrap();
             }
             if from.is_final() {
-                item.change_state(Some("9.9"), from, NOW).unwrap();
+                item.change_state(Some("9.9"), from, TEST_MOMENT).unwrap();
             }
             let before = item.clone();
-            let result = item.change_state(Some("9.9"), to, NOW);
+            let result = item.change_state(Some("9.9"), to, TEST_MOMENT);
             if allowed {
                 assert_eq!(result, Ok(Change::Done), "{from:?} {to:?}");
                 assert_eq!(
@@ -496,44 +500,47 @@ mod tests {
         item.update(
             None,
             set(json!({"00741204": {"vr": "LO", "Value": ["A"]}})),
-            NOW,
+            TEST_MOMENT,
         )
         .unwrap();
         let claim = WorkitemState::InProgress;
         assert_eq!(
-            item.change_state(None, claim, NOW),
+            item.change_state(None, claim, TEST_MOMENT),
             Err(Refusal::NoTransaction)
         );
-        item.change_state(Some("9.9"), claim, NOW).unwrap();
+        item.change_state(Some("9.9"), claim, TEST_MOMENT).unwrap();
         let change = || set(json!({"00741204": {"vr": "LO", "Value": ["B"]}}));
         assert_eq!(
-            item.update(None, change(), NOW),
+            item.update(None, change(), TEST_MOMENT),
             Err(Refusal::NoTransaction)
         );
         assert_eq!(
-            item.update(Some("9.8"), change(), NOW),
+            item.update(Some("9.8"), change(), TEST_MOMENT),
             Err(Refusal::OtherTransaction)
         );
-        item.update(Some("9.9"), change(), NOW).unwrap();
+        item.update(Some("9.9"), change(), TEST_MOMENT).unwrap();
         assert_eq!(item.attributes.text(PROCEDURE_STEP_LABEL), Some("B"));
         let done = WorkitemState::Completed;
-        let missing = item.change_state(Some("9.9"), done, NOW);
+        let missing = item.change_state(Some("9.9"), done, TEST_MOMENT);
         assert!(
             matches!(missing, Err(Refusal::Unfinished(_))),
             "{missing:?}"
         );
-        item.update(Some("9.9"), finished(), NOW).unwrap();
-        let other = item.change_state(Some("9.8"), done, NOW);
+        item.update(Some("9.9"), finished(), TEST_MOMENT).unwrap();
+        let other = item.change_state(Some("9.8"), done, TEST_MOMENT);
         assert_eq!(other, Err(Refusal::OtherTransaction));
-        assert_eq!(item.change_state(Some("9.9"), done, NOW), Ok(Change::Done));
         assert_eq!(
-            item.change_state(Some("9.9"), done, NOW),
+            item.change_state(Some("9.9"), done, TEST_MOMENT),
+            Ok(Change::Done)
+        );
+        assert_eq!(
+            item.change_state(Some("9.9"), done, TEST_MOMENT),
             Ok(Change::Already)
         );
-        let late = item.update(Some("9.9"), change(), NOW);
+        let late = item.update(Some("9.9"), change(), TEST_MOMENT);
         assert_eq!(late, Err(Refusal::State { state: done }));
         assert!(!serde_json::to_string(item.shown()).unwrap().contains("9.9"));
-        let cancel = item.request_cancel(&DataSetJson::default(), NOW);
+        let cancel = item.request_cancel(&DataSetJson::default(), TEST_MOMENT);
         assert_eq!(cancel, Err(Refusal::State { state: done }));
     }
 
@@ -541,13 +548,16 @@ mod tests {
     fn a_cancellation_ends_what_waits_and_is_noted_where_work_goes_on() {
         let reason = set(json!({"00741238": {"vr": "LT", "Value": ["wrong patient"]}}));
         let mut item = scheduled();
-        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Done));
+        assert_eq!(item.request_cancel(&reason, TEST_MOMENT), Ok(Change::Done));
         assert_eq!(item.state, WorkitemState::Canceled);
-        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Already));
+        assert_eq!(
+            item.request_cancel(&reason, TEST_MOMENT),
+            Ok(Change::Already)
+        );
         let mut item = scheduled();
-        item.change_state(Some("9.9"), WorkitemState::InProgress, NOW)
+        item.change_state(Some("9.9"), WorkitemState::InProgress, TEST_MOMENT)
             .unwrap();
-        assert_eq!(item.request_cancel(&reason, NOW), Ok(Change::Done));
+        assert_eq!(item.request_cancel(&reason, TEST_MOMENT), Ok(Change::Done));
         assert_eq!(item.state, WorkitemState::InProgress);
         let noted = item
             .attributes
@@ -574,7 +584,7 @@ mod tests {
             let mut object = scheduled().attributes.object().clone();
             object.insert(tag.into(), value);
             let set = DataSetJson::of(object).unwrap();
-            let refused = Workitem::create(&Tenant::default(), "1.2", set, NOW);
+            let refused = Workitem::create(&Tenant::default(), "1.2", set, TEST_MOMENT);
             assert!(
                 matches!(refused, Err(Refusal::Attribute { tag: at, .. }) if at == tag),
                 "{tag}: {refused:?}"

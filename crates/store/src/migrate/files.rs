@@ -1,9 +1,9 @@
 //! Copying the files of items, and of received objects.
 
-use super::source::{PAGE, Source};
+use super::source::{PAGE_ROWS, Source};
 use super::{MigrateError, Migrated, Progress};
 use crate::backup;
-use crate::blobs::{RECEIVED, STAGING, shelf_path};
+use crate::blobs::{RECEIVED_FOLDER, STAGING_FOLDER, shelf_path};
 use crate::copied::Copied;
 use crate::s3::S3Blobs;
 use futures::{StreamExt, TryStreamExt, stream};
@@ -47,7 +47,9 @@ impl<'a> Copying<'a> {
 
     fn note_received(&mut self, name: String, copied: Copied) {
         match copied {
-            Copied::Not(defect) => self.damaged.push(format!("{RECEIVED}/{name}: {defect}")),
+            Copied::Not(defect) => self
+                .damaged
+                .push(format!("{RECEIVED_FOLDER}/{name}: {defect}")),
             _ => {
                 self.done.received += 1;
                 self.kept.insert(name);
@@ -73,7 +75,7 @@ pub(super) async fn to_bucket(
     tell: &(impl Fn(Progress) + Sync),
 ) -> Result<(), MigrateError> {
     let mut copying = Copying::begin(source, done).await?;
-    let mut pages = RecordPages::new(&source.rows, PAGE);
+    let mut pages = RecordPages::new(&source.rows, PAGE_ROWS);
     while let Some(page) = pages.next().await? {
         let sent = page.into_iter().map(|record: ItemRecord| async move {
             let from = source.folder.join(shelf_path(record.id()));
@@ -86,7 +88,7 @@ pub(super) async fn to_bucket(
         }
     }
     for (name, sha256) in source.rows.waiting_files().await? {
-        let from = source.folder.join(RECEIVED).join(&name);
+        let from = source.folder.join(RECEIVED_FOLDER).join(&name);
         let copied = bucket.take_in_received(&name, &sha256, &from).await?;
         copying.note_received(name, copied);
     }
@@ -101,11 +103,11 @@ pub(super) async fn to_folder(
     done: &mut Migrated,
     tell: &(impl Fn(Progress) + Sync),
 ) -> Result<(), MigrateError> {
-    for shelf in shelves().chain([STAGING]) {
+    for shelf in shelves().chain([STAGING_FOLDER]) {
         fs::create_dir_all(to.join(shelf))?;
     }
     let mut copying = Copying::begin(source, done).await?;
-    let mut pages = RecordPages::new(&source.rows, PAGE);
+    let mut pages = RecordPages::new(&source.rows, PAGE_ROWS);
     while let Some(page) = pages.next().await? {
         for record in page {
             let copied = backup::copy_item(&source.folder, to, &record)?;
@@ -126,5 +128,5 @@ pub(super) async fn to_folder(
 
 fn shelves() -> impl Iterator<Item = &'static str> {
     let shelves = Resource::WITH_FILES.map(Resource::plural);
-    shelves.into_iter().chain([RECEIVED])
+    shelves.into_iter().chain([RECEIVED_FOLDER])
 }

@@ -13,6 +13,7 @@
 //! item is named, and nothing is finished until the folder is repaired.
 
 mod files;
+mod moved;
 mod rows;
 mod source;
 
@@ -30,6 +31,7 @@ use std::path::{Path, PathBuf};
 use ventriform_service::config::PostgresSettings;
 use ventriform_service::records::{StoreError, random_id};
 
+pub use moved::{MovedFiles, note_moved_files};
 pub use rows::TableCount;
 
 /// Where a data folder is moved.
@@ -109,6 +111,40 @@ pub enum MigrateError {
         .0.join("\n")
     )]
     Damaged(Vec<String>),
+    /// Files are not where they were said to be.
+    #[error(
+        "{place} lacks {of} files of the records, or has them in another length:\n{}\nNothing was noted. Copy \
+         them there, or give the place that has them",
+        .missing.join("\n")
+    )]
+    FilesMissing {
+        /// The bucket or folder.
+        place: String,
+        /// The first of the missing files.
+        missing: Vec<String>,
+        /// Number of all missing files.
+        of: usize,
+    },
+    /// The folder is that of another database.
+    #[error(
+        "{folder} holds the files of the records in {url}. Nothing was noted. Give the folder with the files of \
+         this database; if it does not belong to {url} any more, delete {marker}",
+        folder = .folder.display(), marker = .folder.join(MARKER_FILE).display(),
+    )]
+    OtherStore {
+        /// The folder.
+        folder: PathBuf,
+        /// The database to which it belongs.
+        url: String,
+    },
+    /// The database knows no place of files.
+    #[error(
+        "no files of the records in {0} are known: start the service on it, which notes their place"
+    )]
+    NoPlace(String),
+    /// Services use the database.
+    #[error("services are running on {0}: stop all of them, or wait a minute if they were killed")]
+    Running(String),
     /// The target gave back other rows than it was given.
     #[error(
         "the rows of the table {0} were read back differently than they were written; nothing was committed"

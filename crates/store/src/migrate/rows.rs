@@ -83,7 +83,7 @@ pub(super) async fn copy(
 ) -> Result<Vec<TableCount>, MigrateError> {
     let from = file_of(from)?;
     let mut to = postgres::connect_unlimited(to).await.map_err(of_postgres)?;
-    run(&mut to, postgres::BEGIN).await?;
+    run(&mut to, postgres::BEGIN_WRITING).await?;
     let mut copied = Vec::new();
     let mut sent = 0;
     for table in tables(from, &mut to).await? {

@@ -1,6 +1,6 @@
 //! The data folder that is moved: locked, and read from a snapshot of its database.
 
-use crate::blobs::STAGING;
+use crate::blobs::STAGING_FOLDER;
 use crate::database::SqlStore;
 use crate::query::query;
 use crate::tables::to_json;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use ventriform_service::records::{ItemRecord, RecordPages, StoreResult, hex, random_id};
 
 /// Rows read at a time.
-pub(super) const PAGE: u32 = 200;
+pub(super) const PAGE_ROWS: u32 = 200;
 
 /// A data folder with its records in a file and its files beside it, which no service uses.
 pub(super) struct Source {
@@ -45,7 +45,7 @@ impl Source {
         }
         // As no service runs, closing the database moves its log into it.
         lock.mark(CLOSED_MARK).map_err(|e| unusable(folder, &e))?;
-        let scratch = folder.join(STAGING).join(random_id("migrate-"));
+        let scratch = folder.join(STAGING_FOLDER).join(random_id("migrate-"));
         fs::create_dir_all(&scratch).map_err(|e| unusable(&scratch, &e))?;
         let snapshot = scratch.join(DATABASE_FILE);
         if !sqlite::has_tables(&database).await {
@@ -71,7 +71,7 @@ impl Source {
     /// Notes in the snapshot where the files of each item will be in a bucket: the same place in each attempt.
     pub async fn note_places(&self) -> StoreResult<()> {
         let mut transaction = self.rows.writer.begin().await?;
-        let mut pages = RecordPages::new(&self.rows, PAGE);
+        let mut pages = RecordPages::new(&self.rows, PAGE_ROWS);
         while let Some(page) = pages.next().await? {
             for mut record in page {
                 record.put_at(Some(&place_of(record.id())));

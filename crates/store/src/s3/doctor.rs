@@ -7,7 +7,7 @@
 use super::bucket::Bucket;
 use super::files::S3Blobs;
 use super::shared::publication;
-use crate::blobs::{QUARANTINE, RECEIVED, RECORD, is_plain, shelf_path};
+use crate::blobs::{QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, is_plain, shelf_path};
 use crate::database::SqlStore;
 use crate::findings::Examination;
 use std::collections::{BTreeMap, BTreeSet};
@@ -118,7 +118,7 @@ impl BucketDoctor<'_> {
     ) -> StoreResult<Option<ItemRecord>> {
         let text = self
             .bucket()
-            .read(&format!("{shelf}/{place}/{RECORD}"))
+            .read(&format!("{shelf}/{place}/{RECORD_FILE}"))
             .await?;
         let record: Option<ItemRecord> = text.and_then(|text| serde_json::from_slice(&text).ok());
         let Some(record) = record.filter(|record| record.id() == id && is_plain(id)) else {
@@ -190,7 +190,7 @@ impl BucketDoctor<'_> {
     async fn received(&mut self) -> StoreResult<()> {
         let mut known = BTreeSet::new();
         for (name, sha256) in self.rows.waiting_files().await? {
-            let path = format!("{RECEIVED}/{name}");
+            let path = format!("{RECEIVED_FOLDER}/{name}");
             let wrong = match self.bucket().fetch(&path, None).await? {
                 Some(content) => {
                     self.found.files += 1;
@@ -210,7 +210,7 @@ impl BucketDoctor<'_> {
             }
             known.insert(path);
         }
-        for path in self.bucket().paths(RECEIVED).await? {
+        for path in self.bucket().paths(RECEIVED_FOLDER).await? {
             if known.contains(&path) {
                 continue;
             }
@@ -228,7 +228,7 @@ impl BucketDoctor<'_> {
     /// Brings back what was set aside and is whole.
     async fn quarantine(&mut self) -> StoreResult<()> {
         let mut publications: BTreeMap<String, Vec<String>> = BTreeMap::new();
-        for path in self.bucket().paths(QUARANTINE).await? {
+        for path in self.bucket().paths(QUARANTINE_FOLDER).await? {
             if let Some((folder, _)) = path.rsplit_once('/') {
                 publications
                     .entry(folder.to_owned())
@@ -242,7 +242,7 @@ impl BucketDoctor<'_> {
             let [_, day, _, id, place] = parts[..] else {
                 continue;
             };
-            let shelf = format!("{QUARANTINE}/{day}/{}", shelf_path(id));
+            let shelf = format!("{QUARANTINE_FOLDER}/{day}/{}", shelf_path(id));
             let record = self.whole_record(&shelf, id, place).await?;
             let wanted = !self.rows.was_erased(id).await? && self.rows.record(id).await?.is_none();
             let mut repair = None;

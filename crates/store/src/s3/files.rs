@@ -1,11 +1,12 @@
 //! The files of items in the bucket.
 
 use super::bucket::{Bucket, Content, S3Location, says, text};
-use super::shared::{READY, Shared, owner, publication};
+use super::shared::{PROBE_FILE, Shared, owner, publication};
 use super::staged::StagedPublication;
-use super::{GRACE, S3Refusal};
+use super::{ORPHAN_GRACE, S3Refusal};
 use crate::blobs::{
-    CHECK, QUARANTINE, RECEIVED, RECORD, STAGING, is_of_shelf_before, shelf_name, shelf_path,
+    PROBE_BYTES, QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, STAGING_FOLDER,
+    is_of_shelf_before, shelf_name, shelf_path,
 };
 use crate::cache::{Found, LocalCache};
 use crate::content::{self, Reading};
@@ -104,10 +105,10 @@ impl S3Blobs {
             fix: "Give another `data_dir`",
         };
         let bucket = Bucket::new(location).map_err(|error| refusal(location, &error))?;
-        let content = Bytes::from_static(CHECK);
+        let content = Bytes::from_static(PROBE_BYTES);
         let begun = tokio::time::Instant::now();
         loop {
-            match bucket.probe(READY, content.clone()).await {
+            match bucket.probe(PROBE_FILE, content.clone()).await {
                 Ok(_) => break,
                 Err(error) if may_pass(&error) && begun.elapsed() < FIRST_REQUEST_TIMES.0 => {
                     tracing::warn!(error = text(&error), %location, "waiting for the S3 store");
@@ -116,7 +117,7 @@ impl S3Blobs {
                 Err(error) => return Err(refusal(location, &error)),
             }
         }
-        let staging = folder.join(STAGING);
+        let staging = folder.join(STAGING_FOLDER);
         match fs::remove_dir_all(&staging) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 return Err(unusable(error));
@@ -129,7 +130,7 @@ impl S3Blobs {
             shared: Arc::new(Shared { bucket, cache }),
             gauge,
             folder: folder.to_owned(),
-            grace: GRACE,
+            grace: ORPHAN_GRACE,
         })
     }
 
@@ -145,7 +146,7 @@ impl S3Blobs {
     /// If the store fails.
     pub async fn has_items(&self) -> Result<bool, BlobError> {
         let shelves = Resource::WITH_FILES.map(Resource::plural);
-        for shelf in shelves.into_iter().chain([RECEIVED]) {
+        for shelf in shelves.into_iter().chain([RECEIVED_FOLDER]) {
             if self.shared.bucket.has_files(shelf).await? {
                 return Ok(true);
             }
@@ -155,7 +156,7 @@ impl S3Blobs {
 
     /// A new path under `staging/`.
     pub(super) fn new_staging_path(&self) -> PathBuf {
-        self.folder.join(STAGING).join(random_id(""))
+        self.folder.join(STAGING_FOLDER).join(random_id(""))
     }
 
     /// Place and path of a file of an item. Files that were stored in a folder have none.
@@ -163,6 +164,24 @@ impl S3Blobs {
         let place = file.place.as_deref()?;
         let path = format!("{}/{}", publication(id, place), file.name);
         Some((Shared::cached(id, place), path))
+    }
+
+    /// The length of a file of an item; `None` if it is missing or was stored in a folder.
+    pub(crate) async fn size(&self, id: &str, file: &FileRecord) -> Result<Option<u64>, BlobError> {
+        match Self::address(id, file) {
+            Some((_, path)) => self.shared.bucket.size(&path).await,
+            None => Ok(None),
+        }
+    }
+
+    /// Whether the file of a received object is there.
+    pub(crate) async fn has_received(&self, name: &str) -> Result<bool, BlobError> {
+        let size = self
+            .shared
+            .bucket
+            .size(&format!("{RECEIVED_FOLDER}/{name}"))
+            .await?;
+        Ok(size.is_some())
     }
 
     async fn copy(&self, id: &str, file: &FileRecord) -> Result<Option<Found>, BlobError> {
@@ -184,7 +203,7 @@ impl S3Blobs {
         let target = publication(id, &place.unwrap_or_default());
         let text = serde_json::to_vec_pretty(record)
             .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
-        let noted = format!("{target}/{RECORD}");
+        let noted = format!("{target}/{RECORD_FILE}");
         if self.shared.bucket.read(&noted).await?.as_deref() == Some(&text) {
             return Ok(Copied::Before);
         }
@@ -215,7 +234,7 @@ impl S3Blobs {
         sha256: &str,
         from: &Path,
     ) -> Result<Copied, BlobError> {
-        let path = format!("{RECEIVED}/{name}");
+        let path = format!("{RECEIVED_FOLDER}/{name}");
         let there = self.shared.bucket.fetch(&path, None).await?;
         if there.is_some_and(|content| content.sha256 == sha256) {
             return Ok(Copied::Before);
@@ -263,7 +282,7 @@ impl S3Blobs {
                 }
             }
         }
-        let received = self.shared.bucket.paths(RECEIVED).await?;
+        let received = self.shared.bucket.paths(RECEIVED_FOLDER).await?;
         let others = received.into_iter().filter(|path| {
             path.rsplit('/')
                 .next()
@@ -294,7 +313,7 @@ impl S3Blobs {
         now: Timestamp,
     ) -> Result<(), BlobError> {
         for path in self.shared.bucket.paths(&publication(id, place)).await? {
-            let to = format!("{QUARANTINE}/{}/{path}", shelf_name(now));
+            let to = format!("{QUARANTINE_FOLDER}/{}/{path}", shelf_name(now));
             self.shared.bucket.shift(&path, &to).await?;
         }
         Ok(())
@@ -362,7 +381,7 @@ impl BlobStore for S3Blobs {
                 paths.push(path.to_owned());
             }
         };
-        let aside = self.shared.bucket.each(QUARANTINE, add).await?;
+        let aside = self.shared.bucket.each(QUARANTINE_FOLDER, add).await?;
         self.shared.bucket.delete(aside).await
     }
 
@@ -438,7 +457,7 @@ impl BlobStore for S3Blobs {
         let text = serde_json::to_vec_pretty(record)
             .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
         for place in places_of(&record.files()) {
-            let path = format!("{}/{RECORD}", publication(record.id(), place));
+            let path = format!("{}/{RECORD_FILE}", publication(record.id(), place));
             self.shared
                 .bucket
                 .put_new(&path, text.clone().into())
@@ -457,21 +476,21 @@ impl BlobStore for S3Blobs {
                 paths.push(path.to_owned());
             }
         };
-        let old = self.shared.bucket.each(QUARANTINE, old).await?;
+        let old = self.shared.bucket.each(QUARANTINE_FOLDER, old).await?;
         self.shared.bucket.delete(old).await
     }
 
     async fn check(&self) -> Result<(), BlobError> {
         self.require_room(0)?;
-        let content = Bytes::from_static(CHECK);
-        let probe = self.shared.bucket.probe(READY, content);
+        let content = Bytes::from_static(PROBE_BYTES);
+        let probe = self.shared.bucket.probe(PROBE_FILE, content);
         match tokio::time::timeout(CHECK_LIMIT, probe).await {
             Ok(Ok(true)) => Ok(()),
             Ok(Ok(false)) => Err(BlobError::new(
                 StoreFault::Away,
                 "the S3 store gave back another content than it was given",
             )),
-            Ok(Err(error)) => Err(self.shared.bucket.fault(READY, &error)),
+            Ok(Err(error)) => Err(self.shared.bucket.fault(PROBE_FILE, &error)),
             Err(_) => Err(BlobError::new(
                 StoreFault::Away,
                 "the S3 store did not answer in time",

@@ -19,7 +19,7 @@
 //! local disk ([`super::cache`]), whose copies are verified. Nothing on the local disk is needed again:
 //! all of it can be deleted.
 //!
-//! A publication whose row was not committed is an orphan. While it is younger than [`GRACE`] by the
+//! A publication whose row was not committed is an orphan. While it is younger than [`ORPHAN_GRACE`] by the
 //! store's clock, it may still be going on. Older ones are set aside by the sweep, or deleted if the
 //! item was erased or has another publication.
 
@@ -37,7 +37,7 @@ pub use files::S3Blobs;
 use std::time::Duration;
 
 /// Age after which a publication without a row was given up.
-pub const GRACE: Duration = Duration::from_secs(3600);
+pub const ORPHAN_GRACE: Duration = Duration::from_secs(3600);
 
 /// Why the bucket cannot be used, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use super::files::S3Blobs;
 use super::shared::Shared;
-use crate::blobs::{QUARANTINE, RECEIVED, shelf_name};
+use crate::blobs::{QUARANTINE_FOLDER, RECEIVED_FOLDER, shelf_name};
 use crate::received::Receiving;
 use async_trait::async_trait;
 use object_store::ObjectMeta;
@@ -28,7 +28,7 @@ impl IncomingFile for Incoming {
     }
 
     async fn keep(self: Box<Self>, name: &str) -> Result<(), BlobError> {
-        let path = format!("{RECEIVED}/{name}");
+        let path = format!("{RECEIVED_FOLDER}/{name}");
         self.shared.bucket.put_file(&path, &self.file.path).await?;
         Ok(())
     }
@@ -44,7 +44,7 @@ impl ReceivedFiles for S3Blobs {
     }
 
     async fn received(&self, name: &str, sha256: &str) -> Result<Option<LocalFile>, BlobError> {
-        let path = format!("{RECEIVED}/{name}");
+        let path = format!("{RECEIVED_FOLDER}/{name}");
         let Some(bytes) = self.shared.bucket.size(&path).await? else {
             return Ok(None);
         };
@@ -54,16 +54,19 @@ impl ReceivedFiles for S3Blobs {
             sha256: sha256.to_owned(),
             place: None,
         };
-        let place = format!("{RECEIVED}.{name}");
+        let place = format!("{RECEIVED_FOLDER}.{name}");
         let found = self.shared.copy(&place, &file, &path).await?;
         Ok(found.map(|found| found.local))
     }
 
     async fn discard(&self, names: &[String]) -> Result<(), BlobError> {
-        let paths: Vec<_> = names.iter().map(|n| format!("{RECEIVED}/{n}")).collect();
+        let paths: Vec<_> = names
+            .iter()
+            .map(|n| format!("{RECEIVED_FOLDER}/{n}"))
+            .collect();
         self.shared.bucket.delete(paths).await?;
         for name in names {
-            let place = format!("{RECEIVED}.{name}");
+            let place = format!("{RECEIVED_FOLDER}.{name}");
             self.shared.cache.forget(|other| *other == place)?;
         }
         Ok(())
@@ -76,12 +79,12 @@ impl ReceivedFiles for S3Blobs {
                 names.extend(path.rsplit('/').next().map(str::to_owned));
             }
         };
-        self.shared.bucket.each(RECEIVED, old).await
+        self.shared.bucket.each(RECEIVED_FOLDER, old).await
     }
 
     async fn quarantine(&self, name: &str, now: Timestamp) -> Result<(), BlobError> {
-        let from = format!("{RECEIVED}/{name}");
-        let to = format!("{QUARANTINE}/{}/{from}", shelf_name(now));
+        let from = format!("{RECEIVED_FOLDER}/{name}");
+        let to = format!("{QUARANTINE_FOLDER}/{}/{from}", shelf_name(now));
         self.shared.bucket.shift(&from, &to).await
     }
 }

@@ -1,7 +1,7 @@
 //! The bucket with its local copies, and the paths in it.
 
 use super::bucket::Bucket;
-use crate::blobs::{CHECK, shelf_path};
+use crate::blobs::{PROBE_BYTES, shelf_path};
 use crate::cache::{Found, LocalCache};
 use bytes::Bytes;
 use object_store::ObjectMeta;
@@ -11,7 +11,7 @@ use std::time::Duration;
 use ventriform_service::records::{BlobError, FileRecord, StoreFault, Timestamp};
 
 /// The content that checks write.
-pub(super) const READY: &str = "ready";
+pub(super) const PROBE_FILE: &str = "ready";
 
 /// The bucket and its local copies.
 pub(super) struct Shared {
@@ -68,7 +68,10 @@ impl Shared {
 
     /// The time `age` ago by the store's clock.
     pub async fn before(&self, age: Duration) -> Result<Timestamp, BlobError> {
-        let now = self.bucket.now(READY, Bytes::from_static(CHECK)).await?;
+        let now = self
+            .bucket
+            .now(PROBE_FILE, Bytes::from_static(PROBE_BYTES))
+            .await?;
         let age = Timestamp::try_from(age.as_millis()).unwrap_or(Timestamp::MAX);
         Ok(now.saturating_sub(age))
     }

@@ -2,7 +2,7 @@
 
 use super::bucket::Bucket;
 use super::shared::{Shared, publication};
-use crate::blobs::{RECORD, UploadFile};
+use crate::blobs::{RECORD_FILE, UploadFile};
 use crate::content;
 use crate::space::DiskGauge;
 use async_trait::async_trait;
@@ -136,7 +136,7 @@ impl StagedFiles for StagedPublication {
         }
         let text = serde_json::to_vec_pretty(record)
             .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?;
-        let path = format!("{}/{RECORD}", publication(id, &self.place));
+        let path = format!("{}/{RECORD_FILE}", publication(id, &self.place));
         self.shared.bucket.put(&path, text.into()).await?;
         self.sent().published = true;
         for file in record.files() {

@@ -174,6 +174,21 @@ impl SqlStore {
         row.map(|row| row.try_get(0)).transpose()
     }
 
+    /// Notes that the files of the records are at `place` now.
+    pub(crate) async fn change_place(&self, place: &str) -> StoreResult<()> {
+        let change = query("UPDATE store_place SET place = $1").bind(place);
+        change.write(&self.writer).await?;
+        Ok(())
+    }
+
+    /// Whether a process lives that uses this database and a bucket.
+    pub(crate) async fn has_processes(&self) -> StoreResult<bool> {
+        let row = query("SELECT EXISTS (SELECT 1 FROM runs WHERE expires_at > database_now())")
+            .fetch_one(&self.readers)
+            .await?;
+        row.try_get(0)
+    }
+
     /// Where the files of the records are: `place`, unless another place was noted before.
     pub(crate) async fn note_place(&self, place: &str) -> StoreResult<String> {
         let mut transaction = self.writer.begin().await?;
