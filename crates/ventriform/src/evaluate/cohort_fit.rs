@@ -6,9 +6,9 @@
 use super::models::CohortModel;
 use super::rows::{Agreed, FitOutcome};
 use super::table::rounded;
-use crate::fit::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
+use crate::judge::Fit;
 use crate::locate::cup::Cup;
 use crate::locate::patient_orientation::PatientOrientation;
 use crate::mesh::TriMesh;
