@@ -23,7 +23,7 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, FileFacts, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, IsoLevel, Isolate, SurfaceError};
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use crate::volume::{
     self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
 };

@@ -12,7 +12,7 @@ use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 
 /// A segmentation's report with its pictures.
 #[derive(Debug, Clone, Copy)]

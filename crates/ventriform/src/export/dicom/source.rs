@@ -6,7 +6,7 @@ use super::data_set::{DataSet, reference};
 use super::uid::{derived, is_uid};
 use crate::geometry::frame::VoxelToPatient;
 use crate::text::is_printable;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
 

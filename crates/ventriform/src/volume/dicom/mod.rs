@@ -44,9 +44,7 @@ mod volumes;
 #[cfg(test)]
 mod tests;
 
-pub use described::{Segment, SegmentCode};
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
-pub use provenance::Provenance;
 pub(super) use syntax::is_dicom;
 
 use self::attributes::{
@@ -61,13 +59,13 @@ use self::scan::Scan;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
 use self::volumes::Marks;
-use super::VolumeError;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
 use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
+use super::{Provenance, Segment, VolumeError};
 use crate::progress::{Monitor, Stage};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};

@@ -4,12 +4,11 @@
 //! Spacing Between Slices define; slices without a frame are empty, as the standard allows to omit
 //! them. Of a fractional segmentation, fractions of at least one half belong to the segment.
 
-use super::super::VolumeError;
 use super::super::decode::Figures;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
+use super::super::{Segment, VolumeError};
 use super::attributes::{Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENTATION_TYPE};
-use super::described::Segment;
 use super::pixels::{Pixels, too_many_voxels};
 use super::stack::{Located, heights, stated_gap};
 use crate::progress::{Monitor, Stage};

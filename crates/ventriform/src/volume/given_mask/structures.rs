@@ -2,7 +2,7 @@
 
 use crate::grid::survey;
 use crate::progress::Monitor;
-use crate::volume::dicom::Segment;
+use crate::volume::Segment;
 use crate::volume::{Volume, VolumeFacts};
 use std::collections::BTreeMap;
 
