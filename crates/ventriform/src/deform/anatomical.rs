@@ -464,7 +464,7 @@ mod tests {
         );
     }
 
-    /// What blur adds to a slab as thick as the mean wall is taken off in the mean; no wall gets thinner than the
+    /// The mean wall loses as much as blur adds to a slab of its thickness; no wall gets thinner than the
     /// least thickness.
     #[test]
     fn a_known_resolution_sets_the_mean_loss_and_some_wall_is_left() {

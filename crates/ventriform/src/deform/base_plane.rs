@@ -188,7 +188,7 @@ impl RimFrame {
         moved
     }
 
-    /// How far towards the apex the mesh begins in each direction, mm from the cup's centre: the most basal
+    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex: the most basal
     /// crossing of its edges with the half plane there. `None` if there is a direction without any.
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         (0..RIM_DIRECTIONS)

@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 /// The result of one fit, or why there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CohortFit {
-    /// How it went.
+    /// Figures of the fit, or why there are none.
     pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`](super::rows::Gold::ALL).
     pub agreed: [Option<Agreed>; 2],

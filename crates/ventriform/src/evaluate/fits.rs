@@ -42,7 +42,7 @@ pub struct PatientFits {
 
 /// Input that all fits of a run share.
 pub struct FitRun<'a> {
-    /// How the models are fitted.
+    /// Parameters of the fits.
     pub parameters: &'a DeformParameters,
     /// Whether the fit that `auto` keeps is a result too.
     pub auto: bool,

@@ -31,7 +31,7 @@ pub struct Evidence {
     pub residual: f64,
     /// Root mean square of the strain.
     pub strain: f64,
-    /// How much darker the cavity is than the wall, 0..=1.
+    /// Share of the wall's brightness that the cavity lacks, 0..=1.
     pub hollowness: f64,
     /// Volume of the cavity, ml.
     pub cavity_ml: f64,
@@ -40,13 +40,13 @@ pub struct Evidence {
     /// Standard deviation of the distance from the axis to the middle of the wall, between the
     /// apical cap and the rim, as a share of its mean.
     pub unroundness: f64,
-    /// How far the middle of the wall lies off the axis there, as a share of that mean.
+    /// Distance of the middle of the wall from the axis there, as a share of that mean.
     pub offset: f64,
     /// Length from rim to apex over the outer radius.
     pub slenderness: f64,
     /// Distance of the septum from the axis over that of the free wall.
     pub septal_bulge: f64,
-    /// How far the septum lies outside the circles through the free wall, as a share of their radius.
+    /// Distance of the septum outside the circles through the free wall, as a share of their radius.
     /// It does not depend on the axis, which moves towards a septum that is fitted too far out.
     pub septal_overshoot: f64,
     /// Share of the wall that takes up less than half as much as the bright wall does, 0..=1.

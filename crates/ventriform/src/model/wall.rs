@@ -154,7 +154,7 @@ impl VentricleWall {
         })
     }
 
-    /// How far `point` lies from the cup's centre along the axis towards the apex, mm.
+    /// The distance of `point` from the cup's centre along the axis, positive towards the apex, mm.
     pub fn along_axis(&self, point: &Vec3) -> f64 {
         (point - self.frame.centre).dot(&self.frame.axis)
     }

@@ -16,11 +16,11 @@ use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 use crate::progress::{Cancelled, Monitor};
 
-/// How far from the rim the base may reach, as a share of the length from rim to apex. Valve planes
+/// Greatest distance of the base from the rim, as a share of the length from rim to apex. Valve planes
 /// are slanted, and the rim is their mean.
 const MAX_BASE_SHARE: f64 = 0.3;
 
-/// How often patches beside the largest part of a side are given to the other side, until none is left.
+/// Most rounds in which patches beside the largest part of a side are given to the other side.
 const MAX_REASSIGNMENTS: usize = 8;
 
 /// The part of each triangle of `mesh`, a ventricle's wall with this `cup` (LPS mm); `None` if the mesh has

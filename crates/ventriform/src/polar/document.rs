@@ -14,7 +14,7 @@ pub struct PolarSummary {
     pub threshold_percent: f64,
     /// Share of the wall below it.
     pub extent_percent: f64,
-    /// What the percentages refer to.
+    /// The reference of the percentages.
     pub note: String,
     /// The 17 segments.
     pub segments: Vec<PolarSegment>,
@@ -26,7 +26,7 @@ pub struct PolarSummary {
     pub rows: usize,
     /// Columns of pixels, around the axis.
     pub columns: usize,
-    /// What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+    /// Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
     #[serde(default)]
     #[cfg_attr(feature = "schema", schema(required))]
     pub orientation: String,

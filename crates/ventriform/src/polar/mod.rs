@@ -68,11 +68,11 @@ pub struct PolarParameters {
     pub rim_margin: f64,
     /// Length of wall next to it over which the weight rises to 1, mm, 0..=30. Default 12.
     pub rim_fade: f64,
-    /// How wide the levels are drawn. Default [`Projection::Standard`].
+    /// Widths of the levels. Default [`Projection::Standard`].
     pub projection: Projection,
 }
 
-/// How wide the levels are on the map.
+/// Widths of the levels on the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Projection {
     /// Rings of equal width.
@@ -151,7 +151,7 @@ pub struct PolarMap {
     pub territories: [Territory; 3],
     /// Where the levels lie.
     pub levels: Levels,
-    /// How wide the levels are drawn.
+    /// Widths of the levels.
     pub projection: Projection,
     /// The source of the patient's orientation. If it is unknown, levels hold, but no position of a level
     /// is known to be anterior: segments of a level are then counted from a convention.

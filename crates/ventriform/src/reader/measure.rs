@@ -117,7 +117,7 @@ struct MaskField<'a> {
 }
 
 impl MaskField<'_> {
-    /// How far from `start` a line leaves the mask, mm. `None` if it does not start in it, or does
+    /// The distance from `start` at which a line leaves the mask, mm. `None` if it does not start in it, or does
     /// not leave it.
     fn leaves(&self, start: &Vec3, direction: &Vec3) -> Option<f64> {
         let value = |distance: f64| self.at(&(start + direction * distance));

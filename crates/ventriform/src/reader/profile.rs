@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
-/// How far a reader's wall lies from the fitted one, mm.
+/// Distances of a reader's wall from the fitted one, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ReaderOffsets {
-    /// How far the inner surface lies farther out.
+    /// Distance of the inner surface, positive outward.
     pub endocardium: f64,
-    /// How far the outer surface lies farther out.
+    /// Distance of the outer surface, positive outward.
     pub epicardium: f64,
-    /// How far the rim lies farther towards the base.
+    /// Distance of the rim, positive towards the base.
     pub rim: f64,
 }
 
@@ -38,7 +38,7 @@ impl ReaderOffsets {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = LearntOffset))]
 #[serde(deny_unknown_fields)]
 pub struct ReaderOffset {
-    /// What is applied: the mean, drawn towards zero.
+    /// The applied offset: the mean, drawn towards zero.
     pub value: f64,
     /// Mean over the masks.
     pub mean: f64,
@@ -114,7 +114,7 @@ pub struct ProfileDocument {
     masks: usize,
     /// The distances, mm.
     offsets_mm: LearntOffsets,
-    /// What it was learnt on.
+    /// The masks it was learnt on.
     learnt_on: Vec<LearntOn>,
 }
 

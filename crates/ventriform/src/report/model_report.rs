@@ -32,7 +32,7 @@ pub struct ModelReport {
     pub surface: SurfaceReport,
     /// The mesh before optimisation.
     pub retile: RetileReport,
-    /// What optimisation did.
+    /// Figures of optimisation.
     pub optimise: OptimiseReport,
     /// The model: counts and topology.
     pub mesh: MeshFacts,

@@ -41,7 +41,7 @@ use crate::progress::{Cancelled, Monitor};
 const PROBE: f64 = 1.25;
 /// C: smoothing length over that at which error and noise are in balance.
 const STRENGTH: f64 = 0.63;
-/// How much of the rest is shape, over what a second pass of the filter takes off. Of noise the second
+/// The part of the rest that is shape, over what a second pass of the filter takes off. Of noise the second
 /// pass takes off a fifth.
 const BENT: f64 = 2.0;
 /// Largest width of the correlation over the length of the filter: the filter passes next to nothing of
@@ -199,7 +199,7 @@ fn take_back_intersections(
     }
 }
 
-/// How fast the intensity falls along the normal at every vertex, per mm.
+/// The fall of the intensity along the normal at every vertex, per mm.
 fn steepness(
     vertices: &[Vec3],
     normals: &[Vec3],

@@ -61,7 +61,7 @@ fn template() -> Template {
     Template::new(model.mesh, Organ::LeftVentricle, &monitor).unwrap()
 }
 
-/// What `volume` shows after a turn about `centre` and a shift, on the same voxels.
+/// The content of `volume` after a turn about `centre` and a shift, on the same voxels.
 fn moved(volume: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) -> Volume {
     let field = Field::new(volume, None, 0.0);
     let [nx, ny, _] = volume.shape;

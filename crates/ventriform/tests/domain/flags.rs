@@ -1,4 +1,4 @@
-//! What gives reason to doubt a segmentation: motion, masks, objects that are no hearts.
+//! Flags of a segmentation: motion, masks, objects that are no hearts.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]

@@ -1,4 +1,4 @@
-//! What phantoms with a known difficulty must show: a defect of the base, a right ventricle as bright as the
+//! Results of phantoms with a known difficulty: a defect of the base, a right ventricle as bright as the
 //! left one.
 
 // Helpers of a test state their expectations by panicking, as tests do.

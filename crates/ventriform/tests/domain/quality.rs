@@ -1,4 +1,4 @@
-//! How good models are, as figures that may not get worse: distances to the surface that the scan would
+//! Quality of models, as figures that may not get worse: distances to the surface that the scan would
 //! have without noise, and shapes. `cargo run --release -p ventriform-tools --bin truth` judges
 //! more of them.
 

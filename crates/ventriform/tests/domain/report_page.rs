@@ -94,7 +94,7 @@ fn report(model: &TriMesh) -> ModelReport {
     })
 }
 
-/// How far `model` lies from the surface.
+/// Distances of `model` from the surface.
 fn closeness(model: &TriMesh) -> Closeness {
     Closeness::of(model, &surface().mesh, &Monitor::silent()).unwrap()
 }

@@ -55,7 +55,7 @@ pub struct StatedIdentity {
     pub frame_of_reference_uid: Option<String>,
 }
 
-/// How the objects are freed of the patient's identity.
+/// Parameters of the removal of the patient's identity from objects.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Deidentification {
     /// Secret from which the new UIDs are derived: objects made with the same secret from the same

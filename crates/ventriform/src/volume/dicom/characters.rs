@@ -122,7 +122,7 @@ const JIS_DIFFERENCES: [(char, char); 6] = [
     ('\u{ffe2}', '\u{00ac}'),
 ];
 
-/// How text is divided, by its value representation.
+/// Division of text, by its value representation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Division {
     /// Codes, numbers, dates, UIDs: always ASCII.

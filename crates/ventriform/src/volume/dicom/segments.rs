@@ -22,7 +22,7 @@ const MOST_VOXELS: u64 = 1 << 25;
 /// Largest deviation of a frame from its slice, as a share of the distance of slices.
 const PLACE_SLACK: f64 = 0.05;
 
-/// How a stored number becomes a label.
+/// The meaning of a stored number as a label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
     /// 1: the voxel belongs to the frame's segment.

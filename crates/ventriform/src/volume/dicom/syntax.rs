@@ -75,7 +75,7 @@ pub(super) struct Syntax {
     pub transfer_syntax: &'static TransferSyntax,
     /// Whether the data set is deflated. Its offsets count inflated bytes.
     pub deflated: bool,
-    /// How the pixels are compressed.
+    /// Compression of the pixels.
     pub compression: Compression,
     /// Whether the file is gzipped.
     pub gzip: bool,
@@ -181,7 +181,7 @@ fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
     }
 }
 
-/// How the elements of a data set are written.
+/// Encoding of the elements of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     ImplicitLittle,

@@ -44,7 +44,7 @@ pub(super) struct HeldStructures {
     pub(super) range: [f32; 2],
 }
 
-/// How the structures are stored.
+/// Storage of the structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeldKind {
     /// Segments of a DICOM Segmentation.
