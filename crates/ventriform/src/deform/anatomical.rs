@@ -28,7 +28,7 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 use crate::numeric::order;
 
 /// The numbers that describe a ray.
@@ -149,7 +149,7 @@ impl WallShifts {
 /// Reduces the shifts of the rays on which less than the least thickness would be left of the wall, both by the same
 /// factor; to 0 where the wall is thinner already.
 fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut RayMap; 2]) {
-    for index in 0..ROWS * COLUMNS {
+    for index in 0..RAY_ROWS * RAY_COLUMNS {
         let thickness = outer.0[index] - inner.0[index];
         let less = inner_shift.0[index] - outer_shift.0[index];
         let most = (thickness - MIN_THICKNESS_MM).max(0.0);
@@ -186,11 +186,11 @@ fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; RAY_TE
     let radius = inner.smoothed();
     let uptake = uptake.smoothed();
     let usual = quantile_of(&thickness.0, 0.5);
-    let size = (quantile_of(&radius.0[ROWS / 4 * COLUMNS..], 0.5).max(2.0) / 15.0).ln();
+    let size = (quantile_of(&radius.0[RAY_ROWS / 4 * RAY_COLUMNS..], 0.5).max(2.0) / 15.0).ln();
     let full = quantile_of(&uptake.0, 0.85);
-    (0..ROWS * COLUMNS)
+    (0..RAY_ROWS * RAY_COLUMNS)
         .map(|index| {
-            let way = ((index / COLUMNS) as f64 + 0.5) / ROWS as f64;
+            let way = ((index / RAY_COLUMNS) as f64 + 0.5) / RAY_ROWS as f64;
             let missing = if full > 0.0 {
                 (1.0 - uptake.0[index] / full).clamp(0.0, 1.0)
             } else {
@@ -218,19 +218,19 @@ struct RayMap(Vec<f64>);
 
 impl RayMap {
     fn from_fn(value: impl FnMut(usize) -> f64) -> Self {
-        Self((0..ROWS * COLUMNS).map(value).collect())
+        Self((0..RAY_ROWS * RAY_COLUMNS).map(value).collect())
     }
 
     /// Rays without a value get that of the next ray of their column, towards the apex first. `None`
     /// if a column has no value at all.
     fn filled(value: impl Fn(usize) -> Option<f64>) -> Option<Self> {
-        let mut map = Self(vec![0.0; ROWS * COLUMNS]);
-        for column in 0..COLUMNS {
-            let known = |row: usize| value(row * COLUMNS + column);
-            for row in 0..ROWS {
+        let mut map = Self(vec![0.0; RAY_ROWS * RAY_COLUMNS]);
+        for column in 0..RAY_COLUMNS {
+            let known = |row: usize| value(row * RAY_COLUMNS + column);
+            for row in 0..RAY_ROWS {
                 let apical = (0..=row).rev().find_map(known);
-                let found = apical.or_else(|| (row..ROWS).find_map(known))?;
-                map.0[row * COLUMNS + column] = found;
+                let found = apical.or_else(|| (row..RAY_ROWS).find_map(known))?;
+                map.0[row * RAY_COLUMNS + column] = found;
             }
         }
         Some(map)
@@ -251,18 +251,18 @@ impl RayMap {
                 .collect::<Vec<_>>()
         });
         let rows = Self::from_fn(|index| {
-            let (row, column) = ((index / COLUMNS) as i64, index % COLUMNS);
+            let (row, column) = ((index / RAY_COLUMNS) as i64, index % RAY_COLUMNS);
             let value = |d: i64| {
-                let row = (row + d).clamp(0, ROWS as i64 - 1) as usize;
-                self.0[row * COLUMNS + column]
+                let row = (row + d).clamp(0, RAY_ROWS as i64 - 1) as usize;
+                self.0[row * RAY_COLUMNS + column]
             };
             along.iter().map(|(d, w)| w * value(*d)).sum()
         });
         Self::from_fn(|index| {
-            let (row, column) = (index / COLUMNS, (index % COLUMNS) as i64);
+            let (row, column) = (index / RAY_COLUMNS, (index % RAY_COLUMNS) as i64);
             let value = |d: i64| {
-                let column = (column + d).rem_euclid(COLUMNS as i64) as usize;
-                rows.0[row * COLUMNS + column]
+                let column = (column + d).rem_euclid(RAY_COLUMNS as i64) as usize;
+                rows.0[row * RAY_COLUMNS + column]
             };
             around.iter().map(|(d, w)| w * value(*d)).sum()
         })
@@ -270,12 +270,12 @@ impl RayMap {
 
     /// The value between rays, linear in row and column.
     fn at(&self, row: f64, column: f64) -> f64 {
-        let row = row.clamp(0.0, ROWS as f64 - 1.0);
-        let (low, left) = (row.floor().min(ROWS as f64 - 2.0), column.floor());
+        let row = row.clamp(0.0, RAY_ROWS as f64 - 1.0);
+        let (low, left) = (row.floor().min(RAY_ROWS as f64 - 2.0), column.floor());
         let (up, right) = (row - low, column - left);
         let value = |r: usize, c: usize| {
-            let column = (left as usize + c) % COLUMNS;
-            self.0[(low as usize + r) * COLUMNS + column]
+            let column = (left as usize + c) % RAY_COLUMNS;
+            self.0[(low as usize + r) * RAY_COLUMNS + column]
         };
         (1.0 - up) * ((1.0 - right) * value(0, 0) + right * value(0, 1))
             + up * ((1.0 - right) * value(1, 0) + right * value(1, 1))
@@ -294,22 +294,22 @@ mod tests {
 
     /// The value 1 on one ray, 0 elsewhere.
     fn impulse(row: usize, column: usize) -> RayMap {
-        RayMap::from_fn(|index| f64::from(u8::from(index == row * COLUMNS + column)))
+        RayMap::from_fn(|index| f64::from(u8::from(index == row * RAY_COLUMNS + column)))
     }
 
     #[test]
     fn smoothing_spreads_by_its_deviations_and_goes_round_the_wall() {
         let level = RayMap::from_fn(|_| 7.0).smoothed();
         assert!(level.0.iter().all(|v| (v - 7.0).abs() < 1e-9));
-        let (row, column) = (ROWS / 2, 1);
+        let (row, column) = (RAY_ROWS / 2, 1);
         let spread = impulse(row, column).smoothed();
         assert!((spread.0.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         let (mut along, mut around) = (0.0, 0.0);
         for (index, v) in spread.0.iter().enumerate() {
-            let rows = (index / COLUMNS) as f64 - row as f64;
-            let columns = (index % COLUMNS) as f64 - column as f64;
-            let half = COLUMNS as f64 / 2.0;
-            let columns = (columns + half).rem_euclid(COLUMNS as f64) - half;
+            let rows = (index / RAY_COLUMNS) as f64 - row as f64;
+            let columns = (index % RAY_COLUMNS) as f64 - column as f64;
+            let half = RAY_COLUMNS as f64 / 2.0;
+            let columns = (columns + half).rem_euclid(RAY_COLUMNS as f64) - half;
             along += v * rows * rows;
             around += v * columns * columns;
         }
@@ -325,8 +325,9 @@ mod tests {
 
     #[test]
     fn a_map_is_linear_between_rays_and_goes_round() {
-        let map =
-            RayMap::from_fn(|index| 10.0 * (index / COLUMNS) as f64 + (index % COLUMNS) as f64);
+        let map = RayMap::from_fn(|index| {
+            10.0 * (index / RAY_COLUMNS) as f64 + (index % RAY_COLUMNS) as f64
+        });
         for (row, column) in [(0.0, 0.0), (3.25, 7.5), (30.75, 12.0), (31.0, 58.25)] {
             assert!((map.at(row, column) - (10.0 * row + column)).abs() < 1e-9);
         }
@@ -345,7 +346,7 @@ mod tests {
         let mut inner_shift = RayMap::from_fn(|_| 4.0);
         let mut outer_shift = RayMap::from_fn(|_| -2.0);
         keep_thinnest([&inner, &outer], [&mut inner_shift, &mut outer_shift]);
-        for index in 0..ROWS * COLUMNS {
+        for index in 0..RAY_ROWS * RAY_COLUMNS {
             let (more, less) = (inner_shift.0[index], -outer_shift.0[index]);
             let left = looks(index) - more - less;
             let expected = (looks(index) - 6.0).max(MIN_THICKNESS_MM.min(looks(index)));
@@ -356,15 +357,15 @@ mod tests {
 
     #[test]
     fn rays_that_miss_the_wall_take_the_next_value_of_their_column() {
-        let known = |index: usize| match (index / COLUMNS, index % COLUMNS) {
+        let known = |index: usize| match (index / RAY_COLUMNS, index % RAY_COLUMNS) {
             (row, 4) if row < 3 || row == 9 => None,
             (row, column) => Some((100 * row + column) as f64),
         };
         let map = RayMap::filled(known).unwrap();
-        let at = |row: usize, column: usize| map.0[row * COLUMNS + column];
+        let at = |row: usize, column: usize| map.0[row * RAY_COLUMNS + column];
         assert_eq!((at(0, 4), at(2, 4), at(9, 4)), (304.0, 304.0, 804.0));
         assert_eq!((at(0, 5), at(9, 3)), (5.0, 903.0));
-        assert!(RayMap::filled(|index| (index % COLUMNS != 4).then_some(1.0)).is_none());
+        assert!(RayMap::filled(|index| (index % RAY_COLUMNS != 4).then_some(1.0)).is_none());
     }
 
     /// A wall of 14 mm about a cavity of 18 mm radius, whose uptake halves at a quarter of its columns.
@@ -372,9 +373,9 @@ mod tests {
     fn rays_are_described_by_what_the_wall_is_like() {
         let inner = RayMap::from_fn(|_| 18.0);
         let outer = RayMap::from_fn(|_| 32.0);
-        let dark = COLUMNS / 4..COLUMNS / 2;
+        let dark = RAY_COLUMNS / 4..RAY_COLUMNS / 2;
         let uptake = RayMap::from_fn(|i| {
-            if dark.contains(&(i % COLUMNS)) {
+            if dark.contains(&(i % RAY_COLUMNS)) {
                 2.0
             } else {
                 4.0
@@ -383,7 +384,7 @@ mod tests {
         let numbers = describe(&inner, &outer, &uptake);
         let size = 1.2f64.ln();
         for (row, column) in [(0, 0), (10, 50), (31, 22)] {
-            let way = (row as f64 + 0.5) / ROWS as f64;
+            let way = (row as f64 + 0.5) / RAY_ROWS as f64;
             let missing = if column == 22 { 0.5 } else { 0.0 };
             let wanted = [
                 1.0,
@@ -398,7 +399,7 @@ mod tests {
                 (way - 0.5) * (way - 0.5),
                 (-way / 0.12).exp(),
             ];
-            for (found, wanted) in numbers[row * COLUMNS + column].iter().zip(wanted) {
+            for (found, wanted) in numbers[row * RAY_COLUMNS + column].iter().zip(wanted) {
                 assert!((found - wanted).abs() < 0.02, "{found} {wanted}");
             }
         }
@@ -416,8 +417,8 @@ mod tests {
                 .map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
         };
         for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
-            let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * COLUMNS);
-            let all @ [apex, middle, rim] = [0, ROWS / 2, ROWS - 1].map(of);
+            let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * RAY_COLUMNS);
+            let all @ [apex, middle, rim] = [0, RAY_ROWS / 2, RAY_ROWS - 1].map(of);
             for [i, o] in all {
                 assert!(
                     i > 0.0 && o < 0.0 && (2.0..10.0).contains(&(i - o)),
@@ -431,10 +432,10 @@ mod tests {
             );
             assert!(rim[1] < middle[1] - 0.6, "{rim:?} {middle:?}");
         }
-        let index = ROWS / 2 * COLUMNS + 30;
+        let index = RAY_ROWS / 2 * RAY_COLUMNS + 30;
         let usual = shifts(&level(20.0), &level(34.0), &level(1.0), index);
         let thick = RayMap::from_fn(|i| {
-            if (i % COLUMNS).abs_diff(30) < 12 {
+            if (i % RAY_COLUMNS).abs_diff(30) < 12 {
                 37.0
             } else {
                 34.0
@@ -451,7 +452,7 @@ mod tests {
         assert!((larger[0] - usual[0]).abs() < 0.6);
         assert!(larger[1] < usual[1] - 0.3, "{usual:?} {larger:?}");
         let defect = RayMap::from_fn(|i| {
-            if (i % COLUMNS).abs_diff(30) < 12 {
+            if (i % RAY_COLUMNS).abs_diff(30) < 12 {
                 0.5
             } else {
                 1.0
@@ -496,7 +497,7 @@ mod tests {
             assert!((loss - excess).abs() < 1e-6, "{loss} {excess}");
         }
         let thin = of(6.0, None);
-        for index in 0..ROWS * COLUMNS {
+        for index in 0..RAY_ROWS * RAY_COLUMNS {
             let before = thin.outer.0[index] - thin.inner.0[index];
             let loss = thin.inner_shift.0[index] - thin.outer_shift.0[index];
             let left = before - loss;

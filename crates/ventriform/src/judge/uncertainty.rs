@@ -19,7 +19,7 @@ use crate::deform::sensors::{PER_TRIANGLE, SensorReading};
 use crate::deform::{FittedModel, WallEdge};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::model::wall::{ROWS, VentricleWall};
+use crate::model::wall::{RAY_ROWS, VentricleWall};
 
 /// Figures of a node behind its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -84,7 +84,7 @@ pub(super) fn node_evidence(
     }
     let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
         seen: if share > 0.0 { seen / share } else { 0.0 },
-        way: ((wall.place(p).row + 0.5) / ROWS as f64).clamp(0.0, 1.0),
+        way: ((wall.place(p).row + 0.5) / RAY_ROWS as f64).clamp(0.0, 1.0),
         spread: None,
     };
     mesh.vertices.iter().zip(sums).map(of).collect()

@@ -1,7 +1,7 @@
 //! A ventricle's wall seen from its long axis: where rays from the cavity enter and leave it.
 //!
-//! In go a closed mesh, its cup and the patient's superior direction; out come [`ROWS`] ×
-//! [`COLUMNS`] rays with their distances to the wall, and thickness, extent and cavity volume.
+//! In go a closed mesh, its cup and the patient's superior direction; out come [`RAY_ROWS`] ×
+//! [`RAY_COLUMNS`] rays with their distances to the wall, and thickness, extent and cavity volume.
 //!
 //! Near the apex the rays start at one point (the focus) and fan out over a half sphere;
 //! basal of it they start on the axis and run across it. Rows follow each other at equal
@@ -22,9 +22,9 @@ use crate::progress::{Cancelled, Monitor};
 use nalgebra::{Matrix3, Rotation3};
 
 /// Rows of rays, apex to base.
-pub const ROWS: usize = 32;
+pub const RAY_ROWS: usize = 32;
 /// Rays in a row.
-pub const COLUMNS: usize = 60;
+pub const RAY_COLUMNS: usize = 60;
 
 /// A ray from the long axis and where it meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +42,7 @@ pub struct WallRay {
 pub struct WallPlace {
     /// Row, apex first: the rays of row `n` lie at `n`. Beyond the last row basal of the rim.
     pub row: f64,
-    /// Column, 0..[`COLUMNS`]: the rays of column `n` lie at `n`.
+    /// Column, 0..[`RAY_COLUMNS`]: the rays of column `n` lie at `n`.
     pub column: f64,
     /// Distance from the start of the ray through the point, mm.
     pub distance: f64,
@@ -50,7 +50,7 @@ pub struct WallPlace {
     pub direction: Vec3,
 }
 
-/// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
+/// The wall as [`RAY_ROWS`] × [`RAY_COLUMNS`] rays, row by row, apex first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VentricleWall {
     /// The rays.
@@ -127,21 +127,21 @@ impl VentricleWall {
         let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         let ray = |index: usize| {
             monitor.check()?;
-            let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
+            let (start, direction) = frame.ray(index / RAY_COLUMNS, index % RAY_COLUMNS);
             Ok(WallRay {
                 start,
                 direction,
                 wall: crossing(mesh, &tree, &start, &direction),
             })
         };
-        let rays = (0..ROWS * COLUMNS)
+        let rays = (0..RAY_ROWS * RAY_COLUMNS)
             .map(ray)
             .collect::<Result<Vec<_>, _>>()?;
         let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
         let rays_met = met.len().max(1) as f64;
         let thickness = met.iter().map(|w| w[1] - w[0]).sum::<f64>() / rays_met;
         let squares: f64 = met.iter().map(|w| (w[1] - w[0] - thickness).powi(2)).sum();
-        let basal = &rays[ROWS / 2 * COLUMNS..];
+        let basal = &rays[RAY_ROWS / 2 * RAY_COLUMNS..];
         Ok(Self {
             cavity_ml: frame.cavity(&rays) / 1000.0,
             thickness,
@@ -162,7 +162,7 @@ impl VentricleWall {
     /// Where the cavity ends at the apex, mm from the cup's centre: the mean over the rays of the
     /// apical row that enter the wall.
     pub fn cavity_end(&self) -> f64 {
-        let ends: Vec<f64> = self.rays[..COLUMNS]
+        let ends: Vec<f64> = self.rays[..RAY_COLUMNS]
             .iter()
             .filter_map(|ray| Some(self.along_axis(&(ray.start + ray.direction * ray.wall?[0]))))
             .collect();
@@ -208,13 +208,13 @@ impl VentricleWall {
             return false;
         }
         let place = self.place(point);
-        let row = place.row.clamp(0.0, (ROWS - 1) as f64);
+        let row = place.row.clamp(0.0, (RAY_ROWS - 1) as f64);
         let rows = [row.floor() as usize, row.ceil() as usize];
-        let column = place.column.floor() as usize % COLUMNS;
-        let columns = [column, (column + 1) % COLUMNS];
+        let column = place.column.floor() as usize % RAY_COLUMNS;
+        let columns = [column, (column + 1) % RAY_COLUMNS];
         let between = |pair: [f64; 2], share: f64| pair[0] + (pair[1] - pair[0]) * share;
         let across = |row: usize| {
-            let pair = columns.map(|column| inner[row * COLUMNS + column]);
+            let pair = columns.map(|column| inner[row * RAY_COLUMNS + column]);
             between(pair, place.column.fract())
         };
         place.distance < between(rows.map(across), row.fract())
@@ -299,12 +299,12 @@ impl AxisFrame {
     }
 
     fn row_spacing(&self) -> f64 {
-        (self.arc() + self.focus - self.rim) / ROWS as f64
+        (self.arc() + self.focus - self.rim) / RAY_ROWS as f64
     }
 
     /// Start and direction of the ray in the middle of its row and column.
     fn ray(&self, row: usize, column: usize) -> (Vec3, Vec3) {
-        let (sin, cos) = (TAU * (column as f64 + 0.5) / COLUMNS as f64).sin_cos();
+        let (sin, cos) = (TAU * (column as f64 + 0.5) / RAY_COLUMNS as f64).sin_cos();
         let across = self.lateral * cos + self.anterior * sin;
         let from_apex = (row as f64 + 0.5) * self.row_spacing();
         let at = |along: f64| self.centre + self.axis * along;
@@ -337,7 +337,8 @@ impl AxisFrame {
         WallPlace {
             row: from_apex / self.row_spacing() - 0.5,
             // Rounding may give COLUMNS itself.
-            column: (turn * COLUMNS as f64 - 0.5).rem_euclid(COLUMNS as f64) % COLUMNS as f64,
+            column: (turn * RAY_COLUMNS as f64 - 0.5).rem_euclid(RAY_COLUMNS as f64)
+                % RAY_COLUMNS as f64,
             distance,
             direction: outward.try_normalize(1e-9).unwrap_or(self.axis),
         }
@@ -348,10 +349,10 @@ impl AxisFrame {
         let mut volume = 0.0;
         let step = self.row_spacing();
         for (index, r) in inner_radii(rays).into_iter().enumerate() {
-            let row = index / COLUMNS;
+            let row = index / RAY_COLUMNS;
             let near = row as f64 * step;
             let far = near + step;
-            let turn = TAU / COLUMNS as f64;
+            let turn = TAU / RAY_COLUMNS as f64;
             let angle = |arc: f64| arc.min(self.arc()) / (self.apex - self.focus).max(1e-9);
             // The part of the row over the half sphere, then the part along the cylinder.
             volume += r.powi(3) / 3.0 * turn * (angle(near).cos() - angle(far).cos());
@@ -365,9 +366,9 @@ impl AxisFrame {
 /// The distance at which each ray enters the wall, mm. Where a ray misses the wall (a low rim), that of the
 /// nearest ray of its column towards the apex.
 fn inner_radii(rays: &[WallRay]) -> Vec<f64> {
-    let mut last = [0.0; COLUMNS];
+    let mut last = [0.0; RAY_COLUMNS];
     let radius = |(index, ray): (usize, &WallRay)| {
-        let inner: &mut f64 = &mut last[index % COLUMNS];
+        let inner: &mut f64 = &mut last[index % RAY_COLUMNS];
         if let Some([enters, _]) = ray.wall {
             *inner = enters;
         }
@@ -428,13 +429,17 @@ mod tests {
         let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
         for (index, ray) in wall.rays.iter().enumerate() {
             let place = wall.place(&(ray.start + ray.direction * 17.0));
-            let expected = [(index / COLUMNS) as f64, (index % COLUMNS) as f64, 17.0];
+            let expected = [
+                (index / RAY_COLUMNS) as f64,
+                (index % RAY_COLUMNS) as f64,
+                17.0,
+            ];
             let found = [place.row, place.column, place.distance];
             for (found, expected) in found.iter().zip(expected) {
                 let off = (found - expected).abs();
                 // Columns are periodic.
                 assert!(
-                    off.min((off - COLUMNS as f64).abs()) < 1e-6,
+                    off.min((off - RAY_COLUMNS as f64).abs()) < 1e-6,
                     "{index}: {found} {expected}"
                 );
             }

@@ -51,7 +51,7 @@ impl Default for FitParameters {
     fn default() -> Self {
         Self {
             frame: None,
-            model: FitParameters::AUTO.into(),
+            model: FitParameters::AUTO_MODEL.into(),
             expert: None,
             mask: MaskChoice::default(),
             reader: None,
@@ -79,21 +79,21 @@ pub struct KnownPlace {
 
 impl FitParameters {
     /// The value of [`FitParameters::model`] that selects the best of the available models.
-    pub const AUTO: &str = "auto";
-    /// Most models that [`FitParameters::model`] names after [`FitParameters::AUTO`].
+    pub const AUTO_MODEL: &str = "auto";
+    /// Most models that [`FitParameters::model`] names after [`FitParameters::AUTO_MODEL`].
     pub const MOST_NAMED: usize = 8;
 
     /// Whether the built-in hearts and the library are fitted, beside the models that are named.
     pub fn is_auto(&self) -> bool {
-        self.model.split(',').next() == Some(Self::AUTO)
+        self.model.split(',').next() == Some(Self::AUTO_MODEL)
     }
 
     /// The fields under which the models that `model` names are looked up, with their ids: `model`,
-    /// and after [`FitParameters::AUTO`] `model[0]`, `model[1]`, ...
+    /// and after [`FitParameters::AUTO_MODEL`] `model[0]`, `model[1]`, ...
     pub fn named_models(model: &str) -> Vec<(String, String)> {
         let mut parts = model.split(',');
         match parts.next() {
-            Some(Self::AUTO) => parts
+            Some(Self::AUTO_MODEL) => parts
                 .enumerate()
                 .map(|(n, id)| (format!("model[{n}]"), id.to_owned()))
                 .collect(),

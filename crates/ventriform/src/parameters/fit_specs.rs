@@ -31,10 +31,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         name: "model",
         kind: Kind::Stored {
             prefixes: &["mdl_", "tpl_", "seg_"],
-            word: FitParameters::AUTO,
+            word: FitParameters::AUTO_MODEL,
             more: FitParameters::MOST_NAMED,
         },
-        default: FitParameters::AUTO,
+        default: FitParameters::AUTO_MODEL,
         summary: "Id of the model to fit (a template, a model or an earlier segmentation), or auto: \
                   fits the built-in hearts, the templates flagged `library` and the models named after \
                   it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative \

@@ -1,7 +1,7 @@
 //! The polar map as it is written in `polar.json` and summed up in reports.
 
 use super::picture::rings;
-use super::{COLUMNS, PolarMap, ROWS, Segment, territory};
+use super::{PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
 use serde::{Deserialize, Serialize};
 
 /// A polar map without its pixels.
@@ -118,8 +118,8 @@ impl PolarSummary {
                 .to_owned(),
             segments: map.segments.iter().map(segment).collect(),
             territories: territories.collect(),
-            rows: ROWS,
-            columns: COLUMNS,
+            rows: RAY_ROWS,
+            columns: RAY_COLUMNS,
             orientation: map.orientation.as_str().to_owned(),
             first_column: oriented.then(|| "lateral".to_owned()),
             direction: oriented.then(|| "lateral, anterior, septal, inferior".to_owned()),
@@ -138,15 +138,15 @@ impl PolarDocument {
                 0.0
             }
         };
-        let pixels = map.pixels.chunks(COLUMNS);
+        let pixels = map.pixels.chunks(RAY_COLUMNS);
         let pixels = pixels.map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect());
-        let numbers = |row| (0..COLUMNS).map(move |column| map.segment_of(row, column));
+        let numbers = |row| (0..RAY_COLUMNS).map(move |column| map.segment_of(row, column));
         let ends = map.levels.ends().iter();
         let ends = ends.map(|ends| ends.map(|rows| (1e3 * rows).round() / 1e3));
         Self {
             summary: PolarSummary::of(map),
             values_percent: pixels.collect(),
-            segment_of: (0..ROWS).map(|row| numbers(row).collect()).collect(),
+            segment_of: (0..RAY_ROWS).map(|row| numbers(row).collect()).collect(),
             level_ends: Some(ends.collect()),
             rings: Some(rings(map).map(|share| (1e4 * share).round() / 1e4).into()),
         }

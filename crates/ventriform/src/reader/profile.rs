@@ -90,7 +90,7 @@ pub enum ProfileError {
 /// The version of the JSON.
 const PROFILE_VERSION: u32 = 1;
 /// The JSON's statement of its format.
-const FORMAT: &str = "ventriform-reader-profile";
+const PROFILE_FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
 const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
 /// Longest JSON that is read, bytes.
@@ -146,7 +146,7 @@ impl ReaderProfile {
     pub fn to_json(&self) -> String {
         let [endocardium, epicardium, rim] = self.offsets;
         let document = ProfileDocument {
-            format: FORMAT.into(),
+            format: PROFILE_FORMAT.into(),
             version: PROFILE_VERSION,
             edge: self.edge.as_str().into(),
             masks: self.masks(),
@@ -183,8 +183,8 @@ impl ReaderProfile {
         }
         let syntax = |error: serde_json::Error| ProfileError::Syntax(error.to_string());
         let any: serde_json::Value = serde_json::from_slice(text).map_err(syntax)?;
-        if any["format"] != FORMAT {
-            let reason = format!("`format` is not {FORMAT}");
+        if any["format"] != PROFILE_FORMAT {
+            let reason = format!("`format` is not {PROFILE_FORMAT}");
             return Err(ProfileError::Syntax(reason));
         }
         let version = any["version"].as_u64().unwrap_or(0);
