@@ -137,12 +137,12 @@ impl WallShifts {
 
     /// The displacement of a point of the apparent wall, mm.
     fn at(&self, wall: &VentricleWall, point: &Vec3) -> Vec3 {
-        let place = wall.place(point);
-        let at = |map: &RayMap| map.at(place.row, place.column);
+        let position = wall.position(point);
+        let at = |map: &RayMap| map.at(position.row, position.column);
         let (inner, outer) = (at(&self.inner), at(&self.outer));
-        let depth = ((place.distance - inner) / (outer - inner).max(1e-6)).clamp(0.0, 1.0);
+        let depth = ((position.distance - inner) / (outer - inner).max(1e-6)).clamp(0.0, 1.0);
         let shift = at(&self.inner_shift) * (1.0 - depth) + at(&self.outer_shift) * depth;
-        place.direction * shift
+        position.direction * shift
     }
 }
 

@@ -99,7 +99,7 @@ pub enum Sign {
     /// All is well.
     Good,
     /// Somebody should look.
-    Doubt,
+    Flag,
     /// Something is wrong.
     Bad,
 }
@@ -108,11 +108,11 @@ pub enum Sign {
 pub fn verdict(sign: Sign, headline: &str, checks: &[(bool, String)]) -> Markup {
     let mark = match sign {
         Sign::Good => "✓",
-        Sign::Doubt => "!",
+        Sign::Flag => "!",
         Sign::Bad => "✗",
     };
     html! {
-        section.verdict.doubt[sign == Sign::Doubt].bad[sign == Sign::Bad] {
+        section.verdict.doubt[sign == Sign::Flag].bad[sign == Sign::Bad] {
             div.sign aria-hidden="true" { (mark) }
             div {
                 h2 { (headline) }

@@ -84,7 +84,7 @@ pub(super) fn node_evidence(
     }
     let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
         seen: if share > 0.0 { seen / share } else { 0.0 },
-        way: ((wall.place(p).row + 0.5) / RAY_ROWS as f64).clamp(0.0, 1.0),
+        way: ((wall.position(p).row + 0.5) / RAY_ROWS as f64).clamp(0.0, 1.0),
         spread: None,
     };
     mesh.vertices.iter().zip(sums).map(of).collect()

@@ -39,7 +39,7 @@ pub struct WallRay {
 
 /// A point in the coordinates of the rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallPlace {
+pub struct WallPosition {
     /// Row, apex first: the rays of row `n` lie at `n`. Beyond the last row basal of the rim.
     pub row: f64,
     /// Column, 0..[`RAY_COLUMNS`]: the rays of column `n` lie at `n`.
@@ -90,7 +90,7 @@ pub fn turn_between(from: &Vec3, to: &Vec3, superior: &Vec3) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(turn)
 }
 
-/// The place of `cup` after its model has moved from `before` to `after`, by the similarity that
+/// The position of `cup` after its model has moved from `before` to `after`, by the similarity that
 /// maps the nodes best in the sense of least squares. The breadth stays.
 pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
     let n = before.vertices.len() as f64;
@@ -207,17 +207,17 @@ impl VentricleWall {
         if self.along_axis(point) < self.frame.rim {
             return false;
         }
-        let place = self.place(point);
-        let row = place.row.clamp(0.0, (RAY_ROWS - 1) as f64);
+        let position = self.position(point);
+        let row = position.row.clamp(0.0, (RAY_ROWS - 1) as f64);
         let rows = [row.floor() as usize, row.ceil() as usize];
-        let column = place.column.floor() as usize % RAY_COLUMNS;
+        let column = position.column.floor() as usize % RAY_COLUMNS;
         let columns = [column, (column + 1) % RAY_COLUMNS];
         let between = |pair: [f64; 2], share: f64| pair[0] + (pair[1] - pair[0]) * share;
         let across = |row: usize| {
             let pair = columns.map(|column| inner[row * RAY_COLUMNS + column]);
-            between(pair, place.column.fract())
+            between(pair, position.column.fract())
         };
-        place.distance < between(rows.map(across), row.fract())
+        position.distance < between(rows.map(across), row.fract())
     }
 
     /// The voxels of a grid between which the inner surface lies: least and greatest indices; `None` if
@@ -245,8 +245,8 @@ impl VentricleWall {
     }
 
     /// `point` in the coordinates of the rays. A point on the axis gets column 0.
-    pub fn place(&self, point: &Vec3) -> WallPlace {
-        self.frame.place(point)
+    pub fn position(&self, point: &Vec3) -> WallPosition {
+        self.frame.position(point)
     }
 }
 
@@ -317,7 +317,7 @@ impl AxisFrame {
     }
 
     /// The inverse of [`AxisFrame::ray`].
-    fn place(&self, point: &Vec3) -> WallPlace {
+    fn position(&self, point: &Vec3) -> WallPosition {
         let from_centre = point - self.centre;
         let along = from_centre.dot(&self.axis);
         let (x, y) = (
@@ -334,9 +334,9 @@ impl AxisFrame {
         };
         let outward = point - (self.centre + self.axis * start);
         let distance = outward.norm();
-        WallPlace {
+        WallPosition {
             row: from_apex / self.row_spacing() - 0.5,
-            // Rounding may give COLUMNS itself.
+            // Rounding may give RAY_COLUMNS itself.
             column: (turn * RAY_COLUMNS as f64 - 0.5).rem_euclid(RAY_COLUMNS as f64)
                 % RAY_COLUMNS as f64,
             distance,
@@ -428,13 +428,13 @@ mod tests {
         };
         let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
         for (index, ray) in wall.rays.iter().enumerate() {
-            let place = wall.place(&(ray.start + ray.direction * 17.0));
+            let position = wall.position(&(ray.start + ray.direction * 17.0));
             let expected = [
                 (index / RAY_COLUMNS) as f64,
                 (index % RAY_COLUMNS) as f64,
                 17.0,
             ];
-            let found = [place.row, place.column, place.distance];
+            let found = [position.row, position.column, position.distance];
             for (found, expected) in found.iter().zip(expected) {
                 let off = (found - expected).abs();
                 // Columns are periodic.
@@ -443,7 +443,7 @@ mod tests {
                     "{index}: {found} {expected}"
                 );
             }
-            assert!((place.direction - ray.direction).norm() < 1e-9);
+            assert!((position.direction - ray.direction).norm() < 1e-9);
         }
     }
 

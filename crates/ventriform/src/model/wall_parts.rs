@@ -1,7 +1,7 @@
 //! Which triangles of a ventricle's closed surface are endocardium, which epicardium, which base.
 //!
 //! 1. Each triangle gets a side: it faces the long axis (inner) or away from it (outer), by its normal and the
-//!    direction of the ray through its centre ([`VentricleWall::place`]), which near the apex fans out.
+//!    direction of the ray through its centre ([`VentricleWall::position`]), which near the apex fans out.
 //!    Of each side the largest connected part counts; patches beside it get the side about them.
 //! 2. Base are, near the rim, the triangles that face away from the apex more than to either side.
 //! 3. Where inner and outer still share an edge, the triangle that faces away from the apex more is base,
@@ -46,7 +46,7 @@ pub fn wall_parts(
             let normal = normal / area.max(f64::MIN_POSITIVE);
             Facing {
                 area,
-                outward: normal.dot(&wall.place(&centre).direction),
+                outward: normal.dot(&wall.position(&centre).direction),
                 away: -normal.dot(&cup.axis),
                 basal: wall.along_axis(&centre) < basal_end,
             }

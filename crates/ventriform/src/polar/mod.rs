@@ -235,13 +235,13 @@ impl PolarMap {
     /// The uptake of the wall at a point, per cent of the reference, linear between the rays of `wall`, by
     /// which the map was made; NaN where no ray near it met the wall.
     pub fn uptake_at(&self, wall: &VentricleWall, point: &Vec3) -> f64 {
-        let place = wall.place(point);
-        let row = place.row.clamp(0.0, RAY_ROWS as f64 - 1.0);
+        let position = wall.position(point);
+        let row = position.row.clamp(0.0, RAY_ROWS as f64 - 1.0);
         let (mut sum, mut weight) = (0.0, 0.0);
         for (r, of_row) in [(row.floor(), 1.0 - row.fract()), (row.ceil(), row.fract())] {
             for (c, of_column) in [
-                (place.column.floor(), 1.0 - place.column.fract()),
-                (place.column.floor() + 1.0, place.column.fract()),
+                (position.column.floor(), 1.0 - position.column.fract()),
+                (position.column.floor() + 1.0, position.column.fract()),
             ] {
                 let pixel = self.pixels[r as usize * RAY_COLUMNS + c as usize % RAY_COLUMNS];
                 if let Some(pixel) = pixel {

@@ -95,17 +95,17 @@ impl WallEdges {
 
     /// The displacement of a point of the wall by `offsets`, without that of the rim, mm.
     fn shift(&self, wall: &VentricleWall, point: &Vec3, offsets: &ReaderOffsets) -> Vec3 {
-        let place = wall.place(point);
-        let [inner, outer] = self.at(place.row, place.column);
+        let position = wall.position(point);
+        let [inner, outer] = self.at(position.row, position.column);
         let thickness = (outer - inner).max(1e-6);
         let thinner = offsets.endocardium - offsets.epicardium;
         let most = (thickness - MIN_THICKNESS_MM).max(0.0);
         let part = if thinner > most { most / thinner } else { 1.0 };
-        let depth = ((place.distance - inner) / thickness).clamp(0.0, 1.0);
+        let depth = ((position.distance - inner) / thickness).clamp(0.0, 1.0);
         let along = offsets.endocardium * (1.0 - depth) + offsets.epicardium * depth;
         // A point on the axis stays on it.
-        let along = (part * along).max(-place.distance);
-        place.direction * along
+        let along = (part * along).max(-position.distance);
+        position.direction * along
     }
 
     /// The edges between rays, linear in row and column.

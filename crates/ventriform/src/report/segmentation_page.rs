@@ -1,4 +1,4 @@
-//! The page of a segmentation: doubts, figures, slices, polar map, agreement, the fitted model.
+//! The page of a segmentation: flags, figures, slices, polar map, agreement, the fitted model.
 
 use maud::{Markup, html};
 use serde_json::{Map, Value, json};
@@ -209,14 +209,8 @@ fn verdict(report: &SegmentationReport) -> Markup {
             Sign::Good,
             "Nothing gives reason to doubt this segmentation.".to_owned(),
         ),
-        1 => (
-            Sign::Doubt,
-            "There is one reason to look closer.".to_owned(),
-        ),
-        n => (
-            Sign::Doubt,
-            format!("There are {n} reasons to look closer."),
-        ),
+        1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
+        n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
     };
     document::verdict(sign, &headline, &checks(report))
 }
