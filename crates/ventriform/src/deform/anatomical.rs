@@ -12,7 +12,8 @@
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
-//! The coefficients are a least-squares fit to simulated hearts whose walls are known. Two other
+//! The coefficients are a least-squares fit to simulated hearts whose walls are known; `scripts/calibrate_walls.py`
+//! estimates them again. Two other
 //! ways were tried on the same hearts and came out behind. A fixed shift of both surfaces makes
 //! small hearts too thin. A forward model (the wall rendered, blurred and compared with the image)
 //! cannot tell the width of the point response from the wall's thickness: its least residual lies
@@ -24,32 +25,14 @@
 //! left out): hollowness, uptake, thickness, strength of the edges and the like.
 
 use super::blur_correction;
+use super::calibration::{CAVITY_SIZE_SHIFT, INNER_SHIFT_MM, NARROW_CAVITY_SHIFT, OUTER_SHIFT_MM};
+use super::ray_terms::RayTerms;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 use crate::numeric::order;
-
-/// The numbers that describe a ray.
-const RAY_TERMS: usize = 11;
-
-/// Distance by which the inner surface moves outward, mm, for each number that describes a ray.
-const INNER_SHIFT_MM: [f64; RAY_TERMS] = [
-    2.838, 0.526, 1.454, -1.673, 0.413, 0.403, 1.411, 0.545, -1.927, 3.921, -0.076,
-];
-/// Distance by which the outer surface moves outward, mm, likewise.
-const OUTER_SHIFT_MM: [f64; RAY_TERMS] = [
-    -1.066, -0.223, -1.725, -0.026, -0.417, 0.619, -1.1, -0.075, -1.404, -1.183, -2.356,
-];
-
-/// A cavity that looks smaller than the first, ml, is as narrow as the blur: its edge hardly moves any
-/// more when the cavity shrinks, and so the inner surface moves outward less, by the second, mm, times the logarithm
-/// of the ratio.
-const NARROW_CAVITY_ML_MM: (f64, f64) = (25.0, 0.94);
-/// The outer surface moves outward more, the smaller the cavity looks: by the second, mm, times the logarithm of
-/// the ratio of the first, ml, and the cavity.
-const CAVITY_SIZE_ML_MM: (f64, f64) = (68.0, 0.435);
 
 /// The thickness that is left at least, mm.
 const MIN_THICKNESS_MM: f64 = 4.0;
@@ -96,20 +79,10 @@ struct WallShifts {
 
 impl WallShifts {
     fn of(wall: &VentricleWall, image: &Field, resolution: Option<f64>) -> Option<Self> {
-        let side = |s: usize| RayMap::filled(|index| Some(wall.rays[index].wall?[s]));
-        let (inner, outer) = (side(0)?, side(1)?);
-        let uptake = RayMap::from_fn(|index| {
-            let ray = &wall.rays[index];
-            let middle = f64::midpoint(inner.0[index], outer.0[index]);
-            image.at(&(ray.start + ray.direction * middle))
-        });
-        let numbers = describe(&inner, &outer, &uptake);
-        let shift = |coefficients: &[f64; RAY_TERMS]| {
-            RayMap::from_fn(|index| {
-                let terms = coefficients.iter().zip(&numbers[index]);
-                terms.map(|(c, x)| c * x).sum()
-            })
-        };
+        let [inner, outer] = sides(wall)?;
+        let rays = describe(&inner, &outer, &uptake(wall, [&inner, &outer], image));
+        let shift =
+            |coefficients: &RayTerms| RayMap::from_fn(|index| coefficients.of(&rays[index]));
         let (mut inner_shift, mut outer_shift) = (shift(&INNER_SHIFT_MM), shift(&OUTER_SHIFT_MM));
         let of_size = shifts_of_size(wall.cavity_ml);
         for (shift, more) in [&mut inner_shift, &mut outer_shift]
@@ -165,8 +138,8 @@ fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut
 fn shifts_of_size(cavity: f64) -> [f64; 2] {
     let size = cavity.max(1.0).ln();
     [
-        -NARROW_CAVITY_ML_MM.1 * (NARROW_CAVITY_ML_MM.0.ln() - size).max(0.0),
-        CAVITY_SIZE_ML_MM.1 * (CAVITY_SIZE_ML_MM.0.ln() - size),
+        -NARROW_CAVITY_SHIFT.per_log_mm * (NARROW_CAVITY_SHIFT.cavity_ml.ln() - size).max(0.0),
+        CAVITY_SIZE_SHIFT.per_log_mm * (CAVITY_SIZE_SHIFT.cavity_ml.ln() - size),
     ]
 }
 
@@ -175,13 +148,35 @@ fn mean_difference(a: &RayMap, b: &RayMap) -> f64 {
     sum / a.0.len() as f64
 }
 
+/// The numbers that describe each ray of the apparent `wall`; `image` is the blurred image about it. `None` where a
+/// direction has no wall at all.
+pub fn ray_terms(wall: &VentricleWall, image: &Field) -> Option<Vec<RayTerms>> {
+    let [inner, outer] = sides(wall)?;
+    Some(describe(
+        &inner,
+        &outer,
+        &uptake(wall, [&inner, &outer], image),
+    ))
+}
+
+/// The distances at which the rays enter and leave the wall, mm.
+fn sides(wall: &VentricleWall) -> Option<[RayMap; 2]> {
+    let side = |s: usize| RayMap::filled(|index| Some(wall.rays[index].wall?[s]));
+    Some([side(0)?, side(1)?])
+}
+
+/// The value of the image in the middle of the wall.
+fn uptake(wall: &VentricleWall, [inner, outer]: [&RayMap; 2], image: &Field) -> RayMap {
+    RayMap::from_fn(|index| {
+        let ray = &wall.rays[index];
+        let middle = f64::midpoint(inner.0[index], outer.0[index]);
+        image.at(&(ray.start + ray.direction * middle))
+    })
+}
+
 /// The numbers that describe each ray, from the distances at which it enters and leaves the wall,
-/// mm, and the image's value in the middle of the wall:
-/// 1, thickness of the wall (median) less 15 mm, logarithm of its inner radius (median of the rays
-/// across the axis and near them) over 15 mm and that squared, thickness at the ray less the median,
-/// exp(-radius / 12 mm), the missing share of uptake and that squared, the way from apex to base
-/// (less a half) and that squared, and exp(-way / 0.12).
-fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; RAY_TERMS]> {
+/// mm, and the image's value in the middle of the wall.
+fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<RayTerms> {
     let thickness = RayMap::from_fn(|i| outer.0[i] - inner.0[i]).smoothed();
     let radius = inner.smoothed();
     let uptake = uptake.smoothed();
@@ -196,19 +191,19 @@ fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; RAY_TE
             } else {
                 0.0
             };
-            [
-                1.0,
-                usual - 15.0,
-                size,
-                size * size,
-                thickness.0[index] - usual,
-                (-radius.0[index].max(2.0) / 12.0).exp(),
-                missing,
-                missing * missing,
-                way - 0.5,
-                (way - 0.5).powi(2),
-                (-way / 0.12).exp(),
-            ]
+            RayTerms {
+                constant: 1.0,
+                thickness: usual - 15.0,
+                ln_radius: size,
+                ln_radius_squared: size * size,
+                thickness_here: thickness.0[index] - usual,
+                narrowness_here: (-radius.0[index].max(2.0) / 12.0).exp(),
+                missing_uptake: missing,
+                missing_uptake_squared: missing * missing,
+                way: way - 0.5,
+                way_squared: (way - 0.5).powi(2),
+                nearness_to_apex: (-way / 0.12).exp(),
+            }
         })
         .collect()
 }
@@ -399,7 +394,8 @@ mod tests {
                 (way - 0.5) * (way - 0.5),
                 (-way / 0.12).exp(),
             ];
-            for (found, wanted) in numbers[row * RAY_COLUMNS + column].iter().zip(wanted) {
+            let found = numbers[row * RAY_COLUMNS + column].values();
+            for (found, wanted) in found.into_iter().zip(wanted) {
                 assert!((found - wanted).abs() < 0.02, "{found} {wanted}");
             }
         }
@@ -413,8 +409,7 @@ mod tests {
         let level = |value: f64| RayMap::from_fn(|_| value);
         let shifts = |inner: &RayMap, outer: &RayMap, uptake: &RayMap, index: usize| {
             let numbers = describe(inner, outer, uptake)[index];
-            [INNER_SHIFT_MM, OUTER_SHIFT_MM]
-                .map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
+            [INNER_SHIFT_MM, OUTER_SHIFT_MM].map(|coefficients| coefficients.of(&numbers))
         };
         for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
             let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * RAY_COLUMNS);
@@ -512,7 +507,7 @@ mod tests {
     fn a_narrow_cavity_keeps_more_of_its_wall_and_a_usual_one_is_left_as_calibrated() {
         let [inner, outer] = shifts_of_size(12.0);
         assert!(inner < -0.5 && outer > 0.5);
-        let [inner, outer] = shifts_of_size(CAVITY_SIZE_ML_MM.0);
+        let [inner, outer] = shifts_of_size(CAVITY_SIZE_SHIFT.cavity_ml);
         assert_eq!((inner, outer), (0.0, 0.0));
         // The wall never gets thinner by it, the smaller the heart.
         let added: Vec<f64> = [300.0, 100.0, 60.0, 30.0, 20.0, 10.0, 5.0, 0.0]

@@ -378,7 +378,7 @@ fn inner_radii(rays: &[WallRay]) -> Vec<f64> {
 }
 
 /// Where a ray first enters the wall and then leaves it.
-fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
+pub fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
     let mut hits: Vec<(f64, bool)> = Vec::new();
     tree.for_each_along(start, direction, |t| {
         let [a, b, c] = mesh.corners(t as usize);
