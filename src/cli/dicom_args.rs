@@ -9,7 +9,7 @@ use ventriform::export::dicom::{
 };
 use ventriform::progress::Monitor;
 use ventriform::segmentation::SegmentedVolume;
-use ventriform::volume::dicom::Provenance;
+use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform_service::work::problems::Explain;
 

@@ -12,7 +12,7 @@ use ventriform::export::{self, Format, Part};
 use ventriform::pipeline::{self, Model};
 use ventriform::progress::{CancelToken, Monitor};
 use ventriform::report::{MeasuredSurface, ModelReport};
-use ventriform::volume::dicom::Provenance;
+use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadOptions};
 use ventriform_service::work::problems::Explain;
 

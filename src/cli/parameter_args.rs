@@ -188,7 +188,10 @@ mod tests {
             "--axis=-1,0,0",
         ];
         let fit = FitArgs::from_arg_matches(&fit.try_get_matches_from(line).unwrap()).unwrap();
-        assert_eq!(fit.parameters().unwrap().place.seed_point, Some([1, 2, 3]));
+        assert_eq!(
+            fit.parameters().unwrap().position.seed_point,
+            Some([1, 2, 3])
+        );
         let snake = parse(&["test", "--mask_smoothing", "1.5"]).unwrap();
         assert_eq!(snake.parameters().unwrap().surface.mask_smoothing, 1.5);
     }

@@ -70,7 +70,7 @@ pub struct SegmentArgs {
 }
 
 /// The word that stands for the built-in hearts.
-pub(super) const MODEL_AUTO: &str = FitParameters::AUTO;
+pub(super) const MODEL_AUTO: &str = FitParameters::AUTO_MODEL;
 
 pub(super) fn parse_format(text: &str) -> Result<Format, String> {
     Format::from_extension(text).ok_or_else(|| {

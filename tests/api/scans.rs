@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform::progress::Monitor;
-use ventriform::volume::dicom::Provenance;
+use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform_service::access::{Quota, Scope};
 use ventriform_service::records::Tenant;

@@ -2,8 +2,8 @@
 //! re-exports to the file that defines the item.
 //!
 //! In: the folder `src`. Out: one arrow for each pair of files of which the first names an item
-//! of the second. Test modules, comments and strings are left out. Items that macros generate and
-//! glob re-exports are not followed.
+//! that the second defines or hands on by a `pub use`. Test modules, comments and strings are left
+//! out. Items that macros generate and glob re-exports are not followed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -55,33 +55,39 @@ impl Sources {
             .iter()
             .map(|(module, named)| {
                 let used = named.iter().filter(|n| n.reexported_as.is_none());
-                let files = used.filter_map(|n| self.defining_file(&n.target, &reexports, 0));
+                let files = used.flat_map(|n| self.files_to(&n.target, &reexports));
                 let others = files.filter(|file| file != *module).collect();
                 ((*module).clone(), others)
             })
             .collect()
     }
 
-    /// The longest beginning of `target` that is a file, after following re-exports.
-    fn defining_file(
+    /// The files that hand on what `target` names, and the file that defines it: of each path, the
+    /// longest beginning that is a file.
+    fn files_to(
         &self,
         target: &[String],
         reexports: &BTreeMap<(&ModulePath, &str), &ModulePath>,
-        depth: usize,
-    ) -> Option<ModulePath> {
-        let length = (0..=target.len())
+    ) -> Vec<ModulePath> {
+        let mut files = Vec::new();
+        let mut path = target.to_vec();
+        while let Some(length) = (0..=path.len())
             .rev()
-            .find(|n| self.0.contains_key(&target[..*n]))?;
-        let module = target[..length].to_vec();
-        if let Some(name) = target.get(length)
-            && let Some(onward) = reexports.get(&(&module, name.as_str()))
-            && depth < 8
-            && onward.as_slice() != &target[..=length]
+            .find(|n| self.0.contains_key(&path[..*n]))
         {
-            let onward = [onward.as_slice(), &target[length + 1..]].concat();
-            return self.defining_file(&onward, reexports, depth + 1);
+            let module = path[..length].to_vec();
+            let name = path.get(length);
+            let onward = name.and_then(|name| reexports.get(&(&module, name.as_str())).copied());
+            let again = files.contains(&module);
+            files.push(module.clone());
+            match onward {
+                Some(onward) if !again && onward.as_slice() != &path[..=length] => {
+                    path = [onward.as_slice(), &path[length + 1..]].concat();
+                }
+                _ => break,
+            }
         }
-        Some(module)
+        files
     }
 
     /// Every path of this crate that the tokens of `module` name.
@@ -393,4 +399,21 @@ fn a_circle_is_found_and_a_family_is_none() {
     .into();
     let expected = ["a::c", "a::d", "e"].map(module);
     assert_eq!(circles(&arrows), [expected]);
+}
+
+#[test]
+fn a_file_uses_those_that_hand_on_what_it_names() {
+    let module = |text: &str| text.split("::").map(str::to_owned).collect::<ModulePath>();
+    let sources = Sources(
+        [
+            ("a", "use crate::b::Kept;"),
+            ("b", "pub use kept::Kept; use crate::a::Other;"),
+            ("b::kept", "pub struct Kept;"),
+        ]
+        .map(|(path, code)| (module(path), tokens(code)))
+        .into(),
+    );
+    let arrows = sources.arrows();
+    assert_eq!(arrows[&module("a")], ["b", "b::kept"].map(module).into());
+    assert_eq!(circles(&arrows), [["a", "b"].map(module)]);
 }

@@ -26,7 +26,7 @@ use ventriform_service::work::dicom;
 #[utoipa::path(get, path = "/v1/volumes/{id}/identity", tag = "volumes",
     operation_id = "get_volume_identity",
     params(("id" = String, Path, description = "The volume's id"), openapi::CachedHeaders),
-    responses((status = 200, description = "What is known", body = ventriform::volume::dicom::Provenance),
+    responses((status = 200, description = "What is known", body = ventriform::volume::Provenance),
         openapi::UnchangedAnswer, openapi::ScopeProblems, LookupProblems))]
 pub async fn get_identity(
     State(app): State<App>,
@@ -48,7 +48,7 @@ pub async fn get_identity(
     operation_id = "state_volume_identity",
     params(("id" = String, Path, description = "The volume's id")),
     request_body(content = openapi::StatedScanSchema, content_type = "application/json"),
-    responses((status = 200, description = "What is known now", body = ventriform::volume::dicom::Provenance),
+    responses((status = 200, description = "What is known now", body = ventriform::volume::Provenance),
         openapi::IdentityProblems, LookupProblems))]
 pub async fn state_identity(
     State(app): State<App>,

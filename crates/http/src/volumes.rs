@@ -122,7 +122,7 @@ pub struct VolumeBody {
     /// Oddities of the file that do not prevent its use.
     warnings: Vec<String>,
     /// Whose scan it is, as far as the caller's scope allows to see it; absent if nothing is known.
-    #[schema(value_type = Option<ventriform::volume::dicom::Provenance>)]
+    #[schema(value_type = Option<ventriform::volume::Provenance>)]
     dicom: Option<Map<String, Value>>,
     /// Related paths.
     links: VolumeLinks,

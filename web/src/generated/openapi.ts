@@ -104,12 +104,12 @@ export interface components {
             active: number;
             /**
              * Format: double
-             * @description What it is ranked by: its confidence by its own figures.
+             * @description Its confidence by its own figures, by which templates are ranked.
              */
             confidence: number;
             /**
              * Format: double
-             * @description What decides between equals.
+             * @description Figure that decides between equals.
              */
             merit: number;
             /**
@@ -233,7 +233,7 @@ export interface components {
         Distance: {
             /**
              * Format: double
-             * @description How much more area the model has than the surface, percent.
+             * @description Area of the model beyond that of the surface, percent of it.
              */
             area_error_percent: number;
             /**
@@ -282,7 +282,7 @@ export interface components {
             surface_volume_ml: number;
             /**
              * Format: double
-             * @description How much more volume the model encloses than the surface, percent.
+             * @description Volume that the model encloses beyond that of the surface, percent of it.
              */
             volume_error_percent: number;
             /**
@@ -423,7 +423,7 @@ export interface components {
             gain_of_two_places?: number | null;
             /**
              * Format: double
-             * @description How much darker the cavity is than the wall, 0 to 1.
+             * @description Share of the wall's brightness that the cavity lacks, 0 to 1.
              */
             hollowness: number;
             /**
@@ -467,7 +467,7 @@ export interface components {
              */
             unroundness: number;
         };
-        /** @description What a volume's file says. */
+        /** @description The statements of a volume's file. */
         FileFacts: {
             /** @description Maps a voxel index to LPS millimetres; row by row. */
             affine_lps: number[][];
@@ -520,7 +520,7 @@ export interface components {
              */
             secret: string;
         };
-        /** @description How a fit went, and the fitted model's pose. */
+        /** @description Figures of a fit, and the fitted model's pose. */
         Fit: {
             /**
              * Format: double
@@ -529,7 +529,7 @@ export interface components {
             active_sensors: number;
             /**
              * Format: double
-             * @description How reliable the fit is, 0 to 1.
+             * @description Confidence that the fit is right, 0 to 1.
              */
             confidence: number;
             /** @description How far each vertex moved, mm. */
@@ -698,7 +698,7 @@ export interface components {
         Flag: {
             /** @description Its stable name. */
             code: string;
-            /** @description What was found. */
+            /** @description The finding. */
             reason: string;
         };
         /** @description The state of the service. */
@@ -1094,7 +1094,7 @@ export interface components {
             centre: number[];
             /**
              * Format: double
-             * @description How sure the search is, 0 to 1.
+             * @description Confidence of the search, 0 to 1.
              */
             confidence: number;
             /**
@@ -1104,7 +1104,7 @@ export interface components {
             correlation: number;
             /**
              * Format: double
-             * @description How hollow it is, 0 to 1.
+             * @description Hollowness, 0 to 1.
              */
             hollowness: number;
             /**
@@ -1467,7 +1467,7 @@ export interface components {
             input: components["schemas"]["FileFacts"];
             /** @description The model: counts and topology. */
             mesh: components["schemas"]["MeshFacts"];
-            /** @description What optimisation did. */
+            /** @description Figures of optimisation. */
             optimise: components["schemas"]["OptimiseReport"];
             /** @description Every parameter, defaults written out. */
             parameters: components["schemas"]["ModelParameters"];
@@ -1542,7 +1542,7 @@ export interface components {
             vertices: number;
             /**
              * Format: double
-             * @description How much more volume the model encloses than the surface, percent.
+             * @description Volume that the model encloses beyond that of the surface, percent of it.
              */
             volume_error_percent: number;
         };
@@ -1629,7 +1629,7 @@ export interface components {
              */
             to: string;
         };
-        /** @description What optimisation did. */
+        /** @description Figures of optimisation. */
         OptimiseReport: {
             /** @description Why it ended: `no_flip_gains`, `cycle` or `sweep_limit`. */
             ended: string;
@@ -1680,9 +1680,9 @@ export interface components {
             extent_percent: number;
             /** @description Where the first column looks; null if the orientation is unknown. */
             first_column?: string | null;
-            /** @description What the percentages refer to. */
+            /** @description The reference of the percentages. */
             note: string;
-            /** @description What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            /** @description Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
             orientation: string;
             /**
              * Format: double
@@ -1761,9 +1761,9 @@ export interface components {
             extent_percent: number;
             /** @description Where the first column looks; null if the orientation is unknown. */
             first_column?: string | null;
-            /** @description What the percentages refer to. */
+            /** @description The reference of the percentages. */
             note: string;
-            /** @description What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            /** @description Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
             orientation: string;
             /**
              * Format: double
@@ -1789,10 +1789,10 @@ export interface components {
         Posture: {
             /**
              * Format: double
-             * @description How sure that is, 0 to 1.
+             * @description Confidence of that, 0 to 1.
              */
             confidence: number;
-            /** @description What told it: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            /** @description Its source: `superior`, `anterior`, `body`, `frame` or `unknown`. */
             source: string;
             /** @description The direction to the head. */
             superior: number[];
@@ -1921,7 +1921,7 @@ export interface components {
              */
             version: number;
         };
-        /** @description What a reader's profile holds. */
+        /** @description Content of a reader's profile. */
         ReaderSummary: {
             /** @description The wall that the distances start from: `apparent` or `anatomical`. */
             edge: string;
@@ -2492,7 +2492,7 @@ export interface components {
             /** @description Why that one was taken. */
             choice: string;
             evidence?: components["schemas"]["Evidence"] | null;
-            /** @description How the fit went. */
+            /** @description Figures of the fit. */
             fit: components["schemas"]["Fit"];
             /** @description Reasons to look closer. */
             flags: components["schemas"]["Flag"][];
@@ -2537,7 +2537,7 @@ export interface components {
             choice: string;
             /**
              * Format: double
-             * @description How reliable the fit is, 0 to 1.
+             * @description Confidence that the fit is right, 0 to 1.
              */
             confidence: number;
             /** @description Reasons to look closer. */
@@ -2555,7 +2555,7 @@ export interface components {
             /** @description Volumes. */
             volumes_ml: components["schemas"]["FittedVolumes"];
         };
-        /** @description How well-shaped the triangles are. */
+        /** @description Figures of the triangles' shapes. */
         Shape: {
             /** @description Areas of triangles, mm². */
             area_mm2: components["schemas"]["Summary"];
@@ -2570,7 +2570,7 @@ export interface components {
             /** @description Edges at each vertex. */
             valence: components["schemas"]["Valence"];
         };
-        /** @description How smooth the mesh is. */
+        /** @description Figures of the mesh's smoothness. */
         Smoothness: {
             /** @description Angle between the normals of neighbouring triangles, degrees, 0 = flat. */
             dihedral_deg: components["schemas"]["Summary"];
@@ -3006,7 +3006,7 @@ export interface components {
              * @description Enclosed volume, millilitres.
              */
             volume_ml: number;
-            /** @description What was assumed or changed of the mesh, in sentences. */
+            /** @description Assumptions about the mesh and changes of it, in sentences. */
             warnings: string[];
         };
         /** @description The wall that an artery usually feeds. */
@@ -3081,7 +3081,7 @@ export interface components {
              */
             file: string;
         };
-        /** @description How many edges meet at a vertex. */
+        /** @description Numbers of edges that meet at a vertex. */
         Valence: {
             /** @description Number of vertices for each valence. */
             counts: {

@@ -29,7 +29,7 @@ use ventriform::mesh::TriMesh;
 use ventriform::progress::Monitor;
 use ventriform::report::SegmentationReport;
 use ventriform::segmentation::cavity;
-use ventriform::volume::dicom::Provenance;
+use ventriform::volume::Provenance;
 use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, VolumeFile};
 
 /// The files of a result of which objects are made.

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use std::io;
 use ventriform::export::read_json::{self, ReadMeshError};
 use ventriform::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
-use ventriform::volume::dicom::Provenance;
+use ventriform::volume::Provenance;
 
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]

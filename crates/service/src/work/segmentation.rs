@@ -40,7 +40,8 @@ impl Work for SegmentationWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let text = |field: &str| parameters.get(field)?.as_str();
-        let models = FitParameters::named_models(text("model").unwrap_or(FitParameters::AUTO));
+        let models =
+            FitParameters::named_models(text("model").unwrap_or(FitParameters::AUTO_MODEL));
         let named = |field: &str| Some((field.to_owned(), text(field)?.to_owned()));
         let (expert, reader) = (named("expert"), named("reader"));
         Needs {

@@ -43,7 +43,7 @@ pub trait UploadReader: Send + Sync + 'static {
     fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure>;
 
     /// The statements of the files of one volume about patient, study and acquisition: the fields of
-    /// [`Provenance`](ventriform::volume::dicom::Provenance), without the frames of slices, which differ
+    /// [`Provenance`](ventriform::volume::Provenance), without the frames of slices, which differ
     /// between gates. `None` unless they are DICOM.
     ///
     /// # Errors

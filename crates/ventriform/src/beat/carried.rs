@@ -36,15 +36,15 @@ impl CarriedNodes {
         let [inner, outer]: [Vec<f64>; 2] =
             [0, 1].map(|side| still.walls.iter().map(|ends| ends[side]).collect());
         let node = |point: &Vec3| {
-            let place = wall.place(point);
-            let arc = (place.row + 0.5) * wall.row_spacing;
+            let position = wall.position(point);
+            let arc = (position.row + 0.5) * wall.row_spacing;
             // The ray of column n lies in the middle of its sector.
-            let turn = (place.column + 0.5) / wall::COLUMNS as f64;
+            let turn = (position.column + 0.5) / wall::RAY_COLUMNS as f64;
             let column = turn * COLUMNS as f64 % COLUMNS as f64;
             let nodes = between(rows, arc / ROW_SPACING_MM, column);
             let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
             let (enters, leaves) = (value(&inner), value(&outer));
-            let depth = (place.distance - enters) / (leaves - enters).max(1e-6);
+            let depth = (position.distance - enters) / (leaves - enters).max(1e-6);
             CarriedNode {
                 arc_share: arc / rim_at(&still.rim, column).max(1e-6),
                 turn,
@@ -63,7 +63,7 @@ impl CarriedNodes {
         rim: &[f64],
     ) -> Vec<Vec3> {
         let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
-        let place = |node: &CarriedNode| {
+        let moved = |node: &CarriedNode| {
             let column = node.turn * COLUMNS as f64 % COLUMNS as f64;
             let arc = node.arc_share * rim_at(rim, column);
             let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
@@ -80,6 +80,6 @@ impl CarriedNodes {
                 coordinates.focus - coordinates.axis * basal + across * distance
             }
         };
-        self.0.iter().map(place).collect()
+        self.0.iter().map(moved).collect()
     }
 }

@@ -9,7 +9,7 @@ use super::flags::{self, BeatFlag};
 use super::moment::{Contraction, WallMoment, area_vectors};
 use super::phase::{Phases, circular_mean};
 use super::study::GatedStudy;
-use crate::model::wall::COLUMNS;
+use crate::model::wall::RAY_COLUMNS;
 use crate::polar::PolarMap;
 
 /// Moments of the curve.
@@ -155,7 +155,7 @@ fn segments(map: &PolarMap, contraction: &Contraction, phases: &Phases) -> Vec<S
     let of = |segment: usize| {
         let own: Vec<usize> = (0..contraction.areas.len())
             .filter(|ray| contraction.areas[*ray] > 0.0)
-            .filter(|ray| map.segment_of(ray / COLUMNS, ray % COLUMNS) == segment)
+            .filter(|ray| map.segment_of(ray / RAY_COLUMNS, ray % RAY_COLUMNS) == segment)
             .collect();
         let area: f64 = own.iter().map(|ray| contraction.areas[*ray]).sum();
         let mean = |values: &[f64]| {

@@ -5,12 +5,12 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use super::fields::{COLUMNS as NODE_COLUMNS, Layout, ROW_SPACING_MM, WallState, between};
 use super::fit::rim_at;
 use crate::geometry::Vec3;
-use crate::model::wall::{COLUMNS, ROWS, RayCoordinates};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, RayCoordinates};
 
 /// Both surfaces of the wall at a moment; each ray follows the same muscle through the beat.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WallMoment {
-    /// Points of the inner surface, LPS mm, [`ROWS`] × [`COLUMNS`], apex first; also of rays beyond the rim.
+    /// Points of the inner surface, LPS mm, [`RAY_ROWS`] × [`RAY_COLUMNS`], apex first; also of rays beyond the rim.
     pub inner: Vec<Vec3>,
     /// Points of the outer surface, LPS mm.
     pub outer: Vec<Vec3>,
@@ -31,10 +31,10 @@ impl WallMoment {
         let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
         let (mut inner, mut outer) = (Vec::new(), Vec::new());
         let (mut thickness, mut on) = (Vec::new(), Vec::new());
-        for row in 0..ROWS {
+        for row in 0..RAY_ROWS {
             let arc = (row as f64 + 0.5) * row_spacing;
-            for column in 0..COLUMNS {
-                let turn = (column as f64 + 0.5) / COLUMNS as f64;
+            for column in 0..RAY_COLUMNS {
+                let turn = (column as f64 + 0.5) / RAY_COLUMNS as f64;
                 let nodes = between(
                     layout.rows,
                     arc / ROW_SPACING_MM,
@@ -66,15 +66,15 @@ impl WallMoment {
     }
 }
 
-/// The area vector (outward) that each point of a surface of [`ROWS`] × [`COLUMNS`] points stands for, mm².
+/// The area vector (outward) that each point of a surface of [`RAY_ROWS`] × [`RAY_COLUMNS`] points stands for, mm².
 pub(super) fn area_vectors(points: &[Vec3]) -> Vec<Vec3> {
-    let at = |row: usize, column: usize| points[row * COLUMNS + column % COLUMNS];
+    let at = |row: usize, column: usize| points[row * RAY_COLUMNS + column % RAY_COLUMNS];
     let mut areas = Vec::with_capacity(points.len());
-    for row in 0..ROWS {
-        let (up, down) = (row.saturating_sub(1), (row + 1).min(ROWS - 1));
-        for column in 0..COLUMNS {
+    for row in 0..RAY_ROWS {
+        let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
+        for column in 0..RAY_COLUMNS {
             let along = (at(down, column) - at(up, column)) / (down - up) as f64;
-            let around = (at(row, column + 1) - at(row, column + COLUMNS - 1)) / 2.0;
+            let around = (at(row, column + 1) - at(row, column + RAY_COLUMNS - 1)) / 2.0;
             areas.push(around.cross(&along));
         }
     }

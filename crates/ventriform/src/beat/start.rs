@@ -14,7 +14,7 @@ const PEAK_MARGIN_MM: f64 = 3.0;
 /// Samples on the way through the wall.
 const PEAK_SAMPLES: usize = 20;
 /// Rays of the wall for each column of nodes.
-const RAYS_PER_COLUMN: usize = wall::COLUMNS / COLUMNS;
+const RAYS_PER_COLUMN: usize = wall::RAY_COLUMNS / COLUMNS;
 
 /// The wall of the summed image at the nodes.
 #[derive(Debug, Clone)]
@@ -56,14 +56,14 @@ impl StillWall {
 
 /// The rays about a column of nodes.
 fn rays_of(column: usize) -> impl Iterator<Item = usize> {
-    let first = column * RAYS_PER_COLUMN + wall::COLUMNS - RAYS_PER_COLUMN / 2;
-    (first..first + RAYS_PER_COLUMN).map(|ray| ray % wall::COLUMNS)
+    let first = column * RAYS_PER_COLUMN + wall::RAY_COLUMNS - RAYS_PER_COLUMN / 2;
+    (first..first + RAYS_PER_COLUMN).map(|ray| ray % wall::RAY_COLUMNS)
 }
 
 fn rim_of(wall: &VentricleWall, column: usize) -> f64 {
     let arc = |ray: usize| {
-        let met = |row: &usize| wall.rays[row * wall::COLUMNS + ray].wall.is_some();
-        let rows = (0..wall::ROWS).rev().find(met).map_or(0, |row| row + 1);
+        let met = |row: &usize| wall.rays[row * wall::RAY_COLUMNS + ray].wall.is_some();
+        let rows = (0..wall::RAY_ROWS).rev().find(met).map_or(0, |row| row + 1);
         rows as f64 * wall.row_spacing
     };
     rays_of(column).map(arc).sum::<f64>() / RAYS_PER_COLUMN as f64
@@ -72,15 +72,12 @@ fn rim_of(wall: &VentricleWall, column: usize) -> f64 {
 /// Mean distances of the wall on the rays about a node.
 fn met_at(wall: &VentricleWall, row: usize, column: usize, rim: f64) -> Option<[f64; 2]> {
     let last = (rim / wall.row_spacing - 1.0).floor();
-    let last = last.clamp(0.0, (wall::ROWS - 1) as f64);
-    let place = (row as f64 * ROW_SPACING_MM / wall.row_spacing - 0.5).clamp(0.0, last);
+    let last = last.clamp(0.0, (wall::RAY_ROWS - 1) as f64);
+    let at = (row as f64 * ROW_SPACING_MM / wall.row_spacing - 0.5).clamp(0.0, last);
     let (mut sum, mut weight) = ([0.0; 2], 0.0);
-    for (row, share) in [
-        (place.floor(), 1.0 - place.fract()),
-        (place.ceil(), place.fract()),
-    ] {
+    for (row, share) in [(at.floor(), 1.0 - at.fract()), (at.ceil(), at.fract())] {
         for ray in rays_of(column) {
-            if let Some([enters, leaves]) = wall.rays[row as usize * wall::COLUMNS + ray].wall {
+            if let Some([enters, leaves]) = wall.rays[row as usize * wall::RAY_COLUMNS + ray].wall {
                 sum[0] += share * enters;
                 sum[1] += share * leaves;
                 weight += share;

@@ -211,7 +211,7 @@ mod tests {
         }
     }
 
-    /// What each of the twelve fields does to a point 30 mm off the axis at the rim and on the axis at the apex.
+    /// Each of the twelve fields moves a point 30 mm off the axis at the rim and one on the axis at the apex.
     #[test]
     fn the_fields_move_turn_stretch_thicken_and_raise() {
         let axis = Vec3::new(0.0, 0.6, 0.8);

@@ -12,7 +12,8 @@
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
-//! The coefficients are a least-squares fit to simulated hearts whose walls are known. Two other
+//! The coefficients are a least-squares fit to simulated hearts whose walls are known; `scripts/calibrate_walls.py`
+//! estimates them again. Two other
 //! ways were tried on the same hearts and came out behind. A fixed shift of both surfaces makes
 //! small hearts too thin. A forward model (the wall rendered, blurred and compared with the image)
 //! cannot tell the width of the point response from the wall's thickness: its least residual lies
@@ -24,32 +25,14 @@
 //! left out): hollowness, uptake, thickness, strength of the edges and the like.
 
 use super::blur_correction;
+use super::calibration::{CAVITY_SIZE_SHIFT, INNER_SHIFT_MM, NARROW_CAVITY_SHIFT, OUTER_SHIFT_MM};
+use super::ray_terms::RayTerms;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 use crate::numeric::order;
-
-/// The numbers that describe a ray.
-const RAY_TERMS: usize = 11;
-
-/// Distance by which the inner surface moves outward, mm, for each number that describes a ray.
-const INNER_SHIFT_MM: [f64; RAY_TERMS] = [
-    2.838, 0.526, 1.454, -1.673, 0.413, 0.403, 1.411, 0.545, -1.927, 3.921, -0.076,
-];
-/// Distance by which the outer surface moves outward, mm, likewise.
-const OUTER_SHIFT_MM: [f64; RAY_TERMS] = [
-    -1.066, -0.223, -1.725, -0.026, -0.417, 0.619, -1.1, -0.075, -1.404, -1.183, -2.356,
-];
-
-/// A cavity that looks smaller than the first, ml, is as narrow as the blur: its edge hardly moves any
-/// more when the cavity shrinks, and so the inner surface moves outward less, by the second, mm, times the logarithm
-/// of the ratio.
-const NARROW_CAVITY_ML_MM: (f64, f64) = (25.0, 0.94);
-/// The outer surface moves outward more, the smaller the cavity looks: by the second, mm, times the logarithm of
-/// the ratio of the first, ml, and the cavity.
-const CAVITY_SIZE_ML_MM: (f64, f64) = (68.0, 0.435);
 
 /// The thickness that is left at least, mm.
 const MIN_THICKNESS_MM: f64 = 4.0;
@@ -96,20 +79,10 @@ struct WallShifts {
 
 impl WallShifts {
     fn of(wall: &VentricleWall, image: &Field, resolution: Option<f64>) -> Option<Self> {
-        let side = |s: usize| RayMap::filled(|index| Some(wall.rays[index].wall?[s]));
-        let (inner, outer) = (side(0)?, side(1)?);
-        let uptake = RayMap::from_fn(|index| {
-            let ray = &wall.rays[index];
-            let middle = f64::midpoint(inner.0[index], outer.0[index]);
-            image.at(&(ray.start + ray.direction * middle))
-        });
-        let numbers = describe(&inner, &outer, &uptake);
-        let shift = |coefficients: &[f64; RAY_TERMS]| {
-            RayMap::from_fn(|index| {
-                let terms = coefficients.iter().zip(&numbers[index]);
-                terms.map(|(c, x)| c * x).sum()
-            })
-        };
+        let [inner, outer] = sides(wall)?;
+        let rays = describe(&inner, &outer, &uptake(wall, [&inner, &outer], image));
+        let shift =
+            |coefficients: &RayTerms| RayMap::from_fn(|index| coefficients.of(&rays[index]));
         let (mut inner_shift, mut outer_shift) = (shift(&INNER_SHIFT_MM), shift(&OUTER_SHIFT_MM));
         let of_size = shifts_of_size(wall.cavity_ml);
         for (shift, more) in [&mut inner_shift, &mut outer_shift]
@@ -137,19 +110,19 @@ impl WallShifts {
 
     /// The displacement of a point of the apparent wall, mm.
     fn at(&self, wall: &VentricleWall, point: &Vec3) -> Vec3 {
-        let place = wall.place(point);
-        let at = |map: &RayMap| map.at(place.row, place.column);
+        let position = wall.position(point);
+        let at = |map: &RayMap| map.at(position.row, position.column);
         let (inner, outer) = (at(&self.inner), at(&self.outer));
-        let depth = ((place.distance - inner) / (outer - inner).max(1e-6)).clamp(0.0, 1.0);
+        let depth = ((position.distance - inner) / (outer - inner).max(1e-6)).clamp(0.0, 1.0);
         let shift = at(&self.inner_shift) * (1.0 - depth) + at(&self.outer_shift) * depth;
-        place.direction * shift
+        position.direction * shift
     }
 }
 
 /// Reduces the shifts of the rays on which less than the least thickness would be left of the wall, both by the same
 /// factor; to 0 where the wall is thinner already.
 fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut RayMap; 2]) {
-    for index in 0..ROWS * COLUMNS {
+    for index in 0..RAY_ROWS * RAY_COLUMNS {
         let thickness = outer.0[index] - inner.0[index];
         let less = inner_shift.0[index] - outer_shift.0[index];
         let most = (thickness - MIN_THICKNESS_MM).max(0.0);
@@ -165,8 +138,8 @@ fn keep_thinnest([inner, outer]: [&RayMap; 2], [inner_shift, outer_shift]: [&mut
 fn shifts_of_size(cavity: f64) -> [f64; 2] {
     let size = cavity.max(1.0).ln();
     [
-        -NARROW_CAVITY_ML_MM.1 * (NARROW_CAVITY_ML_MM.0.ln() - size).max(0.0),
-        CAVITY_SIZE_ML_MM.1 * (CAVITY_SIZE_ML_MM.0.ln() - size),
+        -NARROW_CAVITY_SHIFT.per_log_mm * (NARROW_CAVITY_SHIFT.cavity_ml.ln() - size).max(0.0),
+        CAVITY_SIZE_SHIFT.per_log_mm * (CAVITY_SIZE_SHIFT.cavity_ml.ln() - size),
     ]
 }
 
@@ -175,40 +148,62 @@ fn mean_difference(a: &RayMap, b: &RayMap) -> f64 {
     sum / a.0.len() as f64
 }
 
+/// The numbers that describe each ray of the apparent `wall`; `image` is the blurred image about it. `None` where a
+/// direction has no wall at all.
+pub fn ray_terms(wall: &VentricleWall, image: &Field) -> Option<Vec<RayTerms>> {
+    let [inner, outer] = sides(wall)?;
+    Some(describe(
+        &inner,
+        &outer,
+        &uptake(wall, [&inner, &outer], image),
+    ))
+}
+
+/// The distances at which the rays enter and leave the wall, mm.
+fn sides(wall: &VentricleWall) -> Option<[RayMap; 2]> {
+    let side = |s: usize| RayMap::filled(|index| Some(wall.rays[index].wall?[s]));
+    Some([side(0)?, side(1)?])
+}
+
+/// The value of the image in the middle of the wall.
+fn uptake(wall: &VentricleWall, [inner, outer]: [&RayMap; 2], image: &Field) -> RayMap {
+    RayMap::from_fn(|index| {
+        let ray = &wall.rays[index];
+        let middle = f64::midpoint(inner.0[index], outer.0[index]);
+        image.at(&(ray.start + ray.direction * middle))
+    })
+}
+
 /// The numbers that describe each ray, from the distances at which it enters and leaves the wall,
-/// mm, and the image's value in the middle of the wall:
-/// 1, thickness of the wall (median) less 15 mm, logarithm of its inner radius (median of the rays
-/// across the axis and near them) over 15 mm and that squared, thickness at the ray less the median,
-/// exp(-radius / 12 mm), the missing share of uptake and that squared, the way from apex to base
-/// (less a half) and that squared, and exp(-way / 0.12).
-fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<[f64; RAY_TERMS]> {
+/// mm, and the image's value in the middle of the wall.
+fn describe(inner: &RayMap, outer: &RayMap, uptake: &RayMap) -> Vec<RayTerms> {
     let thickness = RayMap::from_fn(|i| outer.0[i] - inner.0[i]).smoothed();
     let radius = inner.smoothed();
     let uptake = uptake.smoothed();
     let usual = quantile_of(&thickness.0, 0.5);
-    let size = (quantile_of(&radius.0[ROWS / 4 * COLUMNS..], 0.5).max(2.0) / 15.0).ln();
+    let size = (quantile_of(&radius.0[RAY_ROWS / 4 * RAY_COLUMNS..], 0.5).max(2.0) / 15.0).ln();
     let full = quantile_of(&uptake.0, 0.85);
-    (0..ROWS * COLUMNS)
+    (0..RAY_ROWS * RAY_COLUMNS)
         .map(|index| {
-            let way = ((index / COLUMNS) as f64 + 0.5) / ROWS as f64;
+            let way = ((index / RAY_COLUMNS) as f64 + 0.5) / RAY_ROWS as f64;
             let missing = if full > 0.0 {
                 (1.0 - uptake.0[index] / full).clamp(0.0, 1.0)
             } else {
                 0.0
             };
-            [
-                1.0,
-                usual - 15.0,
-                size,
-                size * size,
-                thickness.0[index] - usual,
-                (-radius.0[index].max(2.0) / 12.0).exp(),
-                missing,
-                missing * missing,
-                way - 0.5,
-                (way - 0.5).powi(2),
-                (-way / 0.12).exp(),
-            ]
+            RayTerms {
+                constant: 1.0,
+                thickness: usual - 15.0,
+                ln_radius: size,
+                ln_radius_squared: size * size,
+                thickness_here: thickness.0[index] - usual,
+                narrowness_here: (-radius.0[index].max(2.0) / 12.0).exp(),
+                missing_uptake: missing,
+                missing_uptake_squared: missing * missing,
+                way: way - 0.5,
+                way_squared: (way - 0.5).powi(2),
+                nearness_to_apex: (-way / 0.12).exp(),
+            }
         })
         .collect()
 }
@@ -218,19 +213,19 @@ struct RayMap(Vec<f64>);
 
 impl RayMap {
     fn from_fn(value: impl FnMut(usize) -> f64) -> Self {
-        Self((0..ROWS * COLUMNS).map(value).collect())
+        Self((0..RAY_ROWS * RAY_COLUMNS).map(value).collect())
     }
 
     /// Rays without a value get that of the next ray of their column, towards the apex first. `None`
     /// if a column has no value at all.
     fn filled(value: impl Fn(usize) -> Option<f64>) -> Option<Self> {
-        let mut map = Self(vec![0.0; ROWS * COLUMNS]);
-        for column in 0..COLUMNS {
-            let known = |row: usize| value(row * COLUMNS + column);
-            for row in 0..ROWS {
+        let mut map = Self(vec![0.0; RAY_ROWS * RAY_COLUMNS]);
+        for column in 0..RAY_COLUMNS {
+            let known = |row: usize| value(row * RAY_COLUMNS + column);
+            for row in 0..RAY_ROWS {
                 let apical = (0..=row).rev().find_map(known);
-                let found = apical.or_else(|| (row..ROWS).find_map(known))?;
-                map.0[row * COLUMNS + column] = found;
+                let found = apical.or_else(|| (row..RAY_ROWS).find_map(known))?;
+                map.0[row * RAY_COLUMNS + column] = found;
             }
         }
         Some(map)
@@ -251,18 +246,18 @@ impl RayMap {
                 .collect::<Vec<_>>()
         });
         let rows = Self::from_fn(|index| {
-            let (row, column) = ((index / COLUMNS) as i64, index % COLUMNS);
+            let (row, column) = ((index / RAY_COLUMNS) as i64, index % RAY_COLUMNS);
             let value = |d: i64| {
-                let row = (row + d).clamp(0, ROWS as i64 - 1) as usize;
-                self.0[row * COLUMNS + column]
+                let row = (row + d).clamp(0, RAY_ROWS as i64 - 1) as usize;
+                self.0[row * RAY_COLUMNS + column]
             };
             along.iter().map(|(d, w)| w * value(*d)).sum()
         });
         Self::from_fn(|index| {
-            let (row, column) = (index / COLUMNS, (index % COLUMNS) as i64);
+            let (row, column) = (index / RAY_COLUMNS, (index % RAY_COLUMNS) as i64);
             let value = |d: i64| {
-                let column = (column + d).rem_euclid(COLUMNS as i64) as usize;
-                rows.0[row * COLUMNS + column]
+                let column = (column + d).rem_euclid(RAY_COLUMNS as i64) as usize;
+                rows.0[row * RAY_COLUMNS + column]
             };
             around.iter().map(|(d, w)| w * value(*d)).sum()
         })
@@ -270,12 +265,12 @@ impl RayMap {
 
     /// The value between rays, linear in row and column.
     fn at(&self, row: f64, column: f64) -> f64 {
-        let row = row.clamp(0.0, ROWS as f64 - 1.0);
-        let (low, left) = (row.floor().min(ROWS as f64 - 2.0), column.floor());
+        let row = row.clamp(0.0, RAY_ROWS as f64 - 1.0);
+        let (low, left) = (row.floor().min(RAY_ROWS as f64 - 2.0), column.floor());
         let (up, right) = (row - low, column - left);
         let value = |r: usize, c: usize| {
-            let column = (left as usize + c) % COLUMNS;
-            self.0[(low as usize + r) * COLUMNS + column]
+            let column = (left as usize + c) % RAY_COLUMNS;
+            self.0[(low as usize + r) * RAY_COLUMNS + column]
         };
         (1.0 - up) * ((1.0 - right) * value(0, 0) + right * value(0, 1))
             + up * ((1.0 - right) * value(1, 0) + right * value(1, 1))
@@ -294,22 +289,22 @@ mod tests {
 
     /// The value 1 on one ray, 0 elsewhere.
     fn impulse(row: usize, column: usize) -> RayMap {
-        RayMap::from_fn(|index| f64::from(u8::from(index == row * COLUMNS + column)))
+        RayMap::from_fn(|index| f64::from(u8::from(index == row * RAY_COLUMNS + column)))
     }
 
     #[test]
     fn smoothing_spreads_by_its_deviations_and_goes_round_the_wall() {
         let level = RayMap::from_fn(|_| 7.0).smoothed();
         assert!(level.0.iter().all(|v| (v - 7.0).abs() < 1e-9));
-        let (row, column) = (ROWS / 2, 1);
+        let (row, column) = (RAY_ROWS / 2, 1);
         let spread = impulse(row, column).smoothed();
         assert!((spread.0.iter().sum::<f64>() - 1.0).abs() < 1e-9);
         let (mut along, mut around) = (0.0, 0.0);
         for (index, v) in spread.0.iter().enumerate() {
-            let rows = (index / COLUMNS) as f64 - row as f64;
-            let columns = (index % COLUMNS) as f64 - column as f64;
-            let half = COLUMNS as f64 / 2.0;
-            let columns = (columns + half).rem_euclid(COLUMNS as f64) - half;
+            let rows = (index / RAY_COLUMNS) as f64 - row as f64;
+            let columns = (index % RAY_COLUMNS) as f64 - column as f64;
+            let half = RAY_COLUMNS as f64 / 2.0;
+            let columns = (columns + half).rem_euclid(RAY_COLUMNS as f64) - half;
             along += v * rows * rows;
             around += v * columns * columns;
         }
@@ -325,8 +320,9 @@ mod tests {
 
     #[test]
     fn a_map_is_linear_between_rays_and_goes_round() {
-        let map =
-            RayMap::from_fn(|index| 10.0 * (index / COLUMNS) as f64 + (index % COLUMNS) as f64);
+        let map = RayMap::from_fn(|index| {
+            10.0 * (index / RAY_COLUMNS) as f64 + (index % RAY_COLUMNS) as f64
+        });
         for (row, column) in [(0.0, 0.0), (3.25, 7.5), (30.75, 12.0), (31.0, 58.25)] {
             assert!((map.at(row, column) - (10.0 * row + column)).abs() < 1e-9);
         }
@@ -345,7 +341,7 @@ mod tests {
         let mut inner_shift = RayMap::from_fn(|_| 4.0);
         let mut outer_shift = RayMap::from_fn(|_| -2.0);
         keep_thinnest([&inner, &outer], [&mut inner_shift, &mut outer_shift]);
-        for index in 0..ROWS * COLUMNS {
+        for index in 0..RAY_ROWS * RAY_COLUMNS {
             let (more, less) = (inner_shift.0[index], -outer_shift.0[index]);
             let left = looks(index) - more - less;
             let expected = (looks(index) - 6.0).max(MIN_THICKNESS_MM.min(looks(index)));
@@ -356,15 +352,15 @@ mod tests {
 
     #[test]
     fn rays_that_miss_the_wall_take_the_next_value_of_their_column() {
-        let known = |index: usize| match (index / COLUMNS, index % COLUMNS) {
+        let known = |index: usize| match (index / RAY_COLUMNS, index % RAY_COLUMNS) {
             (row, 4) if row < 3 || row == 9 => None,
             (row, column) => Some((100 * row + column) as f64),
         };
         let map = RayMap::filled(known).unwrap();
-        let at = |row: usize, column: usize| map.0[row * COLUMNS + column];
+        let at = |row: usize, column: usize| map.0[row * RAY_COLUMNS + column];
         assert_eq!((at(0, 4), at(2, 4), at(9, 4)), (304.0, 304.0, 804.0));
         assert_eq!((at(0, 5), at(9, 3)), (5.0, 903.0));
-        assert!(RayMap::filled(|index| (index % COLUMNS != 4).then_some(1.0)).is_none());
+        assert!(RayMap::filled(|index| (index % RAY_COLUMNS != 4).then_some(1.0)).is_none());
     }
 
     /// A wall of 14 mm about a cavity of 18 mm radius, whose uptake halves at a quarter of its columns.
@@ -372,9 +368,9 @@ mod tests {
     fn rays_are_described_by_what_the_wall_is_like() {
         let inner = RayMap::from_fn(|_| 18.0);
         let outer = RayMap::from_fn(|_| 32.0);
-        let dark = COLUMNS / 4..COLUMNS / 2;
+        let dark = RAY_COLUMNS / 4..RAY_COLUMNS / 2;
         let uptake = RayMap::from_fn(|i| {
-            if dark.contains(&(i % COLUMNS)) {
+            if dark.contains(&(i % RAY_COLUMNS)) {
                 2.0
             } else {
                 4.0
@@ -383,7 +379,7 @@ mod tests {
         let numbers = describe(&inner, &outer, &uptake);
         let size = 1.2f64.ln();
         for (row, column) in [(0, 0), (10, 50), (31, 22)] {
-            let way = (row as f64 + 0.5) / ROWS as f64;
+            let way = (row as f64 + 0.5) / RAY_ROWS as f64;
             let missing = if column == 22 { 0.5 } else { 0.0 };
             let wanted = [
                 1.0,
@@ -398,7 +394,8 @@ mod tests {
                 (way - 0.5) * (way - 0.5),
                 (-way / 0.12).exp(),
             ];
-            for (found, wanted) in numbers[row * COLUMNS + column].iter().zip(wanted) {
+            let found = numbers[row * RAY_COLUMNS + column].values();
+            for (found, wanted) in found.into_iter().zip(wanted) {
                 assert!((found - wanted).abs() < 0.02, "{found} {wanted}");
             }
         }
@@ -412,12 +409,11 @@ mod tests {
         let level = |value: f64| RayMap::from_fn(|_| value);
         let shifts = |inner: &RayMap, outer: &RayMap, uptake: &RayMap, index: usize| {
             let numbers = describe(inner, outer, uptake)[index];
-            [INNER_SHIFT_MM, OUTER_SHIFT_MM]
-                .map(|c| c.iter().zip(numbers).map(|(c, x)| c * x).sum::<f64>())
+            [INNER_SHIFT_MM, OUTER_SHIFT_MM].map(|coefficients| coefficients.of(&numbers))
         };
         for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
-            let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * COLUMNS);
-            let all @ [apex, middle, rim] = [0, ROWS / 2, ROWS - 1].map(of);
+            let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * RAY_COLUMNS);
+            let all @ [apex, middle, rim] = [0, RAY_ROWS / 2, RAY_ROWS - 1].map(of);
             for [i, o] in all {
                 assert!(
                     i > 0.0 && o < 0.0 && (2.0..10.0).contains(&(i - o)),
@@ -431,10 +427,10 @@ mod tests {
             );
             assert!(rim[1] < middle[1] - 0.6, "{rim:?} {middle:?}");
         }
-        let index = ROWS / 2 * COLUMNS + 30;
+        let index = RAY_ROWS / 2 * RAY_COLUMNS + 30;
         let usual = shifts(&level(20.0), &level(34.0), &level(1.0), index);
         let thick = RayMap::from_fn(|i| {
-            if (i % COLUMNS).abs_diff(30) < 12 {
+            if (i % RAY_COLUMNS).abs_diff(30) < 12 {
                 37.0
             } else {
                 34.0
@@ -451,7 +447,7 @@ mod tests {
         assert!((larger[0] - usual[0]).abs() < 0.6);
         assert!(larger[1] < usual[1] - 0.3, "{usual:?} {larger:?}");
         let defect = RayMap::from_fn(|i| {
-            if (i % COLUMNS).abs_diff(30) < 12 {
+            if (i % RAY_COLUMNS).abs_diff(30) < 12 {
                 0.5
             } else {
                 1.0
@@ -464,7 +460,7 @@ mod tests {
         );
     }
 
-    /// What blur adds to a slab as thick as the mean wall is taken off in the mean; no wall gets thinner than the
+    /// The mean wall loses as much as blur adds to a slab of its thickness; no wall gets thinner than the
     /// least thickness.
     #[test]
     fn a_known_resolution_sets_the_mean_loss_and_some_wall_is_left() {
@@ -496,7 +492,7 @@ mod tests {
             assert!((loss - excess).abs() < 1e-6, "{loss} {excess}");
         }
         let thin = of(6.0, None);
-        for index in 0..ROWS * COLUMNS {
+        for index in 0..RAY_ROWS * RAY_COLUMNS {
             let before = thin.outer.0[index] - thin.inner.0[index];
             let loss = thin.inner_shift.0[index] - thin.outer_shift.0[index];
             let left = before - loss;
@@ -511,7 +507,7 @@ mod tests {
     fn a_narrow_cavity_keeps_more_of_its_wall_and_a_usual_one_is_left_as_calibrated() {
         let [inner, outer] = shifts_of_size(12.0);
         assert!(inner < -0.5 && outer > 0.5);
-        let [inner, outer] = shifts_of_size(CAVITY_SIZE_ML_MM.0);
+        let [inner, outer] = shifts_of_size(CAVITY_SIZE_SHIFT.cavity_ml);
         assert_eq!((inner, outer), (0.0, 0.0));
         // The wall never gets thinner by it, the smaller the heart.
         let added: Vec<f64> = [300.0, 100.0, 60.0, 30.0, 20.0, 10.0, 5.0, 0.0]

@@ -1,6 +1,6 @@
 //! Runs of the motion, repeated with a stiffer model while the result is folded.
 
-use super::base_plane;
+use super::base_plane::{self, rim_heights};
 use super::dynamics::{self, MotionResult};
 use super::elastic::Elastic;
 use super::fitted_model::{FittedModel, WallSurface, WallSurfaces};
@@ -109,6 +109,8 @@ impl Attempt {
                 .transpose()
         };
         let sensed_wall = wall_of(&self.moved.mesh)?;
+        let sensed_rim_mm =
+            cup.and_then(|cup| rim_heights(&self.moved.mesh, &cup, &orientation.superior));
         let settled = cup.and_then(|cup| settled(&self.moved.mesh, &cup, &orientation, parameters));
         let (mesh, wall) = match settled {
             Some(mesh) => {
@@ -149,6 +151,7 @@ impl Attempt {
             wall_ml,
             surfaces,
             sensed_wall,
+            sensed_rim_mm,
             readings: self.moved.readings,
             scale: setup.pose.scale(),
             rotation: *setup.pose.rotation(),

@@ -5,14 +5,14 @@
 //! patient's superior direction; out comes the model with its rim moved along the long axis.
 //!
 //! 1. The rim's height in each of [`RIM_DIRECTIONS`] directions about the axis.
-//! 2. The shape of the rim that hearts have ([`RIM_MEAN`], [`RIM_PRECISION`], in three harmonics and shares of
-//!    the heart's length) is fitted to them, robustly: a short stretch far from the rest hardly pulls it.
+//! 2. The shape of the rim that hearts have ([`RIM_SHAPE`], in three harmonics and shares of the heart's length) is fitted to them, robustly: a short stretch far from the rest hardly pulls it.
 //! 3. The distance from that shape is the sum of what is true of this heart and what the signal took away
-//!    or added. A piecewise linear function ([`correction`]) says how much of it to take back.
+//!    or added. A piecewise linear function ([`RIM_CORRECTION`]) says how much of it to take back.
 //! 4. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the wall
 //!    is stretched or compressed there.
 //!
-//! Shape and function are least-squares fits to simulated hearts whose rims are known. On hearts that were
+//! Shape and function are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
+//! estimates them again. On hearts that were
 //! left out, the rms error of the rim's height falls from 3.8 to 3.2 mm, and the largest error of six
 //! isolated basal infarcts from 13 to 9 mm in the mean (two of them hardly change). Not guaranteed: an
 //! infarct over half of the base moves the shape itself. A model whose orientation is unknown keeps its rim.
@@ -21,6 +21,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::calibration::{RIM_CORRECTION, RIM_SHAPE};
+use super::rim_model::RIM_TERMS;
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
@@ -29,23 +31,7 @@ use crate::model::wall::anterior;
 use crate::numeric::order;
 
 /// Directions about the axis: from lateral over anterior, septal and inferior.
-const RIM_DIRECTIONS: usize = 30;
-/// Harmonics of the rim's shape: the cosines and sines of one to three times the angle.
-const RIM_HARMONICS: usize = 3;
-const RIM_TERMS: usize = 2 * RIM_HARMONICS;
-
-/// Mean coefficients of the rim's height towards the apex, shares of the heart's length.
-const RIM_MEAN: [f64; RIM_TERMS] = [-0.0638, 0.0248, 0.0188, -0.0082, -0.0038, 0.0008];
-/// Inverse of their covariance.
-const RIM_PRECISION: [[f64; RIM_TERMS]; RIM_TERMS] = [
-    [2029.0, 51.0, 1485.0, -24.0, -998.0, -454.0],
-    [51.0, 2307.0, -383.0, 1555.0, 172.0, -110.0],
-    [1485.0, -383.0, 6336.0, -677.0, 1556.0, -2108.0],
-    [-24.0, 1555.0, -677.0, 4764.0, -220.0, 1541.0],
-    [-998.0, 172.0, 1556.0, -220.0, 7487.0, -688.0],
-    [-454.0, -110.0, -2108.0, 1541.0, -688.0, 8253.0],
-];
-
+pub const RIM_DIRECTIONS: usize = 30;
 /// Distance from the shape at which a direction counts half, mm.
 const OUTLIER_DISTANCE_MM: f64 = 4.0;
 /// Neighbouring directions are not independent: as many of them count as one.
@@ -55,12 +41,6 @@ const REWEIGHTING_ROUNDS: usize = 30;
 
 /// Length of wall next to the rim that is stretched, mm.
 pub const STRETCHED_LENGTH_MM: f64 = 25.0;
-
-/// Distance towards the base by which a rim is moved that lies `distance` mm too near to the apex, mm.
-fn correction(distance: f64) -> f64 {
-    let beyond = (distance - 4.0).max(0.0) * 1.136 + (-distance - 4.0).max(0.0) * 0.278;
-    (0.784 + 0.95 * distance + beyond).clamp(-12.0, 16.0)
-}
 
 /// `mesh` with its rim where anatomy and image together put it. `None` without a rim in every direction, and
 /// where the moved surface would intersect itself: then the mesh stays.
@@ -73,10 +53,16 @@ pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<TriMesh> {
     let shifts: Vec<f64> = rim
         .iter()
         .zip(&shape)
-        .map(|(h, e)| correction(h - e))
+        .map(|(h, e)| RIM_CORRECTION.of(h - e))
         .collect();
     let moved = frame.stretched(mesh, &rim, &shifts);
     self_intersections(&moved).is_empty().then_some(moved)
+}
+
+/// The height at which `mesh` begins in each of [`RIM_DIRECTIONS`] directions about the axis, mm from the cup's
+/// centre towards the apex; `None` without a rim in every direction.
+pub fn rim_heights(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<Vec<f64>> {
+    RimFrame::of(cup, superior).heights(mesh)
 }
 
 /// `mesh` with its whole rim moved towards the base by `distance` mm. It stays as it is without a rim in
@@ -118,13 +104,14 @@ fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
             _ => (times * angle).sin(),
         }
     });
+    let usual_terms = RIM_SHAPE.mean_terms();
     let mean = DVector::from_fn(RIM_TERMS + 1, |term, _| match term {
         0 => 0.0,
-        term => RIM_MEAN[term - 1] * length,
+        term => usual_terms[term - 1] * length,
     });
     let prior = DMatrix::from_fn(RIM_TERMS + 1, RIM_TERMS + 1, |a, b| match (a, b) {
         (0, _) | (_, 0) => 0.0,
-        (a, b) => RIM_PRECISION[a - 1][b - 1] / (length * length),
+        (a, b) => RIM_SHAPE.precision[a - 1][b - 1] / (length * length),
     });
     let heights = DVector::from_column_slice(rim);
     let usual = &basis * &mean;
@@ -188,7 +175,7 @@ impl RimFrame {
         moved
     }
 
-    /// How far towards the apex the mesh begins in each direction, mm from the cup's centre: the most basal
+    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex: the most basal
     /// crossing of its edges with the half plane there. `None` if there is a direction without any.
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         (0..RIM_DIRECTIONS)
@@ -253,7 +240,9 @@ mod tests {
             let usual: f64 = (0..RIM_TERMS)
                 .map(|t| {
                     let times = (t / 2 + 1) as f64 * angle;
-                    RIM_MEAN[t] * 70.0 * if t % 2 == 0 { times.cos() } else { times.sin() }
+                    RIM_SHAPE.mean_terms()[t]
+                        * 70.0
+                        * if t % 2 == 0 { times.cos() } else { times.sin() }
                 })
                 .sum();
             let off = (angle.to_degrees() - 90.0).abs();
@@ -328,7 +317,7 @@ mod tests {
     fn the_mean_rim_is_that_of_hearts() {
         let height = |d: usize| {
             (0..RIM_TERMS)
-                .map(|t| RIM_MEAN[t] * wave(t, d))
+                .map(|t| RIM_SHAPE.mean_terms()[t] * wave(t, d))
                 .sum::<f64>()
         };
         let by_height = |a: &usize, b: &usize| height(*a).total_cmp(&height(*b));
@@ -337,7 +326,7 @@ mod tests {
         let longest = angle((0..RIM_DIRECTIONS).min_by(by_height).unwrap());
         assert!((145.0..170.0).contains(&shortest), "{shortest}");
         assert!((300.0..350.0).contains(&longest), "{longest}");
-        let precision = DMatrix::from_fn(RIM_TERMS, RIM_TERMS, |a, b| RIM_PRECISION[a][b]);
+        let precision = DMatrix::from_fn(RIM_TERMS, RIM_TERMS, |a, b| RIM_SHAPE.precision[a][b]);
         assert_eq!(precision, precision.transpose());
         assert!(precision.cholesky().is_some());
     }
@@ -357,12 +346,12 @@ mod tests {
                     .map(|(h, s)| (1.0 + ((h - s) / 4.0).powi(2)).ln() / 2.0 / 3.0);
                 let off: [f64; RIM_TERMS] = std::array::from_fn(|t| {
                     let sum: f64 = (0..RIM_DIRECTIONS).map(|d| shape[d] * wave(t, d)).sum();
-                    2.0 * sum / RIM_DIRECTIONS as f64 / length - RIM_MEAN[t]
+                    2.0 * sum / RIM_DIRECTIONS as f64 / length - RIM_SHAPE.mean_terms()[t]
                 });
                 let mut prior = 0.0;
                 for a in 0..RIM_TERMS {
                     for b in 0..RIM_TERMS {
-                        prior += off[a] * RIM_PRECISION[a][b] * off[b] / 2.0;
+                        prior += off[a] * RIM_SHAPE.precision[a][b] * off[b] / 2.0;
                     }
                 }
                 robust.sum::<f64>() + prior
@@ -385,12 +374,12 @@ mod tests {
     #[test]
     fn the_correction_grows_steadily_to_its_limits() {
         let steps: Vec<f64> = (-300..=300)
-            .map(|n| correction(f64::from(n) / 10.0))
+            .map(|n| RIM_CORRECTION.of(f64::from(n) / 10.0))
             .collect();
         assert!(steps.windows(2).all(|s| s[1] >= s[0] && s[1] - s[0] < 0.25));
         assert_eq!((steps[0], steps[600]), (-12.0, 16.0));
-        let slope = |d: f64| (correction(d + 0.5) - correction(d - 0.5)).abs();
-        assert!(correction(0.0).abs() < 1.0);
+        let slope = |d: f64| (RIM_CORRECTION.of(d + 0.5) - RIM_CORRECTION.of(d - 0.5)).abs();
+        assert!(RIM_CORRECTION.of(0.0).abs() < 1.0);
         for within in [-3.0, 0.0, 3.0] {
             assert!((slope(within) - 0.95).abs() < 1e-9);
         }

@@ -50,7 +50,7 @@ pub struct Stiffness {
     pub support: f64,
     /// Greatest length of a support spring, mm. Default 46, the 14 voxels of the experiment.
     pub support_radius: f64,
-    /// How k_p depends on the number of nodes. Default [`SupportScaling::Fixed`].
+    /// Dependence of k_p on the number of nodes. Default [`SupportScaling::Fixed`].
     pub support_scaling: SupportScaling,
 }
 

@@ -91,6 +91,9 @@ pub struct FittedModel {
     pub surfaces: Option<WallSurfaces>,
     /// The wall as the sensors left it, before the base plane was put; ventricles only.
     pub sensed_wall: Option<VentricleWall>,
+    /// Height of its rim in each of [`RIM_DIRECTIONS`](super::base_plane::RIM_DIRECTIONS) directions, mm from the
+    /// cup's centre towards the apex; `None` without a rim in every direction.
+    pub sensed_rim_mm: Option<Vec<f64>>,
     /// The sensors' readings when the motion ended, [`PER_TRIANGLE`](super::sensors::PER_TRIANGLE) of each triangle.
     pub readings: Vec<SensorReading>,
     /// Isotropic scale of the pose against the template.

@@ -34,12 +34,15 @@ pub mod anatomical;
 pub mod attempt;
 pub mod base_plane;
 pub mod blur_correction;
+mod calibration;
 pub mod dynamics;
 pub mod elastic;
 pub mod error;
 pub mod fitted_model;
 pub mod organ_position;
 pub mod parameters;
+pub mod ray_terms;
+mod rim_model;
 pub mod sensors;
 pub mod setup;
 

@@ -45,7 +45,7 @@ pub struct DeformParameters {
     /// The image's resolution (full width of a point at half its maximum, motion and filter
     /// included), mm, 0..=30, for the anatomical wall. Default `None`: by calibration.
     pub resolution: Option<f64>,
-    /// How the model moves.
+    /// The kind of motion.
     pub motion: Motion,
 }
 

@@ -13,11 +13,11 @@ use sha2::{Digest, Sha256};
 
 use super::text::leaves;
 
-const STYLE: &str = include_str!("document.css");
+const DOCUMENT_STYLE: &str = include_str!("document.css");
 /// Built from `web/src/report.tsx`: draws the embedded data, to be touched.
-const SCRIPT: &str = include_str!("../../assets/report.js");
+const REPORT_SCRIPT: &str = include_str!("../../assets/report.js");
 /// The style of what it draws.
-const SCRIPT_STYLE: &str = include_str!("../../assets/report.css");
+const REPORT_STYLE: &str = include_str!("../../assets/report.css");
 
 /// A page.
 #[derive(Debug, Clone)]
@@ -46,8 +46,8 @@ impl HtmlDocument<'_> {
                         content=(content_security_policy(self.data.is_some()));
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     title { (self.title) }
-                    style { (PreEscaped(STYLE)) }
-                    @if self.data.is_some() { style { (PreEscaped(SCRIPT_STYLE)) } }
+                    style { (PreEscaped(DOCUMENT_STYLE)) }
+                    @if self.data.is_some() { style { (PreEscaped(REPORT_STYLE)) } }
                 }
                 body {
                     main {
@@ -62,7 +62,7 @@ impl HtmlDocument<'_> {
                         // Only inside of strings can JSON have this letter, which could end the element.
                         @let data = data.to_string().replace('<', "\\u003c");
                         script type="application/json" id="data" { (PreEscaped(data)) }
-                        script { (PreEscaped(SCRIPT)) }
+                        script { (PreEscaped(REPORT_SCRIPT)) }
                     }
                 }
             }
@@ -82,11 +82,11 @@ pub fn content_security_policy(scripted: bool) -> String {
     let hash = |text: &str| format!("'sha256-{}'", STANDARD.encode(Sha256::digest(text)));
     let (style, script) = if scripted {
         (
-            format!("{} {}", hash(STYLE), hash(SCRIPT_STYLE)),
-            format!(" script-src {};", hash(SCRIPT)),
+            format!("{} {}", hash(DOCUMENT_STYLE), hash(REPORT_STYLE)),
+            format!(" script-src {};", hash(REPORT_SCRIPT)),
         )
     } else {
-        (hash(STYLE), String::new())
+        (hash(DOCUMENT_STYLE), String::new())
     };
     format!(
         "default-src 'none'; img-src data:; style-src {style};{script} base-uri 'none'; form-action 'none'"
@@ -99,7 +99,7 @@ pub enum Sign {
     /// All is well.
     Good,
     /// Somebody should look.
-    Doubt,
+    Flag,
     /// Something is wrong.
     Bad,
 }
@@ -108,11 +108,11 @@ pub enum Sign {
 pub fn verdict(sign: Sign, headline: &str, checks: &[(bool, String)]) -> Markup {
     let mark = match sign {
         Sign::Good => "✓",
-        Sign::Doubt => "!",
+        Sign::Flag => "!",
         Sign::Bad => "✗",
     };
     html! {
-        section.verdict.doubt[sign == Sign::Doubt].bad[sign == Sign::Bad] {
+        section.verdict.doubt[sign == Sign::Flag].bad[sign == Sign::Bad] {
             div.sign aria-hidden="true" { (mark) }
             div {
                 h2 { (headline) }

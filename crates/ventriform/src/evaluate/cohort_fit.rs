@@ -6,9 +6,9 @@
 use super::models::CohortModel;
 use super::rows::{Agreed, FitOutcome};
 use super::table::rounded;
-use crate::fit::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
+use crate::judge::Fit;
 use crate::locate::cup::Cup;
 use crate::locate::patient_orientation::PatientOrientation;
 use crate::mesh::TriMesh;
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 /// The result of one fit, or why there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CohortFit {
-    /// How it went.
+    /// Figures of the fit, or why there are none.
     pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`](super::rows::Gold::ALL).
     pub agreed: [Option<Agreed>; 2],

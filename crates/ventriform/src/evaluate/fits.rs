@@ -15,9 +15,9 @@ use super::rows::{FitOutcome, FitRow, Gold, ModelKind, Variant};
 use super::sample::Sample;
 use crate::deform::DeformParameters;
 use crate::export::{self, Format, Metadata};
-use crate::fit::Fit;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
+use crate::judge::Fit;
 use crate::progress::Monitor;
 use crate::segmentation::{OrganSearch, built_in, fit_built_in};
 use crate::volume::Volume;
@@ -42,7 +42,7 @@ pub struct PatientFits {
 
 /// Input that all fits of a run share.
 pub struct FitRun<'a> {
-    /// How the models are fitted.
+    /// Parameters of the fits.
     pub parameters: &'a DeformParameters,
     /// Whether the fit that `auto` keeps is a result too.
     pub auto: bool,

@@ -17,9 +17,9 @@ pub struct EvaluationParameters {
     pub reference_points: Vec<usize>,
     /// The variants of models to fit.
     pub variants: Vec<Variant>,
-    /// How our models are made: a value of the model parameter `method`.
+    /// The method that makes our models: a value of the model parameter `method`.
     pub method: String,
-    /// How the models are fitted.
+    /// Parameters of the fits.
     pub deform: DeformParameters,
     /// Cases that had a part in choosing the program's constants.
     pub in_sample: InSample,
@@ -37,7 +37,7 @@ pub enum InSample {
 }
 
 impl InSample {
-    /// How figures of that case are labelled.
+    /// The label of figures of that case.
     pub fn of(&self, case: &str) -> Sample {
         match self {
             InSample::Named(names) if !names.iter().any(|name| name == case) => Sample::HeldOut,

@@ -101,7 +101,7 @@ pub struct ModelKind {
     pub points: usize,
 }
 
-/// How a fit went.
+/// The outcome of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum FitOutcome {
     /// There is a fit; the reason why its motion ended.
@@ -156,7 +156,7 @@ pub struct FitRow {
     pub case: String,
     /// Whether the patient had a part in choosing the program's constants. It had none in the model.
     pub sample: Sample,
-    /// How it went.
+    /// Its outcome.
     pub outcome: FitOutcome,
     /// Agreement with [`Gold::ALL`]; `None` where there is no such gold standard or no fit.
     pub agreed: [Option<Agreed>; 2],

@@ -1,6 +1,6 @@
 //! Whether a figure was taken on cases that had a part in what is judged.
 
-/// How a case stands to what is judged on it.
+/// The relation of a case to what is judged on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
     /// It had a part in making or choosing it: the figure is optimistic.

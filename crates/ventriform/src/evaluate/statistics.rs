@@ -41,7 +41,7 @@ pub enum StatisticsError {
     /// Fewer than two fits.
     #[error("{count} fits were given; at least two are needed")]
     TooFew {
-        /// How many there were.
+        /// Their number.
         count: usize,
     },
     /// A fit has other nodes or triangles than the first one.

@@ -16,7 +16,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::{ExportError, FRAME, Metadata, UNIT, single};
+use super::{COORDINATE_FRAME, ExportError, LENGTH_UNIT, Metadata, single};
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 
@@ -108,8 +108,8 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
                 "material": 0,
             }],
             "extras": {
-                "frame": FRAME,
-                "unit": UNIT,
+                "frame": COORDINATE_FRAME,
+                "unit": LENGTH_UNIT,
                 "frame_of_reference_uid": metadata.frame_of_reference_uid,
             },
         }],

@@ -10,7 +10,7 @@
 //! | [`Format::Stl`] | single | the 80-byte header |
 //! | [`Format::Ply`] | double | comments |
 //! | [`Format::Obj`] | double, shortest decimal | comments |
-//! | [`Format::Vtp`] | double | field data `SPACE`, `UNIT` |
+//! | [`Format::Vtp`] | double | field data `SPACE`, `LENGTH_UNIT` |
 //! | [`Format::Vtk`] | double | the title line |
 //! | [`Format::Json`] | double, shortest decimal | `frame`, `unit` |
 //!
@@ -53,10 +53,10 @@ pub use crate::mesh::part::Part;
 use crate::mesh::TriMesh;
 
 /// The coordinate frame of all formats.
-pub const FRAME: &str = "LPS";
+pub const COORDINATE_FRAME: &str = "LPS";
 
 /// The unit of length of all formats.
-pub const UNIT: &str = "mm";
+pub const LENGTH_UNIT: &str = "mm";
 
 /// A file format for meshes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -198,8 +198,8 @@ impl Metadata {
     /// All metadata as one JSON object, with frame and unit first.
     fn to_object(&self) -> Map<String, Value> {
         let mut object = Map::new();
-        object.insert("frame".into(), FRAME.into());
-        object.insert("unit".into(), UNIT.into());
+        object.insert("frame".into(), COORDINATE_FRAME.into());
+        object.insert("unit".into(), LENGTH_UNIT.into());
         for (key, value) in self.identity() {
             object.insert(key.into(), value.into());
         }
@@ -245,7 +245,7 @@ impl Metadata {
 
     /// The metadata as comment lines, in ASCII without control characters.
     fn comments(&self) -> Vec<String> {
-        let mut lines = vec![format!("SPACE={FRAME} UNIT={UNIT}")];
+        let mut lines = vec![format!("SPACE={COORDINATE_FRAME} UNIT={LENGTH_UNIT}")];
         let identity = self.identity();
         lines.extend(identity.iter().map(|(k, v)| format!("{k}: {v}")));
         lines.extend(self.quality.iter().map(|(k, v)| format!("{k}: {v}")));

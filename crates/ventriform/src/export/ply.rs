@@ -1,6 +1,6 @@
 //! Binary little-endian PLY with positions and normals in double precision.
 
-use super::{ExportError, Format, Metadata, UNIT};
+use super::{ExportError, Format, LENGTH_UNIT, Metadata};
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 
@@ -43,7 +43,7 @@ fn header(mesh: &TriMesh, metadata: &Metadata) -> String {
     ];
     lines.extend(metadata.comments().iter().map(|c| format!("comment {c}")));
     lines.push(format!(
-        "comment coordinates are {UNIT}, x to the left, y to posterior, z to superior"
+        "comment coordinates are {LENGTH_UNIT}, x to the left, y to posterior, z to superior"
     ));
     if metadata.parts_of(mesh).is_some() {
         let names = Part::ALL.map(|part| format!("{} {}", part.number(), part.as_str()));

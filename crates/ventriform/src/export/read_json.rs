@@ -64,8 +64,8 @@ pub fn decode(bytes: &[u8]) -> Result<TriMesh, ReadMeshError> {
     }
     let document: ReadMesh =
         serde_json::from_slice(bytes).map_err(|e| ReadMeshError::Json(e.to_string()))?;
-    demand("frame", document.frame, super::FRAME)?;
-    demand("unit", document.unit, super::UNIT)?;
+    demand("frame", document.frame, super::COORDINATE_FRAME)?;
+    demand("unit", document.unit, super::LENGTH_UNIT)?;
     let count = document.vertices.len() as u32;
     let stray = |t: &[u32; 3]| t.iter().any(|v| *v >= count);
     if let Some(triangle) = document.triangles.iter().position(stray) {

@@ -6,7 +6,7 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use super::{FRAME, Metadata, UNIT};
+use super::{COORDINATE_FRAME, LENGTH_UNIT, Metadata};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
@@ -71,8 +71,8 @@ fn scalars(name: &str, values: &[f64]) -> String {
 
 fn fields(mesh: &TriMesh, metadata: &Metadata) -> String {
     let mut fields = vec![
-        ("SPACE".to_owned(), FRAME.to_owned()),
-        ("UNIT".to_owned(), UNIT.to_owned()),
+        ("SPACE".to_owned(), COORDINATE_FRAME.to_owned()),
+        ("UNIT".to_owned(), LENGTH_UNIT.to_owned()),
     ];
     for (key, value) in metadata.identity() {
         fields.push((key.to_owned(), value.to_owned()));

@@ -48,7 +48,7 @@ impl GatedHeart {
         for (name, gate) in ends.into_iter().chain(gates) {
             for format in formats {
                 monitor.check()?;
-                let metadata = Metadata::new(&format!("Left ventricle, gate {}", gate + 1));
+                let metadata = Metadata::new(format!("Left ventricle, gate {}", gate + 1));
                 files.push(NamedFile {
                     name: format!("{name}.{}", format.extension()),
                     media_type: format.media_type(),

@@ -17,7 +17,7 @@ use crate::grid::voxelise::Mask;
 use crate::numeric::order::quantile;
 use crate::progress::{Cancelled, Monitor};
 
-/// How two masks agree. A is the first, B the reference.
+/// Figures of two masks' agreement. A is the first, B the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
     /// E_J, 0..=1.

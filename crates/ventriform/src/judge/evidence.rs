@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 use super::motion::Views;
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall, WallRay};
 use crate::numeric::order;
 
 /// Rows between the apical cap and the rim, where hearts are round.
@@ -31,7 +31,7 @@ pub struct Evidence {
     pub residual: f64,
     /// Root mean square of the strain.
     pub strain: f64,
-    /// How much darker the cavity is than the wall, 0..=1.
+    /// Share of the wall's brightness that the cavity lacks, 0..=1.
     pub hollowness: f64,
     /// Volume of the cavity, ml.
     pub cavity_ml: f64,
@@ -40,13 +40,13 @@ pub struct Evidence {
     /// Standard deviation of the distance from the axis to the middle of the wall, between the
     /// apical cap and the rim, as a share of its mean.
     pub unroundness: f64,
-    /// How far the middle of the wall lies off the axis there, as a share of that mean.
+    /// Distance of the middle of the wall from the axis there, as a share of that mean.
     pub offset: f64,
     /// Length from rim to apex over the outer radius.
     pub slenderness: f64,
     /// Distance of the septum from the axis over that of the free wall.
     pub septal_bulge: f64,
-    /// How far the septum lies outside the circles through the free wall, as a share of their radius.
+    /// Distance of the septum outside the circles through the free wall, as a share of their radius.
     /// It does not depend on the axis, which moves towards a septum that is fitted too far out.
     pub septal_overshoot: f64,
     /// Share of the wall that takes up less than half as much as the bright wall does, 0..=1.
@@ -79,16 +79,16 @@ impl Evidence {
         views: Option<Views>,
     ) -> Option<Self> {
         let uptake = WallUptake::of(wall, image)?;
-        let middle: Vec<f64> = (0..COLUMNS)
+        let middle: Vec<f64> = (0..RAY_COLUMNS)
             .map(|column| mean(&middles(wall, column..column + 1)))
             .collect::<Option<_>>()?;
-        let radii = middles(wall, 0..COLUMNS);
+        let radii = middles(wall, 0..RAY_COLUMNS);
         let radius = mean(&radii)?;
         let squares: f64 = radii.iter().map(|r| (r - radius).powi(2)).sum();
-        let outer: Vec<f64> = of_body(wall, 0..COLUMNS)
+        let outer: Vec<f64> = of_body(wall, 0..RAY_COLUMNS)
             .map(|[_, leaves]| leaves)
             .collect();
-        let free: Vec<f64> = [0..FREE_WALL_COLUMNS[0], FREE_WALL_COLUMNS[1]..COLUMNS]
+        let free: Vec<f64> = [0..FREE_WALL_COLUMNS[0], FREE_WALL_COLUMNS[1]..RAY_COLUMNS]
             .into_iter()
             .flat_map(|columns| middles(wall, columns))
             .collect();
@@ -170,17 +170,17 @@ fn septal_overshoot(wall: &VentricleWall) -> f64 {
     let of_row = |row: usize| {
         let places = |columns: Range<usize>| {
             columns.filter_map(move |column| {
-                let [enters, leaves] = wall.rays[row * COLUMNS + column].wall?;
-                let (sin, cos) = (TAU * (column as f64 + 0.5) / COLUMNS as f64).sin_cos();
+                let [enters, leaves] = wall.rays[row * RAY_COLUMNS + column].wall?;
+                let (sin, cos) = (TAU * (column as f64 + 0.5) / RAY_COLUMNS as f64).sin_cos();
                 let middle = f64::midpoint(enters, leaves);
                 Some([middle * cos, middle * sin])
             })
         };
         let free: Vec<[f64; 2]> = places(0..FREE_WALL_COLUMNS[0])
-            .chain(places(FREE_WALL_COLUMNS[1]..COLUMNS))
+            .chain(places(FREE_WALL_COLUMNS[1]..RAY_COLUMNS))
             .collect();
         let septum: Vec<[f64; 2]> = places(SEPTAL_COLUMNS).collect();
-        if 3 * free.len() < COLUMNS || 2 * septum.len() < SEPTAL_COLUMNS.len() {
+        if 3 * free.len() < RAY_COLUMNS || 2 * septum.len() < SEPTAL_COLUMNS.len() {
             return None;
         }
         let ([x, y], radius) = circle(&free)?;
@@ -206,8 +206,8 @@ fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
 
 /// Distances at which the rays of these columns, between the apical cap and the rim, enter and leave the wall.
 fn of_body(wall: &VentricleWall, columns: Range<usize>) -> impl Iterator<Item = [f64; 2]> {
-    const { assert!(BODY_ROWS.end <= ROWS) };
-    let rows = BODY_ROWS.flat_map(move |row| columns.clone().map(move |c| row * COLUMNS + c));
+    const { assert!(BODY_ROWS.end <= RAY_ROWS) };
+    let rows = BODY_ROWS.flat_map(move |row| columns.clone().map(move |c| row * RAY_COLUMNS + c));
     rows.filter_map(|index| wall.rays[index].wall)
 }
 
@@ -337,8 +337,8 @@ mod tests {
         );
 
         let round = wall(&cup());
-        let septal = round.rays[20 * COLUMNS + 30].direction;
-        let lateral = round.rays[20 * COLUMNS].direction;
+        let septal = round.rays[20 * RAY_COLUMNS + 30].direction;
+        let lateral = round.rays[20 * RAY_COLUMNS].direction;
         let mut bulged = cup();
         for p in &mut bulged.vertices {
             let across = Vec3::new(p.x, p.y, 0.0);
@@ -349,7 +349,7 @@ mod tests {
         // A third of a turn of the free wall and half of the septum have to show.
         let seen = |free: usize, septum: usize| {
             let mut part = wall(&bulged);
-            let free = (FREE_WALL_COLUMNS[1]..COLUMNS)
+            let free = (FREE_WALL_COLUMNS[1]..RAY_COLUMNS)
                 .chain(0..FREE_WALL_COLUMNS[0])
                 .skip(free);
             for row in BODY_ROWS {
@@ -357,7 +357,7 @@ mod tests {
                     .clone()
                     .chain(SEPTAL_COLUMNS.start + septum..SEPTAL_COLUMNS.end)
                 {
-                    part.rays[row * COLUMNS + column].wall = None;
+                    part.rays[row * RAY_COLUMNS + column].wall = None;
                 }
             }
             septal_overshoot(&part)

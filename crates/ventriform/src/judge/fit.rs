@@ -8,7 +8,7 @@ use crate::deform::{FittedModel, WallEdge};
 pub struct Fit {
     /// The model in the patient.
     pub model: FittedModel,
-    /// How likely it is right, and why.
+    /// Its confidence, with the reasons.
     pub judgement: Judgement,
 }
 

@@ -23,11 +23,13 @@ mod flag_rules;
 pub mod flags;
 pub mod logistic;
 pub mod motion;
+mod node_terms;
 pub mod refusal;
 pub mod septum;
 #[cfg(test)]
 mod test_fits;
 pub mod uncertainty;
+mod uncertainty_calibration;
 
 pub use evidence::Evidence;
 pub use fit::Fit;

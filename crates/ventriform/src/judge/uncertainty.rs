@@ -8,18 +8,20 @@
 //! the fits of the other built-in hearts, the logarithm of the odds of a good fit, and the way from
 //! apex to rim. The coefficients are a quantile regression: 68 % of the nodes are to lie nearer to the wall
 //! (the apparent one to an expert's mask, the anatomical one to the true wall). They come from 23250 nodes
-//! of 155 simulated hearts of the seeds that [`confidence`] is calibrated on. There 70 %
+//! (`scripts/calibrate_walls.py` estimates them again) of 155 simulated hearts of the seeds that [`confidence`] is calibrated on. There 70 %
 //! lie within one standard deviation and 93 and 91 % within two (each heart left out with a fifth of
 //! all), about as many where the result is small as where it is great. docs/evaluation.md has the figures of held-out hearts.
 //!
 //! Not guaranteed: a heart in the wrong place. Its nodes are as near to each other's fits as those of a right one.
 
 use super::confidence;
+use super::node_terms::NodeTerms;
+use super::uncertainty_calibration::{ANATOMICAL_TERMS, APPARENT_TERMS, MEDIAN_SPREAD_MM};
 use crate::deform::sensors::{PER_TRIANGLE, SensorReading};
 use crate::deform::{FittedModel, WallEdge};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
-use crate::model::wall::{ROWS, VentricleWall};
+use crate::model::wall::{RAY_ROWS, VentricleWall};
 
 /// Figures of a node behind its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -84,21 +86,12 @@ pub(super) fn node_evidence(
     }
     let of = |(p, [seen, share]): (&Vec3, [f64; 2])| NodeEvidence {
         seen: if share > 0.0 { seen / share } else { 0.0 },
-        way: ((wall.place(p).row + 0.5) / ROWS as f64).clamp(0.0, 1.0),
+        way: ((wall.position(p).row + 0.5) / RAY_ROWS as f64).clamp(0.0, 1.0),
         spread: None,
     };
     mesh.vertices.iter().zip(sums).map(of).collect()
 }
 
-/// Coefficients: 1, edge, ln(distance from other fits / mm + 0.3), ln(odds), way from apex to rim less
-/// a half, and that squared.
-type UncertaintyTerms = [f64; 6];
-
-const APPARENT_TERMS: UncertaintyTerms = [1.515, -1.017, 0.482, -0.112, -0.046, 1.002];
-const ANATOMICAL_TERMS: UncertaintyTerms = [1.448, -1.190, 0.641, -0.124, 0.151, 1.292];
-
-/// The distance that stands for that from other fits where there are none: its median, mm.
-const MEDIAN_SPREAD_MM: f64 = 0.8;
 /// Least and greatest result, mm.
 const UNCERTAINTY_RANGE_MM: [f64; 2] = [0.5, 15.0];
 
@@ -113,10 +106,15 @@ pub fn of_nodes(nodes: &[NodeEvidence], chance: f64, edge: WallEdge) -> Vec<f64>
     let of = |node: &NodeEvidence| {
         let way = node.way.clamp(0.0, 1.0) - 0.5;
         let spread = node.spread.unwrap_or(MEDIAN_SPREAD_MM);
-        let values = [1.0, node.seen, (spread + 0.3).ln(), odds, way, way * way];
-        let sum: f64 = terms.iter().zip(values).map(|(c, x)| c * x).sum();
-        sum.exp()
-            .clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
+        let values = NodeTerms {
+            constant: 1.0,
+            seen: node.seen,
+            ln_spread: (spread + 0.3).ln(),
+            log_odds: odds,
+            way,
+            way_squared: way * way,
+        };
+        (terms.of(&values).exp()).clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
     };
     nodes.iter().map(of).collect()
 }

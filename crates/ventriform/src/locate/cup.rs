@@ -241,7 +241,7 @@ impl Cup {
         }
     }
 
-    /// How bright it is across the base, wall = 1: the brightest of the discs about the axis
+    /// The brightness across the base, wall = 1: the brightest of the discs about the axis
     /// from 0.3 of the length behind the base plane to 0.2 before it. A ventricle is open
     /// there (blood, atrium, lung); a stomach, a skull or a ball is closed there.
     pub fn lid(&self, field: &Field, wall: f64) -> f64 {
@@ -286,7 +286,7 @@ pub struct Match {
     pub correlation: f64,
     /// Mean value along the middle of the wall.
     pub wall: f64,
-    /// How much darker the cavity is than the wall: 0 for a solid body, 1 for an empty one.
+    /// Share of the wall's brightness that the cavity lacks: 0 for a solid body, 1 for an empty one.
     pub hollowness: f64,
 }
 

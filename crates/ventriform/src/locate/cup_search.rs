@@ -83,7 +83,7 @@ pub struct ScoredCup {
     pub correlation: f64,
     /// Mean value of the wall's middle.
     pub wall: f64,
-    /// How much darker the cavity is than the wall, 0..=1.
+    /// Share of the wall's brightness that the cavity lacks, 0..=1.
     pub hollowness: f64,
     /// Whether it is the wall that an infarct leaves: then `wall` and `hollowness` are those of what is left, and
     /// [`CHANCE_CORRELATION`] is taken off score and correlation.
@@ -164,7 +164,7 @@ impl<'a> CupSearch<'a> {
         self.climb(&starts[0])
     }
 
-    /// How well `cup` agrees with the picture.
+    /// `cup` with its agreement with the picture.
     pub fn score(&self, cup: Cup) -> ScoredCup {
         let mut scratch = Vec::with_capacity(160);
         let found = cup.match_score(&self.pattern, self.field, &mut scratch);

@@ -27,7 +27,7 @@ pub struct Localisation {
     pub correlation: f64,
     /// Mean value of the wall's middle in the image's unit.
     pub wall: f64,
-    /// How much darker the cavity is than the wall, or than what an infarct left of it, 0..=1.
+    /// Share of the brightness of the wall, or of what an infarct left of it, that the cavity lacks, 0..=1.
     pub hollowness: f64,
     /// Uptake of the apical wall against the basal one, if the apical wall does not show (less than
     /// 0.42): place and length then come from the base.

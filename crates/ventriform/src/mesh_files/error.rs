@@ -62,7 +62,7 @@ pub enum MeshFileError {
         "the surface is open: {edges} edges belong to one triangle only, the first from {from} to {to}"
     )]
     Open {
-        /// How many.
+        /// Their number.
         edges: usize,
         /// One end of the first, as the file states it.
         from: String,
@@ -75,7 +75,7 @@ pub enum MeshFileError {
          first from {from} to {to}"
     )]
     Orientation {
-        /// How many.
+        /// Their number.
         edges: usize,
         /// One end of the first, as the file states it.
         from: String,

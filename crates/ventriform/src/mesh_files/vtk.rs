@@ -13,7 +13,7 @@ use crate::geometry::Vec3;
 
 const FORMAT: MeshFormat = MeshFormat::Vtk;
 
-/// How cells are listed.
+/// The layout of a list of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cells {
     Polygons,

@@ -1,4 +1,4 @@
-//! How a template is placed in a patient as a whole.
+//! The pose of a template in a patient.
 //!
 //! A ventricle's pose takes one cup to another, in this order: the patient's own tilt in the
 //! frame, the least turn from axis to axis, a roll about the axis; then lengths along the axis are

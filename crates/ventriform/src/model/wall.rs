@@ -1,7 +1,7 @@
 //! A ventricle's wall seen from its long axis: where rays from the cavity enter and leave it.
 //!
-//! In go a closed mesh, its cup and the patient's superior direction; out come [`ROWS`] ×
-//! [`COLUMNS`] rays with their distances to the wall, and thickness, extent and cavity volume.
+//! In go a closed mesh, its cup and the patient's superior direction; out come [`RAY_ROWS`] ×
+//! [`RAY_COLUMNS`] rays with their distances to the wall, and thickness, extent and cavity volume.
 //!
 //! Near the apex the rays start at one point (the focus) and fan out over a half sphere;
 //! basal of it they start on the axis and run across it. Rows follow each other at equal
@@ -22,9 +22,9 @@ use crate::progress::{Cancelled, Monitor};
 use nalgebra::{Matrix3, Rotation3};
 
 /// Rows of rays, apex to base.
-pub const ROWS: usize = 32;
+pub const RAY_ROWS: usize = 32;
 /// Rays in a row.
-pub const COLUMNS: usize = 60;
+pub const RAY_COLUMNS: usize = 60;
 
 /// A ray from the long axis and where it meets the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,10 +39,10 @@ pub struct WallRay {
 
 /// A point in the coordinates of the rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WallPlace {
+pub struct WallPosition {
     /// Row, apex first: the rays of row `n` lie at `n`. Beyond the last row basal of the rim.
     pub row: f64,
-    /// Column, 0..[`COLUMNS`]: the rays of column `n` lie at `n`.
+    /// Column, 0..[`RAY_COLUMNS`]: the rays of column `n` lie at `n`.
     pub column: f64,
     /// Distance from the start of the ray through the point, mm.
     pub distance: f64,
@@ -71,7 +71,7 @@ pub struct RayCoordinates {
     pub rim_arc: f64,
 }
 
-/// The wall as [`ROWS`] × [`COLUMNS`] rays, row by row, apex first.
+/// The wall as [`RAY_ROWS`] × [`RAY_COLUMNS`] rays, row by row, apex first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VentricleWall {
     /// The rays.
@@ -111,7 +111,7 @@ pub fn turn_between(from: &Vec3, to: &Vec3, superior: &Vec3) -> Rotation3<f64> {
     Rotation3::from_matrix_unchecked(turn)
 }
 
-/// The place of `cup` after its model has moved from `before` to `after`, by the similarity that
+/// The position of `cup` after its model has moved from `before` to `after`, by the similarity that
 /// maps the nodes best in the sense of least squares. The breadth stays.
 pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
     let n = before.vertices.len() as f64;
@@ -148,21 +148,21 @@ impl VentricleWall {
         let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         let ray = |index: usize| {
             monitor.check()?;
-            let (start, direction) = frame.ray(index / COLUMNS, index % COLUMNS);
+            let (start, direction) = frame.ray(index / RAY_COLUMNS, index % RAY_COLUMNS);
             Ok(WallRay {
                 start,
                 direction,
                 wall: crossing(mesh, &tree, &start, &direction),
             })
         };
-        let rays = (0..ROWS * COLUMNS)
+        let rays = (0..RAY_ROWS * RAY_COLUMNS)
             .map(ray)
             .collect::<Result<Vec<_>, _>>()?;
         let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
         let rays_met = met.len().max(1) as f64;
         let thickness = met.iter().map(|w| w[1] - w[0]).sum::<f64>() / rays_met;
         let squares: f64 = met.iter().map(|w| (w[1] - w[0] - thickness).powi(2)).sum();
-        let basal = &rays[ROWS / 2 * COLUMNS..];
+        let basal = &rays[RAY_ROWS / 2 * RAY_COLUMNS..];
         Ok(Self {
             cavity_ml: frame.cavity(&rays) / 1000.0,
             thickness,
@@ -188,7 +188,7 @@ impl VentricleWall {
         }
     }
 
-    /// How far `point` lies from the cup's centre along the axis towards the apex, mm.
+    /// The distance of `point` from the cup's centre along the axis, positive towards the apex, mm.
     pub fn along_axis(&self, point: &Vec3) -> f64 {
         (point - self.frame.centre).dot(&self.frame.axis)
     }
@@ -196,7 +196,7 @@ impl VentricleWall {
     /// Where the cavity ends at the apex, mm from the cup's centre: the mean over the rays of the
     /// apical row that enter the wall.
     pub fn cavity_end(&self) -> f64 {
-        let ends: Vec<f64> = self.rays[..COLUMNS]
+        let ends: Vec<f64> = self.rays[..RAY_COLUMNS]
             .iter()
             .filter_map(|ray| Some(self.along_axis(&(ray.start + ray.direction * ray.wall?[0]))))
             .collect();
@@ -241,17 +241,17 @@ impl VentricleWall {
         if self.along_axis(point) < self.frame.rim {
             return false;
         }
-        let place = self.place(point);
-        let row = place.row.clamp(0.0, (ROWS - 1) as f64);
+        let position = self.position(point);
+        let row = position.row.clamp(0.0, (RAY_ROWS - 1) as f64);
         let rows = [row.floor() as usize, row.ceil() as usize];
-        let column = place.column.floor() as usize % COLUMNS;
-        let columns = [column, (column + 1) % COLUMNS];
+        let column = position.column.floor() as usize % RAY_COLUMNS;
+        let columns = [column, (column + 1) % RAY_COLUMNS];
         let between = |pair: [f64; 2], share: f64| pair[0] + (pair[1] - pair[0]) * share;
         let across = |row: usize| {
-            let pair = columns.map(|column| inner[row * COLUMNS + column]);
-            between(pair, place.column.fract())
+            let pair = columns.map(|column| inner[row * RAY_COLUMNS + column]);
+            between(pair, position.column.fract())
         };
-        place.distance < between(rows.map(across), row.fract())
+        position.distance < between(rows.map(across), row.fract())
     }
 
     /// The voxels of a grid between which the inner surface lies: least and greatest indices; `None` if
@@ -279,8 +279,8 @@ impl VentricleWall {
     }
 
     /// `point` in the coordinates of the rays. A point on the axis gets column 0.
-    pub fn place(&self, point: &Vec3) -> WallPlace {
-        self.frame.place(point)
+    pub fn position(&self, point: &Vec3) -> WallPosition {
+        self.frame.position(point)
     }
 }
 
@@ -333,12 +333,12 @@ impl AxisFrame {
     }
 
     fn row_spacing(&self) -> f64 {
-        (self.arc() + self.focus - self.rim) / ROWS as f64
+        (self.arc() + self.focus - self.rim) / RAY_ROWS as f64
     }
 
     /// Start and direction of the ray in the middle of its row and column.
     fn ray(&self, row: usize, column: usize) -> (Vec3, Vec3) {
-        let (sin, cos) = (TAU * (column as f64 + 0.5) / COLUMNS as f64).sin_cos();
+        let (sin, cos) = (TAU * (column as f64 + 0.5) / RAY_COLUMNS as f64).sin_cos();
         let across = self.lateral * cos + self.anterior * sin;
         let from_apex = (row as f64 + 0.5) * self.row_spacing();
         let at = |along: f64| self.centre + self.axis * along;
@@ -351,7 +351,7 @@ impl AxisFrame {
     }
 
     /// The inverse of [`AxisFrame::ray`].
-    fn place(&self, point: &Vec3) -> WallPlace {
+    fn position(&self, point: &Vec3) -> WallPosition {
         let from_centre = point - self.centre;
         let along = from_centre.dot(&self.axis);
         let (x, y) = (
@@ -368,10 +368,11 @@ impl AxisFrame {
         };
         let outward = point - (self.centre + self.axis * start);
         let distance = outward.norm();
-        WallPlace {
+        WallPosition {
             row: from_apex / self.row_spacing() - 0.5,
-            // Rounding may give COLUMNS itself.
-            column: (turn * COLUMNS as f64 - 0.5).rem_euclid(COLUMNS as f64) % COLUMNS as f64,
+            // Rounding may give RAY_COLUMNS itself.
+            column: (turn * RAY_COLUMNS as f64 - 0.5).rem_euclid(RAY_COLUMNS as f64)
+                % RAY_COLUMNS as f64,
             distance,
             direction: outward.try_normalize(1e-9).unwrap_or(self.axis),
         }
@@ -382,10 +383,10 @@ impl AxisFrame {
         let mut volume = 0.0;
         let step = self.row_spacing();
         for (index, r) in inner_radii(rays).into_iter().enumerate() {
-            let row = index / COLUMNS;
+            let row = index / RAY_COLUMNS;
             let near = row as f64 * step;
             let far = near + step;
-            let turn = TAU / COLUMNS as f64;
+            let turn = TAU / RAY_COLUMNS as f64;
             let angle = |arc: f64| arc.min(self.arc()) / (self.apex - self.focus).max(1e-9);
             // The part of the row over the half sphere, then the part along the cylinder.
             volume += r.powi(3) / 3.0 * turn * (angle(near).cos() - angle(far).cos());
@@ -399,9 +400,9 @@ impl AxisFrame {
 /// The distance at which each ray enters the wall, mm. Where a ray misses the wall (a low rim), that of the
 /// nearest ray of its column towards the apex.
 fn inner_radii(rays: &[WallRay]) -> Vec<f64> {
-    let mut last = [0.0; COLUMNS];
+    let mut last = [0.0; RAY_COLUMNS];
     let radius = |(index, ray): (usize, &WallRay)| {
-        let inner: &mut f64 = &mut last[index % COLUMNS];
+        let inner: &mut f64 = &mut last[index % RAY_COLUMNS];
         if let Some([enters, _]) = ray.wall {
             *inner = enters;
         }
@@ -411,7 +412,7 @@ fn inner_radii(rays: &[WallRay]) -> Vec<f64> {
 }
 
 /// Where a ray first enters the wall and then leaves it.
-fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
+pub fn crossing(mesh: &TriMesh, tree: &Bvh, start: &Vec3, direction: &Vec3) -> Option<[f64; 2]> {
     let mut hits: Vec<(f64, bool)> = Vec::new();
     tree.for_each_along(start, direction, |t| {
         let [a, b, c] = mesh.corners(t as usize);
@@ -461,18 +462,22 @@ mod tests {
         };
         let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
         for (index, ray) in wall.rays.iter().enumerate() {
-            let place = wall.place(&(ray.start + ray.direction * 17.0));
-            let expected = [(index / COLUMNS) as f64, (index % COLUMNS) as f64, 17.0];
-            let found = [place.row, place.column, place.distance];
+            let position = wall.position(&(ray.start + ray.direction * 17.0));
+            let expected = [
+                (index / RAY_COLUMNS) as f64,
+                (index % RAY_COLUMNS) as f64,
+                17.0,
+            ];
+            let found = [position.row, position.column, position.distance];
             for (found, expected) in found.iter().zip(expected) {
                 let off = (found - expected).abs();
                 // Columns are periodic.
                 assert!(
-                    off.min((off - COLUMNS as f64).abs()) < 1e-6,
+                    off.min((off - RAY_COLUMNS as f64).abs()) < 1e-6,
                     "{index}: {found} {expected}"
                 );
             }
-            assert!((place.direction - ray.direction).norm() < 1e-9);
+            assert!((position.direction - ray.direction).norm() < 1e-9);
         }
     }
 

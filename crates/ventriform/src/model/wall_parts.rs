@@ -1,7 +1,7 @@
 //! Which triangles of a ventricle's closed surface are endocardium, which epicardium, which base.
 //!
 //! 1. Each triangle gets a side: it faces the long axis (inner) or away from it (outer), by its normal and the
-//!    direction of the ray through its centre ([`VentricleWall::place`]), which near the apex fans out.
+//!    direction of the ray through its centre ([`VentricleWall::position`]), which near the apex fans out.
 //!    Of each side the largest connected part counts; patches beside it get the side about them.
 //! 2. Base are, near the rim, the triangles that face away from the apex more than to either side.
 //! 3. Where inner and outer still share an edge, the triangle that faces away from the apex more is base,
@@ -16,11 +16,11 @@ use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 use crate::progress::{Cancelled, Monitor};
 
-/// How far from the rim the base may reach, as a share of the length from rim to apex. Valve planes
+/// Greatest distance of the base from the rim, as a share of the length from rim to apex. Valve planes
 /// are slanted, and the rim is their mean.
 const MAX_BASE_SHARE: f64 = 0.3;
 
-/// How often patches beside the largest part of a side are given to the other side, until none is left.
+/// Most rounds in which patches beside the largest part of a side are given to the other side.
 const MAX_REASSIGNMENTS: usize = 8;
 
 /// The part of each triangle of `mesh`, a ventricle's wall with this `cup` (LPS mm); `None` if the mesh has
@@ -46,7 +46,7 @@ pub fn wall_parts(
             let normal = normal / area.max(f64::MIN_POSITIVE);
             Facing {
                 area,
-                outward: normal.dot(&wall.place(&centre).direction),
+                outward: normal.dot(&wall.position(&centre).direction),
                 away: -normal.dot(&cup.axis),
                 basal: wall.along_axis(&centre) < basal_end,
             }

@@ -40,7 +40,7 @@ pub struct LeastSquaresParameters {
     /// Additional weight of misshapen triangles: a triangle's weight is
     /// 1 + this · (R/(2r) - 1). 0..=100, default 3.
     pub worst_weight: f64,
-    /// How freely triangles choose their size, 0..=1: 0 pulls all towards one size (times the
+    /// Freedom of triangles to choose their size, 0..=1: 0 pulls all towards one size (times the
     /// wanted relative spacing), 1 lets each keep its own. Default 1.
     pub free_size: f64,
     /// Additional weight of distant samples: a sample's weight is 1 + this · r²/mean r².

@@ -27,7 +27,7 @@ pub struct FitParameters {
     /// The organ that the model shows.
     pub organ: Organ,
     /// Known position of the organ.
-    pub place: KnownPlace,
+    pub position: KnownPosition,
     /// Parameters of the deformation. [`FitParameters::on`] sets its hints.
     pub deform: DeformParameters,
     /// Parameters of the polar map.
@@ -51,12 +51,12 @@ impl Default for FitParameters {
     fn default() -> Self {
         Self {
             frame: None,
-            model: FitParameters::AUTO.into(),
+            model: FitParameters::AUTO_MODEL.into(),
             expert: None,
             mask: MaskChoice::default(),
             reader: None,
             organ: Organ::LeftVentricle,
-            place: KnownPlace::default(),
+            position: KnownPosition::default(),
             deform: DeformParameters::default(),
             polar: PolarParameters::default(),
             mask_grid: MaskGrid::default(),
@@ -66,7 +66,7 @@ impl Default for FitParameters {
 
 /// The user's hints about the organ's position.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct KnownPlace {
+pub struct KnownPosition {
     /// A point in the cavity (or in the organ), LPS mm.
     pub centre: Option<Vec3>,
     /// A voxel in the cavity (or in the organ).
@@ -79,21 +79,21 @@ pub struct KnownPlace {
 
 impl FitParameters {
     /// The value of [`FitParameters::model`] that selects the best of the available models.
-    pub const AUTO: &str = "auto";
-    /// Most models that [`FitParameters::model`] names after [`FitParameters::AUTO`].
+    pub const AUTO_MODEL: &str = "auto";
+    /// Most models that [`FitParameters::model`] names after [`FitParameters::AUTO_MODEL`].
     pub const MOST_NAMED: usize = 8;
 
     /// Whether the built-in hearts and the library are fitted, beside the models that are named.
     pub fn is_auto(&self) -> bool {
-        self.model.split(',').next() == Some(Self::AUTO)
+        self.model.split(',').next() == Some(Self::AUTO_MODEL)
     }
 
     /// The fields under which the models that `model` names are looked up, with their ids: `model`,
-    /// and after [`FitParameters::AUTO`] `model[0]`, `model[1]`, ...
+    /// and after [`FitParameters::AUTO_MODEL`] `model[0]`, `model[1]`, ...
     pub fn named_models(model: &str) -> Vec<(String, String)> {
         let mut parts = model.split(',');
         match parts.next() {
-            Some(Self::AUTO) => parts
+            Some(Self::AUTO_MODEL) => parts
                 .enumerate()
                 .map(|(n, id)| (format!("model[{n}]"), id.to_owned()))
                 .collect(),
@@ -106,7 +106,7 @@ impl FitParameters {
     /// # Errors
     /// A [`ParameterError`] if both a point and a voxel state the organ's position.
     pub(super) fn settle(parameters: Self) -> Result<Self, ParameterError> {
-        if parameters.place.centre.is_some() && parameters.place.seed_point.is_some() {
+        if parameters.position.centre.is_some() && parameters.position.seed_point.is_some() {
             return Err(ParameterError {
                 field: "seed_point".into(),
                 message: "`center` and `seed_point` both state the organ's position".into(),
@@ -122,15 +122,15 @@ impl FitParameters {
     /// A [`ParameterError`] for a hint outside the volume.
     pub fn on(&self, volume: &Volume) -> Result<DeformParameters, ParameterError> {
         Ok(DeformParameters {
-            hints: self.place.hints(volume)?,
+            hints: self.position.hints(volume)?,
             ..self.deform.clone()
         })
     }
 }
 
-impl KnownPlace {
+impl KnownPosition {
     fn hints(&self, volume: &Volume) -> Result<Hints, ParameterError> {
-        let place = |voxel: [usize; 3]| {
+        let position = |voxel: [usize; 3]| {
             let index = Vec3::from(voxel.map(|x| x as f64));
             volume.frame.to_patient(&index)
         };
@@ -148,11 +148,11 @@ impl KnownPlace {
             return Err(outside("box", volume));
         }
         let corners = self.region.map(|ends| {
-            let corner = |c: usize| place([0, 1, 2].map(|a| ends[c >> a & 1][a]));
+            let corner = |c: usize| position([0, 1, 2].map(|a| ends[c >> a & 1][a]));
             Aabb::of(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
         });
         Ok(Hints {
-            centre: self.centre.or(self.seed_point.map(place)),
+            centre: self.centre.or(self.seed_point.map(position)),
             axis: self.axis,
             region: corners,
         })

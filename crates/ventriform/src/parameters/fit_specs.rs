@@ -31,10 +31,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         name: "model",
         kind: Kind::Stored {
             prefixes: &["mdl_", "tpl_", "seg_"],
-            word: FitParameters::AUTO,
+            word: FitParameters::AUTO_MODEL,
             more: FitParameters::MOST_NAMED,
         },
-        default: FitParameters::AUTO,
+        default: FitParameters::AUTO_MODEL,
         summary: "Id of the model to fit (a template, a model or an earlier segmentation), or auto: \
                   fits the built-in hearts, the templates flagged `library` and the models named after \
                   it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative \
@@ -174,10 +174,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
                   it and does not question it. Default: the organ is searched for in the whole \
                   volume",
         read: |d, v| {
-            d.place.centre = Some(point(v.numbers()));
+            d.position.centre = Some(point(v.numbers()));
             Ok(())
         },
-        write: |p| json!(p.place.centre.map(|c| [c.x, c.y, c.z])),
+        write: |p| json!(p.position.centre.map(|c| [c.x, c.y, c.z])),
     },
     ParameterSpec {
         name: "seed_point",
@@ -186,10 +186,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "Voxel i,j,k (counted from 0) in the cavity; use this or center",
         read: |d, v| {
             let list = v.indices()?;
-            d.place.seed_point = Some([list[0], list[1], list[2]]);
+            d.position.seed_point = Some([list[0], list[1], list[2]]);
             Ok(())
         },
-        write: |p| json!(p.place.seed_point),
+        write: |p| json!(p.position.seed_point),
     },
     ParameterSpec {
         name: "axis",
@@ -198,10 +198,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "Direction from base to apex, x,y,z in LPS, of any length: the search stays within \
                   35 degrees of it",
         read: |d, v| {
-            d.place.axis = Some(direction(v.numbers())?);
+            d.position.axis = Some(direction(v.numbers())?);
             Ok(())
         },
-        write: |p| json!(p.place.axis.map(|a| [a.x, a.y, a.z])),
+        write: |p| json!(p.position.axis.map(|a| [a.x, a.y, a.z])),
     },
     ParameterSpec {
         name: "box",
@@ -210,10 +210,10 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         summary: "Box of voxels that contains the centre of the organ: i0,j0,k0,i1,j1,k1, counted \
                   from 0, both corners included",
         read: |d, v| {
-            d.place.region = Some(v.corners()?);
+            d.position.region = Some(v.corners()?);
             Ok(())
         },
-        write: |p| match p.place.region {
+        write: |p| match p.position.region {
             Some([[a, b, c], [d, e, f]]) => json!([a, b, c, d, e, f]),
             None => Value::Null,
         },

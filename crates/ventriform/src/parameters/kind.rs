@@ -23,12 +23,12 @@ pub enum Kind {
     Choice(&'static [&'static str]),
     /// `count` whole numbers, separated by commas (in JSON also an array).
     Integers {
-        /// How many.
+        /// Their number.
         count: usize,
     },
     /// `count` finite numbers, separated by commas (in JSON also an array).
     Numbers {
-        /// How many.
+        /// Their number.
         count: usize,
     },
     /// One of the listed words, or three finite numbers separated by commas (in JSON also an array).
@@ -46,7 +46,7 @@ pub enum Kind {
         prefixes: &'static [&'static str],
         /// A word that is accepted instead of an id; empty if there is none.
         word: &'static str,
-        /// How many ids may follow the word, separated by commas.
+        /// Most ids that may follow the word, separated by commas.
         more: usize,
     },
 }

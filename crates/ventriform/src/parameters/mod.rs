@@ -17,7 +17,7 @@ mod schema;
 mod specs;
 mod table;
 
-pub use fit::{FitParameters, KnownPlace, MaskGrid};
+pub use fit::{FitParameters, KnownPosition, MaskGrid};
 pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
 pub use kind::Kind;

@@ -23,7 +23,7 @@ use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, Closeness, FileFacts, MeasuredSurface, ModelReport, ReportInput};
 use crate::retile::RetileError;
 use crate::surface::{self, IsoLevel, Isolate, SurfaceError};
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use crate::volume::{
     self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFacts, VolumeFile,
 };
@@ -110,10 +110,10 @@ pub enum PipelineError {
     #[error(transparent)]
     Optimise(OptimiseError),
     /// The finished model failed its checks.
-    #[error("the model is not sound: {}", doubts.join(" "))]
+    #[error("the model is not sound: {}", flags.join(" "))]
     Unsound {
         /// The failed checks, in sentences.
-        doubts: Vec<String>,
+        flags: Vec<String>,
     },
     /// The caller cancelled the work.
     #[error(transparent)]
@@ -286,7 +286,7 @@ fn from_volume(
     });
     if !report.is_sound() {
         return Err(PipelineError::Unsound {
-            doubts: report.warnings,
+            flags: report.warnings,
         });
     }
     report.warnings.splice(0..0, facts.warnings.iter().cloned());

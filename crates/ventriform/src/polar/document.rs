@@ -1,7 +1,7 @@
 //! The polar map as it is written in `polar.json` and summed up in reports.
 
 use super::picture::rings;
-use super::{COLUMNS, PolarMap, ROWS, Segment, territory};
+use super::{PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
 use serde::{Deserialize, Serialize};
 
 /// A polar map without its pixels.
@@ -14,7 +14,7 @@ pub struct PolarSummary {
     pub threshold_percent: f64,
     /// Share of the wall below it.
     pub extent_percent: f64,
-    /// What the percentages refer to.
+    /// The reference of the percentages.
     pub note: String,
     /// The 17 segments.
     pub segments: Vec<PolarSegment>,
@@ -26,7 +26,7 @@ pub struct PolarSummary {
     pub rows: usize,
     /// Columns of pixels, around the axis.
     pub columns: usize,
-    /// What told the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+    /// Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
     #[serde(default)]
     #[cfg_attr(feature = "schema", schema(required))]
     pub orientation: String,
@@ -118,8 +118,8 @@ impl PolarSummary {
                 .to_owned(),
             segments: map.segments.iter().map(segment).collect(),
             territories: territories.collect(),
-            rows: ROWS,
-            columns: COLUMNS,
+            rows: RAY_ROWS,
+            columns: RAY_COLUMNS,
             orientation: map.orientation.as_str().to_owned(),
             first_column: oriented.then(|| "lateral".to_owned()),
             direction: oriented.then(|| "lateral, anterior, septal, inferior".to_owned()),
@@ -138,15 +138,15 @@ impl PolarDocument {
                 0.0
             }
         };
-        let pixels = map.pixels.chunks(COLUMNS);
+        let pixels = map.pixels.chunks(RAY_COLUMNS);
         let pixels = pixels.map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect());
-        let numbers = |row| (0..COLUMNS).map(move |column| map.segment_of(row, column));
+        let numbers = |row| (0..RAY_COLUMNS).map(move |column| map.segment_of(row, column));
         let ends = map.levels.ends().iter();
         let ends = ends.map(|ends| ends.map(|rows| (1e3 * rows).round() / 1e3));
         Self {
             summary: PolarSummary::of(map),
             values_percent: pixels.collect(),
-            segment_of: (0..ROWS).map(|row| numbers(row).collect()).collect(),
+            segment_of: (0..RAY_ROWS).map(|row| numbers(row).collect()).collect(),
             level_ends: Some(ends.collect()),
             rings: Some(rings(map).map(|share| (1e4 * share).round() / 1e4).into()),
         }

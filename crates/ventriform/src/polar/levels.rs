@@ -1,7 +1,7 @@
 //! The four levels of the wall along the long axis: basal, mid, apical, apex.
 
 use crate::geometry::Vec3;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 
 /// A part of the wall along the long axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,14 +37,14 @@ impl Levels {
     pub(super) fn of(middle: &MiddleSurface, anatomical: &VentricleWall) -> Self {
         let [rim, _] = anatomical.extent;
         let length = (anatomical.cavity_end() - rim).max(1e-6);
-        let ends = (0..COLUMNS).map(|column| {
+        let ends = (0..RAY_COLUMNS).map(|column| {
             let share = |row: usize| {
                 let along = anatomical.along_axis(middle.at(row, column));
                 (along - rim) / length
             };
             // The share falls from apex to base; where a wall bends back, it stays.
             let mut least = f64::INFINITY;
-            let shares: Vec<f64> = (0..ROWS)
+            let shares: Vec<f64> = (0..RAY_ROWS)
                 .map(|row| {
                     least = least.min(share(row));
                     least
@@ -93,7 +93,7 @@ fn row_of(shares: &[f64], end: f64) -> f64 {
     let next = shares.iter().position(|share| *share < end);
     let above = next.unwrap_or(shares.len() - 1).clamp(1, shares.len() - 1) - 1;
     let fall = (shares[above] - shares[above + 1]).max(1e-6);
-    (above as f64 + 0.5 + (shares[above] - end) / fall).clamp(0.0, 2.0 * ROWS as f64)
+    (above as f64 + 0.5 + (shares[above] - end) / fall).clamp(0.0, 2.0 * RAY_ROWS as f64)
 }
 
 /// The surface midway through the wall, one point for each ray.
@@ -103,13 +103,13 @@ impl MiddleSurface {
     /// A ray that misses the wall gets the distance of the nearest ray of its column that does not.
     pub fn of(wall: &VentricleWall) -> Self {
         let distance = |row: usize, column: usize| {
-            let [enters, leaves] = wall.rays[row * COLUMNS + column].wall?;
+            let [enters, leaves] = wall.rays[row * RAY_COLUMNS + column].wall?;
             Some(f64::midpoint(enters, leaves))
         };
-        let points = (0..ROWS * COLUMNS).map(|index| {
-            let (row, column) = (index / COLUMNS, index % COLUMNS);
+        let points = (0..RAY_ROWS * RAY_COLUMNS).map(|index| {
+            let (row, column) = (index / RAY_COLUMNS, index % RAY_COLUMNS);
             let apical = (0..=row).rev().find_map(|row| distance(row, column));
-            let found = apical.or_else(|| (row..ROWS).find_map(|row| distance(row, column)));
+            let found = apical.or_else(|| (row..RAY_ROWS).find_map(|row| distance(row, column)));
             let ray = &wall.rays[index];
             ray.start + ray.direction * found.unwrap_or(0.0)
         });
@@ -118,14 +118,14 @@ impl MiddleSurface {
 
     /// The point of a ray, LPS mm.
     pub fn at(&self, row: usize, column: usize) -> &Vec3 {
-        &self.0[row * COLUMNS + column]
+        &self.0[row * RAY_COLUMNS + column]
     }
 
     /// The area that a ray stands for, mm².
     pub fn area(&self, row: usize, column: usize) -> f64 {
-        let (up, down) = (row.saturating_sub(1), (row + 1).min(ROWS - 1));
+        let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
         let along = (self.at(down, column) - self.at(up, column)) / (down - up) as f64;
-        let [left, right] = [COLUMNS - 1, 1].map(|step| (column + step) % COLUMNS);
+        let [left, right] = [RAY_COLUMNS - 1, 1].map(|step| (column + step) % RAY_COLUMNS);
         let around = (self.at(row, right) - self.at(row, left)) / 2.0;
         along.cross(&around).norm()
     }
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_level_ends_where_the_falling_share_passes_its_end() {
-        let shares: Vec<f64> = (0..ROWS).map(|row| 1.1 - 0.04 * row as f64).collect();
+        let shares: Vec<f64> = (0..RAY_ROWS).map(|row| 1.1 - 0.04 * row as f64).collect();
         assert!((row_of(&shares, 1.0) - 3.0).abs() < 1e-9);
         // Beyond the last row.
         assert!((row_of(&shares, -0.3) - 35.5).abs() < 1e-9);

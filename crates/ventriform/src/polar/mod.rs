@@ -48,7 +48,7 @@ use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::locate::patient_orientation::OrientationSource;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall, WallRay};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall, WallRay};
 use levels::MiddleSurface;
 
 /// Parameters of [`map`].
@@ -68,11 +68,11 @@ pub struct PolarParameters {
     pub rim_margin: f64,
     /// Length of wall next to it over which the weight rises to 1, mm, 0..=30. Default 12.
     pub rim_fade: f64,
-    /// How wide the levels are drawn. Default [`Projection::Standard`].
+    /// Widths of the levels. Default [`Projection::Standard`].
     pub projection: Projection,
 }
 
-/// How wide the levels are on the map.
+/// Widths of the levels on the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Projection {
     /// Rings of equal width.
@@ -138,7 +138,7 @@ pub struct Territory {
 /// The map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarMap {
-    /// [`ROWS`] × [`COLUMNS`] pixels, apex first; columns from lateral over anterior, septal
+    /// [`RAY_ROWS`] × [`RAY_COLUMNS`] pixels, apex first; columns from lateral over anterior, septal
     /// and inferior. `None` where there is no wall.
     pub pixels: Vec<Option<Pixel>>,
     /// Mean maximum over the hottest quarter of the wall, image units: 100 per cent.
@@ -151,7 +151,7 @@ pub struct PolarMap {
     pub territories: [Territory; 3],
     /// Where the levels lie.
     pub levels: Levels,
-    /// How wide the levels are drawn.
+    /// Widths of the levels.
     pub projection: Projection,
     /// The source of the patient's orientation. If it is unknown, levels hold, but no position of a level
     /// is known to be anterior: segments of a level are then counted from a convention.
@@ -235,15 +235,15 @@ impl PolarMap {
     /// The uptake of the wall at a point, per cent of the reference, linear between the rays of `wall`, by
     /// which the map was made; NaN where no ray near it met the wall.
     pub fn uptake_at(&self, wall: &VentricleWall, point: &Vec3) -> f64 {
-        let place = wall.place(point);
-        let row = place.row.clamp(0.0, ROWS as f64 - 1.0);
+        let position = wall.position(point);
+        let row = position.row.clamp(0.0, RAY_ROWS as f64 - 1.0);
         let (mut sum, mut weight) = (0.0, 0.0);
         for (r, of_row) in [(row.floor(), 1.0 - row.fract()), (row.ceil(), row.fract())] {
             for (c, of_column) in [
-                (place.column.floor(), 1.0 - place.column.fract()),
-                (place.column.floor() + 1.0, place.column.fract()),
+                (position.column.floor(), 1.0 - position.column.fract()),
+                (position.column.floor() + 1.0, position.column.fract()),
             ] {
-                let pixel = self.pixels[r as usize * COLUMNS + c as usize % COLUMNS];
+                let pixel = self.pixels[r as usize * RAY_COLUMNS + c as usize % RAY_COLUMNS];
                 if let Some(pixel) = pixel {
                     sum += of_row * of_column * pixel.max;
                     weight += of_row * of_column;
@@ -264,7 +264,7 @@ impl PolarMap {
 }
 
 fn segment_of(levels: &Levels, row: usize, column: usize) -> usize {
-    let angle = 360.0 * (column as f64 + 0.5) / COLUMNS as f64;
+    let angle = 360.0 * (column as f64 + 0.5) / RAY_COLUMNS as f64;
     segment_at(levels.of_pixel(row, column), angle)
 }
 
@@ -294,9 +294,9 @@ pub fn map(
         .iter()
         .enumerate()
         .map(|(index, ray)| {
-            let area = middle.area(index / COLUMNS, index % COLUMNS);
+            let area = middle.area(index / RAY_COLUMNS, index % RAY_COLUMNS);
             let pixel = pixel(&field, ray, area, parameters.extension)?;
-            let rows = rims[index % COLUMNS] as f64 - 0.5 - (index / COLUMNS) as f64;
+            let rows = rims[index % RAY_COLUMNS] as f64 - 0.5 - (index / RAY_COLUMNS) as f64;
             let counted = rows * wall.row_spacing - parameters.rim_margin;
             // Without a fade the weight is a step, and NaN (0 / 0) at the step counts as 0.
             let weight = (counted / parameters.rim_fade).clamp(0.0, 1.0);
@@ -308,7 +308,8 @@ pub fn map(
     let limit = parameters.threshold * reference;
     let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
     let segments: [Segment; 17] = std::array::from_fn(|s| {
-        let own = indexed().filter(|(i, _)| segment_of(&levels, i / COLUMNS, i % COLUMNS) == s + 1);
+        let own = indexed()
+            .filter(|(i, _)| segment_of(&levels, i / RAY_COLUMNS, i % RAY_COLUMNS) == s + 1);
         summarise(s + 1, own.map(|(_, p)| p), reference, limit)
     });
     let territories = ARTERY_NAMES.map(|name| {
@@ -336,10 +337,10 @@ pub fn map(
 }
 
 /// For every column, one more than the last row that meets the wall.
-fn rims(wall: &VentricleWall) -> [usize; COLUMNS] {
+fn rims(wall: &VentricleWall) -> [usize; RAY_COLUMNS] {
     std::array::from_fn(|column| {
-        let met = |row: &usize| wall.rays[row * COLUMNS + column].wall.is_some();
-        (0..ROWS).rev().find(met).map_or(0, |row| row + 1)
+        let met = |row: &usize| wall.rays[row * RAY_COLUMNS + column].wall.is_some();
+        (0..RAY_ROWS).rev().find(met).map_or(0, |row| row + 1)
     })
 }
 

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::{COLUMNS, Level, PolarMap, Projection, ROWS, territory};
+use super::{Level, PolarMap, Projection, RAY_COLUMNS, RAY_ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
 
 /// Height of the picture, pixels.
@@ -37,8 +37,8 @@ static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
 const BORDER_COLOUR: Rgb = [200; 3];
 /// Borders between the territories of two arteries.
 const TERRITORY_BORDER: Rgb = [255; 3];
-const WHITE: Rgb = [255; 3];
-const BLACK: Rgb = [0; 3];
+const WHITE_RGB: Rgb = [255; 3];
+const BLACK_RGB: Rgb = [0; 3];
 
 /// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
 const SIDE_LETTERS: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
@@ -57,7 +57,7 @@ pub fn png(map: &PolarMap) -> Vec<u8> {
 
 fn drawing(map: &PolarMap) -> Drawing {
     let rings = rings(map);
-    let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+    let places = (0..RAY_ROWS).flat_map(|row| (0..RAY_COLUMNS).map(move |column| (row, column)));
     let tiles = places.map(|(row, column)| VectorShape::Polygon {
         corners: tile(map, &rings, row, column),
         fill: shade(map, row, column),
@@ -93,8 +93,11 @@ pub(super) fn rings(map: &PolarMap) -> [f64; 4] {
         return standard;
     }
     let area = |level: Level| -> f64 {
-        let places = (0..ROWS * COLUMNS)
-            .filter(|index| map.levels.of_pixel(index / COLUMNS, index % COLUMNS) == level);
+        let places = (0..RAY_ROWS * RAY_COLUMNS).filter(|index| {
+            map.levels
+                .of_pixel(index / RAY_COLUMNS, index % RAY_COLUMNS)
+                == level
+        });
         places
             .filter_map(|index| Some(map.pixels[index]?.area))
             .sum()
@@ -113,7 +116,7 @@ pub(super) fn rings(map: &PolarMap) -> [f64; 4] {
 
 /// The colour of a place of the map.
 fn shade(map: &PolarMap, row: usize, column: usize) -> Rgb {
-    match map.pixels[row * COLUMNS + column] {
+    match map.pixels[row * RAY_COLUMNS + column] {
         Some(pixel) if map.reference > 0.0 => colour(pixel.max / map.reference),
         _ => PALETTE.no_wall,
     }
@@ -143,7 +146,7 @@ fn colour(share: f64) -> Rgb {
 /// neighbours.
 fn tile(map: &PolarMap, rings: &[f64; 4], row: usize, column: usize) -> Vec<Point> {
     let shares = [row as f64, row as f64 + 1.03].map(|rows| map.levels.share(rows, column, rings));
-    let turns = [column as f64, column as f64 + 1.03].map(|c| c / COLUMNS as f64);
+    let turns = [column as f64, column as f64 + 1.03].map(|c| c / RAY_COLUMNS as f64);
     vec![
         screen(shares[0], turns[0]),
         screen(shares[1], turns[0]),
@@ -156,12 +159,12 @@ fn tile(map: &PolarMap, rings: &[f64; 4], row: usize, column: usize) -> Vec<Poin
 fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     let limit = map.threshold * map.reference;
     let below = |row: usize, column: usize| {
-        let pixel = map.pixels[row * COLUMNS + column % COLUMNS];
+        let pixel = map.pixels[row * RAY_COLUMNS + column % RAY_COLUMNS];
         pixel.map(|pixel| pixel.max < limit)
     };
     let place = |rows: usize, column: usize, side: usize| {
-        let share = map.levels.share(rows as f64, column % COLUMNS, rings);
-        screen(share, (column + side) as f64 / COLUMNS as f64)
+        let share = map.levels.share(rows as f64, column % RAY_COLUMNS, rings);
+        screen(share, (column + side) as f64 / RAY_COLUMNS as f64)
     };
     let line = |ends: [Point; 2]| VectorShape::Line {
         ends,
@@ -169,12 +172,12 @@ fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
         width: 2.5,
     };
     let mut lines = Vec::new();
-    for column in 0..COLUMNS {
-        for row in 0..ROWS {
+    for column in 0..RAY_COLUMNS {
+        for row in 0..RAY_ROWS {
             let Some(here) = below(row, column) else {
                 continue;
             };
-            if row + 1 < ROWS && below(row + 1, column) == Some(!here) {
+            if row + 1 < RAY_ROWS && below(row + 1, column) == Some(!here) {
                 lines.push(line([place(row + 1, column, 0), place(row + 1, column, 1)]));
             }
             if below(row, column + 1) == Some(!here) {
@@ -228,8 +231,8 @@ fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = Ve
             middle: screen(share, turns),
             text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}")),
             size: TEXT_HEIGHT_PX,
-            ink: if bright { BLACK } else { WHITE },
-            rim: Some(if bright { WHITE } else { BLACK }),
+            ink: if bright { BLACK_RGB } else { WHITE_RGB },
+            rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),
         }
     });
     let letters = SIDE_LETTERS
@@ -249,7 +252,7 @@ fn text(middle: Point, text: String) -> VectorShape {
         middle,
         text,
         size: TEXT_HEIGHT_PX,
-        ink: BLACK,
+        ink: BLACK_RGB,
         rim: None,
     }
 }
@@ -289,7 +292,7 @@ fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
         let y = height(f64::from(percent) / 100.0);
         shapes.push(VectorShape::Line {
             ends: [[right, y], [right + 6.0, y]],
-            stroke: BLACK,
+            stroke: BLACK_RGB,
             width: 1.5,
         });
         shapes.push(text([right + 28.0, y], percent.to_string()));

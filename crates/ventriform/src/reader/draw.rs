@@ -13,7 +13,7 @@ use crate::deform::{FittedModel, base_plane};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{COLUMNS, ROWS, VentricleWall};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// The thickness that is left at least, mm.
@@ -79,14 +79,15 @@ struct WallEdges(Vec<[f64; 2]>);
 
 impl WallEdges {
     fn of(wall: &VentricleWall) -> Self {
-        let mut edges = vec![[0.0, 0.0]; ROWS * COLUMNS];
-        for column in 0..COLUMNS {
+        let mut edges = vec![[0.0, 0.0]; RAY_ROWS * RAY_COLUMNS];
+        for column in 0..RAY_COLUMNS {
             let mut last = None;
-            let known = |row: usize| wall.rays[row * COLUMNS + column].wall;
-            let first = (0..ROWS).find_map(known);
-            for row in 0..ROWS {
+            let known = |row: usize| wall.rays[row * RAY_COLUMNS + column].wall;
+            let first = (0..RAY_ROWS).find_map(known);
+            for row in 0..RAY_ROWS {
                 last = known(row).or(last);
-                edges[row * COLUMNS + column] = last.or(first).unwrap_or([0.0, MIN_THICKNESS_MM]);
+                edges[row * RAY_COLUMNS + column] =
+                    last.or(first).unwrap_or([0.0, MIN_THICKNESS_MM]);
             }
         }
         Self(edges)
@@ -94,27 +95,27 @@ impl WallEdges {
 
     /// The displacement of a point of the wall by `offsets`, without that of the rim, mm.
     fn shift(&self, wall: &VentricleWall, point: &Vec3, offsets: &ReaderOffsets) -> Vec3 {
-        let place = wall.place(point);
-        let [inner, outer] = self.at(place.row, place.column);
+        let position = wall.position(point);
+        let [inner, outer] = self.at(position.row, position.column);
         let thickness = (outer - inner).max(1e-6);
         let thinner = offsets.endocardium - offsets.epicardium;
         let most = (thickness - MIN_THICKNESS_MM).max(0.0);
         let part = if thinner > most { most / thinner } else { 1.0 };
-        let depth = ((place.distance - inner) / thickness).clamp(0.0, 1.0);
+        let depth = ((position.distance - inner) / thickness).clamp(0.0, 1.0);
         let along = offsets.endocardium * (1.0 - depth) + offsets.epicardium * depth;
         // A point on the axis stays on it.
-        let along = (part * along).max(-place.distance);
-        place.direction * along
+        let along = (part * along).max(-position.distance);
+        position.direction * along
     }
 
     /// The edges between rays, linear in row and column.
     fn at(&self, row: f64, column: f64) -> [f64; 2] {
-        let row = row.clamp(0.0, ROWS as f64 - 1.0);
-        let (low, left) = (row.floor().min(ROWS as f64 - 2.0), column.floor());
+        let row = row.clamp(0.0, RAY_ROWS as f64 - 1.0);
+        let (low, left) = (row.floor().min(RAY_ROWS as f64 - 2.0), column.floor());
         let (up, right) = (row - low, column - left);
         let value = |r: usize, c: usize, side: usize| {
-            let column = (left as usize + c) % COLUMNS;
-            self.0[(low as usize + r) * COLUMNS + column][side]
+            let column = (left as usize + c) % RAY_COLUMNS;
+            self.0[(low as usize + r) * RAY_COLUMNS + column][side]
         };
         [0, 1].map(|side| {
             (1.0 - up) * ((1.0 - right) * value(0, 0, side) + right * value(0, 1, side))
@@ -185,10 +186,10 @@ mod tests {
         let offsets = ReaderOffsets::from_array([8.0, -8.0, 0.0]);
         let moved = with_surfaces_moved(&mesh, &wall, &offsets);
         let wall = VentricleWall::new(&moved, &tube().1, &Vec3::y(), &Monitor::silent()).unwrap();
-        let thin = wall.rays[ROWS / 2 * COLUMNS..]
+        let thin = wall.rays[RAY_ROWS / 2 * RAY_COLUMNS..]
             .iter()
             .filter_map(|r| r.wall);
-        for [enters, leaves] in thin.take(10 * COLUMNS) {
+        for [enters, leaves] in thin.take(10 * RAY_COLUMNS) {
             let thickness = leaves - enters;
             assert!((2.5..3.5).contains(&thickness), "{thickness}");
         }

@@ -21,7 +21,7 @@ use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::{Vec3, triangle};
 use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
-use crate::model::wall::{COLUMNS, ROWS};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
 
 /// Steps along a ray, mm.
 const RAY_STEP_MM: f64 = 0.25;
@@ -53,12 +53,12 @@ fn medians(fit: &FittedModel, drawn: &Mask, frame: &VoxelToPatient) -> Option<Re
     let drawn = MaskField { mask: drawn, frame };
     let (mut inner, mut outer, mut rim) = (Vec::new(), Vec::new(), Vec::new());
     let mut met = 0;
-    for column in 0..COLUMNS {
-        let rows: Vec<usize> = (0..ROWS)
-            .filter(|row| wall.rays[row * COLUMNS + column].wall.is_some())
+    for column in 0..RAY_COLUMNS {
+        let rows: Vec<usize> = (0..RAY_ROWS)
+            .filter(|row| wall.rays[row * RAY_COLUMNS + column].wall.is_some())
             .collect();
         for (place, row) in rows.iter().enumerate() {
-            let ray = &wall.rays[row * COLUMNS + column];
+            let ray = &wall.rays[row * RAY_COLUMNS + column];
             let Some([enters, leaves]) = ray.wall else {
                 continue;
             };
@@ -117,7 +117,7 @@ struct MaskField<'a> {
 }
 
 impl MaskField<'_> {
-    /// How far from `start` a line leaves the mask, mm. `None` if it does not start in it, or does
+    /// The distance from `start` at which a line leaves the mask, mm. `None` if it does not start in it, or does
     /// not leave it.
     fn leaves(&self, start: &Vec3, direction: &Vec3) -> Option<f64> {
         let value = |distance: f64| self.at(&(start + direction * distance));

@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
 
-/// How far a reader's wall lies from the fitted one, mm.
+/// Distances of a reader's wall from the fitted one, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ReaderOffsets {
-    /// How far the inner surface lies farther out.
+    /// Distance of the inner surface, positive outward.
     pub endocardium: f64,
-    /// How far the outer surface lies farther out.
+    /// Distance of the outer surface, positive outward.
     pub epicardium: f64,
-    /// How far the rim lies farther towards the base.
+    /// Distance of the rim, positive towards the base.
     pub rim: f64,
 }
 
@@ -38,7 +38,7 @@ impl ReaderOffsets {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = LearntOffset))]
 #[serde(deny_unknown_fields)]
 pub struct ReaderOffset {
-    /// What is applied: the mean, drawn towards zero.
+    /// The applied offset: the mean, drawn towards zero.
     pub value: f64,
     /// Mean over the masks.
     pub mean: f64,
@@ -90,7 +90,7 @@ pub enum ProfileError {
 /// The version of the JSON.
 const PROFILE_VERSION: u32 = 1;
 /// The JSON's statement of its format.
-const FORMAT: &str = "ventriform-reader-profile";
+const PROFILE_FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
 const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
 /// Longest JSON that is read, bytes.
@@ -114,7 +114,7 @@ pub struct ProfileDocument {
     masks: usize,
     /// The distances, mm.
     offsets_mm: LearntOffsets,
-    /// What it was learnt on.
+    /// The masks it was learnt on.
     learnt_on: Vec<LearntOn>,
 }
 
@@ -146,7 +146,7 @@ impl ReaderProfile {
     pub fn to_json(&self) -> String {
         let [endocardium, epicardium, rim] = self.offsets;
         let document = ProfileDocument {
-            format: FORMAT.into(),
+            format: PROFILE_FORMAT.into(),
             version: PROFILE_VERSION,
             edge: self.edge.as_str().into(),
             masks: self.masks(),
@@ -183,8 +183,8 @@ impl ReaderProfile {
         }
         let syntax = |error: serde_json::Error| ProfileError::Syntax(error.to_string());
         let any: serde_json::Value = serde_json::from_slice(text).map_err(syntax)?;
-        if any["format"] != FORMAT {
-            let reason = format!("`format` is not {FORMAT}");
+        if any["format"] != PROFILE_FORMAT {
+            let reason = format!("`format` is not {PROFILE_FORMAT}");
             return Err(ProfileError::Syntax(reason));
         }
         let version = any["version"].as_u64().unwrap_or(0);

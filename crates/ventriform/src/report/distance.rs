@@ -67,9 +67,9 @@ pub struct Distance {
     pub volume_ml: f64,
     /// Volume enclosed by the surface, millilitres.
     pub surface_volume_ml: f64,
-    /// How much more volume the model encloses than the surface, percent.
+    /// Volume that the model encloses beyond that of the surface, percent of it.
     pub volume_error_percent: f64,
-    /// How much more area the model has than the surface, percent.
+    /// Area of the model beyond that of the surface, percent of it.
     pub area_error_percent: f64,
 }
 

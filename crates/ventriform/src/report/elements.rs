@@ -136,7 +136,7 @@ pub struct MeshFacts {
     pub max_mm: [f64; 3],
 }
 
-/// What makes a mesh a closed, oriented manifold that faces outward.
+/// The conditions of a closed, oriented manifold that faces outward.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ManifoldFacts {
@@ -158,7 +158,7 @@ pub struct ManifoldFacts {
     pub defect: Option<String>,
 }
 
-/// How well-shaped the triangles are.
+/// Figures of the triangles' shapes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Shape {
@@ -176,7 +176,7 @@ pub struct Shape {
     pub valence: Valence,
 }
 
-/// How many edges meet at a vertex.
+/// Numbers of edges that meet at a vertex.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Valence {
@@ -189,7 +189,7 @@ pub struct Valence {
     pub share_5_to_7: f64,
 }
 
-/// How smooth the mesh is.
+/// Figures of the mesh's smoothness.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct Smoothness {

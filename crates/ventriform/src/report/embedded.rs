@@ -13,7 +13,7 @@ const MOST_TRIANGLES: usize = 20_000;
 
 /// A result as the script draws it.
 pub(super) struct Embedded<'a> {
-    /// What the page shows, for pictures taken of it.
+    /// The name of the result, for pictures taken of the page.
     pub name: &'a str,
     /// The mesh and the uncertainty of its vertices, mm (empty if it is not known).
     pub mesh: (&'a TriMesh, &'a [f64]),

@@ -25,9 +25,9 @@ pub struct LocalisationReport {
     pub correlation: f64,
     /// Correlation of the next best place.
     pub runner_up: Option<f64>,
-    /// How hollow it is, 0 to 1.
+    /// Hollowness, 0 to 1.
     pub hollowness: f64,
-    /// How sure the search is, 0 to 1.
+    /// Confidence of the search, 0 to 1.
     pub confidence: f64,
 }
 
@@ -37,21 +37,21 @@ pub struct LocalisationReport {
 pub struct Posture {
     /// The direction to the head.
     pub superior: [f64; 3],
-    /// What told it: `superior`, `anterior`, `body`, `frame` or `unknown`.
+    /// Its source: `superior`, `anterior`, `body`, `frame` or `unknown`.
     pub source: String,
     /// Its angle to the scanner's axis.
     pub tilt_degrees: f64,
-    /// How sure that is, 0 to 1.
+    /// Confidence of that, 0 to 1.
     pub confidence: f64,
 }
 
-/// How a fit went, and the fitted model's pose.
+/// Figures of a fit, and the fitted model's pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Fit))]
 pub struct FitReport {
     /// Why the motion ended.
     pub reason: String,
-    /// How reliable the fit is, 0 to 1.
+    /// Confidence that the fit is right, 0 to 1.
     pub confidence: f64,
     /// Steps of the motion.
     pub iterations: usize,
@@ -169,7 +169,7 @@ pub struct EvidenceReport {
     pub residual_mm: f64,
     /// Root of the mean squared strain.
     pub strain: f64,
-    /// How much darker the cavity is than the wall, 0 to 1.
+    /// Share of the wall's brightness that the cavity lacks, 0 to 1.
     pub hollowness: f64,
     /// Volume of the cavity.
     pub cavity_ml: f64,

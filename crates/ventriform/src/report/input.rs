@@ -4,7 +4,7 @@ use crate::volume::{IntensitySummary, LabelCount, VolumeFacts};
 use nalgebra::Matrix4;
 use serde::{Deserialize, Serialize};
 
-/// What a volume's file says.
+/// The statements of a volume's file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct FileFacts {

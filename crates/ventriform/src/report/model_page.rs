@@ -18,7 +18,7 @@ use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 
 /// The page for `report` on `mesh`; with `closeness`, the distances to the surface that the
 /// model was made from, also the model coloured by them. Distances of another mesh are left out.

@@ -32,7 +32,7 @@ pub struct ModelReport {
     pub surface: SurfaceReport,
     /// The mesh before optimisation.
     pub retile: RetileReport,
-    /// What optimisation did.
+    /// Figures of optimisation.
     pub optimise: OptimiseReport,
     /// The model: counts and topology.
     pub mesh: MeshFacts,
@@ -83,7 +83,7 @@ impl ModelReport {
         let measures = input.measures;
         let surface = stage_facts::surface(input.surface);
         let mut warnings = stage_facts::warnings(input.surface, input.tiled, input.optimised);
-        warnings.extend(doubts(&measures.mesh, &surface, input.tiled));
+        warnings.extend(flags(&measures.mesh, &surface, input.tiled));
         warnings.extend(coarseness(&measures));
         warnings.extend(volume_lost(&input.surface.facts, &measures.mesh));
         Self {
@@ -204,37 +204,37 @@ fn volume_lost(surface: &SurfaceFacts, mesh: &MeshFacts) -> Option<String> {
 }
 
 /// Sentences about the promises that a model breaks.
-fn doubts(mesh: &MeshFacts, surface: &SurfaceReport, tiled: &Tiled) -> Vec<String> {
-    let mut doubts = Vec::new();
+fn flags(mesh: &MeshFacts, surface: &SurfaceReport, tiled: &Tiled) -> Vec<String> {
+    let mut flags = Vec::new();
     if let Some(defect) = &mesh.manifold.defect {
-        doubts.push(format!("The model is no closed manifold: {defect}."));
+        flags.push(format!("The model is no closed manifold: {defect}."));
     }
     if mesh.self_intersections > 0 {
         let n = mesh.self_intersections;
-        doubts.push(format!(
+        flags.push(format!(
             "The model intersects itself: {n} pairs of triangles."
         ));
     }
     if mesh.euler_characteristic != surface.euler_characteristic {
-        doubts.push(format!(
+        flags.push(format!(
             "The model's Euler characteristic is {}, the surface's {}.",
             mesh.euler_characteristic, surface.euler_characteristic
         ));
     }
     if mesh.manifold.outward_components != surface.outward_components {
-        doubts.push(format!(
+        flags.push(format!(
             "Components of the model that face outward: {}, of the surface: {}.",
             mesh.manifold.outward_components, surface.outward_components
         ));
     }
     if mesh.vertices != tiled.mesh.vertices.len() {
-        doubts.push(format!(
+        flags.push(format!(
             "The model has {} vertices, the re-tiled surface {}.",
             mesh.vertices,
             tiled.mesh.vertices.len()
         ));
     }
-    doubts
+    flags
 }
 
 /// Percent of the surface's volume beyond which a difference of the model's is a warning. Models

@@ -126,7 +126,7 @@ pub struct RetileReport {
     pub smoothness: Smoothness,
 }
 
-/// What optimisation did.
+/// Figures of optimisation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct OptimiseReport {

@@ -1,4 +1,4 @@
-//! The page of a segmentation: doubts, figures, slices, polar map, agreement, the fitted model.
+//! The page of a segmentation: flags, figures, slices, polar map, agreement, the fitted model.
 
 use maud::{Markup, html};
 use serde_json::{Map, Value, json};
@@ -12,7 +12,7 @@ use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 
 /// A segmentation's report with its pictures.
 #[derive(Debug, Clone, Copy)]
@@ -209,14 +209,8 @@ fn verdict(report: &SegmentationReport) -> Markup {
             Sign::Good,
             "Nothing gives reason to doubt this segmentation.".to_owned(),
         ),
-        1 => (
-            Sign::Doubt,
-            "There is one reason to look closer.".to_owned(),
-        ),
-        n => (
-            Sign::Doubt,
-            format!("There are {n} reasons to look closer."),
-        ),
+        1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
+        n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
     };
     document::verdict(sign, &headline, &checks(report))
 }
@@ -334,7 +328,7 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
 /// The slices as a picture; `touched` if the script draws them with the scan, which is without the expert's mask.
 fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
     let polar = report.polar.as_ref();
-    let unknown = polar.is_some_and(|polar| polar.orientation == UNKNOWN);
+    let unknown = polar.is_some_and(|polar| polar.orientation == UNKNOWN_ORIENTATION);
     let (about, names) = match report.is_ventricle() {
         true if unknown => (
             "Planes of the heart through the middle of its cavity, which side is anterior unknown: \
@@ -372,7 +366,7 @@ fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
 }
 
 /// The orientation of a polar map without sides.
-const UNKNOWN: &str = "unknown";
+const UNKNOWN_ORIENTATION: &str = "unknown";
 
 /// The polar map beside its segments.
 fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
@@ -381,7 +375,7 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
     };
     let percent = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 1);
     let sides = match figures.orientation.as_str() {
-        UNKNOWN => {
+        UNKNOWN_ORIENTATION => {
             "base outside. Orientation unknown: nothing in the image or its header tells which side \
              is anterior, so segments have numbers within their level but no sides and no arteries; \
              `superior` or `anterior` can state a direction"

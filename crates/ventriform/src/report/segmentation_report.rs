@@ -34,7 +34,7 @@ pub struct SegmentationReport {
     pub localisation: Option<LocalisationReport>,
     /// Which way is up in the patient.
     pub posture: Option<Posture>,
-    /// How the fit went.
+    /// Figures of the fit.
     pub fit: FitReport,
     /// The figures behind confidence and flags; ventricles only.
     pub evidence: Option<EvidenceReport>,
@@ -75,11 +75,11 @@ pub struct SegmentationReport {
 pub struct CandidateReport {
     /// The model's name.
     pub template: String,
-    /// What it is ranked by: its confidence by its own figures.
+    /// Its confidence by its own figures, by which templates are ranked.
     #[serde(default = "not_stated", deserialize_with = "or_nan")]
     #[cfg_attr(feature = "schema", schema(required))]
     pub confidence: f64,
-    /// What decides between equals.
+    /// Figure that decides between equals.
     pub merit: f64,
     /// Share of the surface along which an edge is seen.
     pub active: f64,
@@ -160,7 +160,7 @@ pub struct AgreementReport {
 pub struct RaisedFlag {
     /// Its stable name.
     pub code: String,
-    /// What was found.
+    /// The finding.
     pub reason: String,
 }
 

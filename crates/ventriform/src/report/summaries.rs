@@ -30,7 +30,7 @@ pub struct ModelSummary {
     pub distance_mean_mm: f64,
     /// Largest distance to the surface, mm.
     pub hausdorff_mm: f64,
-    /// How much more volume the model encloses than the surface, percent.
+    /// Volume that the model encloses beyond that of the surface, percent of it.
     pub volume_error_percent: f64,
     /// The paper's fitness.
     pub fitness: f64,
@@ -48,7 +48,7 @@ pub struct SegmentationSummary {
     pub candidates: Vec<CandidateReport>,
     /// Why the motion ended.
     pub reason: String,
-    /// How reliable the fit is, 0 to 1.
+    /// Confidence that the fit is right, 0 to 1.
     pub confidence: f64,
     /// Volumes.
     pub volumes_ml: FittedVolumes,
@@ -72,11 +72,11 @@ pub struct TemplateSummary {
     pub volume_ml: f64,
     /// Length of its cup, mm; ventricles only.
     pub length_mm: Option<f64>,
-    /// What was assumed or changed of the mesh, in sentences.
+    /// Assumptions about the mesh and changes of it, in sentences.
     pub warnings: Vec<String>,
 }
 
-/// What a reader's profile holds.
+/// Content of a reader's profile.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ReaderSummary {

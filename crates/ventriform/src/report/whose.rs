@@ -1,7 +1,7 @@
 //! The part of a page that says whose scan it shows.
 
 use crate::draw::text::leaves;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use maud::{Markup, html};
 use serde_json::json;
 

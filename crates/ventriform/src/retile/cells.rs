@@ -32,22 +32,22 @@ use std::collections::VecDeque;
 
 /// Fraction of the vector to the centroid that a round adds to a site's velocity. Stable below
 /// 2 (1 + momentum).
-const STEP: f64 = 1.5;
+const STEP_FRACTION: f64 = 1.5;
 
 /// Fraction of its velocity that a site keeps. With 0.8, cells are less regular after 80 rounds.
-const MOMENTUM: f64 = 0.9;
+const MOMENTUM_FRACTION: f64 = 0.9;
 
 /// Number of last rounds without momentum, in which the sites come to rest.
 const COOLING_ROUNDS: usize = 10;
 
 /// Root mean square distance to the centroids, in spacings, below which relaxation ends.
-const SETTLED: f64 = 2e-4;
+const SETTLED_SPACINGS: f64 = 2e-4;
 
 /// Number of samples per parallel task; small, so that threads finish at about the same time.
-const CHUNK: usize = 512;
+const CHUNK_SAMPLES: usize = 512;
 
 /// The label of a sample that has no site yet.
-const UNASSIGNED: u32 = u32::MAX;
+const UNASSIGNED_LABEL: u32 = u32::MAX;
 
 /// The site of each sample and the positions of the sites.
 #[derive(Debug, Clone)]
@@ -61,7 +61,7 @@ pub(super) struct Cells {
 impl Cells {
     /// Cells that grow from one sample each, ring by ring.
     pub fn grow(samples: &WeightedSamples, seeds: &[u32]) -> Self {
-        let mut labels = vec![UNASSIGNED; samples.len()];
+        let mut labels = vec![UNASSIGNED_LABEL; samples.len()];
         let mut front: VecDeque<u32> = seeds.iter().copied().collect();
         for (site, &v) in (0u32..).zip(seeds) {
             labels[v as usize] = site;
@@ -84,7 +84,7 @@ impl Cells {
         monitor: &Monitor,
     ) -> Result<usize, Cancelled> {
         let area: f64 = samples.area.iter().sum();
-        let settled = SETTLED * (area / self.sites.len() as f64).sqrt();
+        let settled = SETTLED_SPACINGS * (area / self.sites.len() as f64).sqrt();
         let patches = Patches::new(samples, weights);
         let mut border = Border::new(samples, &self.labels);
         let mut means = Means::new(self, samples, weights);
@@ -106,7 +106,7 @@ impl Cells {
                 centroids = patches.centroids(&self.labels, &self.sites);
             }
             let (momentum, step) = if round + COOLING_ROUNDS < rounds {
-                (MOMENTUM, STEP)
+                (MOMENTUM_FRACTION, STEP_FRACTION)
             } else {
                 (0.0, 1.0)
             };
@@ -175,10 +175,10 @@ impl Cells {
         for &part in &parts {
             size[part as usize] += 1;
         }
-        let mut largest = vec![UNASSIGNED; self.sites.len()];
+        let mut largest = vec![UNASSIGNED_LABEL; self.sites.len()];
         for (&part, &site) in parts.iter().zip(&self.labels) {
             let best = &mut largest[site as usize];
-            if *best == UNASSIGNED || size[part as usize] > size[*best as usize] {
+            if *best == UNASSIGNED_LABEL || size[part as usize] > size[*best as usize] {
                 *best = part;
             }
         }
@@ -187,7 +187,7 @@ impl Cells {
             if largest[*label as usize] == parts[v as usize] {
                 front.push_back(v);
             } else {
-                *label = UNASSIGNED;
+                *label = UNASSIGNED_LABEL;
             }
         }
         flood(samples, &mut self.labels, &mut front);
@@ -204,13 +204,13 @@ impl Cells {
         let mut front = VecDeque::new();
         for label in &mut self.labels {
             if *label == site {
-                *label = UNASSIGNED;
+                *label = UNASSIGNED_LABEL;
             }
         }
         self.labels[target] = site;
         self.sites[site as usize] = samples.working[target];
         for v in 0..self.labels.len() {
-            if ![UNASSIGNED, site].contains(&self.labels[v]) {
+            if ![UNASSIGNED_LABEL, site].contains(&self.labels[v]) {
                 front.push_back(v as u32);
             }
         }
@@ -251,8 +251,8 @@ impl Border {
         self.nearest.resize(self.samples.len(), 0);
         let (labels, sites) = (&cells.labels, &cells.sites);
         let near = |v: &u32| nearest_site(samples, labels, sites, *v as usize);
-        (self.nearest.par_chunks_mut(CHUNK))
-            .zip(self.samples.par_chunks(CHUNK))
+        (self.nearest.par_chunks_mut(CHUNK_SAMPLES))
+            .zip(self.samples.par_chunks(CHUNK_SAMPLES))
             .for_each(|(nearest, samples)| {
                 for (nearest, v) in nearest.iter_mut().zip(samples) {
                     *nearest = near(v);
@@ -262,7 +262,7 @@ impl Border {
         let mut kept = 0;
         for place in 0..count {
             let (v, nearest) = (self.samples[place], self.nearest[place]);
-            if nearest == UNASSIGNED {
+            if nearest == UNASSIGNED_LABEL {
                 // A neighbour that comes earlier may have changed; one that comes later lists it again.
                 let inside = !has_other_neighbour(samples, &cells.labels, v as usize);
                 if inside {
@@ -340,7 +340,7 @@ impl<'a> Means<'a> {
 }
 
 /// The nearest of the sites that sample `v` and its neighbours belong to; of two at the same
-/// distance the lower one. [`UNASSIGNED`] where all neighbours belong to the sample's own site.
+/// distance the lower one. [`UNASSIGNED_LABEL`] where all neighbours belong to the sample's own site.
 fn nearest_site(samples: &WeightedSamples, labels: &[u32], sites: &[Vec3], v: usize) -> u32 {
     let own = labels[v];
     let position = samples.working[v];
@@ -359,14 +359,18 @@ fn nearest_site(samples: &WeightedSamples, labels: &[u32], sites: &[Vec3], v: us
             (best, least) = (site, distance);
         }
     }
-    if least.is_nan() { UNASSIGNED } else { best }
+    if least.is_nan() {
+        UNASSIGNED_LABEL
+    } else {
+        best
+    }
 }
 
 /// Spreads labels from the samples of `front` to all that have none.
 fn flood(samples: &WeightedSamples, labels: &mut [u32], front: &mut VecDeque<u32>) {
     while let Some(v) = front.pop_front() {
         for &n in samples.around(v as usize) {
-            if labels[n as usize] == UNASSIGNED {
+            if labels[n as usize] == UNASSIGNED_LABEL {
                 labels[n as usize] = labels[v as usize];
                 front.push_back(n);
             }
@@ -376,11 +380,11 @@ fn flood(samples: &WeightedSamples, labels: &mut [u32], front: &mut VecDeque<u32
 
 /// The connected part of every sample, where samples of the same label are connected.
 fn connected_parts(samples: &WeightedSamples, labels: &[u32]) -> Vec<u32> {
-    let mut parts = vec![UNASSIGNED; labels.len()];
+    let mut parts = vec![UNASSIGNED_LABEL; labels.len()];
     let mut count = 0;
     let mut stack = Vec::new();
     for start in 0..labels.len() {
-        if parts[start] != UNASSIGNED {
+        if parts[start] != UNASSIGNED_LABEL {
             continue;
         }
         parts[start] = count;
@@ -388,7 +392,7 @@ fn connected_parts(samples: &WeightedSamples, labels: &[u32]) -> Vec<u32> {
         while let Some(v) = stack.pop() {
             for &n in samples.around(v as usize) {
                 let n = n as usize;
-                if parts[n] == UNASSIGNED && labels[n] == labels[v as usize] {
+                if parts[n] == UNASSIGNED_LABEL && labels[n] == labels[v as usize] {
                     parts[n] = count;
                     stack.push(n as u32);
                 }
@@ -424,7 +428,7 @@ mod tests {
                 *site += Vec3::from_fn(|_, _| random.random_range(-2.0..2.0));
             }
             let nearest = |v: usize| match nearest_site(&samples, &cells.labels, &cells.sites, v) {
-                UNASSIGNED => cells.labels[v],
+                UNASSIGNED_LABEL => cells.labels[v],
                 site => site,
             };
             let expected: Vec<u32> = (0..samples.len()).map(nearest).collect();
@@ -485,7 +489,7 @@ mod tests {
             let distance = |site: &u32| (samples.working[v] - cells.sites[*site as usize]).norm();
             near.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
             let found = match nearest_site(&samples, &cells.labels, &cells.sites, v) {
-                UNASSIGNED => cells.labels[v],
+                UNASSIGNED_LABEL => cells.labels[v],
                 site => site,
             };
             assert_eq!(found, near[0]);
@@ -670,7 +674,7 @@ mod tests {
         let mut velocities = vec![Vec3::zeros(); cells.sites.len()];
         for round in 0..rounds {
             let nearest = |v: usize| match nearest_site(samples, &cells.labels, &cells.sites, v) {
-                UNASSIGNED => cells.labels[v],
+                UNASSIGNED_LABEL => cells.labels[v],
                 site => site,
             };
             cells.labels = (0..samples.len()).map(nearest).collect();
@@ -688,7 +692,7 @@ mod tests {
             for (site, centroid) in centroids.into_iter().enumerate() {
                 let way = centroid - cells.sites[site];
                 velocities[site] = if left > COOLING_ROUNDS {
-                    velocities[site] * MOMENTUM + way * STEP
+                    velocities[site] * MOMENTUM_FRACTION + way * STEP_FRACTION
                 } else {
                     way
                 };
@@ -711,7 +715,7 @@ mod tests {
             .collect();
         let seeds: Vec<u32> = (0..40).map(|k| k * 45).collect();
         let start = Cells::grow(&samples, &seeds);
-        let limit = SETTLED * (mesh.area() / 40.0).sqrt();
+        let limit = SETTLED_SPACINGS * (mesh.area() / 40.0).sqrt();
         for rounds in [(1, 0), (1, 1), (4, 2), (10, 0), (11, 3), (13, 13), (20, 7)] {
             let mut cells = start.clone();
             let done = cells.relax(&samples, &weights, rounds, &Monitor::silent());
@@ -731,7 +735,7 @@ mod tests {
         let samples = ball();
         let silent = Monitor::silent();
         let area: f64 = samples.area.iter().sum();
-        let limit = SETTLED * (area / 12.0).sqrt();
+        let limit = SETTLED_SPACINGS * (area / 12.0).sqrt();
         for rounds in [(300, 300), (10, 10), (60, 55)] {
             let mut cells = cells(&samples);
             let (_, expected) =

@@ -103,7 +103,7 @@ pub struct RetileParameters {
     /// Largest number of rounds of relaxation ([`Method::Refined`]), 0..=1000. Default 50; 80 make triangles more
     /// regular by .001 of 2r/R.
     pub relaxation_iterations: usize,
-    /// How many of the last rounds of relaxation cut triangles between cells to find the cells' centroids;
+    /// Number of the last rounds of relaxation that cut triangles between cells to find the cells' centroids;
     /// those before count whole samples. Default 20. Requests cannot set it; the built-in hearts were made
     /// with exact centroids in all rounds.
     pub exact_rounds: usize,

@@ -16,7 +16,7 @@ const END_MARGIN: f64 = 1e-7;
 /// Largest number of edges that one path crosses; no path on a regular surface comes near it.
 const MAX_CROSSINGS: usize = 10_000;
 
-/// How far points near an edge of their triangle are moved towards its centroid, as a fraction of
+/// Shift of points near an edge of their triangle towards its centroid, as a fraction of
 /// the way.
 pub(crate) const EDGE_INSET: f64 = 2e-3;
 

@@ -15,7 +15,7 @@ use crate::model::wall_parts;
 use crate::polar::{self, PolarDocument};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationSummary};
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry, MaskError, StoredType};
 use crate::volume::{AffineSource, Reading};
 use serde::Serialize;

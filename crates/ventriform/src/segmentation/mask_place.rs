@@ -22,7 +22,7 @@ pub(super) struct MaskPlace<'a> {
     pub frame: VoxelToPatient,
     /// Voxels along i, j, k.
     pub shape: [usize; 3],
-    /// How the scan's file states the grid, if it is NIfTI and the grid is the scan's.
+    /// The grid as the scan's file states it, if it is NIfTI and the grid is the scan's.
     pub stated: Option<&'a StatedGrid>,
     /// Whether it is another grid than the scan's.
     covering: bool,

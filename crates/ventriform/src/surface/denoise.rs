@@ -38,15 +38,15 @@ use crate::mesh::{TriMesh, vertex_normals};
 use crate::progress::{Cancelled, Monitor};
 
 /// Length of the filter that separates noise from shape, voxels.
-const PROBE: f64 = 1.25;
+const PROBE_LENGTH_VOXELS: f64 = 1.25;
 /// C: smoothing length over that at which error and noise are in balance.
-const STRENGTH: f64 = 0.63;
-/// How much of the rest is shape, over what a second pass of the filter takes off. Of noise the second
+const SMOOTHING_LENGTH_RATIO: f64 = 0.63;
+/// The part of the rest that is shape, over what a second pass of the filter takes off. Of noise the second
 /// pass takes off a fifth.
-const BENT: f64 = 2.0;
+const SHAPE_RATIO: f64 = 2.0;
 /// Largest width of the correlation over the length of the filter: the filter passes next to nothing of
 /// noise that is wider.
-const WIDEST: f64 = 1.2;
+const MAX_WIDTH_RATIO: f64 = 1.2;
 /// Largest movement of a vertex over the noise there.
 const LARGEST_MOVE: f64 = 3.0;
 /// Largest cotangent of an angle; larger ones belong to slivers.
@@ -64,7 +64,7 @@ const LARGEST_RATE: f64 = 2.0;
 const MAX_DEGREE: usize = 300;
 /// Degree over the square root of the operator's largest eigenvalue: with it the series is exact to a
 /// hundredth.
-const DEGREE: f64 = 5.0;
+const DEGREE_RATIO: f64 = 5.0;
 /// Median of the absolute values of a Gaussian variable over its standard deviation.
 const MEDIAN_OF_GAUSSIAN: f64 = 0.674_489_750_196_081_7;
 /// Fewest vertices of a surface whose noise can be measured.
@@ -105,7 +105,7 @@ pub fn denoise(
         return Ok(None);
     }
     let laplacian = Laplacian::new(even, &mesh.triangles);
-    let probe = PROBE * spacing;
+    let probe = PROBE_LENGTH_VOXELS * spacing;
     let uniform = |length: f64| vec![length; even.len()];
     let [smooth, again] = laplacian.filter(&mesh.vertices, &uniform(probe), [1, 2], monitor)?;
     let normals = vertex_normals(&smooth, &mesh.triangles);
@@ -128,7 +128,7 @@ pub fn denoise(
     let spread = |heights: &[f64]| {
         median(heights.iter().zip(&steepness).map(|(h, g)| h.abs() * g)) / MEDIAN_OF_GAUSSIAN
     };
-    let seen = (spread(&rest).powi(2) - (BENT * spread(&bent)).powi(2)).max(0.0);
+    let seen = (spread(&rest).powi(2) - (SHAPE_RATIO * spread(&bent)).powi(2)).max(0.0);
     let width = laplacian.width(&rest, &smooth, probe);
     let level = (seen / share_seen(width, probe)).sqrt();
     let mut noise = SurfaceNoise {
@@ -157,7 +157,7 @@ pub fn denoise(
         .map(|(k, g)| {
             let radius = 1.0 / k.max(least);
             let error = level / g * noise.correlation_mm / (radius * radius);
-            STRENGTH * radius * error.powf(0.2)
+            SMOOTHING_LENGTH_RATIO * radius * error.powf(0.2)
         })
         .collect();
     let [smooth] = laplacian.filter(&mesh.vertices, &lengths, [1], monitor)?;
@@ -199,7 +199,7 @@ fn take_back_intersections(
     }
 }
 
-/// How fast the intensity falls along the normal at every vertex, per mm.
+/// The fall of the intensity along the normal at every vertex, per mm.
 fn steepness(
     vertices: &[Vec3],
     normals: &[Vec3],
@@ -219,14 +219,16 @@ fn steepness(
 /// what a second pass of the filter takes off is subtracted.
 fn share_seen(width: f64, probe: f64) -> f64 {
     // The spectrum is exp(-(width k)²); u = (width k)².
-    const STEPS: usize = 1000;
-    const STEP: f64 = 0.01;
-    (0..STEPS)
+    const SPECTRUM_STEPS: usize = 1000;
+    const SPECTRUM_STEP: f64 = 0.01;
+    (0..SPECTRUM_STEPS)
         .map(|n| {
-            let u = (n as f64 + 0.5) * STEP;
+            let u = (n as f64 + 0.5) * SPECTRUM_STEP;
             let passed = 1.0 / (1.0 + (u * (probe / width).powi(2)).powi(3));
             let stopped = 1.0 - passed;
-            (stopped.powi(2) - (BENT * passed * stopped).powi(2)) * (-u).exp() * STEP
+            (stopped.powi(2) - (SHAPE_RATIO * passed * stopped).powi(2))
+                * (-u).exp()
+                * SPECTRUM_STEP
         })
         .sum()
 }
@@ -337,11 +339,11 @@ impl Laplacian {
             .map(|v| 2.0 * self.degree[v] * wanted(v))
             .sum();
         let largest = (LARGEST_RATE * sum / positions.len() as f64)
-            .min(((MAX_DEGREE - 4) as f64 / DEGREE).powi(2));
+            .min(((MAX_DEGREE - 4) as f64 / DEGREE_RATIO).powi(2));
         let scale: Vec<f64> = (0..positions.len())
             .map(|v| wanted(v).min(largest / (2.0 * self.degree[v])))
             .collect();
-        let degree = (DEGREE * largest.sqrt()).ceil() as usize + 4;
+        let degree = (DEGREE_RATIO * largest.sqrt()).ceil() as usize + 4;
         let half = largest / 2.0;
         let steps: Vec<Step> = (0..positions.len())
             .map(|v| Step {
@@ -433,7 +435,7 @@ impl Laplacian {
         // 1/w² is the mean square of the wave number, of which the filter leaves that above 1/probe.
         let square = 2.0 * differences / (mean * distances).max(f64::MIN_POSITIVE);
         (square - 1.0 / (probe * probe))
-            .max((WIDEST * probe).powi(-2))
+            .max((MAX_WIDTH_RATIO * probe).powi(-2))
             .sqrt()
             .recip()
     }
@@ -614,7 +616,7 @@ mod tests {
     fn the_series_is_that_of_the_function() {
         let f = |x: f64| x * x / (1.0 + x.powi(3));
         let largest: f64 = 60.0;
-        let degree = (DEGREE * largest.sqrt()).ceil() as usize + 4;
+        let degree = (DEGREE_RATIO * largest.sqrt()).ceil() as usize + 4;
         let series = chebyshev(f, largest, degree);
         for x in [0.0, 0.1, 0.9, 2.0, 17.0, 60.0_f64] {
             let angle = (2.0 * x / largest - 1.0).acos();

@@ -32,7 +32,7 @@ pub struct SurfaceFacts {
     pub kind: VolumeKind,
     /// The label surfaced.
     pub label: Option<i64>,
-    /// How much like a left ventricle the found region looks, 0..1; `None` where it was not
+    /// Likeness of the found region to a left ventricle, 0..1; `None` where it was not
     /// searched.
     pub ventricle_score: Option<f64>,
     /// Volume of the voxels that carry the label, ml; `None` for intensities. The surface is made to

@@ -7,13 +7,13 @@
 use super::object::Object;
 use super::region::WallShell;
 use super::{IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, iso_value};
+use crate::grid::Volume;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::grid::survey::Survey;
 use crate::locate::rays::{PLAUSIBLE_SCORE, UNCERTAIN_SCORE};
 use crate::locate::{self, LocateError};
 use crate::progress::Monitor;
-use crate::volume::Volume;
 
 /// Chooses the ventricle, or the part that `parameters` select.
 ///

@@ -6,10 +6,10 @@ use super::{
 };
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::Volume;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::progress::Monitor;
-use crate::volume::Volume;
 
 /// Selects the voxels of `label`, smoothed so that their surface has no staircase.
 ///

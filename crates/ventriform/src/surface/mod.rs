@@ -39,10 +39,10 @@ use std::sync::Arc;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
+use crate::grid::Volume;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Census};
 use crate::progress::{Monitor, Stage};
-use crate::volume::Volume;
 
 use crate::grid::components::Components;
 use crate::grid::survey::Survey;

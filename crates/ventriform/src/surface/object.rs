@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::Volume;
 use crate::grid::labels::Labels;
-use crate::volume::Volume;
 
 /// The voxels to surface, and the samples that place the vertices.
 pub(super) struct Object<'a> {

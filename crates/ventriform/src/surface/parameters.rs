@@ -1,8 +1,8 @@
 //! Parameters of the surface's extraction.
 
 use super::SurfaceError;
+use crate::grid::Volume;
 use crate::locate::Hints;
-use crate::volume::Volume;
 
 /// Choice of the iso-value.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -16,12 +16,12 @@ use std::collections::BinaryHeap;
 use rayon::prelude::*;
 
 use crate::geometry::Vec3;
+use crate::grid::Volume;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::locate::directions::Compass;
 use crate::locate::rays::Cavity;
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::Volume;
 
 /// Greatest distance of the ventricle's voxels outward from the middle of the wall, mm.
 const MAX_OUTWARD_MM: f64 = 24.0;

@@ -6,9 +6,9 @@
 use crate::geometry::Vec3;
 
 /// Weight of the shrinking step.
-const LAMBDA: f64 = 0.5;
+const SHRINKING_WEIGHT: f64 = 0.5;
 /// Weight of the growing step.
-const MU: f64 = -0.53;
+const GROWING_WEIGHT: f64 = -0.53;
 
 /// Smooths the vertices of a closed mesh by `passes` pairs of steps.
 pub fn taubin(vertices: &[Vec3], triangles: &[[u32; 3]], passes: usize) -> Vec<Vec3> {
@@ -21,7 +21,11 @@ pub fn taubin(vertices: &[Vec3], triangles: &[[u32; 3]], passes: usize) -> Vec<V
     }
     let mut sums = vec![Vec3::zeros(); vertices.len()];
     for pass in 0..2 * passes {
-        let weight = if pass % 2 == 0 { LAMBDA } else { MU };
+        let weight = if pass % 2 == 0 {
+            SHRINKING_WEIGHT
+        } else {
+            GROWING_WEIGHT
+        };
         sums.fill(Vec3::zeros());
         for &[a, b, c] in triangles {
             sums[a as usize] += current[b as usize];

@@ -22,7 +22,7 @@ pub enum VolumeError {
         file: String,
         /// The format.
         format: String,
-        /// How to make a readable file of it.
+        /// A way to make a readable file of it.
         fix: &'static str,
     },
     /// A DICOM object that holds no volume.
@@ -108,7 +108,7 @@ pub enum VolumeError {
         file: String,
         /// The limited quantity.
         what: &'static str,
-        /// How much of it the file has.
+        /// Its amount in the file.
         asked: u64,
         /// The limit.
         limit: u64,
@@ -150,7 +150,7 @@ pub enum VolumeError {
     NotOneVolume {
         /// Where they were found: a folder, an archive, or what was given.
         place: String,
-        /// How many files there are of each kind.
+        /// Numbers of files of each kind.
         held: String,
     },
     /// The value of a voxel exceeds the range of 32-bit floats.

@@ -7,8 +7,8 @@
 use super::facts::VolumeFacts;
 use super::nifti::grid::StatedGrid;
 use super::open::Reading;
+use super::provenance::Provenance;
 use super::{Volume, VolumeError};
-use crate::volume::dicom::Provenance;
 
 /// What a file says of the beats that were gated. Parts that it leaves out are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]

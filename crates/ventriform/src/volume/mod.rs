@@ -57,8 +57,10 @@ pub mod nifti;
 mod open;
 pub mod phantom;
 pub mod preview;
+mod provenance;
 mod read;
 mod recognise;
+mod segment;
 mod source;
 mod summary;
 mod surface_file;
@@ -74,9 +76,11 @@ pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
+pub use provenance::Provenance;
 pub use read::{
     inspect, labels_are_rounded, preview_files, provenance, read, read_gates, read_segment,
     segments, surface, voxels_of_label,
 };
+pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;
 pub use summary::summarise;

@@ -3,7 +3,6 @@
 //! A format implements [`OpenVolume`]; [`read`] and [`inspect`] do the rest.
 
 use super::decode::DataType;
-use super::dicom::{Provenance, Segment};
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
@@ -12,7 +11,7 @@ use super::limits::ReadOptions;
 use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;
 use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
-use super::{Volume, VolumeError};
+use super::{Provenance, Segment, Volume, VolumeError};
 use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
 use crate::mesh::TriMesh;

@@ -1,6 +1,6 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
-use super::dicom::{DicomFile, Provenance, Segment};
+use super::dicom::DicomFile;
 use super::gates::{GateTiming, GatedReading};
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
@@ -8,7 +8,7 @@ use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
 use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
-use super::{LabelCount, VolumeError, VolumeFacts, archive, nifti};
+use super::{LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
 use crate::mesh::TriMesh;
 use crate::mesh_files::MeshStatement;

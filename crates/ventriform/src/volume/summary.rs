@@ -253,7 +253,7 @@ fn is_labelled(voxel: f32) -> bool {
 /// The exact value of a voxel that carries no label: a missing value or a fraction.
 pub(super) const NO_LABEL: i64 = i64::MIN;
 
-/// How often neighbours along i have different labels. Exact for volumes of whole numbers.
+/// Counts of neighbours along i with different labels. Exact for volumes of whole numbers.
 pub(super) struct Coherence {
     /// Voxels per row.
     row: usize,

@@ -24,12 +24,12 @@ use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
 use ventriform::volume::Volume;
 
-const SPACING: f64 = 3.5;
+const SPACING_MM: f64 = 3.5;
 
 /// A volume of `n`³ voxels about the origin with `value` at every centre, blurred by
 /// `sigma` mm.
 fn picture(n: usize, sigma: f64, value: impl Fn(&Vec3) -> f64) -> Volume {
-    let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
+    let frame = VoxelToPatient::centred([n; 3], [SPACING_MM; 3], Vec3::zeros()).unwrap();
     let mut volume = Volume::sampled([n; 3], frame, value);
     volume.voxels = Field::new(&volume, None, sigma).values().to_vec();
     volume
@@ -37,7 +37,7 @@ fn picture(n: usize, sigma: f64, value: impl Fn(&Vec3) -> f64) -> Volume {
 
 /// The value of a ball's indicator, antialiased over a voxel.
 fn ball(p: &Vec3, centre: &Vec3, radius: f64) -> f64 {
-    ((radius - (p - centre).norm()) / SPACING + 0.5).clamp(0.0, 1.0)
+    ((radius - (p - centre).norm()) / SPACING_MM + 0.5).clamp(0.0, 1.0)
 }
 
 /// A ventricle-like cup at `centre` with its apex along `axis`.
@@ -55,7 +55,7 @@ fn placed(mut mesh: TriMesh, centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
 
 /// A blurred image of `wall`: 1 in the wall, multiplied by `uptake` at each point.
 fn scan(wall: &TriMesh, n: usize, uptake: impl Fn(&Vec3) -> f64) -> Volume {
-    let frame = VoxelToPatient::centred([n; 3], [SPACING; 3], Vec3::zeros()).unwrap();
+    let frame = VoxelToPatient::centred([n; 3], [SPACING_MM; 3], Vec3::zeros()).unwrap();
     let mask = voxelise(wall, [n; 3], &frame);
     let mut volume = picture(n, 0.0, |_| 0.0);
     for (v, inside) in mask.voxels.iter().enumerate() {
@@ -115,9 +115,12 @@ fn a_sphere_grows_onto_a_sphere_and_a_shifted_one_comes_back() {
         let found = (3.0 * fit.model.mesh.volume() / (4.0 * std::f64::consts::PI)).cbrt();
         // Blur of 2 mm moves the steepest slope of a ball inward by sigma²/R.
         let edge = radius - 4.0 / radius;
-        assert!((found - edge).abs() < 0.1 * SPACING, "{found} for {edge}");
+        assert!(
+            (found - edge).abs() < 0.1 * SPACING_MM,
+            "{found} for {edge}"
+        );
         let middle: Vec3 = fit.model.mesh.vertices.iter().sum::<Vec3>() / 162.0;
-        assert!((middle - centre).norm() < 0.1 * SPACING, "{middle}");
+        assert!((middle - centre).norm() < 0.1 * SPACING_MM, "{middle}");
     }
 }
 
@@ -335,7 +338,7 @@ fn a_margin_moves_both_sides_and_the_rim_outwards() {
     let volume = scan(&truth, 56, |_| 1.0);
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     let monitor = Monitor::silent();
-    let edge = |mesh: TriMesh| Reference::new(&surface::Surface::exact(mesh, SPACING));
+    let edge = |mesh: TriMesh| Reference::new(&surface::Surface::exact(mesh, SPACING_MM));
     let truth = edge(truth);
     let places = [-2.0, 2.0].map(|margin| {
         let parameters = DeformParameters {

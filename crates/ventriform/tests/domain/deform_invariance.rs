@@ -61,7 +61,7 @@ fn template() -> Template {
     Template::new(model.mesh, Organ::LeftVentricle, &monitor).unwrap()
 }
 
-/// What `volume` shows after a turn about `centre` and a shift, on the same voxels.
+/// The content of `volume` after a turn about `centre` and a shift, on the same voxels.
 fn moved(volume: &Volume, centre: &Vec3, turn: &Rotation3<f64>, shift: &Vec3) -> Volume {
     let field = Field::new(volume, None, 0.0);
     let [nx, ny, _] = volume.shape;
@@ -106,13 +106,13 @@ fn worst_variation(runs: &[Vec<f64>]) -> (f64, usize) {
 }
 
 /// The largest variation allowed.
-const LIMIT: f64 = 0.05;
+const MAX_VARIATION: f64 = 0.05;
 
 /// The largest variation of the basal segments between noise of 5 and 10 %. Noise changes the image
 /// itself, above all the uptake along the rim, which the basal thirds of the wall reach; 0.0515 was measured.
-const BASAL_NOISE_LIMIT: f64 = 0.055;
+const MAX_BASAL_NOISE_VARIATION: f64 = 0.055;
 /// The places of the basal segments among the measures.
-const BASAL: std::ops::Range<usize> = 2..8;
+const BASAL_MEASURES: std::ops::Range<usize> = 2..8;
 
 #[test]
 fn shifts_turns_of_the_patient_and_turns_of_the_grid_change_nothing() {
@@ -149,7 +149,10 @@ fn shifts_turns_of_the_patient_and_turns_of_the_grid_change_nothing() {
         runs.push(measure(&oblique, &template));
     }
     let (variation, measure) = worst_variation(&runs);
-    assert!(variation < LIMIT, "measure {measure} varies by {variation}");
+    assert!(
+        variation < MAX_VARIATION,
+        "measure {measure} varies by {variation}"
+    );
 }
 
 #[test]
@@ -169,7 +172,10 @@ fn a_patient_who_is_tilted_keeps_volumes_and_segments() {
         )
     });
     let (variation, measure) = worst_variation(&runs);
-    assert!(variation < LIMIT, "measure {measure} varies by {variation}");
+    assert!(
+        variation < MAX_VARIATION,
+        "measure {measure} varies by {variation}"
+    );
 }
 
 #[test]
@@ -189,7 +195,10 @@ fn so_do_tilted_scans_with_several_defects() {
         let runs =
             tilts().map(|turn| measure(&moved(&volume, &centre, &turn, &Vec3::zeros()), &template));
         let (variation, measure) = worst_variation(&runs);
-        assert!(variation < LIMIT, "{case}: {measure} varies by {variation}");
+        assert!(
+            variation < MAX_VARIATION,
+            "{case}: {measure} varies by {variation}"
+        );
     }
 }
 
@@ -215,11 +224,11 @@ fn doubled_noise_changes_little() {
     let (basal, others): (Vec<Vec<f64>>, Vec<Vec<f64>>) = runs
         .into_iter()
         .map(|run| {
-            let others = [&run[..BASAL.start], &run[BASAL.end..]].concat();
-            (run[BASAL].to_vec(), others)
+            let others = [&run[..BASAL_MEASURES.start], &run[BASAL_MEASURES.end..]].concat();
+            (run[BASAL_MEASURES].to_vec(), others)
         })
         .unzip();
-    for (measures, limit) in [(basal, BASAL_NOISE_LIMIT), (others, LIMIT)] {
+    for (measures, limit) in [(basal, MAX_BASAL_NOISE_VARIATION), (others, MAX_VARIATION)] {
         let (variation, measure) = worst_variation(&measures);
         assert!(variation < limit, "measure {measure} varies by {variation}");
     }

@@ -20,12 +20,13 @@ use ventriform::model::struts::struts;
 use ventriform::progress::Monitor;
 use ventriform::volume::Volume;
 
-const SPACING: f64 = 4.0;
+const SPACING_MM: f64 = 4.0;
 
 /// A thick-walled half ellipsoid, smooth in space: 1 in the wall, 0 elsewhere.
 fn patient() -> Volume {
     let shape = [32; 3];
-    let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::new(0.0, 0.0, -25.0)).unwrap();
+    let frame =
+        VoxelToPatient::centred(shape, [SPACING_MM; 3], Vec3::new(0.0, 0.0, -25.0)).unwrap();
     let edge = |distance: f64| (0.5 + distance / 12.0).clamp(0.0, 1.0);
     let mut volume = Volume::sampled(shape, frame, |p| {
         let shell = |long: f64, wide: f64| {
@@ -40,10 +41,10 @@ fn patient() -> Volume {
 
 /// Steps of the reference integrator until it rests.
 fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &SensorSettings) -> TriMesh {
-    const MASS: f64 = 1.0;
-    const DAMPING: f64 = 1.0;
-    const STEP: f64 = 0.4;
-    let masses: Vec<f64> = area_shares(start).iter().map(|s| s * MASS).collect();
+    const TOTAL_MASS: f64 = 1.0;
+    const DAMPING_RATE: f64 = 1.0;
+    const TIME_STEP: f64 = 0.4;
+    let masses: Vec<f64> = area_shares(start).iter().map(|s| s * TOTAL_MASS).collect();
     let corners = sensors::barycentric();
     let mut mesh = start.clone();
     let mut velocity = vec![Vec3::zeros(); masses.len()];
@@ -61,9 +62,9 @@ fn explicit(start: &TriMesh, body: &Elastic, field: &Field, look: &SensorSetting
             }
         }
         for node in 0..masses.len() {
-            let acceleration = forces[node] / masses[node] - velocity[node] * DAMPING;
-            velocity[node] += acceleration * STEP;
-            mesh.vertices[node] += velocity[node] * STEP;
+            let acceleration = forces[node] / masses[node] - velocity[node] * DAMPING_RATE;
+            velocity[node] += acceleration * TIME_STEP;
+            mesh.vertices[node] += velocity[node] * TIME_STEP;
         }
     }
     let fastest = velocity.iter().map(Vec3::norm).fold(0.0, f64::max);
@@ -121,7 +122,13 @@ fn explicit_and_implicit_steps_end_in_the_same_state() {
         // the mean, 0.31 at most. They cannot be equal, because one rests on the mean of twelve
         // readings and the other on the last one.
         assert!(moved > 4.0, "{moved}");
-        assert!(apart < 0.15 * SPACING, "{kind:?}: {apart} mm in the mean");
-        assert!(farthest < 0.35 * SPACING, "{kind:?}: {farthest} mm at most");
+        assert!(
+            apart < 0.15 * SPACING_MM,
+            "{kind:?}: {apart} mm in the mean"
+        );
+        assert!(
+            farthest < 0.35 * SPACING_MM,
+            "{kind:?}: {farthest} mm at most"
+        );
     }
 }

@@ -72,7 +72,7 @@ fn filling(shape: [usize; 3], spacing: [f64; 3]) -> Volume {
     })
 }
 
-const HALF: (&str, &str) = ("iso", "absolute:0.75");
+const HALF_LEVEL: (&str, &str) = ("iso", "absolute:0.75");
 
 #[test]
 fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
@@ -86,7 +86,7 @@ fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
     ] {
         for method in ["refined", "paper"] {
             let body = filling(shape, [2.0; 3]);
-            let pairs = [HALF, ("points", "150"), ("method", method)];
+            let pairs = [HALF_LEVEL, ("points", "150"), ("method", method)];
             if method == "paper" && shape.contains(&1024) {
                 continue; // Takes a minute and tells nothing new.
             }
@@ -95,7 +95,10 @@ fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
                 assert_eq!(error.field(), Some("points"), "{shape:?} {method}: {error}");
                 if let PipelineError::Retile(RetileError::TooFewPoints { needed, .. }) = error {
                     let enough = needed.to_string();
-                    model(&body, &[HALF, ("points", &enough), ("method", method)]);
+                    model(
+                        &body,
+                        &[HALF_LEVEL, ("points", &enough), ("method", method)],
+                    );
                 }
             }
         }
@@ -107,7 +110,7 @@ fn any_shape_from_three_to_a_thousand_voxels_an_axis() {
 #[test]
 fn a_model_that_cannot_follow_its_surface_says_so() {
     for (shape, coarse, starts) in [([3, 3, 1024], true, 1), ([30, 30, 40], false, 3)] {
-        let report = model(&filling(shape, [2.0; 3]), &[HALF, ("points", "67")]).report;
+        let report = model(&filling(shape, [2.0; 3]), &[HALF_LEVEL, ("points", "67")]).report;
         assert_eq!(report.retile.starts.len(), starts);
         let lost = report.distance.volume_error_percent;
         assert_eq!(lost < -10.0, coarse, "{shape:?} lost {lost} %");
@@ -122,7 +125,7 @@ fn a_model_that_cannot_follow_its_surface_says_so() {
 #[test]
 fn fewer_than_three_voxels_an_axis_are_a_model_or_an_error() {
     for shape in [[1, 1, 1], [2, 2, 2], [1, 30, 30], [2, 40, 9]] {
-        let made = generate(&filling(shape, [2.0; 3]), &[HALF]);
+        let made = generate(&filling(shape, [2.0; 3]), &[HALF_LEVEL]);
         let refused = matches!(
             made,
             Err(PipelineError::Volume(VolumeError::SingleSlice { .. }))
@@ -136,7 +139,7 @@ fn voxels_ten_times_longer_than_wide() {
     for spacing in [[1.0, 1.0, 10.0], [10.0, 1.0, 1.0], [0.5, 5.0, 1.0]] {
         let shape = [0, 1, 2].map(|r| (60.0 / spacing[r]) as usize);
         for (method, points) in [("refined", "12"), ("refined", "300"), ("paper", "150")] {
-            let pairs = [HALF, ("points", points), ("method", method)];
+            let pairs = [HALF_LEVEL, ("points", points), ("method", method)];
             let model = model(&filling(shape, spacing), &pairs);
             assert_eq!(model.report.mesh.euler_characteristic, 2);
         }
@@ -195,7 +198,7 @@ fn several_components_are_kept_or_dropped_as_asked() {
 fn from_twelve_points_to_fifty_thousand() {
     let ball = filling([40; 3], [2.0; 3]);
     for (method, points) in [("refined", "12"), ("paper", "12"), ("refined", "20000")] {
-        model(&ball, &[HALF, ("points", points), ("method", method)]);
+        model(&ball, &[HALF_LEVEL, ("points", points), ("method", method)]);
     }
     for points in ["11", "50001"] {
         let error = ModelParameters::from_pairs([("points", points)]).unwrap_err();
@@ -213,12 +216,12 @@ fn missing_and_infinite_voxels_count_as_outside() {
         for n in (0..holed.voxels.len()).step_by(97) {
             holed.voxels[n] = bad;
         }
-        let made = model(&holed, &[HALF, ("isolate", "largest")]);
+        let made = model(&holed, &[HALF_LEVEL, ("isolate", "largest")]);
         let warned = |w: &String| w.contains("NaN or infinite");
         assert!(made.report.warnings.iter().any(warned));
         let mut slab = filling([30; 3], [2.0; 3]);
         slab.voxels[..12 * 900].fill(bad);
-        model(&slab, &[HALF]);
+        model(&slab, &[HALF_LEVEL]);
         let nothing = volume([6; 3], [1.0; 3], |_| f64::from(bad));
         let error = generate(&nothing, &[]).unwrap_err();
         assert!(error.to_string().contains("finite"), "{error}");

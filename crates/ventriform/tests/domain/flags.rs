@@ -1,4 +1,4 @@
-//! What gives reason to doubt a segmentation: motion, masks, objects that are no hearts.
+//! Flags of a segmentation: motion, masks, objects that are no hearts.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
@@ -72,8 +72,8 @@ fn a_scan_with_motion_is_doubted_the_more_the_farther_the_patient_moved() {
         };
         match segmented(&scan(&moved).volume) {
             Ok(fit) => {
-                let doubted = codes(&fit).contains(&"motion");
-                assert!(doubted || motion_mm < 20.0, "{:?}", fit.judgement.evidence);
+                let flagged = codes(&fit).contains(&"motion");
+                assert!(flagged || motion_mm < 20.0, "{:?}", fit.judgement.evidence);
                 fit.judgement.confidence
             }
             Err(_) => 0.0,

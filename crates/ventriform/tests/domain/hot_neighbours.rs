@@ -1,4 +1,4 @@
-//! What phantoms with a known difficulty must show: a defect of the base, a right ventricle as bright as the
+//! Results of phantoms with a known difficulty: a defect of the base, a right ventricle as bright as the
 //! left one.
 
 // Helpers of a test state their expectations by panicking, as tests do.
@@ -96,10 +96,10 @@ fn a_hot_right_ventricle_is_left_out_or_doubted() {
         };
         let spacing = scan.truth.frame.spacing();
         let found = compare(&made.segmentation.mask, &truth, spacing, &Monitor::silent()).unwrap();
-        let doubted = !fit.judgement.flags.is_empty() || fit.judgement.confidence < 0.5;
+        let flagged = !fit.judgement.flags.is_empty() || fit.judgement.confidence < 0.5;
         let least = if infarct { 0.7 } else { 0.8 };
         assert!(
-            found.jaccard > least || doubted,
+            found.jaccard > least || flagged,
             "{uptake} {infarct}: {:.3}, {:.2}",
             found.jaccard,
             fit.judgement.confidence

@@ -17,7 +17,7 @@ use ventriform::mesh_files::{
     MeshFileError, MeshFrame, MeshStatement, MeshUnit, ReadMesh, look, read,
 };
 
-const LIMIT: u64 = 1 << 24;
+const MAX_BYTES: u64 = 1 << 24;
 
 fn silent() -> MeshStatement {
     MeshStatement::default()
@@ -28,11 +28,11 @@ fn given(unit: Option<MeshUnit>, frame: Option<MeshFrame>) -> MeshStatement {
 }
 
 fn reading(bytes: &[u8]) -> ReadMesh {
-    read(bytes, &silent(), LIMIT).unwrap_or_else(|error| panic!("{error}"))
+    read(bytes, &silent(), MAX_BYTES).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn refusal(bytes: &[u8]) -> MeshFileError {
-    read(bytes, &silent(), LIMIT).unwrap_err()
+    read(bytes, &silent(), MAX_BYTES).unwrap_err()
 }
 
 /// The triangles by their corners in space, each from its smallest corner on.
@@ -110,7 +110,7 @@ fn every_format_that_is_written_is_read_back_to_the_same_mesh() {
                     continue; // Its header states the frame and, where it fits, the unit.
                 }
                 for stated in [ras, cm] {
-                    let refused = read(&bytes, &stated, LIMIT).unwrap_err();
+                    let refused = read(&bytes, &stated, MAX_BYTES).unwrap_err();
                     assert!(
                         matches!(refused, MeshFileError::Contradiction { .. }),
                         "{name}"
@@ -124,7 +124,7 @@ fn every_format_that_is_written_is_read_back_to_the_same_mesh() {
 // ------------------------------------------------------------------------------- one body in every storage
 
 /// Corners of a wedge without symmetry, millimetres.
-const CORNERS: [[f32; 3]; 6] = [
+const WEDGE_CORNERS_MM: [[f32; 3]; 6] = [
     [10.0, -20.0, 5.0],
     [50.0, -20.0, 5.0],
     [10.0, 20.0, 5.0],
@@ -133,7 +133,7 @@ const CORNERS: [[f32; 3]; 6] = [
     [10.0, 20.0, 45.5],
 ];
 /// Its faces, outward: two triangles and three quadrangles.
-const FACES: [&[u32]; 5] = [
+const WEDGE_FACES: [&[u32]; 5] = [
     &[0, 2, 1],
     &[3, 4, 5],
     &[0, 1, 4, 3],
@@ -147,12 +147,14 @@ fn triangles() -> Vec<[u32; 3]> {
             .map(|n| [face[0], face[n], face[n + 1]])
             .collect()
     };
-    FACES.iter().flat_map(split).collect()
+    WEDGE_FACES.iter().flat_map(split).collect()
 }
 
 fn wedge() -> TriMesh {
     TriMesh {
-        vertices: CORNERS.map(|p| Vec3::from(p.map(f64::from))).to_vec(),
+        vertices: WEDGE_CORNERS_MM
+            .map(|p| Vec3::from(p.map(f64::from)))
+            .to_vec(),
         triangles: triangles(),
     }
 }
@@ -169,7 +171,7 @@ fn stl_text(comment: &str) -> Vec<u8> {
         for v in t {
             text += &format!(
                 "      vertex {}\n",
-                words(CORNERS[v as usize].map(|x| format!("{x:e}")))
+                words(WEDGE_CORNERS_MM[v as usize].map(|x| format!("{x:e}")))
             );
         }
         text += "    endloop\n  endfacet\n";
@@ -184,7 +186,11 @@ fn stl_binary(header: &str) -> Vec<u8> {
     for t in triangles() {
         bytes.extend([0; 12]);
         for v in t {
-            bytes.extend(CORNERS[v as usize].iter().flat_map(|x| x.to_le_bytes()));
+            bytes.extend(
+                WEDGE_CORNERS_MM[v as usize]
+                    .iter()
+                    .flat_map(|x| x.to_le_bytes()),
+            );
         }
         bytes.extend([7, 9]);
     }
@@ -205,10 +211,10 @@ fn ply_header(encoding: &str, comment: &str) -> Vec<u8> {
 fn ply_text(comment: &str) -> Vec<u8> {
     let mut bytes = ply_header("ascii", comment);
     bytes.extend(b"3\n");
-    for p in CORNERS {
+    for p in WEDGE_CORNERS_MM {
         bytes.extend(format!("{} 200 2 5 6\n", words(p)).into_bytes());
     }
-    for face in FACES {
+    for face in WEDGE_FACES {
         bytes.extend(format!("1 {} {}\n", face.len(), words(face)).into_bytes());
     }
     bytes.extend(b"0 1");
@@ -230,12 +236,12 @@ fn ply_binary(big: bool, comment: &str) -> Vec<u8> {
         }
     };
     bytes.extend([0, 3]);
-    for p in CORNERS {
+    for p in WEDGE_CORNERS_MM {
         bytes.extend(p.iter().flat_map(|x| four(x.to_bits())));
         bytes.extend([200, 1]);
         bytes.extend(four(77));
     }
-    for face in FACES {
+    for face in WEDGE_FACES {
         bytes.extend([1, face.len() as u8]);
         bytes.extend(face.iter().flat_map(|v| four(*v)));
     }
@@ -245,11 +251,11 @@ fn ply_binary(big: bool, comment: &str) -> Vec<u8> {
 
 fn obj(comment: &str, relative: bool) -> Vec<u8> {
     let mut text = format!("# {comment}\nmtllib a.mtl\no wedge\n");
-    for p in CORNERS {
+    for p in WEDGE_CORNERS_MM {
         text += &format!("v {} 1.0\n", words(p));
     }
     text += "vn 0 0 1\nvt 0.5 0.5\ng all\nusemtl red\ns off\n";
-    for face in FACES {
+    for face in WEDGE_FACES {
         let corner = |v: &u32| {
             if relative {
                 format!("{}", i64::from(*v) - 6)
@@ -291,14 +297,19 @@ fn vtk(version: &str, binary: bool, title: &str) -> Vec<u8> {
     });
     bytes.extend(b"POINTS 6 float\n");
     if binary {
-        bytes.extend(CORNERS.iter().flatten().flat_map(|x| x.to_be_bytes()))
+        bytes.extend(
+            WEDGE_CORNERS_MM
+                .iter()
+                .flatten()
+                .flat_map(|x| x.to_be_bytes()),
+        )
     } else {
-        bytes.extend(words(CORNERS.iter().flatten()).into_bytes())
+        bytes.extend(words(WEDGE_CORNERS_MM.iter().flatten()).into_bytes())
     }
     bytes.extend(b"\nMETADATA\nINFORMATION 0\n\n");
-    let corners: Vec<u32> = FACES.concat();
+    let corners: Vec<u32> = WEDGE_FACES.concat();
     if version.starts_with('5') {
-        let ends = FACES.iter().scan(0, |end, face| {
+        let ends = WEDGE_FACES.iter().scan(0, |end, face| {
             *end += face.len() as u32;
             Some(*end)
         });
@@ -311,7 +322,7 @@ fn vtk(version: &str, binary: bool, title: &str) -> Vec<u8> {
         bytes.extend(b"VERTICES 1 2\n");
         bytes.extend(ints(&[1, 0], false));
         bytes.extend(b"POLYGONS 5 23\n");
-        let cells: Vec<u32> = FACES
+        let cells: Vec<u32> = WEDGE_FACES
             .iter()
             .flat_map(|f| [&[f.len() as u32], *f].concat())
             .collect();
@@ -342,13 +353,13 @@ fn vtp(data: Data, packed: bool, wide: bool, big: bool, fields: &str) -> Vec<u8>
         (true, false) => n.to_le_bytes().to_vec(),
         (false, _) => four(n as u32).to_vec(),
     };
-    let points: Vec<u8> = CORNERS
+    let points: Vec<u8> = WEDGE_CORNERS_MM
         .iter()
         .flatten()
         .flat_map(|x| four(x.to_bits()))
         .collect();
-    let corners: Vec<u32> = FACES.concat();
-    let ends: Vec<u32> = FACES
+    let corners: Vec<u32> = WEDGE_FACES.concat();
+    let ends: Vec<u32> = WEDGE_FACES
         .iter()
         .scan(0, |end, face| {
             *end += face.len() as u32;
@@ -410,7 +421,7 @@ fn vtp(data: Data, packed: bool, wide: bool, big: bool, fields: &str) -> Vec<u8>
     let points = array(
         "type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\"",
         &points,
-        words(CORNERS.iter().flatten()),
+        words(WEDGE_CORNERS_MM.iter().flatten()),
     );
     let connectivity = array(
         "type=\"Int32\" Name=\"connectivity\"",
@@ -450,7 +461,7 @@ fn gltf(embedded: bool) -> Vec<u8> {
         let world = [p[0] / 1000.0, p[2] / 1000.0, -p[1] / 1000.0];
         [(world[0] - 0.1) * 2.0, world[1] * 2.0, world[2] * 2.0]
     };
-    let mut buffer: Vec<u8> = CORNERS
+    let mut buffer: Vec<u8> = WEDGE_CORNERS_MM
         .iter()
         .flat_map(|p| stored(*p))
         .flat_map(f32::to_le_bytes)
@@ -495,7 +506,7 @@ fn gltf(embedded: bool) -> Vec<u8> {
 }
 
 fn json(head: &str) -> Vec<u8> {
-    let vertices: Vec<String> = CORNERS.iter().map(|p| format!("{p:?}")).collect();
+    let vertices: Vec<String> = WEDGE_CORNERS_MM.iter().map(|p| format!("{p:?}")).collect();
     let triangles: Vec<String> = triangles().iter().map(|t| format!("{t:?}")).collect();
     format!(
         "{{{head}\"vertices\":[{}],\"triangles\":[{}]}}",
@@ -544,7 +555,8 @@ fn storages() -> Vec<(String, Vec<u8>)> {
 fn one_body_is_the_same_in_every_storage() {
     let wanted = facets(&wedge());
     for (name, bytes) in storages() {
-        let back = read(&bytes, &silent(), LIMIT).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let back =
+            read(&bytes, &silent(), MAX_BYTES).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(facets(&back.mesh), wanted, "{name}");
         assert_eq!(back.mesh.vertices.len(), 6, "{name}");
         assert!(
@@ -615,7 +627,7 @@ fn ras_comes_to_lps_whoever_states_it() {
     for (number, bytes) in files.iter().enumerate() {
         assert_eq!(facets(&reading(bytes).mesh), wanted, "{number}");
         let lps = given(None, Some(MeshFrame::Lps));
-        let refused = read(bytes, &lps, LIMIT).unwrap_err();
+        let refused = read(bytes, &lps, MAX_BYTES).unwrap_err();
         assert!(
             matches!(refused, MeshFileError::Contradiction { field: "frame", .. }),
             "{refused}"
@@ -623,7 +635,7 @@ fn ras_comes_to_lps_whoever_states_it() {
     }
     for (name, bytes) in storages() {
         let ras = given(None, Some(MeshFrame::Ras));
-        let back = read(&bytes, &ras, LIMIT).unwrap();
+        let back = read(&bytes, &ras, MAX_BYTES).unwrap();
         assert_eq!(facets(&back.mesh), wanted, "{name}");
         assert!(
             !back.notes.iter().any(|note| note.contains("frame")),
@@ -663,7 +675,7 @@ fn a_unit_that_nobody_states_is_never_guessed() {
         (MeshUnit::Metre, 0.001),
     ] {
         let bytes = sized(scale);
-        let stated = read(&bytes, &given(Some(unit), None), LIMIT).unwrap();
+        let stated = read(&bytes, &given(Some(unit), None), MAX_BYTES).unwrap();
         assert_eq!(facets(&stated.mesh), wanted);
         let said = [
             format!("# UNIT={}\n", unit.as_str()).into_bytes(),
@@ -686,7 +698,7 @@ fn a_unit_that_nobody_states_is_never_guessed() {
                 .contains(&format!("factor {}", unit.in_millimetres())),
             "{refused}"
         );
-        let seen = look(&bytes, &silent(), LIMIT).unwrap();
+        let seen = look(&bytes, &silent(), MAX_BYTES).unwrap();
         assert_eq!(seen.unlikely, Some(*size));
     }
     for (scale, likely) in [(1e-7, None), (1000.0, None)] {
@@ -861,7 +873,7 @@ fn every_part_of_a_file_is_cut_off_and_damaged_without_a_panic() {
     files.push(("gltf".into(), gltf(true)));
     for (name, whole) in files {
         let check = |bytes: &[u8]| {
-            if let Ok(found) = look(bytes, &silent(), LIMIT) {
+            if let Ok(found) = look(bytes, &silent(), MAX_BYTES) {
                 let mesh = &found.mesh;
                 assert!(
                     mesh.vertices

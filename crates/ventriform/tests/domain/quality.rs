@@ -1,4 +1,4 @@
-//! How good models are, as figures that may not get worse: distances to the surface that the scan would
+//! Quality of models, as figures that may not get worse: distances to the surface that the scan would
 //! have without noise, and shapes. `cargo run --release -p ventriform-tools --bin truth` judges
 //! more of them.
 
@@ -17,7 +17,7 @@ use ventriform::volume::phantom::{PhantomParameters, phantom};
 /// mean and of the worst triangle.
 type Known = (f64, f64, usize, [f64; 3]);
 
-const KNOWN: [Known; 12] = [
+const KNOWN_FIGURES: [Known; 12] = [
     (3.2, 0.03, 67, [0.5361, 0.9753, 0.8548]),
     (3.2, 0.03, 150, [0.2629, 0.9871, 0.9205]),
     (3.2, 0.03, 300, [0.1730, 0.9902, 0.9211]),
@@ -33,7 +33,7 @@ const KNOWN: [Known; 12] = [
 ];
 
 /// Share by which a figure may be worse.
-const MARGIN: f64 = 0.02;
+const MARGIN_SHARE: f64 = 0.02;
 
 fn scan(voxel: f64, noise: f64) -> ventriform::Volume {
     let parameters = PhantomParameters {
@@ -54,7 +54,7 @@ fn scan(voxel: f64, noise: f64) -> ventriform::Volume {
 fn models_are_as_near_to_the_truth_and_as_regular_as_they_were() {
     let silent = Monitor::silent();
     let mut worse = Vec::new();
-    for of_one_scan in KNOWN.chunks(3) {
+    for of_one_scan in KNOWN_FIGURES.chunks(3) {
         let (voxel, noise, ..) = of_one_scan[0];
         let (noisy, clean) = (scan(voxel, noise), scan(voxel, 0.0));
         let mut truth = None;
@@ -73,9 +73,9 @@ fn models_are_as_near_to_the_truth_and_as_regular_as_they_were() {
             let found = figures(&model.mesh, truth);
             println!("({voxel:?}, {noise:?}, {points}, {found:.4?}),");
             // 2r/R is 1 at best: what is missing from 1 may be a fiftieth of the whole more.
-            if found[0] > known[0] * (1.0 + MARGIN)
-                || found[1] < known[1] - (1.0 - known[1]).max(0.1) * MARGIN
-                || found[2] < known[2] * (1.0 - MARGIN)
+            if found[0] > known[0] * (1.0 + MARGIN_SHARE)
+                || found[1] < known[1] - (1.0 - known[1]).max(0.1) * MARGIN_SHARE
+                || found[2] < known[2] * (1.0 - MARGIN_SHARE)
             {
                 worse.push(format!(
                     "{voxel} {noise} {points}: {found:.4?}, was {known:?}"

@@ -25,12 +25,12 @@ use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
 use ventriform::volume::describe;
 
-const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'&";
+const HOSTILE_TEXT: &str = "</script><img src=x onerror=alert(1)>\"'&";
 
 fn surface() -> Surface {
     let mut surface = Surface::exact(shapes::cup(80.0, 32.0, 10.0, 48), 2.0);
     surface.facts.iso_value = 0.47;
-    surface.facts.warnings = vec![format!("A warning {HOSTILE}")];
+    surface.facts.warnings = vec![format!("A warning {HOSTILE_TEXT}")];
     surface
 }
 
@@ -77,7 +77,7 @@ fn report(model: &TriMesh) -> ModelReport {
     };
     ModelReport::new(ReportInput {
         input: FileFacts {
-            data_type: HOSTILE.to_owned(),
+            data_type: HOSTILE_TEXT.to_owned(),
             ..FileFacts::of(&describe(&volume()).unwrap())
         },
         parameters: object(&json!({ "points": model.vertices.len(), "seed": 1 })),
@@ -94,7 +94,7 @@ fn report(model: &TriMesh) -> ModelReport {
     })
 }
 
-/// How far `model` lies from the surface.
+/// Distances of `model` from the surface.
 fn closeness(model: &TriMesh) -> Closeness {
     Closeness::of(model, &surface().mesh, &Monitor::silent()).unwrap()
 }

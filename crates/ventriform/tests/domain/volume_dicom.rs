@@ -17,7 +17,7 @@ fn read(path: &Path) -> Result<Reading, volume::VolumeError> {
 }
 
 /// File, sum of the pixels, Image Position (Patient): computed with pydicom 3.
-const PATIENTS: &[(&str, f64, [f64; 3])] = &[
+const PATIENT_FILES: &[(&str, f64, [f64; 3])] = &[
     (
         "1.2.840.4267.32.117076509617201664779117387663005758527",
         353_947_599.0,
@@ -40,7 +40,7 @@ fn patients_are_read_with_their_signed_spacing() {
     let Some(folder) = shared_data("clinical") else {
         return;
     };
-    for (name, sum, position) in PATIENTS {
+    for (name, sum, position) in PATIENT_FILES {
         let reading = read(&folder.join(format!("{name}.dcm"))).unwrap();
         let facts = reading.facts;
         assert_eq!(facts.shape, [70, 70, 50]);
@@ -60,7 +60,7 @@ fn the_experts_mask_lies_on_the_heart() {
     let Some(folder) = shared_data("clinical") else {
         return;
     };
-    let name = PATIENTS[1].0;
+    let name = PATIENT_FILES[1].0;
     let scan = read(&folder.join(format!("{name}.dcm"))).unwrap().volume;
     let mask = read(&folder.join(format!("{name}_mask.nii.gz"))).unwrap();
     assert_eq!(mask.facts.intensity.labels.map(|l| l.len()), Some(1));
@@ -79,26 +79,41 @@ fn the_experts_mask_lies_on_the_heart() {
 
 /// File, slices, sum of the values with slope and intercept, and the diagonal of the affine: computed
 /// with pydicom 3 and its decoders, voxels of the Pixel Padding Value as -1000 HU.
-const ODD: &[(&str, usize, f64, [f64; 3])] = &[
-    ("D_CLUNIE_CT1_RLE_FRAGS.dcm", 1, -115_524_515.0, CT),
+const ODD_FILES: &[(&str, usize, f64, [f64; 3])] = &[
+    (
+        "D_CLUNIE_CT1_RLE_FRAGS.dcm",
+        1,
+        -115_524_515.0,
+        CT_SPACING_MM,
+    ),
     (
         "GH177_D_CLUNIE_CT1_IVRLE_BigEndian_ELE_undefinded_length.dcm",
         1,
         -115_524_515.0,
-        CT,
+        CT_SPACING_MM,
     ),
-    ("GH184.dcm", 1, 3_228_937.134_038, PET),
-    ("GH610.dcm", 1, 1.166_530_305_741_4, PET),
-    ("CT_small.dcm", 1, -1_950_906.0, CT),
-    ("J2K_pixelrep_mismatch.dcm", 1, -172_605_258.0, TILTED),
-    ("MR_small.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_RLE.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_bigendian.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_expb.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_implicit.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_jp2klossless.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_jpeg_ls_lossless.dcm", 1, 2_125_338.0, MR),
-    ("MR_small_padded.dcm", 1, 2_125_338.0, MR),
+    ("GH184.dcm", 1, 3_228_937.134_038, PET_SPACING_MM),
+    ("GH610.dcm", 1, 1.166_530_305_741_4, PET_SPACING_MM),
+    ("CT_small.dcm", 1, -1_950_906.0, CT_SPACING_MM),
+    (
+        "J2K_pixelrep_mismatch.dcm",
+        1,
+        -172_605_258.0,
+        TILTED_SPACING_MM,
+    ),
+    ("MR_small.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    ("MR_small_RLE.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    ("MR_small_bigendian.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    ("MR_small_expb.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    ("MR_small_implicit.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    ("MR_small_jp2klossless.dcm", 1, 2_125_338.0, MR_SPACING_MM),
+    (
+        "MR_small_jpeg_ls_lossless.dcm",
+        1,
+        2_125_338.0,
+        MR_SPACING_MM,
+    ),
+    ("MR_small_padded.dcm", 1, 2_125_338.0, MR_SPACING_MM),
     (
         "bad_sequence.dcm",
         1,
@@ -113,13 +128,13 @@ const ODD: &[(&str, usize, f64, [f64; 3])] = &[
     ),
     ("liver.dcm", 3, 107_098.0, [0.810547, 0.810547, 1.0]),
     ("liver_1frame.dcm", 1, 36_233.0, [0.810547, 0.810547, 1.0]),
-    ("zipMR.gz", 1, 2_125_338.0, MR),
+    ("zipMR.gz", 1, 2_125_338.0, MR_SPACING_MM),
 ];
 
-const CT: [f64; 3] = [0.661_468, 0.661_468, 5.0];
-const PET: [f64; 3] = [5.468_75, 5.468_75, 3.27];
-const TILTED: [f64; 3] = [0.431, 0.399618, 4.635942];
-const MR: [f64; 3] = [0.3125, 0.3125, 0.8];
+const CT_SPACING_MM: [f64; 3] = [0.661_468, 0.661_468, 5.0];
+const PET_SPACING_MM: [f64; 3] = [5.468_75, 5.468_75, 3.27];
+const TILTED_SPACING_MM: [f64; 3] = [0.431, 0.399618, 4.635942];
+const MR_SPACING_MM: [f64; 3] = [0.3125, 0.3125, 0.8];
 
 #[test]
 fn odd_files_are_read_as_by_pydicom_or_refused_and_none_panics() {
@@ -132,7 +147,7 @@ fn odd_files_are_read_as_by_pydicom_or_refused_and_none_panics() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_string_lossy();
             seen += 1;
-            let known = ODD.iter().find(|(odd, ..)| *odd == name);
+            let known = ODD_FILES.iter().find(|(odd, ..)| *odd == name);
             match (read(&path), known) {
                 (Ok(reading), Some((_, slices, sum, diagonal))) => {
                     let facts = reading.facts;
@@ -155,7 +170,7 @@ fn odd_files_are_read_as_by_pydicom_or_refused_and_none_panics() {
         }
     }
     assert!(seen > 60);
-    assert_eq!(right, ODD.len());
+    assert_eq!(right, ODD_FILES.len());
 }
 
 #[test]

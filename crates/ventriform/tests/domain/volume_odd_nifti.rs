@@ -29,7 +29,7 @@ type Expected = (
 );
 
 #[rustfmt::skip]
-const READABLE: &[Expected] = &[
+const READABLE_FILES: &[Expected] = &[
     (&["nibabel/anatomical.nii"], None, [33, 41, 25], 284166082.0, 0, [30.0, -36.0, -10.0]),
     (&["nibabel/reoriented_anat_moved.nii"], None, [21, 26, 22], 32739769.449157715, 0, [-31.297897, -39.977585, -15.599409]),
     (&["nibabel/resampled_anat_moved.nii"], None, [17, 21, 3], 7749957.09866333, 153, [28.0, -32.0, 24.0]),
@@ -71,7 +71,7 @@ const READABLE: &[Expected] = &[
 
 #[test]
 fn readable_files_give_the_voxels_that_nibabel_reads() {
-    for (names, frame, shape, sum, missing, position) in READABLE {
+    for (names, frame, shape, sum, missing, position) in READABLE_FILES {
         let Some(reading) = read(names, *frame) else {
             return;
         };
@@ -96,7 +96,7 @@ fn readable_files_give_the_voxels_that_nibabel_reads() {
 }
 
 /// Files and a part of the message that must be there.
-const REFUSED: &[(&[&str], &str)] = &[
+const REFUSED_FILES: &[(&[&str], &str)] = &[
     (&["nibabel/analyze.hdr"], "Analyze 7.5"),
     (&["nibabel/nifti1.hdr"], "second file, which is missing"),
     (&["nibabel/nifti2.hdr"], "second file, which is missing"),
@@ -146,7 +146,7 @@ const REFUSED: &[(&[&str], &str)] = &[
 
 #[test]
 fn other_files_are_refused_by_field_and_value() {
-    for (names, part) in REFUSED {
+    for (names, part) in REFUSED_FILES {
         let Some(result) = read(names, None) else {
             return;
         };

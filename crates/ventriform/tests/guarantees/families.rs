@@ -15,7 +15,7 @@ use ventriform::volume::Volume;
 use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// Iso-value of the fields below. Most of them grow by 1 per millimetre towards the inside.
-const LEVEL: f64 = 50.0;
+const ISO_LEVEL: f64 = 50.0;
 
 fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * random.random::<f64>()
@@ -35,10 +35,10 @@ fn volume(shape: [usize; 3], spacing: f64, value: impl Fn(Vec3) -> f64) -> Volum
     Volume::sampled(shape, frame, |p| value(*p))
 }
 
-/// The surface at [`LEVEL`] of the components that `isolate` keeps, with all handles.
+/// The surface at [`ISO_LEVEL`] of the components that `isolate` keeps, with all handles.
 fn kept(volume: &Volume, isolate: Isolate) -> Surface {
     let parameters = SurfaceParameters {
-        iso: IsoLevel::Absolute(LEVEL),
+        iso: IsoLevel::Absolute(ISO_LEVEL),
         isolate,
         topology: TopologyMode::Keep,
         ..SurfaceParameters::default()
@@ -99,7 +99,7 @@ pub fn metaballs(seed: u64) -> Surface {
         .collect();
     let field = volume([30; 3], 3.0, |p| {
         let heat = |(c, r): &(Vec3, f64)| (-((p - c).norm() / r).powi(2)).exp();
-        LEVEL - 0.4 + balls.iter().map(heat).sum::<f64>()
+        ISO_LEVEL - 0.4 + balls.iter().map(heat).sum::<f64>()
     });
     kept(&field, Isolate::Largest)
 }
@@ -124,7 +124,7 @@ pub fn rings(seed: u64) -> Surface {
             let q = Vec3::new(q.x, cos * q.y - sin * q.z, sin * q.y + cos * q.z);
             (q.xy().norm() - radius).hypot(q.z)
         };
-        LEVEL + tube
+        ISO_LEVEL + tube
             - (0..count as usize)
                 .map(nearest)
                 .fold(f64::INFINITY, f64::min)
@@ -151,13 +151,13 @@ pub fn thin_sheets(seed: u64) -> Surface {
     let mut field = volume([32; 3], spacing, |p| {
         let along = p.dot(&up);
         let q = (p - up * along).norm().hypot(along * stretch);
-        LEVEL + (wall / 2.0 - (q - radius).abs()).min(open - along)
+        ISO_LEVEL + (wall / 2.0 - (q - radius).abs()).min(open - along)
     });
     if !seed.is_multiple_of(3) {
         return kept(&field, Isolate::Largest);
     }
     for v in &mut field.voxels {
-        *v = f32::from(u8::from(*v >= LEVEL as f32));
+        *v = f32::from(u8::from(*v >= ISO_LEVEL as f32));
     }
     field.integral = true;
     let parameters = SurfaceParameters::default();
@@ -199,7 +199,7 @@ pub fn noise(seed: u64) -> Surface {
     let share = between(&mut random, 0.5, 0.8);
     let level = sorted[(share * sorted.len() as f64) as usize];
     for v in &mut field.voxels {
-        *v = *v - level + LEVEL as f32;
+        *v = *v - level + ISO_LEVEL as f32;
     }
     let isolate = [Isolate::Largest, Isolate::None][(seed % 2) as usize];
     kept(&field, isolate)
@@ -231,7 +231,7 @@ pub fn several(seed: u64) -> Surface {
                 _ => (2.5 - (q.norm() - 10.0).abs()).max(3.0 - q.norm()),
             }
         };
-        LEVEL + kinds.iter().map(inward).fold(f64::NEG_INFINITY, f64::max)
+        ISO_LEVEL + kinds.iter().map(inward).fold(f64::NEG_INFINITY, f64::max)
     });
     kept(&field, Isolate::None)
 }

@@ -26,13 +26,13 @@ use ventriform::retile::{RetileError, retile};
 use ventriform::surface::Surface;
 
 /// Numbers of points; the sweeps take them in turn.
-const POINTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];
+const POINT_COUNTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];
 
 /// Numbers of points for surfaces of dozens of components and handles, which most of the others are too few for.
 const MANY_POINTS: [usize; 3] = [200, 600, 700];
 
 /// An N that an error names is tested up to this many points.
-const TRIED: usize = 1500;
+const MAX_TRIED_POINTS: usize = 1500;
 
 fn parameters(method: &str, points: usize, seed: u64) -> ModelParameters {
     let (points, seed) = (points.to_string(), seed.to_string());
@@ -90,10 +90,10 @@ fn demand(surface: &Surface, points: usize, mesh: &TriMesh, what: &str) {
     );
 }
 
-/// Tests `seeds` surfaces of a family (or `VENTRIFORM_SEEDS`) at [`POINTS`]. `refusable` is the largest share of
+/// Tests `seeds` surfaces of a family (or `VENTRIFORM_SEEDS`) at [`POINT_COUNTS`]. `refusable` is the largest share of
 /// models that may be refused. Refusals take longest: the N that works is found by trying.
 fn sweep(name: &str, family: fn(u64) -> Surface, seeds: u64, refusable: f64) {
-    sweep_at(&POINTS, name, family, seeds, refusable);
+    sweep_at(&POINT_COUNTS, name, family, seeds, refusable);
 }
 
 /// The same at other numbers of points.
@@ -118,7 +118,7 @@ fn sweep_at(numbers: &[usize], name: &str, family: fn(u64) -> Surface, seeds: u6
                 Err(RetileError::TooFewPoints { needed, .. }) => {
                     *refused.entry("too few points").or_default() += 1;
                     assert!(needed > points, "{what}: the error names {needed} points");
-                    if needed <= TRIED {
+                    if needed <= MAX_TRIED_POINTS {
                         let more = model(&surface, &parameters(method, needed, seed));
                         let mesh = more
                             .unwrap_or_else(|e| panic!("{what}: {needed} points fail too: {e}"));

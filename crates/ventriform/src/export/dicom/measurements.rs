@@ -22,7 +22,7 @@ struct Figure<T = SegmentationReport> {
     value: fn(&T) -> Option<f64>,
     concept: Code,
     unit: Code,
-    /// How it was derived from the single values.
+    /// Derivation from the single values.
     derivation: Option<Code>,
 }
 
@@ -91,7 +91,7 @@ const STRUCTURE_FIGURES: &[Figure] = &[
 struct Part {
     /// Its name, after the name of the structure.
     name: &'static str,
-    /// How it was measured, if in several ways.
+    /// Method of measurement, if there are several.
     method: Option<Code>,
     /// Where it was measured, if not in the whole structure.
     site: Option<Code>,

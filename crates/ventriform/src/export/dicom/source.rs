@@ -6,7 +6,7 @@ use super::data_set::{DataSet, reference};
 use super::uid::{derived, is_uid};
 use crate::geometry::frame::VoxelToPatient;
 use crate::text::is_printable;
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
 
@@ -55,7 +55,7 @@ pub struct StatedIdentity {
     pub frame_of_reference_uid: Option<String>,
 }
 
-/// How the objects are freed of the patient's identity.
+/// Parameters of the removal of the patient's identity from objects.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Deidentification {
     /// Secret from which the new UIDs are derived: objects made with the same secret from the same

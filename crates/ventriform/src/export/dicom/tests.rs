@@ -10,7 +10,7 @@ use crate::mesh::shapes;
 use crate::polar::{PolarSegment, PolarSummary};
 use crate::report::segmentation_report::tests::first_report;
 use crate::report::{RaisedFlag, SegmentationReport, Thickness, Thicknesses, WallVolumes};
-use crate::volume::dicom::Provenance;
+use crate::volume::Provenance;
 use dicom_core::Tag;
 use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use nalgebra::Matrix3;

@@ -9,7 +9,7 @@ use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
 use crate::mesh::{FaceId, TriMesh, topology};
 
-/// How often a step is halved before the vertices concerned stay in place.
+/// Most halvings of a step before the vertices concerned stay in place.
 const MAX_HALVINGS: usize = 5;
 
 /// Adds `step` to `vertices`, or as much of it as turns no triangle over and no component inside

@@ -38,7 +38,7 @@ pub struct Fairing<'a> {
     half_edges: &'a HalfEdges,
     /// Unit normal at each vertex.
     normals: Vec<Vec3>,
-    /// How far each vertex should move along its normal, mm.
+    /// Wanted motion of each vertex along its normal, mm.
     pub(super) rises: Vec<f64>,
     /// Weight of each vertex's term.
     weight: f64,

@@ -36,7 +36,7 @@ const MIN_DIHEDRAL_COSINE: f64 = -0.5;
 /// Longest ring for the dynamic programming, which takes its third power.
 const LONGEST_RING: usize = 32;
 
-/// How often the dynamic programming is repeated at most.
+/// Most repetitions of the dynamic programming.
 const MAX_RETRIES: usize = 24;
 
 /// A triangle of a hole: places k < l < m in the ring.

@@ -512,7 +512,7 @@ mod tests {
         }
     }
 
-    /// What the removal leaves over, at the positions of the vertices that the error names.
+    /// The vertices that removal leaves lie at the positions of those that the error names.
     #[test]
     fn stuck_vertices_are_named_by_their_numbers_on_the_surface() {
         let surface = double_torus();

@@ -55,13 +55,13 @@ struct Term {
     g1: Option<(&'static [u8], Set)>,
 }
 
-const ASCII: (&[u8], Set) = (b"(B", Set::Ascii);
-const ROMAN: (&[u8], Set) = (b"(J", Set::Roman);
+const ASCII_ESCAPE: (&[u8], Set) = (b"(B", Set::Ascii);
+const ROMAN_ESCAPE: (&[u8], Set) = (b"(J", Set::Roman);
 
 const fn right(number: &'static str, escape: &'static [u8], set: Set) -> Term {
     Term {
         number,
-        g0: Some(ASCII),
+        g0: Some(ASCII_ESCAPE),
         g1: Some((escape, set)),
     }
 }
@@ -70,7 +70,7 @@ const fn right(number: &'static str, escape: &'static [u8], set: Set) -> Term {
 const DEFINED_TERMS: [Term; 17] = [
     Term {
         number: "6",
-        g0: Some(ASCII),
+        g0: Some(ASCII_ESCAPE),
         g1: None,
     },
     right("100", b"-A", Set::Latin1),
@@ -87,7 +87,7 @@ const DEFINED_TERMS: [Term; 17] = [
     right("203", b"-b", Set::Right(ISO_8859_15)),
     Term {
         number: "13",
-        g0: Some(ROMAN),
+        g0: Some(ROMAN_ESCAPE),
         g1: Some((b")I", Set::Katakana)),
     },
     Term {
@@ -122,7 +122,7 @@ const JIS_DIFFERENCES: [(char, char); 6] = [
     ('\u{ffe2}', '\u{00ac}'),
 ];
 
-/// How text is divided, by its value representation.
+/// Division of text, by its value representation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Division {
     /// Codes, numbers, dates, UIDs: always ASCII.
@@ -174,7 +174,7 @@ impl CharacterSets {
         let mut sets = Self {
             whole: None,
             first: (Set::Ascii, None),
-            escapes: vec![(ASCII.0, ASCII.1, false)],
+            escapes: vec![(ASCII_ESCAPE.0, ASCII_ESCAPE.1, false)],
             unknown: None,
         };
         for (place, text) in terms.iter().enumerate() {
@@ -205,7 +205,7 @@ impl CharacterSets {
         self.escapes.extend(g0.into_iter().chain(g1));
         // Japanese text returns from pairs to either of both.
         if matches!(g0, Some((_, Set::Kanji | Set::MoreKanji, _))) {
-            self.escapes.push((ROMAN.0, ROMAN.1, false));
+            self.escapes.push((ROMAN_ESCAPE.0, ROMAN_ESCAPE.1, false));
         }
         if is_first {
             let single = g0.map(|(_, set, _)| set).filter(|set| !set.is_pairs());

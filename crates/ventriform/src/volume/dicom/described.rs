@@ -1,29 +1,10 @@
 //! The segments of a Segmentation (Segment Sequence, PS3.3 C.8.20.4).
 
+use super::super::{Segment, SegmentCode};
 use super::attributes::{
     Attributes, SEGMENT_LABEL, SEGMENT_NUMBER, SEGMENT_REGION_MEANING, SEGMENT_REGION_VALUE,
     SEGMENT_TYPE_MEANING, SEGMENT_TYPE_VALUE,
 };
-
-/// A segment of a segmentation, as its file describes it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Segment {
-    /// Segment Number: the value of its voxels.
-    pub number: u16,
-    /// Segment Label.
-    pub label: Option<String>,
-    /// Codes of its type, then of its anatomic region, as far as stated.
-    pub codes: Vec<SegmentCode>,
-}
-
-/// A coded concept of a segment.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SegmentCode {
-    /// Code Value.
-    pub value: String,
-    /// Code Meaning.
-    pub meaning: String,
-}
 
 impl Segment {
     /// The segments that `a` describes, in the order of the file.

@@ -45,9 +45,7 @@ mod volumes;
 #[cfg(test)]
 mod tests;
 
-pub use described::{Segment, SegmentCode};
 pub use header::{DicomHeader, read_header, storage_classes, transfer_syntaxes};
-pub use provenance::Provenance;
 pub(super) use syntax::is_dicom;
 
 use self::attributes::{
@@ -62,7 +60,6 @@ use self::scan::Scan;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
 use self::volumes::Marks;
-use super::VolumeError;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
 use super::gates::GateTiming;
@@ -70,6 +67,7 @@ use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
+use super::{Provenance, Segment, VolumeError};
 use crate::progress::{Monitor, Stage};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};

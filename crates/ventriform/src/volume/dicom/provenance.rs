@@ -1,5 +1,6 @@
-//! Whose scan a volume is, how it was made and which DICOM objects it came from.
+//! The [`Provenance`] that a data set states (PS3.3 C.7, C.8.4).
 
+use super::super::Provenance;
 use super::attributes::{
     ACCESSION_NUMBER, ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_TIME, Attributes,
     CONTENT_DATE, CONTEXT_MEANING, CONVOLUTION_KERNEL, FRAME_OF_REFERENCE, IMAGE_TYPE,
@@ -10,43 +11,9 @@ use super::attributes::{
     SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE, STUDY_DATE, STUDY_DESCRIPTION,
     STUDY_ID, STUDY_TIME, STUDY_UID, clip,
 };
-use serde::{Deserialize, Serialize};
-use std::fmt;
 
-macro_rules! provenance {
-    ($($(#[$doc:meta])* $field:ident = $attribute:expr;)*) => {
-        // Patient, study, series, instances and acquisition (PS3.3 C.7, C.8.4). An attribute that is
-        // absent or empty is `None`. This is personal data: `Debug` shows no value of it, so that it
-        // cannot get into a log.
-        /// Whose scan a volume is: what its DICOM header says, or was stated.
-        #[derive(Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-        #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Scan))]
-        pub struct Provenance {
-            $(
-                $(#[$doc])*
-                #[serde(skip_serializing_if = "Option::is_none")]
-                pub $field: Option<String>,
-            )*
-            // From the acquisition context, the protocol, or the descriptions of series and study.
-            /// `rest` or `stress`.
-            #[serde(skip_serializing_if = "Option::is_none")]
-            pub rest_or_stress: Option<String>,
-            // In the order of the volume's slices; empty for a single one.
-            /// SOP Instance UIDs of a series of several instances; in `/identity` only.
-            #[serde(default, skip_serializing_if = "Vec::is_empty")]
-            pub instance_uids: Vec<String>,
-            /// For every slice of the volume, the number of its stored frame in the instance, from 1;
-            /// empty for a series of single-frame instances, and for a segmentation.
-            #[serde(default, skip_serializing_if = "Vec::is_empty")]
-            #[cfg_attr(feature = "schema", schema(ignore))]
-            pub slice_frames: Vec<u32>,
-            // See [`decode`](super::characters).
-            /// Fields that the file states and that cannot be decoded; while they belong to patient or
-            /// study, no DICOM object is made.
-            #[serde(default, skip_serializing_if = "Vec::is_empty")]
-            pub undecoded: Vec<String>,
-        }
-
+macro_rules! attributes_of_fields {
+    ($($field:ident = $attribute:expr;)*) => {
         impl Provenance {
             /// The provenance that the data set states, without the frames of the slices.
             pub(super) fn of(a: &Attributes) -> Self {
@@ -79,87 +46,42 @@ macro_rules! provenance {
                 });
                 unknown.into_iter().chain(each).collect()
             }
-
-            /// The stated values, each with its name, without the numbers of slices.
-            pub fn stated(&self) -> Vec<(&'static str, &str)> {
-                let fields = [$((stringify!($field), self.$field.as_deref()),)*];
-                let state = ("rest_or_stress", self.rest_or_stress.as_deref());
-                fields
-                    .into_iter()
-                    .chain([state])
-                    .filter_map(|(name, value)| Some((name, value?)))
-                    .collect()
-            }
         }
     };
 }
 
-provenance! {
-    /// Patient's Name (0010,0010), components separated by `^`.
+attributes_of_fields! {
     patient_name = PATIENT_NAME;
-    /// Patient ID (0010,0020).
     patient_id = PATIENT_ID;
-    /// Patient's Birth Date (0010,0030), `YYYYMMDD`.
     patient_birth_date = PATIENT_BIRTH_DATE;
-    /// Patient's Sex (0010,0040): `M`, `F` or `O`.
     patient_sex = PATIENT_SEX;
-    /// Study Instance UID (0020,000D).
     study_uid = STUDY_UID;
-    /// Study Date (0008,0020), `YYYYMMDD`.
     study_date = STUDY_DATE;
-    /// Study Time (0008,0030), `HHMMSS.FFFFFF`.
     study_time = STUDY_TIME;
-    /// Study ID (0020,0010).
     study_id = STUDY_ID;
-    /// Study Description (0008,1030).
     study_description = STUDY_DESCRIPTION;
-    /// Accession Number (0008,0050).
     accession_number = ACCESSION_NUMBER;
-    /// Referring Physician's Name (0008,0090).
     referring_physician = REFERRING_PHYSICIAN;
-    /// Series Instance UID (0020,000E).
     series_uid = SERIES_UID;
-    /// Series Number (0020,0011).
     series_number = SERIES_NUMBER;
-    /// Series Description (0008,103E).
     series_description = SERIES_DESCRIPTION;
-    /// Modality (0008,0060).
     modality = MODALITY;
-    /// Image Type (0008,0008), values separated by backslashes.
     image_type = IMAGE_TYPE;
-    /// Frame of Reference UID (0020,0052).
     frame_of_reference_uid = FRAME_OF_REFERENCE;
-    /// Position Reference Indicator (0020,1040).
     position_reference_indicator = POSITION_REFERENCE;
-    /// SOP Class UID (0008,0016) of the instances.
     sop_class_uid = SOP_CLASS;
-    /// SOP Instance UID (0008,0018); of a series of several instances, the first one's.
     sop_instance_uid = SOP_INSTANCE;
-    /// Acquisition Date (0008,0022), or the date in Acquisition `DateTime` (0008,002A), or
-    /// the Series Date, `YYYYMMDD`.
     acquisition_date = ACQUISITION_DATE;
-    /// Acquisition Time (0008,0032), or the time in Acquisition `DateTime` (0008,002A).
     acquisition_time = ACQUISITION_TIME;
-    /// Meaning of the Radiopharmaceutical Code (0054,0304), or the Radiopharmaceutical
-    /// (0018,0031).
     radiopharmaceutical = PHARMACEUTICAL_MEANING;
-    /// Meaning of the Radionuclide Code (0054,0300).
     radionuclide = NUCLIDE_MEANING;
-    /// Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images.
     injected_dose = INJECTED_DOSE;
-    /// Radiopharmaceutical Start Time (0018,1072).
     injection_time = INJECTION_TIME;
-    /// Manufacturer (0008,0070) of the equipment.
     manufacturer = MANUFACTURER;
-    /// Manufacturer's Model Name (0008,1090).
     model_name = MODEL_NAME;
-    /// Software Versions (0018,1020).
     software_versions = SOFTWARE_VERSIONS;
-    /// Protocol Name (0018,1030).
     protocol_name = PROTOCOL_NAME;
-    /// Reconstruction Method (0054,1103).
     reconstruction_method = RECONSTRUCTION_METHOD;
-    /// Convolution Kernel (0018,1210).
     convolution_kernel = CONVOLUTION_KERNEL;
 }
 
@@ -205,10 +127,4 @@ fn rest_or_stress(a: &Attributes) -> Option<String> {
             _ => None,
         }
     })
-}
-
-impl fmt::Debug for Provenance {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Provenance").finish_non_exhaustive()
-    }
 }

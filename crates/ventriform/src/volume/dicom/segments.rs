@@ -4,12 +4,11 @@
 //! Spacing Between Slices define; slices without a frame are empty, as the standard allows to omit
 //! them. Of a fractional segmentation, fractions of at least one half belong to the segment.
 
-use super::super::VolumeError;
 use super::super::decode::Figures;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
+use super::super::{Segment, VolumeError};
 use super::attributes::{Attributes, FRAME_SEGMENT, MAXIMUM_FRACTION, SEGMENTATION_TYPE};
-use super::described::Segment;
 use super::pixels::{Pixels, too_many_voxels};
 use super::stack::{Located, heights, stated_gap};
 use crate::progress::{Monitor, Stage};
@@ -23,7 +22,7 @@ const MOST_VOXELS: u64 = 1 << 25;
 /// Largest deviation of a frame from its slice, as a share of the distance of slices.
 const PLACE_SLACK: f64 = 0.05;
 
-/// How a stored number becomes a label.
+/// The meaning of a stored number as a label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
     /// 1: the voxel belongs to the frame's segment.

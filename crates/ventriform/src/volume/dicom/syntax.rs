@@ -11,7 +11,7 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
 use super::attributes::clip;
-use super::codec::Process;
+use super::codec::{Compression, Process};
 use dicom_encoding::transfer_syntax::{Endianness, TransferSyntax, TransferSyntaxIndex};
 use dicom_transfer_syntax_registry::TransferSyntaxRegistry;
 use std::fmt;
@@ -32,21 +32,6 @@ pub(super) fn read() -> impl Iterator<Item = &'static str> {
     whole
         .into_iter()
         .chain(COMPRESSED_SYNTAXES.iter().map(|(uid, _)| *uid))
-}
-
-/// How the pixels are compressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Compression {
-    /// Not at all.
-    None,
-    /// Run lengths, PS3.5 annex G.
-    Rle,
-    /// JPEG (ISO 10918-1): baseline, or lossless with any predictor.
-    Jpeg(Process),
-    /// JPEG-LS (ISO 14495-1), near-lossless or only lossless.
-    JpegLs { near: bool },
-    /// JPEG 2000 (ISO 15444-1), irreversible or only reversible.
-    Jpeg2000 { irreversible: bool },
 }
 
 /// The transfer syntaxes with compressed pixels that are read. A lossless one never holds numbers that
@@ -90,7 +75,7 @@ pub(super) struct Syntax {
     pub transfer_syntax: &'static TransferSyntax,
     /// Whether the data set is deflated. Its offsets count inflated bytes.
     pub deflated: bool,
-    /// How the pixels are compressed.
+    /// Compression of the pixels.
     pub compression: Compression,
     /// Whether the file is gzipped.
     pub gzip: bool,
@@ -196,7 +181,7 @@ fn guess(start: &[u8]) -> Option<&'static TransferSyntax> {
     }
 }
 
-/// How the elements of a data set are written.
+/// Encoding of the elements of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Encoding {
     ImplicitLittle,

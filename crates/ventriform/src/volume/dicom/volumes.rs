@@ -41,7 +41,7 @@ const MOST_DIMENSIONS: usize = 16;
 /// Largest deviation of a step of cardiac delays from the mean step.
 const MAX_DELAY_DEVIATION: f64 = 0.25;
 
-/// How the value of a criterion is stored.
+/// Stored form of a criterion's value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
     /// One decimal number as text.
@@ -60,7 +60,7 @@ enum Form {
     TimeOn(Attribute),
 }
 
-/// How far a criterion is to be believed, from the most to the least.
+/// Reliability of a criterion, from the most to the least.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Standing {
     /// Cardiac delay, which says what a frame shows.

@@ -18,7 +18,7 @@ pub enum GivenMaskError {
     /// The file holds several volumes.
     #[error("the file holds {frames} volumes, and a mask is one")]
     Volumes {
-        /// How many.
+        /// Their number.
         frames: usize,
     },
     /// No voxel belongs to the structure.

@@ -1,4 +1,4 @@
-//! How a caller names a structure.
+//! A structure's name as callers give it.
 
 use std::convert::Infallible;
 use std::str::FromStr;

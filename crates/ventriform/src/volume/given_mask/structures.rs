@@ -2,7 +2,7 @@
 
 use crate::grid::survey;
 use crate::progress::Monitor;
-use crate::volume::dicom::Segment;
+use crate::volume::Segment;
 use crate::volume::{Volume, VolumeFacts};
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ pub(super) struct HeldStructures {
     pub(super) range: [f32; 2],
 }
 
-/// How the structures are stored.
+/// Storage of the structures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeldKind {
     /// Segments of a DICOM Segmentation.

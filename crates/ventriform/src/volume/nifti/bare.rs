@@ -9,7 +9,7 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::{ReadSeek, Source, VolumeFile};
 use super::header::Header;
-use super::write::DESCRIPTION;
+use super::write::FILE_DESCRIPTION;
 use crate::progress::{Monitor, Stage};
 use flate2::bufread::GzDecoder;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -130,7 +130,7 @@ impl Content {
         };
         let blank = |bytes: Option<&[u8]>| bytes.is_some_and(|bytes| bytes.iter().all(|b| *b == 0));
         let own = |text: &Range<usize>| {
-            let rest = self.0.get(text.clone())?.strip_prefix(DESCRIPTION);
+            let rest = self.0.get(text.clone())?.strip_prefix(FILE_DESCRIPTION);
             (text.start == descrip).then_some(rest?)
         };
         let texts = texts

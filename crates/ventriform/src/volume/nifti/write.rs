@@ -25,7 +25,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::io::Write;
 
 /// `descrip` of the files that are written.
-pub(super) const DESCRIPTION: &[u8] = b"ventriform";
+pub(super) const FILE_DESCRIPTION: &[u8] = b"ventriform";
 
 /// Bytes before the first voxel: the header and four bytes that announce no extensions.
 const VOX_OFFSET: usize = 352;
@@ -304,7 +304,7 @@ fn header(
     let ras = frame.to_ras();
     // Frames of other containers differ in the sign of zeros: -0 + 0 is 0.
     let srow = |row: usize| [0, 1, 2, 3].map(|c| ras[(row, c)] as f32 + 0.0);
-    let mut descrip = DESCRIPTION.to_vec();
+    let mut descrip = FILE_DESCRIPTION.to_vec();
     descrip.resize(80, 0);
     let mut header = NiftiHeader {
         dim,

@@ -42,12 +42,12 @@ impl Ellipsoid {
     }
 }
 
-const LIVER: Ellipsoid = Ellipsoid::new([-70.0, -10.0, -80.0], [95.0, 80.0, 55.0]);
-const GUT: [Ellipsoid; 2] = [
+const LIVER_MM: Ellipsoid = Ellipsoid::new([-70.0, -10.0, -80.0], [95.0, 80.0, 55.0]);
+const GUT_MM: [Ellipsoid; 2] = [
     Ellipsoid::new([45.0, -25.0, -95.0], [35.0, 25.0, 16.0]),
     Ellipsoid::new([90.0, 5.0, -105.0], [25.0, 30.0, 18.0]),
 ];
-const LUNGS: [Ellipsoid; 2] = [
+const LUNGS_MM: [Ellipsoid; 2] = [
     Ellipsoid::new([100.0, 15.0, 60.0], [50.0, 80.0, 120.0]),
     Ellipsoid::new([-85.0, 5.0, 60.0], [60.0, 85.0, 120.0]),
 ];
@@ -288,13 +288,13 @@ impl<'a> Anatomy<'a> {
         if (p.x / TORSO_HALF_AXES_MM[0]).powi(2) + (p.y / TORSO_HALF_AXES_MM[1]).powi(2) > 1.0 {
             return 0.0;
         }
-        if LIVER.holds(p) {
+        if LIVER_MM.holds(p) {
             return parameters.liver;
         }
-        if GUT.iter().any(|loops| loops.holds(p)) {
+        if GUT_MM.iter().any(|loops| loops.holds(p)) {
             return parameters.gut;
         }
-        if LUNGS.iter().any(|lung| lung.holds(p)) {
+        if LUNGS_MM.iter().any(|lung| lung.holds(p)) {
             LUNG_SHARE * parameters.background
         } else {
             parameters.background

@@ -17,7 +17,7 @@ pub struct PhantomParameters {
     pub width_mm: f64,
     /// Thickness of the wall, 2..=25 and less than half the width. Default 11.
     pub wall_mm: f64,
-    /// How far the wall extends beyond the equator of the ellipsoid, 0..=half the length. Default 15.
+    /// Extent of the wall beyond the equator of the ellipsoid, 0..=half the length. Default 15.
     pub base_mm: f64,
     /// Slant of the basal plane in degrees, 0..=40. Default 15.
     pub base_tilt_deg: f64,
@@ -39,7 +39,7 @@ pub struct PhantomParameters {
     pub liver: f64,
     /// Uptake of the gut below the heart, 0..=5. Default 0.6.
     pub gut: f64,
-    /// How far the patient moves towards the head during the scan, -60..=60. The true mask keeps the
+    /// Distance that the patient moves towards the head during the scan, -60..=60. The true mask keeps the
     /// first place. Default 0.
     pub motion_mm: f64,
     /// Share of the scan after the motion, 0..=1. Default 0.5.

@@ -9,7 +9,7 @@ use crate::geometry::Vec2;
 use crate::mesh::HalfEdgeId;
 use crate::retile::domain::Domain;
 
-/// How far a window extends beyond its ends, as a fraction of the edge. Otherwise neighbouring
+/// Extent of a window beyond its ends, as a fraction of the edge. Otherwise neighbouring
 /// windows could leave a gap where a ray meets a vertex.
 const WINDOW_OVERLAP: f64 = 1e-9;
 

@@ -272,7 +272,7 @@ fn scaled(edge: u64, depth: u32, high: u64) -> u64 {
     edge.saturating_sub(offset).div_ceil(1 << depth)
 }
 
-/// How many cells of `2^exponent` the numbers from begin to end lie in.
+/// The number of cells of `2^exponent` in which the numbers from begin to end lie.
 fn spans([begin, end]: [u64; 2], exponent: u32) -> u64 {
     end.div_ceil(1 << exponent) - (begin >> exponent)
 }

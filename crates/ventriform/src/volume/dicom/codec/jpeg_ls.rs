@@ -7,7 +7,7 @@
 use super::{FrameError, FrameLayout, Numbers, Pace};
 
 /// Contexts of the regular mode; two more for interrupted runs follow.
-const REGULAR: usize = 365;
+const REGULAR_CONTEXTS: usize = 365;
 
 /// Orders of the run lengths (A.2.1).
 const RUN_ORDERS: [u32; 32] = [
@@ -222,7 +222,7 @@ impl<'a> Scan<'a> {
         let limit = 2 * (value_bits + value_bits.max(8));
         Ok(Self {
             bits: Bits::new(data),
-            contexts: vec![start; REGULAR + 2],
+            contexts: vec![start; REGULAR_CONTEXTS + 2],
             run: 0,
             largest,
             thresholds: [t1, t2, t3],
@@ -373,7 +373,7 @@ impl<'a> Scan<'a> {
     fn interruption(&mut self, ra: i32, rb: i32) -> Result<i32, String> {
         let alike = (ra - rb).abs() <= self.near;
         let kind = i32::from(alike);
-        let place = REGULAR + usize::from(alike);
+        let place = REGULAR_CONTEXTS + usize::from(alike);
         let mut context = self.contexts[place];
         let sum = context.a.saturating_add(kind * (context.n >> 1));
         let order = context.order(sum);

@@ -23,7 +23,6 @@ mod rle;
 
 pub(super) use jpeg::Process;
 
-use super::syntax::Compression;
 use crate::progress::Cancelled;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -33,6 +32,21 @@ pub(super) const MOST_PIXELS: usize = 1 << 20;
 
 /// Pixels decoded between two reports: a few milliseconds of work.
 const PIXELS_PER_REPORT: usize = 1 << 14;
+
+/// The compression of stored pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    /// Not at all.
+    None,
+    /// Run lengths, PS3.5 annex G.
+    Rle,
+    /// JPEG (ISO 10918-1): baseline, or lossless with any predictor.
+    Jpeg(Process),
+    /// JPEG-LS (ISO 14495-1), near-lossless or only lossless.
+    JpegLs { near: bool },
+    /// JPEG 2000 (ISO 15444-1), irreversible or only reversible.
+    Jpeg2000 { irreversible: bool },
+}
 
 /// Layout of a decoded frame.
 #[derive(Debug, Clone, Copy)]

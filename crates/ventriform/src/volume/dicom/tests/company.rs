@@ -23,7 +23,8 @@ fn company() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-const METHODS: [CompressionMethod; 2] = [CompressionMethod::Stored, CompressionMethod::Deflated];
+const ZIP_METHODS: [CompressionMethod; 2] =
+    [CompressionMethod::Stored, CompressionMethod::Deflated];
 
 fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packed = GzEncoder::new(Vec::new(), flate2::Compression::default());
@@ -85,7 +86,7 @@ fn nifti_in_archives_and_folders_is_found_among_other_files() {
     ];
     for volume in volumes {
         let content: Vec<_> = company().into_iter().chain(volume.clone()).collect();
-        for method in METHODS {
+        for method in ZIP_METHODS {
             for content in [&volume, &content] {
                 let reading = read_files(&[archive(content, method)]).unwrap();
                 assert_eq!(reading.volume.voxels, voxels, "{method}");

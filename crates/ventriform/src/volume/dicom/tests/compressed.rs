@@ -39,8 +39,8 @@ const JPEG_LOSSLESS: &str = "\
     ffda0008010000060000f9ff00eaeca1ca6f32fcf0f62baacd08fc579891f54824e638cde9ccebcb8f656db7\
     1d2a745cf8a9cb6895b6a4895b6a4895b6754b30f5f4b30f5f4b30d1ea368798a368798a3680ffd9";
 
-const COLUMNS: usize = 9;
-const ROWS: usize = 7;
+const FRAME_COLUMNS: usize = 9;
+const FRAME_ROWS: usize = 7;
 
 /// The image: 12 bits, with a flat part, edges and gradients.
 fn image() -> Vec<f32> {
@@ -51,7 +51,8 @@ fn image() -> Vec<f32> {
             (37 * x * x + 91 * y * (x % 3) + 13 * y * y) % 4096
         }
     };
-    let pixels = (0..COLUMNS * ROWS).map(|n| value(n % COLUMNS, n / COLUMNS) as f32);
+    let pixels =
+        (0..FRAME_COLUMNS * FRAME_ROWS).map(|n| value(n % FRAME_COLUMNS, n / FRAME_COLUMNS) as f32);
     pixels.collect()
 }
 
@@ -89,8 +90,8 @@ fn layout(frames: usize, signed: bool) -> Elements {
     let number: &'static str = ["0", "1", "2", "3"][frames];
     elements.extend([
         ((0x28, 0x08), ("IS", Text(number))),
-        ((0x28, 0x10), ("US", Shorts(vec![ROWS as u16]))),
-        ((0x28, 0x11), ("US", Shorts(vec![COLUMNS as u16]))),
+        ((0x28, 0x10), ("US", Shorts(vec![FRAME_ROWS as u16]))),
+        ((0x28, 0x11), ("US", Shorts(vec![FRAME_COLUMNS as u16]))),
         ((0x28, 0x103), ("US", Shorts(vec![signed.into()]))),
         ((0x54, 0x80), ("US", Shorts((1..=frames as u16).collect()))),
     ]);
@@ -117,30 +118,38 @@ fn run_lengths() -> Vec<u8> {
     frame
 }
 
-const RLE: &str = "1.2.840.10008.1.2.5";
-const LOSSLESS: &str = "1.2.840.10008.1.2.4.70";
-const LS: &str = "1.2.840.10008.1.2.4.80";
-const LS_NEAR: &str = "1.2.840.10008.1.2.4.81";
-const J2K: &str = "1.2.840.10008.1.2.4.90";
+const RLE_UID: &str = "1.2.840.10008.1.2.5";
+const JPEG_LOSSLESS_UID: &str = "1.2.840.10008.1.2.4.70";
+const JPEG_LS_UID: &str = "1.2.840.10008.1.2.4.80";
+const JPEG_LS_NEAR_UID: &str = "1.2.840.10008.1.2.4.81";
+const JPEG_2000_UID: &str = "1.2.840.10008.1.2.4.90";
 
 #[test]
 fn every_codec_gives_the_image_of_the_encoder() {
     for (uid, packed) in [
-        (RLE, run_lengths()),
-        (LOSSLESS, bytes(JPEG_LOSSLESS)),
-        (LS, bytes(JPEG_LS)),
-        (J2K, bytes(JPEG_2000)),
+        (RLE_UID, run_lengths()),
+        (JPEG_LOSSLESS_UID, bytes(JPEG_LOSSLESS)),
+        (JPEG_LS_UID, bytes(JPEG_LS)),
+        (JPEG_2000_UID, bytes(JPEG_2000)),
     ] {
         let made = file(uid, &layout(1, false), &[vec![], packed]);
         let reading = read_frame(made, None).unwrap();
-        assert_eq!(reading.volume.shape, [COLUMNS, ROWS, 1]);
+        assert_eq!(reading.volume.shape, [FRAME_COLUMNS, FRAME_ROWS, 1]);
         assert_eq!(reading.volume.voxels, image(), "{uid}");
     }
-    let near = file(LS_NEAR, &layout(1, false), &[vec![], bytes(NEAR_LOSSLESS)]);
+    let near = file(
+        JPEG_LS_NEAR_UID,
+        &layout(1, false),
+        &[vec![], bytes(NEAR_LOSSLESS)],
+    );
     let near = read_frame(near, None).unwrap().volume.voxels;
     assert_eq!(near[4..8], [590.0, 925.0, 1331.0, 1813.0]);
     assert!(near.iter().zip(image()).all(|(a, b)| (a - b).abs() <= 2.0));
-    let signed = file(J2K, &layout(1, true), &[vec![], bytes(JPEG_2000_SIGNED)]);
+    let signed = file(
+        JPEG_2000_UID,
+        &layout(1, true),
+        &[vec![], bytes(JPEG_2000_SIGNED)],
+    );
     let signed = read_frame(signed, None).unwrap().volume.voxels;
     assert!(signed.iter().zip(image()).all(|(a, b)| *a == b - 2048.0));
 }
@@ -153,16 +162,20 @@ fn frames_are_found_by_fragments_or_by_their_table() {
     let mut table = 0_u32.to_le_bytes().to_vec();
     table.extend(((8 + 60 + 8 + (ls.len() - 60).next_multiple_of(2)) as u32).to_le_bytes());
     let apart = file(
-        LS,
+        JPEG_LS_UID,
         &elements,
         &[table, a.clone(), b.clone(), a.clone(), b.clone()],
     );
-    let whole = file(LS, &elements, &[vec![], ls.clone(), ls]);
+    let whole = file(JPEG_LS_UID, &elements, &[vec![], ls.clone(), ls]);
     for made in [apart, whole] {
         let voxels = read_frame(made, None).unwrap().volume.voxels;
         assert_eq!(voxels, [image(), image()].concat());
     }
-    let lost = file(LS, &elements, &[vec![], a.clone(), b.clone(), a, b]);
+    let lost = file(
+        JPEG_LS_UID,
+        &elements,
+        &[vec![], a.clone(), b.clone(), a, b],
+    );
     assert_eq!(
         complaint(read_frame(lost, None)).0,
         "Pixel Data (7FE0,0010)"
@@ -172,10 +185,10 @@ fn frames_are_found_by_fragments_or_by_their_table() {
 #[test]
 fn damaged_frames_are_errors() {
     for (uid, packed) in [
-        (RLE, run_lengths()),
-        (LOSSLESS, bytes(JPEG_LOSSLESS)),
-        (LS, bytes(JPEG_LS)),
-        (J2K, bytes(JPEG_2000)),
+        (RLE_UID, run_lengths()),
+        (JPEG_LOSSLESS_UID, bytes(JPEG_LOSSLESS)),
+        (JPEG_LS_UID, bytes(JPEG_LS)),
+        (JPEG_2000_UID, bytes(JPEG_2000)),
     ] {
         let cut = packed[..packed.len() / 3].to_vec();
         let made = file(uid, &layout(1, false), &[vec![], cut]);
@@ -195,10 +208,10 @@ fn damaged_frames_are_errors() {
     }
     let mut vast = layout(1, false);
     vast.insert((0x28, 0x10), ("US", Shorts(vec![60_000])));
-    let error = read_frame(file(RLE, &vast, &[vec![], run_lengths()]), None).unwrap_err();
+    let error = read_frame(file(RLE_UID, &vast, &[vec![], run_lengths()]), None).unwrap_err();
     assert!(matches!(error, VolumeError::Corrupt { .. }), "{error}");
     vast.insert((0x28, 0x11), ("US", Shorts(vec![60_000])));
-    let error = read_frame(file(RLE, &vast, &[vec![], run_lengths()]), None).unwrap_err();
+    let error = read_frame(file(RLE_UID, &vast, &[vec![], run_lengths()]), None).unwrap_err();
     assert!(matches!(error, VolumeError::TooLarge { .. }), "{error}");
 }
 
@@ -249,7 +262,7 @@ fn what_is_not_decoded_is_named() {
         assert!(matches!(error, VolumeError::Unsupported { .. }), "{error}");
         assert!(error.to_string().contains(name), "{error}");
     }
-    let whole = with_meta(RLE, Encoding::Explicit.elements(&slices()));
+    let whole = with_meta(RLE_UID, Encoding::Explicit.elements(&slices()));
     assert_eq!(complaint(read_frame(whole, None)).1, "in one piece");
     let pieces = file(
         Encoding::Explicit.uid(),

@@ -3,8 +3,8 @@
 use super::objects::{ct, enhanced, files};
 use super::*;
 
-const PADDING: (u16, u16) = (0x28, 0x120);
-const LIMIT: (u16, u16) = (0x28, 0x121);
+const PADDING_VALUE_TAG: (u16, u16) = (0x28, 0x120);
+const PADDING_LIMIT_TAG: (u16, u16) = (0x28, 0x121);
 
 /// The voxels of `elements` and the warnings.
 fn padded(mut elements: Elements, given: &[((u16, u16), &'static str, Value)]) -> Vec<f32> {
@@ -32,7 +32,7 @@ fn pixels(first: u16, count: u16, value: u16) -> ((u16, u16), &'static str, Valu
 
 #[test]
 fn padding_counts_as_no_uptake() {
-    let value = |n| (PADDING, "US", Shorts(vec![n]));
+    let value = |n| (PADDING_VALUE_TAG, "US", Shorts(vec![n]));
     let nm = padded(slices(), &[pixels(10, 24, 63_536), value(63_536)]);
     assert_eq!(nm[..6], [10.0, 0.0, 12.0, 13.0, 0.0, 15.0]);
     assert_eq!(nm.iter().filter(|v| **v == 0.0).count(), 2);
@@ -43,13 +43,13 @@ fn padding_counts_as_no_uptake() {
     ];
     let hot = [
         pixels(10, 24, 0x8000),
-        (PADDING, "SS", Shorts(vec![0x8000])),
+        (PADDING_VALUE_TAG, "SS", Shorts(vec![0x8000])),
     ];
     let nm = padded(slices(), &[&scaling[..], &hot].concat());
     assert_eq!(nm[..3], [-5.0, 0.0, -6.0]);
     // A range, in either order of its ends.
     for ends in [[63_000, 65_535], [65_535, 63_000]] {
-        let limit = (LIMIT, "US", Shorts(vec![ends[1]]));
+        let limit = (PADDING_LIMIT_TAG, "US", Shorts(vec![ends[1]]));
         let nm = padded(slices(), &[pixels(10, 24, 64_000), value(ends[0]), limit]);
         assert_eq!(nm[..3], [10.0, 0.0, 12.0]);
     }
@@ -57,7 +57,7 @@ fn padding_counts_as_no_uptake() {
     let reading = {
         let mut elements = gated();
         elements.insert((0x7fe0, 0x10), ("OW", Shorts(vec![63_536; 48])));
-        elements.insert(PADDING, ("US", Shorts(vec![63_536])));
+        elements.insert(PADDING_VALUE_TAG, ("US", Shorts(vec![63_536])));
         read_elements(&elements).unwrap()
     };
     assert_eq!(reading.facts.intensity.maximum, 0.0);
@@ -79,7 +79,7 @@ fn padding_of_slices_counts_as_air_or_as_no_uptake() {
             slice.insert((0x08, 0x16), ("UI", class.clone()));
             // Each file has padding of its own.
             let padding = if height == "0" { 0x8000 } else { 15 };
-            slice.insert(PADDING, ("SS", Shorts(vec![padding])));
+            slice.insert(PADDING_VALUE_TAG, ("SS", Shorts(vec![padding])));
             slice
         });
         let options = ReadOptions::default();
@@ -104,13 +104,13 @@ fn padding_may_need_more_bits_than_are_stored() {
     ];
     // 63536 without its upper four bits is 2096, which the image may hold.
     let mut given = twelve.to_vec();
-    given.push((PADDING, "US", Shorts(vec![63_536])));
+    given.push((PADDING_VALUE_TAG, "US", Shorts(vec![63_536])));
     given.push(pixels(2096, 24, 63_536));
     let voxels = padded(slices(), &given);
     assert_eq!(voxels[..6], [2096.0, 0.0, 2098.0, 2099.0, 0.0, 2101.0]);
     // Upper bits that belong to no value do not hide padding.
     let mut given = twelve.to_vec();
-    given.push((PADDING, "US", Shorts(vec![4095])));
+    given.push((PADDING_VALUE_TAG, "US", Shorts(vec![4095])));
     given.push(pixels(10, 24, 0xafff));
     assert_eq!(padded(slices(), &given)[..2], [10.0, 0.0]);
 }
@@ -133,7 +133,7 @@ fn padding_of_floating_point_pixels() {
 #[test]
 fn padding_that_is_no_uptake_already_is_not_worth_a_word() {
     let reading = changed(|e| {
-        e.insert(PADDING, ("US", Shorts(vec![0])));
+        e.insert(PADDING_VALUE_TAG, ("US", Shorts(vec![0])));
     });
     let reading = reading.unwrap();
     assert_eq!(reading.facts.warnings, Vec::<String>::new());

@@ -188,8 +188,8 @@ fn deflate(bytes: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_wrong_transfer_syntax_is_the_fault_that_is_named() {
-    const DEFLATED: &str = "1.2.840.10008.1.2.1.99";
-    const JPEG: &str = "1.2.840.10008.1.2.4.70";
+    const DEFLATED_UID: &str = "1.2.840.10008.1.2.1.99";
+    const JPEG_LOSSLESS_UID: &str = "1.2.840.10008.1.2.4.70";
     let all = [Encoding::Implicit, Encoding::Explicit, Encoding::BigEndian];
     let fault =
         |uid: &'static str, data_set: Vec<u8>| match read_frame(with_meta(uid, data_set), None) {
@@ -209,8 +209,12 @@ fn a_wrong_transfer_syntax_is_the_fault_that_is_named() {
             other => panic!("{uid}: {other:?}"),
         };
     for is in all {
-        for said in all.map(Encoding::uid).into_iter().chain([DEFLATED, JPEG]) {
-            let right = said == is.uid() || (said == JPEG && is == Encoding::Explicit);
+        for said in all
+            .map(Encoding::uid)
+            .into_iter()
+            .chain([DEFLATED_UID, JPEG_LOSSLESS_UID])
+        {
+            let right = said == is.uid() || (said == JPEG_LOSSLESS_UID && is == Encoding::Explicit);
             if !right {
                 let reason = fault(said, is.elements(&slices()));
                 let name = [
@@ -223,17 +227,21 @@ fn a_wrong_transfer_syntax_is_the_fault_that_is_named() {
         }
     }
     let plain = Encoding::Explicit.elements(&slices());
-    for uid in [Encoding::Implicit.uid(), Encoding::Explicit.uid(), JPEG] {
+    for uid in [
+        Encoding::Implicit.uid(),
+        Encoding::Explicit.uid(),
+        JPEG_LOSSLESS_UID,
+    ] {
         assert!(fault(uid, deflate(&plain)).contains("is deflated"));
     }
     let implicit = deflate(&Encoding::Implicit.elements(&slices()));
-    assert!(fault(DEFLATED, implicit).contains("inflated data set is in Implicit VR"));
+    assert!(fault(DEFLATED_UID, implicit).contains("inflated data set is in Implicit VR"));
     let mut zlib = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     std::io::Write::write_all(&mut zlib, &plain).unwrap();
-    assert!(fault(DEFLATED, zlib.finish().unwrap()).contains("zlib header"));
+    assert!(fault(DEFLATED_UID, zlib.finish().unwrap()).contains("zlib header"));
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
     std::io::Write::write_all(&mut gzip, &plain).unwrap();
-    assert!(fault(DEFLATED, gzip.finish().unwrap()).contains("gzip header"));
+    assert!(fault(DEFLATED_UID, gzip.finish().unwrap()).contains("gzip header"));
 }
 
 #[test]
@@ -305,9 +313,9 @@ fn sequence(tag: [u8; 4], vr: Option<&[u8; 2]>, content: &[u8], defined: bool) -
 
 #[test]
 fn pictures_inside_sequences_are_not_the_image() {
-    const ICON: [u8; 4] = [0x88, 0x00, 0x00, 0x02];
-    const PRIVATE: [u8; 4] = [0x09, 0x00, 0x10, 0x11];
-    const RLE: &str = "1.2.840.10008.1.2.5";
+    const ICON_TAG_BYTES: [u8; 4] = [0x88, 0x00, 0x00, 0x02];
+    const PRIVATE_TAG_BYTES: [u8; 4] = [0x09, 0x00, 0x10, 0x11];
+    const RLE_UID: &str = "1.2.840.10008.1.2.5";
     let run_length = |data: &Elements| {
         // Each frame: 2 segments of 6 bytes in one literal run.
         let Some((_, Shorts(pixels))) = data.get(&(0x7fe0, 0x10)) else {
@@ -351,13 +359,13 @@ fn pictures_inside_sequences_are_not_the_image() {
             fragments(Some(b"UN")),
             plain(Encoding::Explicit),
         ] {
-            let icon = sequence(ICON, Some(b"SQ"), &content, defined);
-            icons.push(sequence(PRIVATE, Some(b"SQ"), &icon, defined));
+            let icon = sequence(ICON_TAG_BYTES, Some(b"SQ"), &content, defined);
+            icons.push(sequence(PRIVATE_TAG_BYTES, Some(b"SQ"), &icon, defined));
             icons.push(icon);
         }
         // A private sequence of unknown representation is in implicit VR.
-        let inner = sequence(ICON, None, &fragments(None), false);
-        icons.push(sequence(PRIVATE, Some(b"UN"), &inner, false));
+        let inner = sequence(ICON_TAG_BYTES, None, &fragments(None), false);
+        icons.push(sequence(PRIVATE_TAG_BYTES, Some(b"UN"), &inner, false));
         for icon in icons {
             let place = |elements: &Elements, pixels: &[u8]| {
                 let mut all = Encoding::Explicit.elements(elements);
@@ -369,7 +377,7 @@ fn pictures_inside_sequences_are_not_the_image() {
             let compressed = place(&rest, &packed);
             for made in [
                 with_meta(Encoding::Explicit.uid(), plain),
-                with_meta(RLE, compressed),
+                with_meta(RLE_UID, compressed),
             ] {
                 let reading = read_frame(made, None).unwrap();
                 assert_eq!(reading.volume.voxels, ramp);
@@ -377,7 +385,7 @@ fn pictures_inside_sequences_are_not_the_image() {
         }
         for content in [fragments(None), plain(Encoding::Implicit)] {
             let mut all = Encoding::Implicit.elements(&bare);
-            all.extend(sequence(ICON, None, &content, defined));
+            all.extend(sequence(ICON_TAG_BYTES, None, &content, defined));
             all.extend(Encoding::Implicit.elements(&pixels));
             let reading = read_frame(with_meta(Encoding::Implicit.uid(), all), None).unwrap();
             assert_eq!(reading.volume.voxels, ramp);
@@ -385,12 +393,12 @@ fn pictures_inside_sequences_are_not_the_image() {
         // An icon is no image.
         let mut lone = Encoding::Explicit.elements(&bare);
         lone.extend(sequence(
-            ICON,
+            ICON_TAG_BYTES,
             Some(b"SQ"),
             &fragments(Some(b"OB")),
             defined,
         ));
-        let (field, value) = complaint(read_frame(with_meta(RLE, lone), None));
+        let (field, value) = complaint(read_frame(with_meta(RLE_UID, lone), None));
         assert_eq!((field, &*value), ("Pixel Data (7FE0,0010)", "missing"));
     }
 }

@@ -4,8 +4,8 @@ use super::objects::{ct, group, item};
 use super::*;
 use proptest::sample::select;
 
-const SLICES: usize = 4;
-const VOLUMES: usize = 3;
+const SLICE_COUNT: usize = 4;
+const VOLUME_COUNT: usize = 3;
 
 /// The first voxel of a slice.
 fn first_voxel(volume: usize, slice: usize) -> u16 {
@@ -40,7 +40,7 @@ macro_rules! says {
 }
 
 /// Every attribute of a file that tells volumes apart, with values as scanners write them.
-const FILES: &[Said] = &[
+const TELLING_ATTRIBUTES: &[Said] = &[
     says!((0x20, 0x100), "IS", |v, s| written(v + 1)),
     // Of the first volume nothing is said.
     |v, _| match v {
@@ -90,23 +90,26 @@ const FILES: &[Said] = &[
     },
     says!((0x20, 0x12), "IS", |v, s| written(v + 4)),
     says!((0x54, 0x1330), "US", |v, s| Shorts(vec![
-        (v * SLICES + s + 1) as u16
+        (v * SLICE_COUNT + s + 1) as u16
     ])),
     // Image Index outranks Instance Numbers that begin again or run through the slices.
     |v, s| {
-        let index = (v * SLICES + SLICES - s) as u16;
+        let index = (v * SLICE_COUNT + SLICE_COUNT - s) as u16;
         vec![
-            ((0x20, 0x13), ("IS", written(s * VOLUMES + VOLUMES - v))),
+            (
+                (0x20, 0x13),
+                ("IS", written(s * VOLUME_COUNT + VOLUME_COUNT - v)),
+            ),
             ((0x54, 0x1330), ("US", Shorts(vec![index]))),
         ]
     },
-    says!((0x20, 0x13), "IS", |v, s| written(1 + v * SLICES + s)),
+    says!((0x20, 0x13), "IS", |v, s| written(1 + v * SLICE_COUNT + s)),
     says!((0x20, 0x13), "IS", |v, s| written(
-        1 + v * SLICES + SLICES - s
+        1 + v * SLICE_COUNT + SLICE_COUNT - s
     )),
     // Slices were taken in two passes.
     says!((0x20, 0x13), "IS", |v, s| written(
-        v * SLICES + [0, 2, 1, 3][s]
+        v * SLICE_COUNT + [0, 2, 1, 3][s]
     )),
     says!((0x08, 0x33), "TM", |v, s| written(format!(
         "10{:02}{:02}",
@@ -215,10 +218,10 @@ fn of_frame(kind: usize, v: usize, s: usize) -> ((u16, u16), Elements) {
             written(format!("10{:02}00", 30 + v)),
         ),
         21 => {
-            let index = (v * SLICES + s + 1) as u16;
+            let index = (v * SLICE_COUNT + s + 1) as u16;
             (unassigned, (0x54, 0x1330), "US", Shorts(vec![index]))
         }
-        _ => (unassigned, (0x20, 0x13), "IS", written(v * SLICES + s)),
+        _ => (unassigned, (0x20, 0x13), "IS", written(v * SLICE_COUNT + s)),
     };
     (sequence, item(tag, vr, value))
 }
@@ -252,16 +255,16 @@ fn read_volume_of(files: &[VolumeFile], frame: usize) -> Result<Reading, VolumeE
 }
 
 fn expected(volume: usize) -> Vec<f32> {
-    let slices = (0..SLICES).map(|slice| first_voxel(volume, slice));
+    let slices = (0..SLICE_COUNT).map(|slice| first_voxel(volume, slice));
     slices
         .flat_map(|first| (first..first + 6).map(f32::from))
         .collect()
 }
 
 fn every_slice() -> Vec<(usize, usize)> {
-    let volumes = 0..VOLUMES;
+    let volumes = 0..VOLUME_COUNT;
     volumes
-        .flat_map(|v| (0..SLICES).map(move |s| (v, s)))
+        .flat_map(|v| (0..SLICE_COUNT).map(move |s| (v, s)))
         .collect()
 }
 
@@ -282,17 +285,17 @@ proptest! {
     #[test]
     fn files_in_any_order_give_the_same_volumes(
         order in Just(every_slice()).prop_shuffle(),
-        say in select(FILES),
+        say in select(TELLING_ATTRIBUTES),
     ) {
         let (given, sorted) = (uploaded(&order, say), uploaded(&every_slice(), say));
-        for volume in 0..VOLUMES {
+        for volume in 0..VOLUME_COUNT {
             let reading = read_volume_of(&given, volume).unwrap();
             prop_assert_eq!(&reading.volume.voxels, &expected(volume));
             let known = read_volume_of(&sorted, volume).unwrap();
             prop_assert_eq!(format!("{:?}", reading.facts), format!("{:?}", known.facts));
             prop_assert_eq!(reading.provenance, known.provenance);
         }
-        prop_assert!(read_volume_of(&given, VOLUMES).is_err());
+        prop_assert!(read_volume_of(&given, VOLUME_COUNT).is_err());
         let facts = |files| inspect_volume(files, &ReadLimits::default(), &Monitor::silent());
         prop_assert_eq!(
             format!("{:?}", facts(&given)),
@@ -312,7 +315,7 @@ proptest! {
         };
         let given = encoding.file(&enhanced(&order, &say));
         let given = [VolumeFile::in_memory("enhanced", given)];
-        for volume in 0..VOLUMES {
+        for volume in 0..VOLUME_COUNT {
             let reading = read_volume_of(&given, volume).unwrap();
             prop_assert_eq!(reading.volume.voxels, expected(volume), "kind {}", kind);
         }
@@ -321,7 +324,7 @@ proptest! {
     /// R-R intervals and echoes: neither alone tells the volumes apart.
     #[test]
     fn two_attributes_tell_apart_what_one_does_not(
-        order in Just([0, 1, 2, 3].map(|v| (0..SLICES).map(move |s| (v, s)).collect::<Vec<_>>()).concat())
+        order in Just([0, 1, 2, 3].map(|v| (0..SLICE_COUNT).map(move |s| (v, s)).collect::<Vec<_>>()).concat())
             .prop_shuffle(),
     ) {
         let say: Said = |v, _| vec![
@@ -338,7 +341,7 @@ proptest! {
     #[test]
     fn what_nothing_tells_apart_is_refused_in_the_same_words(
         order in Just(every_slice()).prop_shuffle(),
-        (say, word) in select(UNTOLD),
+        (say, word) in select(UNTELLING_ATTRIBUTES),
     ) {
         let error = |order: &[(usize, usize)]| match read_volume_of(&uploaded(order, say), 0) {
             Err(VolumeError::NotOneSeries { reason, .. }) => reason,
@@ -354,7 +357,7 @@ proptest! {
 }
 
 /// Attributes that do not tell which images belong to one volume, with a word of the refusal.
-const UNTOLD: &[(Said, &str)] = &[
+const UNTELLING_ATTRIBUTES: &[(Said, &str)] = &[
     (|_, _| Vec::new(), "no attribute tells apart"),
     // Numbers that begin again in every volume.
     (
@@ -363,19 +366,24 @@ const UNTOLD: &[(Said, &str)] = &[
     ),
     // Numbers that run through the volumes at each place, as every way of writing the files gives them.
     (
-        says!((0x20, 0x13), "IS", |v, s| written(s * VOLUMES + v)),
+        says!((0x20, 0x13), "IS", |v, s| written(s * VOLUME_COUNT + v)),
         "Instance Number (0020,0013) differ",
     ),
     (
         says!((0x20, 0x13), "IS", |v, s| written(
-            s * VOLUMES + if s.is_multiple_of(2) { v } else { VOLUMES - v }
+            s * VOLUME_COUNT
+                + if s.is_multiple_of(2) {
+                    v
+                } else {
+                    VOLUME_COUNT - v
+                }
         )),
         "Instance Number",
     ),
     // Blocks, but each with the slices in an order of its own.
     (
         says!((0x20, 0x13), "IS", |v, s| written(
-            v * SLICES + [[0, 1, 2, 3], [2, 0, 3, 1], [3, 1, 2, 0]][v][s]
+            v * SLICE_COUNT + [[0, 1, 2, 3], [2, 0, 3, 1], [3, 1, 2, 0]][v][s]
         )),
         "Instance Number",
     ),
@@ -390,7 +398,7 @@ const UNTOLD: &[(Said, &str)] = &[
     (
         says!((0x08, 0x33), "TM", |v, s| written(format!(
             "1000{:02}",
-            s * VOLUMES + v
+            s * VOLUME_COUNT + v
         ))),
         "Content Time",
     ),
@@ -398,7 +406,7 @@ const UNTOLD: &[(Said, &str)] = &[
         |v, s| {
             vec![
                 ((0x18, 0x1060), ("DS", written(300 * v))),
-                ((0x20, 0x100), ("IS", written((v + s) % VOLUMES))),
+                ((0x20, 0x100), ("IS", written((v + s) % VOLUME_COUNT))),
             ]
         },
         "contradict each other",
@@ -438,7 +446,7 @@ fn images_side_by_side_are_not_one_volume() {
 
 #[test]
 fn one_file_twice_is_one_image_in_any_order() {
-    let mut order: Vec<(usize, usize)> = every_slice()[..SLICES].to_vec();
+    let mut order: Vec<(usize, usize)> = every_slice()[..SLICE_COUNT].to_vec();
     order.push((0, 1));
     let read = |order: &[(usize, usize)]| {
         let given = uploaded(order, |_, _| Vec::new());

@@ -9,7 +9,7 @@ use super::Header;
 use super::bits::{Bits, Table};
 
 /// Place in a block of each coefficient as it is stored (figure A.6).
-const ZIGZAG: [u8; 64] = [
+const ZIGZAG_POSITIONS: [u8; 64] = [
     0, 1, 8, 16, 9, 2, 3, 10, 17, 24, 32, 25, 18, 11, 4, 5, 12, 19, 26, 33, 40, 48, 41, 34, 27, 20,
     13, 6, 7, 14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23, 30, 37, 44, 51, 58, 59,
     52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63,
@@ -90,7 +90,7 @@ fn read_block(
             (_, 1..=COEFFICIENT_BITS) if k + run < 64 => {
                 k += run;
                 let value = bits.signed(size.into())?;
-                block[usize::from(ZIGZAG[k])] = i64::from(value) * i64::from(steps[k]);
+                block[usize::from(ZIGZAG_POSITIONS[k])] = i64::from(value) * i64::from(steps[k]);
                 k += 1;
             }
             (_, 1..=COEFFICIENT_BITS) => {

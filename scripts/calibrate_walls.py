@@ -1,0 +1,344 @@
+#!/usr/bin/env python3
+"""Estimates the constants of rims, walls and nodes from tables of features.
+
+    calibrate_walls.py --check              compare an estimate from the tables with the constants as committed
+    calibrate_walls.py --write              write the files with the constants estimated from the tables
+    calibrate_walls.py --layout             write the files again with the constants as they are
+
+The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs. The
+tables (scripts/calibration/{rims,rays,nodes}.csv, --tables for another folder) are made by
+
+    make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
+    cargo run --release -p ventriform-tools --bin wall_features -- TABLES COHORT CASES/SET...
+
+- RIM_SHAPE: mean and inverse covariance of the harmonics of the true rims, each by least squares, over the heart's length.
+- RIM_CORRECTION: least squares of the distance from the sensed to the true rim, by the distance of the sensed rim from its
+  shape. Bend and range are chosen, not estimated.
+- INNER_SHIFT_MM, OUTER_SHIFT_MM: least squares of the distances from the apparent to the true surfaces, of the rays of fits
+  in which no such distance has a median beyond 6 mm.
+- NARROW_CAVITY_SHIFT, CAVITY_SIZE_SHIFT: least squares of what those leave in the mean of a heart, by the size of the cavity.
+  The size from which a cavity is narrow is chosen.
+- APPARENT_TERMS, ANATOMICAL_TERMS: quantile regression (68 %) of the logarithm of the distance of nodes from the wall.
+
+{reproduced}
+"""
+import argparse
+import csv
+import pathlib
+import re
+import sys
+
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+WALLS = ROOT / "crates/ventriform/src/deform/calibration.rs"
+NODES = ROOT / "crates/ventriform/src/judge/uncertainty_calibration.rs"
+TABLES = ROOT / "scripts/calibration"
+
+REPRODUCED = """\
+The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with 42 scans
+of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and 2104 with 14 of all
+kinds. docs/evaluation.md says how far the estimate is from the committed constants, and why: do not --write it without judging
+the fits anew, since every result depends on them."""
+
+# Sets of the simulator, by the seed that they were made with. "cohort" is the cohort of 19 hearts.
+RIM_SETS = ["cohort", "411", "701"]
+RAY_SETS = ["cohort", "411", "701"]
+SIZE_SETS = ["2101", "2104"]
+NODE_SETS = ["cohort", "411", "701", "702", "703", "704"]
+
+DIRECTIONS = 30
+OUTLIER_MM, CORRELATED, ROUNDS = 4.0, 3.0, 30  # as in deform/base_plane.rs
+LOST_MM = 6.0
+SPREAD_OFFSET_MM = 0.3
+SHARE = 0.68
+LEAST_DISTANCE_MM = 0.01
+
+RAY_FIELDS = ["constant", "thickness", "ln_radius", "ln_radius_squared", "thickness_here", "narrowness_here", "missing_uptake",
+              "missing_uptake_squared", "way", "way_squared", "nearness_to_apex"]
+NODE_FIELDS = ["constant", "seen", "ln_spread", "log_odds", "way", "way_squared"]
+CORRECTION_FIELDS = ["intercept_mm", "slope", "bend_mm", "short_slope", "long_slope"]
+
+ANGLES = 2 * np.pi * (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
+BASIS = np.column_stack([np.ones(DIRECTIONS), *(f(n * ANGLES) for n in (1, 2, 3) for f in (np.cos, np.sin))])
+
+# Name, type and description of the constants with one number for each field.
+TERMS = {
+    "INNER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the inner surface moves outward, mm."),
+    "OUTER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the outer surface moves outward, mm."),
+    "NARROW_CAVITY_SHIFT": (WALLS, "SizeShift", "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as the blur\n"
+                            "/// hardly moves its edge any more when it shrinks."),
+    "CAVITY_SIZE_SHIFT": (WALLS, "SizeShift", "Distance by which the outer surface moves outward of that, the more, the smaller the cavity looks."),
+    "APPARENT_TERMS": (NODES, "NodeTerms", "Distance from an expert's mask."),
+    "ANATOMICAL_TERMS": (NODES, "NodeTerms", "Distance from the true wall."),
+}
+
+WALLS_HEADER = """\
+//! Constants of the models of rim and wall. Written by `scripts/calibrate_walls.py`: do not edit.
+//!
+//! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
+//! the distances from the apparent to the anatomical wall.
+
+use super::ray_terms::{RayTerms, SizeShift};
+use super::rim_model::{RimCorrection, RimHarmonic, RimShape};
+"""
+NODES_HEADER = """\
+//! Constants of the uncertainty of nodes. Written by `scripts/calibrate_walls.py`: do not edit.
+//!
+//! In: nodes of fits to simulated hearts, and their distances from the walls. Out: the logarithm of the distance within
+//! which 68 % of the nodes lie, mm.
+
+use super::node_terms::NodeTerms;
+"""
+
+NUMBER = r"(-?[0-9.]+)"
+
+
+def committed():
+    """The constants of the files as they are: a dictionary of fields for each, and arrays for RIM_SHAPE."""
+    found = {}
+    for file in (WALLS, NODES):
+        text = file.read_text()
+        for name, body in re.findall(r"pub const (\w+): \w+ = \w+ \{\n(.*?)\n\};", text, re.S):
+            found[name] = {field: float(value) for field, value in re.findall(rf"(\w+): {NUMBER}", body)}
+        if file == WALLS:
+            shape = re.search(r"RimShape \{\n(.*?)\n\};", text, re.S)[1]
+            mean = re.findall(rf"cosine: {NUMBER},\s+sine: {NUMBER}", shape)
+            rows = re.findall(r"\[(-?[0-9][^\[\]]*)\]", shape)
+            found["RIM_SHAPE"] = dict(mean=np.array(mean, float).ravel(), precision=np.array([row.split(", ") for row in rows], float))
+            found["RIM_CORRECTION"]["range_mm"] = [float(x) for x in re.search(rf"range_mm: \[{NUMBER}, {NUMBER}\]", text).groups()]
+        else:
+            found["MEDIAN_SPREAD_MM"] = float(re.search(rf"MEDIAN_SPREAD_MM: f64 = {NUMBER};", text)[1])
+    return found
+
+
+def literal(x, digits=3):
+    text = f"{x:.{digits}f}".rstrip("0")
+    text = text + "0" if text.endswith(".") else text
+    return "0.0" if text == "-0.0" else text
+
+
+def layout(constants):
+    """{file: text} with these constants."""
+    shape, correction = constants["RIM_SHAPE"], constants["RIM_CORRECTION"]
+    harmonics = "".join(f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n        }},\n"
+                        for c, s in zip(shape["mean"][::2], shape["mean"][1::2]))
+    rows = "".join("        [" + ", ".join(literal(round(x), 1) for x in row) + "],\n" for row in shape["precision"])
+    low, high = (literal(x) for x in correction["range_mm"])
+    text = {WALLS: WALLS_HEADER, NODES: NODES_HEADER}
+    text[WALLS] += ("\n/// Shape of the rims of hearts.\npub const RIM_SHAPE: RimShape = RimShape {\n"
+                    f"    mean: [\n{harmonics}    ],\n    precision: [\n{rows}    ],\n}};\n"
+                    "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: RimCorrection = RimCorrection {\n"
+                    + "".join(f"    {field}: {literal(correction[field])},\n" for field in CORRECTION_FIELDS) + f"    range_mm: [{low}, {high}],\n}};\n")
+    for name, (file, kind, doc) in TERMS.items():
+        fields = "".join(f"    {field}: {literal(value)},\n" for field, value in constants[name].items())
+        text[file] += f"\n/// {doc}\npub const {name}: {kind} = {kind} {{\n{fields}}};\n"
+    text[NODES] += ("\n/// The distance that stands for that from other fits where there are none: its median, mm.\n"
+                    f"pub const MEDIAN_SPREAD_MM: f64 = {literal(constants['MEDIAN_SPREAD_MM'])};\n")
+    return text
+
+
+def table(path, sets):
+    with open(path, newline="") as file:
+        return [{k: v if k in ("set", "case") else float(v) for k, v in row.items()} for row in csv.DictReader(file) if row["set"] in sets]
+
+
+def column(rows, name):
+    return np.array([row[name] for row in rows])
+
+
+def heights(rows, name):
+    return np.array([[row[f"{name}_{n}"] for n in range(DIRECTIONS)] for row in rows])
+
+
+def expected(rim, length, shape):
+    """The shape of a rim, as deform/base_plane.rs fits it."""
+    mean = np.concatenate([[0.0], shape["mean"] * length])
+    prior = np.zeros((7, 7))
+    prior[1:, 1:] = shape["precision"] / length**2
+    usual = BASIS @ mean
+    fitted = usual + np.median(rim - usual)
+    for _ in range(ROUNDS):
+        weights = 1 / (1 + ((rim - fitted) / OUTLIER_MM) ** 2) / (OUTLIER_MM**2 * CORRELATED)
+        weighted = BASIS.T * weights
+        fitted = BASIS @ np.linalg.solve(weighted @ BASIS + prior, weighted @ rim + prior @ mean)
+    return fitted
+
+
+def from_shape(rows, shape):
+    return np.array([rim - expected(rim, row["length_mm"], shape) for row, rim in zip(rows, heights(rows, "sensed"))])
+
+
+def bent(distance, bend):
+    return np.column_stack([np.ones(distance.size), distance, np.maximum(distance - bend, 0), np.maximum(-distance - bend, 0)])
+
+
+def corrected(distance, correction):
+    slopes = [correction[field] for field in ("intercept_mm", "slope", "short_slope", "long_slope")]
+    shift = bent(distance.ravel(), correction["bend_mm"]) @ slopes
+    return shift.clip(*correction["range_mm"]).reshape(distance.shape)
+
+
+def rays(tables, sets):
+    """Rows of the fits that found the wall, their numbers in the order of RAY_FIELDS, and the shifts of both surfaces."""
+    rows = table(tables / "rays.csv", sets)
+    of_case = {}
+    for row in rows:
+        of_case.setdefault((row["set"], row["case"]), []).append((row["inner_mm"], row["outer_mm"]))
+    met = {case for case, shifts in of_case.items() if np.abs(np.median(shifts, axis=0)).max() < LOST_MM}
+    rows = [row for row in rows if (row["set"], row["case"]) in met]
+    value = {name: column(rows, name) for name in ("thickness", "ln_radius", "thickness_here", "narrowness_here", "missing_uptake", "way")}
+    value |= {"constant": np.ones(len(rows)), "nearness_to_apex": np.exp(-(value["way"] + 0.5) / 0.12)}
+    value |= {f"{name}_squared": value[name] ** 2 for name in ("ln_radius", "missing_uptake", "way")}
+    return rows, np.column_stack([value[field] for field in RAY_FIELDS]), [column(rows, name) for name in ("inner_mm", "outer_mm")]
+
+
+def of_hearts(rows, values):
+    """Logarithm of the cavity's size, and the mean value, of each heart."""
+    hearts = {}
+    for row, value in zip(rows, values):
+        hearts.setdefault((row["set"], row["case"]), (np.log(max(row["cavity_ml"], 1.0)), []))[1].append(value)
+    return np.array([size for size, _ in hearts.values()]), np.array([np.mean(values) for _, values in hearts.values()])
+
+
+def linear(terms, x):
+    return x @ np.array(list(terms.values()))
+
+
+def least_squares(x, y):
+    return np.linalg.lstsq(x, y, rcond=None)[0]
+
+
+def quantile_regression(x, y, share):
+    """Coefficients by majorisation (Hunter and Lange 2000)."""
+    beta = least_squares(x, y)
+    for _ in range(3000):
+        weights = 1 / (1e-5 + np.abs(y - x @ beta))
+        new = np.linalg.solve((x.T * weights) @ x, x.T @ (weights * y) + (2 * share - 1) * x.sum(axis=0))
+        if np.abs(new - beta).max() < 1e-8:
+            break
+        beta = new
+    return beta
+
+
+def nodes(tables, wall):
+    """Numbers of the nodes in the order of NODE_FIELDS, and the distances from that wall, mm."""
+    rows = table(tables / "nodes.csv", NODE_SETS)
+    rows = [row for row in rows if np.isfinite(row["spread_mm"])]
+    way = column(rows, "way").clip(0, 1) - 0.5
+    x = np.column_stack([np.ones(len(rows)), column(rows, "seen"), np.log(column(rows, "spread_mm") + SPREAD_OFFSET_MM),
+                         column(rows, f"log_odds_{wall}"), way, way**2])
+    return rows, x, np.abs(column(rows, f"{wall}_mm")).clip(LEAST_DISTANCE_MM)
+
+
+def estimate(tables, chosen):
+    """Constants from the tables. What is no estimate is as in `chosen`."""
+    made = {}
+    rows = table(tables / "rims.csv", RIM_SETS)
+    of_true = [least_squares(BASIS, rim)[1:] / row["true_length_mm"] for row, rim in zip(rows, heights(rows, "true"))]
+    made["RIM_SHAPE"] = dict(mean=np.mean(of_true, axis=0), precision=np.linalg.inv(np.cov(np.array(of_true).T)))
+    distance = from_shape(rows, made["RIM_SHAPE"]).ravel()
+    bend = chosen["RIM_CORRECTION"]["bend_mm"]
+    intercept, slope, short, long = least_squares(bent(distance, bend), (heights(rows, "sensed") - heights(rows, "true")).ravel())
+    made["RIM_CORRECTION"] = dict(intercept_mm=intercept, slope=slope, bend_mm=bend, short_slope=short, long_slope=long,
+                                  range_mm=chosen["RIM_CORRECTION"]["range_mm"])
+    _, x, both = rays(tables, RAY_SETS)
+    for name, y in zip(("INNER_SHIFT_MM", "OUTER_SHIFT_MM"), both):
+        made[name] = dict(zip(RAY_FIELDS, least_squares(x, y)))
+    rows, x, (inner, outer) = rays(tables, SIZE_SETS)
+    size, rest = of_hearts(rows, inner - linear(made["INNER_SHIFT_MM"], x))
+    narrow = chosen["NARROW_CAVITY_SHIFT"]["cavity_ml"]
+    below = np.maximum(np.log(narrow) - size, 0)
+    made["NARROW_CAVITY_SHIFT"] = dict(cavity_ml=narrow, per_log_mm=-(below @ rest) / (below @ below))
+    size, rest = of_hearts(rows, outer - linear(made["OUTER_SHIFT_MM"], x))
+    level, slope = least_squares(np.column_stack([np.ones(len(size)), size]), rest)
+    made["CAVITY_SIZE_SHIFT"] = dict(cavity_ml=np.exp(-level / slope), per_log_mm=-slope)
+    for name, wall in (("APPARENT_TERMS", "apparent"), ("ANATOMICAL_TERMS", "anatomical")):
+        rows, x, distance = nodes(tables, wall)
+        made[name] = dict(zip(NODE_FIELDS, quantile_regression(x, np.log(distance), SHARE)))
+    made["MEDIAN_SPREAD_MM"] = float(np.median(column(rows, "spread_mm")))
+    return made
+
+
+def rms(x):
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+def show(name, before, after):
+    print(name)
+    for field in before:
+        if field != "range_mm":
+            print(f"  {field:26}{before[field]:12.3f}{after[field]:12.3f}")
+
+
+def compare(tables, before, after):
+    """Prints both constants, and what the difference does on the tables."""
+    print(f"{'':28}{'committed':>12}{'estimated':>12}")
+    rows = table(tables / "rims.csv", RIM_SETS)
+    names = [f"{f} of {n} x angle" for n in (1, 2, 3) for f in ("cosine", "sine")]
+    show("RIM_SHAPE", dict(zip(names, before["RIM_SHAPE"]["mean"])), dict(zip(names, after["RIM_SHAPE"]["mean"])))
+    deviations = [np.sqrt(np.diag(np.linalg.inv(c["RIM_SHAPE"]["precision"]))) for c in (before, after)]
+    show("  standard deviations", *(dict(zip(names, d)) for d in deviations))
+    show("RIM_CORRECTION", before["RIM_CORRECTION"], after["RIM_CORRECTION"])
+    error = heights(rows, "sensed") - heights(rows, "true")
+    shift = [corrected(from_shape(rows, c["RIM_SHAPE"]), c["RIM_CORRECTION"]) for c in (before, after)]
+    print(f"  {len(rows)} rims: rms error {rms(error):.2f} mm as sensed, {rms(error - shift[0]):.2f} committed, {rms(error - shift[1]):.2f} estimated; "
+          f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation {np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n")
+    for sets in (RAY_SETS, SIZE_SETS):
+        rows, x, both = rays(tables, sets)
+        log_size = np.log(np.maximum(column(rows, "cavity_ml"), 1.0))
+        for surface, y in zip(("INNER", "OUTER"), both):
+            if sets is RAY_SETS:
+                show(f"{surface}_SHIFT_MM", before[f"{surface}_SHIFT_MM"], after[f"{surface}_SHIFT_MM"])
+            shift = []
+            for c in (before, after):
+                narrow, of_size = c["NARROW_CAVITY_SHIFT"], c["CAVITY_SIZE_SHIFT"]
+                more = (-narrow["per_log_mm"] * np.maximum(np.log(narrow["cavity_ml"]) - log_size, 0) if surface == "INNER"
+                        else of_size["per_log_mm"] * (np.log(of_size["cavity_ml"]) - log_size))
+                shift.append(linear(c[f"{surface}_SHIFT_MM"], x) + more)
+            print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} left by committed, "
+                  f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm (rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
+                  f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n")
+    for name in ("NARROW_CAVITY_SHIFT", "CAVITY_SIZE_SHIFT"):
+        show(name, before[name], after[name])
+    for name, wall in (("APPARENT_TERMS", "apparent"), ("ANATOMICAL_TERMS", "anatomical")):
+        show(name, before[name], after[name])
+        _, x, distance = nodes(tables, wall)
+        sd = [np.exp(linear(c[name], x)).clip(0.5, 15.0) for c in (before, after)]
+        within = [f"{np.mean(distance <= s):.0%} / {np.mean(distance <= 2 * s):.0%}" for s in sd]
+        print(f"  {len(distance)} nodes within one / two standard deviations: {within[0]} committed, {within[1]} estimated; "
+              f"they differ by a factor of {np.exp(rms(np.log(sd[0] / sd[1]))):.2f} (rms), correlation of the logarithms {np.corrcoef(*np.log(sd))[0, 1]:.3f}\n")
+    print(f"MEDIAN_SPREAD_MM{before['MEDIAN_SPREAD_MM']:24.3f}{after['MEDIAN_SPREAD_MM']:12.3f}")
+
+
+def write(texts):
+    for file, text in texts.items():
+        file.write_text(text)
+
+
+def main():
+    doc = __doc__.replace("{reproduced}", REPRODUCED)
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tables", type=pathlib.Path, default=TABLES, help="folder of the tables of features (CSV)")
+    action = parser.add_mutually_exclusive_group(required=True)
+    action.add_argument("--check", action="store_true", help="compare the estimate with the constants as committed; 1 if a file is not laid out as --layout would")
+    action.add_argument("--write", action="store_true", help="write the estimated constants")
+    action.add_argument("--layout", action="store_true", help="write the committed constants again")
+    a = parser.parse_args()
+    before = committed()
+    if a.layout:
+        write(layout(before))
+        return 0
+    after = estimate(a.tables, before)
+    if a.write:
+        write(layout(after))
+        return 0
+    compare(a.tables, before, after)
+    edited = [file for file, text in layout(before).items() if file.read_text() != text]
+    for file in edited:
+        print(f"{file.relative_to(ROOT)} was edited by hand: run calibrate_walls.py --layout", file=sys.stderr)
+    return min(len(edited), 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

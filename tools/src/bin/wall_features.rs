@@ -1,0 +1,253 @@
+//! Writes the tables of features from which `scripts/calibrate_walls.py` estimates the constants of
+//! `crates/ventriform/src/deform/calibration.rs` and `crates/ventriform/src/judge/uncertainty_calibration.rs`.
+//!
+//! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of every
+//! case in the folders with the built-in hearts, once for each wall, and compares rims and anatomical walls with
+//! `lv_surface.ply`, apparent walls with `lv_expert_img.nii.gz`. Refused scans and those without a heart are left out.
+//! Into the folder TABLES it writes
+//!
+//! - `rims.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it, and of the
+//!   true rim, mm from the cup's centre towards the apex;
+//! - `rays.csv`, a row for every [`RAY_STRIDE`]th ray through the apparent wall that meets the true one: the numbers that
+//!   describe it, as far as they are not functions of others, and the distances by which the true surfaces lie farther out, mm;
+//! - `nodes.csv`, a row for every [`NODE_STRIDE`]th node: the figures behind its uncertainty, and its distance from the
+//!   expert's mask and of its anatomical counterpart from the true wall, mm.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde_json::Value;
+use ventriform::TriMesh;
+use ventriform::deform::WallEdge;
+use ventriform::deform::anatomical::ray_terms;
+use ventriform::deform::base_plane::rim_heights;
+use ventriform::geometry::Vec3;
+use ventriform::geometry::bvh::{Aabb, Bvh};
+use ventriform::grid::field::Field;
+use ventriform::judge::confidence::log_odds;
+use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
+use ventriform::model::wall::crossing;
+use ventriform::parameters::FitParameters;
+use ventriform::progress::Monitor;
+use ventriform::report::MeasuredSurface;
+use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
+use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
+use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+
+/// Rays from one row of the table to the next. It has no factor in common with the rays of a row.
+const RAY_STRIDE: usize = 157;
+/// Nodes from one row of the table to the next.
+const NODE_STRIDE: usize = 11;
+/// Width of the image about the wall, mm.
+const BORDER_MM: f64 = 25.0;
+/// Most bytes of a mesh.
+const MAX_MESH_BYTES: u64 = 1 << 28;
+
+type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
+
+/// The rows of one case.
+#[derive(Default)]
+struct CaseRows {
+    rims: String,
+    rays: String,
+    nodes: String,
+}
+
+fn main() -> Result<()> {
+    let mut folders = std::env::args().skip(1).map(PathBuf::from);
+    let tables = folders
+        .next()
+        .ok_or("usage: wall_features TABLES FOLDER...")?;
+    let mut cases: Vec<(String, PathBuf)> = Vec::new();
+    for folder in folders {
+        for entry in std::fs::read_dir(&folder)? {
+            cases.push((name_of(&folder), entry?.path()));
+        }
+    }
+    cases.retain(|(_, case)| case.join("lv_surface.ply").exists());
+    cases.sort();
+    let rows: Vec<CaseRows> = cases
+        .par_iter()
+        .map(|(set, case)| rows(set, case))
+        .collect::<Result<_>>()?;
+    let table = |name: &str, head: String, rows: Vec<&str>| {
+        std::fs::write(tables.join(name), format!("{head}\n{}", rows.concat()))
+    };
+    let each = |name: &str| (0..30).map(|n| format!(",{name}_{n}")).collect::<String>();
+    let heights = [each("sensed"), each("true")].concat();
+    table(
+        "rims.csv",
+        format!("set,case,length_mm,true_length_mm{heights}"),
+        rows.iter().map(|r| &*r.rims).collect(),
+    )?;
+    table(
+        "rays.csv",
+        "set,case,cavity_ml,thickness,ln_radius,thickness_here,narrowness_here,missing_uptake,way,inner_mm,outer_mm"
+            .into(),
+        rows.iter().map(|r| &*r.rays).collect(),
+    )?;
+    table(
+        "nodes.csv",
+        "set,case,seen,spread_mm,log_odds_apparent,log_odds_anatomical,way,apparent_mm,anatomical_mm"
+            .into(),
+        rows.iter().map(|r| &*r.nodes).collect(),
+    )?;
+    Ok(())
+}
+
+fn name_of(path: &Path) -> String {
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    name.unwrap_or_default().into_owned()
+}
+
+fn rows(set: &str, case: &Path) -> Result<CaseRows> {
+    let params = std::fs::read(case.join("params.json"))?;
+    let params: Value = serde_json::from_slice(&params)?;
+    if params["made"] == "none" {
+        return Ok(CaseRows::default());
+    }
+    let both = [WallEdge::Apparent, WallEdge::Anatomical];
+    let [Ok(apparent), Ok(anatomical)] = both.map(|edge| segmented(case, edge)) else {
+        return Ok(CaseRows::default());
+    };
+    let stated = MeshStatement {
+        unit: Some(MeshUnit::Millimetre),
+        frame: Some(MeshFrame::Ras),
+    };
+    let bytes = std::fs::read(case.join("lv_surface.ply"))?;
+    let truth = mesh_files::read(&bytes, &stated, MAX_MESH_BYTES)?.mesh;
+    let name = format!("{set},{}", name_of(case));
+    Ok(CaseRows {
+        rims: rims(&name, &apparent, &truth)?,
+        rays: rays(&name, &apparent, &truth)?,
+        nodes: nodes(&name, [&apparent, &anatomical], case, &truth)?,
+    })
+}
+
+/// The row of the rim; empty without a rim in every direction.
+fn rims(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
+    let model = &made.segmentation.fit.model;
+    let (Some(cup), Some(orientation)) = (&model.cup, &model.patient_orientation) else {
+        return Ok(String::new());
+    };
+    let real = rim_heights(truth, cup, &orientation.superior);
+    let (Some(sensed), Some(real)) = (&model.sensed_rim_mm, &real) else {
+        return Ok(String::new());
+    };
+    let length = |mesh: &TriMesh, rim: &[f64]| {
+        let along = mesh
+            .vertices
+            .iter()
+            .map(|p| (p - cup.centre).dot(&cup.axis));
+        let mut sorted = rim.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let median = f64::midpoint(sorted[(rim.len() - 1) / 2], sorted[rim.len() / 2]);
+        along.fold(f64::MIN, f64::max) - median
+    };
+    let lengths = [length(model.apparent_mesh(), sensed), length(truth, real)];
+    let mut row = name.to_owned();
+    for figure in lengths.iter().chain(sensed).chain(real) {
+        write!(row, ",{figure:.1}")?;
+    }
+    Ok(row + "\n")
+}
+
+fn rays(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
+    let Some(both) = &made.segmentation.fit.model.surfaces else {
+        return Ok(String::new());
+    };
+    let apparent = &both.apparent;
+    let mut region = Aabb::of(&apparent.mesh.vertices);
+    region.min -= Vec3::repeat(BORDER_MM);
+    region.max += Vec3::repeat(BORDER_MM);
+    let blur = FitParameters::default().deform.blur;
+    let image = Field::new(&made.reading.volume, Some(&region), blur);
+    let terms = ray_terms(&apparent.wall, &image).ok_or("a direction without a wall")?;
+    let tree = Bvh::new(&truth.vertices, &truth.triangles);
+    let mut rows = String::new();
+    for index in (0..terms.len()).step_by(RAY_STRIDE) {
+        let ray = &apparent.wall.rays[index];
+        let real = crossing(truth, &tree, &ray.start, &ray.direction);
+        let (Some([inner, outer]), Some([real_inner, real_outer])) = (ray.wall, real) else {
+            continue;
+        };
+        write!(rows, "{name},{:.2}", apparent.wall.cavity_ml)?;
+        let of = &terms[index];
+        let numbers = [
+            of.thickness,
+            of.ln_radius,
+            of.thickness_here,
+            of.narrowness_here,
+            of.missing_uptake,
+            of.way,
+        ];
+        for number in numbers {
+            write!(rows, ",{number:.3}")?;
+        }
+        let (inner, outer) = (real_inner - inner, real_outer - outer);
+        writeln!(rows, ",{inner:.2},{outer:.2}")?;
+    }
+    Ok(rows)
+}
+
+fn nodes(name: &str, both: [&SegmentedVolume; 2], case: &Path, truth: &TriMesh) -> Result<String> {
+    let monitor = Monitor::silent();
+    let fits = both.map(|made| &made.segmentation.fit);
+    let Some(surfaces) = &fits[0].model.surfaces else {
+        return Ok(String::new());
+    };
+    let drawn = surface_of(&case.join("lv_expert_img.nii.gz"))?;
+    let from_drawn = MeasuredSurface::new(&drawn).of_vertices(&surfaces.apparent.mesh, &monitor)?;
+    let from_truth =
+        MeasuredSurface::new(truth).of_vertices(&surfaces.anatomical.mesh, &monitor)?;
+    let [apparent, anatomical] = fits.map(|fit| log_odds(fit.judgement.confidence));
+    let mut rows = String::new();
+    for (index, node) in fits[0]
+        .judgement
+        .nodes
+        .iter()
+        .enumerate()
+        .step_by(NODE_STRIDE)
+    {
+        let spread = node.spread.unwrap_or(f64::NAN);
+        writeln!(
+            rows,
+            "{name},{:.3},{spread:.3},{apparent:.2},{anatomical:.2},{:.3},{:.2},{:.2}",
+            node.seen, node.way, from_drawn[index], from_truth[index]
+        )?;
+    }
+    Ok(rows)
+}
+
+/// The surface of a mask.
+fn surface_of(mask: &Path) -> Result<TriMesh> {
+    let monitor = Monitor::silent();
+    let (options, limits) = (ReadOptions::default(), ReadLimits::default());
+    let mask = volume::read(&[VolumeFile::at(mask)], &options, &limits, &monitor)?.volume;
+    let parameters = SurfaceParameters {
+        iso: IsoLevel::Absolute(0.5),
+        denoise: Denoise::Off,
+        ..SurfaceParameters::default()
+    };
+    Ok(surface::extract(&mask, &parameters, &monitor)?.mesh)
+}
+
+fn segmented(case: &Path, edge: WallEdge) -> Result<SegmentedVolume> {
+    let mut parameters = FitParameters::default();
+    parameters.deform.edge = edge;
+    let order = SegmentationOrder {
+        volume: &[VolumeFile::at(case.join("spect.nii.gz"))],
+        expert: None,
+        auto: true,
+        models: Vec::new(),
+        reader: None,
+        parameters: &parameters,
+    };
+    Ok(from_files(
+        &order,
+        &ReadLimits::default(),
+        &Monitor::silent(),
+    )?)
+}
