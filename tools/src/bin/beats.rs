@@ -187,12 +187,18 @@ impl Table {
                 correlation(pairs)
             );
         }
-        let (dead, live): (Vec<(f64, bool)>, Vec<(f64, bool)>) =
-            self.akinetic.iter().partition(|(_, akinetic)| *akinetic);
+        let of = |wanted: bool| -> Vec<f64> {
+            let own = self
+                .akinetic
+                .iter()
+                .filter(|(_, akinetic)| *akinetic == wanted);
+            own.map(|(thickening, _)| *thickening).collect()
+        };
+        let (dead, live) = (of(true), of(false));
         let lower = |a: f64, b: f64| f64::from(u8::from(a < b)) + 0.5 * f64::from(u8::from(a == b));
         let pairs = dead
             .iter()
-            .flat_map(|(a, _)| live.iter().map(move |(b, _)| lower(*a, *b)));
+            .flat_map(|a| live.iter().map(move |b| lower(*a, *b)));
         let area = pairs.sum::<f64>() / (dead.len() * live.len()) as f64;
         let within = self.within.iter().sum::<f64>() / self.within.len() as f64;
         println!(

@@ -6,8 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between};
-use super::fit::rim_at;
+use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, rim_at};
 use super::start::StillWall;
 use crate::geometry::Vec3;
 use crate::model::wall::{self, RayCoordinates, VentricleWall};

@@ -252,3 +252,10 @@ pub(super) fn between(rows: usize, row: f64, column: f64) -> [(usize, f64); 4] {
         ((low + 1) * COLUMNS + next, up * right),
     ]
 }
+
+/// The rim's arc at a column with a fraction, mm.
+pub(super) fn rim_at(rim: &[f64], column: f64) -> f64 {
+    let left = column as usize % COLUMNS;
+    let right = (left + 1) % COLUMNS;
+    rim[left] * (1.0 - column.fract()) + rim[right] * column.fract()
+}

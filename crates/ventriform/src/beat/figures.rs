@@ -5,7 +5,7 @@
 //! gates nearest to them are named too. Segments are means over the area of their inner surface at end diastole.
 
 use super::fit::{BeatFit, Volumes};
-use super::flags::{self, BeatFlag};
+use super::flags::{self, BeatFlag, FlagFacts};
 use super::moment::{Contraction, WallMoment, area_vectors};
 use super::phase::{Phases, circular_mean};
 use super::study::GatedStudy;
@@ -96,10 +96,23 @@ impl Beat {
         let phases = phases(&fit, &before);
         let segments = segments(map, &contraction, &phases);
         let ejected = 100.0 * (1.0 - end_systole.cavity_ml / end_diastole.cavity_ml);
-        let mut beat = Self {
+        let flags = flags::of(&FlagFacts {
+            orders_as_smooth: fit.orders_as_smooth,
+            ef_percent: ejected,
+            losses: &study.losses,
+            dark_share: fit.dark_share(),
+            esv_ml: end_systole.cavity_ml,
+            moving_share: phases.moving_share,
+            share_outside: fit.share_outside,
+            motions: (segments.iter())
+                .map(|segment| (segment.segment, segment.motion_mm))
+                .collect(),
+        });
+        let denied = flags.iter().any(BeatFlag::denies_a_beat);
+        Self {
             rates: rates(&curve, fit.gate_count(), end_systole.turns, rr_ms),
             factors: study.factors.clone(),
-            ef_percent: Some(ejected),
+            ef_percent: (!denied).then_some(ejected),
             fit,
             curve,
             gates,
@@ -108,13 +121,8 @@ impl Beat {
             segments,
             phases,
             contraction,
-            flags: Vec::new(),
-        };
-        beat.flags = flags::of(&beat, study);
-        if beat.flags.iter().any(BeatFlag::denies_a_beat) {
-            beat.ef_percent = None;
+            flags,
         }
-        beat
     }
 
     /// Volume that is ejected, ml.

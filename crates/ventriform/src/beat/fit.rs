@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use super::carried::CarriedNodes;
 use super::error::BeatError;
-use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, harmonics};
+use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, harmonics, rim_at};
 use super::image::HeartGrid;
 use super::moment::WallMoment;
 use super::objective::{Objective, Observed, Priors};
@@ -488,13 +488,6 @@ fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
         cavity_ml: cavity / 1e3,
         wall_ml: wall / 1e3,
     }
-}
-
-/// The rim's arc at a column with a fraction, mm.
-pub(super) fn rim_at(rim: &[f64], column: f64) -> f64 {
-    let left = column as usize % COLUMNS;
-    let right = (left + 1) % COLUMNS;
-    rim[left] * (1.0 - column.fract()) + rim[right] * column.fract()
 }
 
 /// The value of a volume at a point by cubic convolution (Keys, IEEE Transactions on Acoustics, Speech, and Signal

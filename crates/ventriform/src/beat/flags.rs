@@ -1,7 +1,6 @@
 //! Reasons to look closer at a beat.
 
-use super::figures::Beat;
-use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE, GatedStudy};
+use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE};
 
 /// Share of the orders of the gates that may be as smooth as theirs.
 const ORDERS_AS_SMOOTH: f64 = 0.1;
@@ -114,22 +113,45 @@ impl BeatFlag {
     }
 }
 
+/// What the flags of a beat are raised by.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FlagFacts<'a> {
+    /// Share of the orders of the gates that are as smooth as theirs.
+    pub orders_as_smooth: f64,
+    /// Change of the cavity, per cent of the largest.
+    pub ef_percent: f64,
+    /// Share of the usual counts that each gate lacks.
+    pub losses: &'a [f64],
+    /// Share of the wall that is too dark to show its motion.
+    pub dark_share: f64,
+    /// End-systolic volume, ml.
+    pub esv_ml: f64,
+    /// Share of the wall that has a phase.
+    pub moving_share: f64,
+    /// Share of the voxels about the wall outside of the volume.
+    pub share_outside: f64,
+    /// Segments and their motion inward, mm.
+    pub motions: Vec<(usize, f64)>,
+}
+
 /// The flags of a beat.
-pub(super) fn of(beat: &Beat, study: &GatedStudy) -> Vec<BeatFlag> {
-    let ef_percent = 100.0 * beat.stroke_ml() / beat.end_diastole.cavity_ml;
-    let orders_as_smooth = beat.fit.orders_as_smooth;
+pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
+    let FlagFacts {
+        orders_as_smooth,
+        ef_percent,
+        esv_ml,
+        moving_share,
+        ..
+    } = *facts;
     let no_beat = orders_as_smooth > ORDERS_AS_SMOOTH || ef_percent < LEAST_EF_PERCENT;
-    let losses: Vec<(usize, f64)> = (study.losses.iter().enumerate())
+    let losses: Vec<(usize, f64)> = (facts.losses.iter().enumerate())
         .filter(|(_, loss)| **loss > COUNT_LOSS_FLAG_SHARE)
         .map(|(gate, loss)| (gate + 1, *loss))
         .collect();
-    let dark = beat.fit.dark_share();
-    let esv_ml = beat.end_systole.cavity_ml;
-    let moving_share = beat.phases.moving_share;
-    let outside = beat.fit.share_outside;
-    let outward: Vec<(usize, f64)> = (beat.segments.iter())
-        .filter(|segment| segment.motion_mm < OUTWARD_MOTION_MM)
-        .map(|segment| (segment.segment, segment.motion_mm))
+    let dark = facts.dark_share;
+    let outside = facts.share_outside;
+    let outward: Vec<(usize, f64)> = (facts.motions.iter().copied())
+        .filter(|(_, motion)| *motion < OUTWARD_MOTION_MM)
         .collect();
     [
         no_beat.then_some(BeatFlag::NoContraction {

@@ -2,8 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::fields::{COLUMNS as NODE_COLUMNS, Layout, ROW_SPACING_MM, WallState, between};
-use super::fit::rim_at;
+use super::fields::{COLUMNS as NODE_COLUMNS, Layout, ROW_SPACING_MM, WallState, between, rim_at};
 use crate::geometry::Vec3;
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, RayCoordinates};
 

@@ -50,6 +50,7 @@ pub mod dicom;
 pub mod error;
 pub mod facts;
 mod folder;
+mod gate_timing;
 pub mod gates;
 pub mod given_mask;
 mod limits;
@@ -71,7 +72,8 @@ pub use error::VolumeError;
 pub use facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
 };
-pub use gates::{GateTiming, GatedReading};
+pub use gate_timing::GateTiming;
+pub use gates::GatedReading;
 pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};
 pub use phantom::{Phantom, PhantomParameters, phantom};

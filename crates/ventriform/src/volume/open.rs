@@ -6,7 +6,7 @@ use super::decode::DataType;
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
 };
-use super::gates::GateTiming;
+use super::gate_timing::GateTiming;
 use super::limits::ReadOptions;
 use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;

@@ -1,7 +1,8 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
 use super::dicom::DicomFile;
-use super::gates::{GateTiming, GatedReading};
+use super::gate_timing::GateTiming;
+use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};

@@ -62,7 +62,7 @@ use self::stack::{Located, Stack, stated_gap};
 use self::volumes::Marks;
 use super::decode::Figures;
 use super::facts::{FileFormat, LengthUnit};
-use super::gates::GateTiming;
+use super::gate_timing::GateTiming;
 use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;

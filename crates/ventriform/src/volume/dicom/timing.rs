@@ -1,7 +1,7 @@
 //! What a gated NM image says of the beats: PS3.3 C.8.4.9, Gated Information Sequence.
 
 use super::super::VolumeError;
-use super::super::gates::GateTiming;
+use super::super::gate_timing::GateTiming;
 use super::attributes::{
     Attribute, Attributes, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
     GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, TIME_SLOT_VECTOR, TIME_SLOTS,
