@@ -1054,7 +1054,7 @@ export interface components {
             spread: number;
             /**
              * Format: double
-             * @description What is applied: the mean, drawn towards zero.
+             * @description The applied offset: the mean, drawn towards zero.
              */
             value: number;
         };
@@ -1882,21 +1882,21 @@ export interface components {
             /** @description The readers, newest first. */
             readers: components["schemas"]["Reader"][];
         };
-        /** @description How far a reader's wall lies from the fitted one, mm. */
+        /** @description Distances of a reader's wall from the fitted one, mm. */
         ReaderOffsets: {
             /**
              * Format: double
-             * @description How far the inner surface lies farther out.
+             * @description Distance of the inner surface, positive outward.
              */
             endocardium: number;
             /**
              * Format: double
-             * @description How far the outer surface lies farther out.
+             * @description Distance of the outer surface, positive outward.
              */
             epicardium: number;
             /**
              * Format: double
-             * @description How far the rim lies farther towards the base.
+             * @description Distance of the rim, positive towards the base.
              */
             rim: number;
         };
@@ -1906,7 +1906,7 @@ export interface components {
             edge: string;
             /** @description `ventriform-reader-profile`. */
             format: string;
-            /** @description What it was learnt on. */
+            /** @description The masks it was learnt on. */
             learnt_on: components["schemas"]["LearntOn"][];
             /**
              * Format: int64
