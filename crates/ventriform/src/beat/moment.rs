@@ -1,4 +1,4 @@
-//! The wall at one moment of the beat, as the rays of [`VentricleWall`] meet it.
+//! The wall at one moment of the beat, as the rays of [`VentricleWall`](crate::model::wall::VentricleWall) meet it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

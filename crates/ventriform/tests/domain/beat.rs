@@ -68,7 +68,7 @@ fn contraction(turns: f64) -> f64 {
 fn gate(index: usize) -> Volume {
     let shape = [40; 3];
     let centre = Vec3::new(20.0, -20.0, 30.0);
-    let frame = VoxelToPatient::centred(shape, [SPACING_MM; 3], centre).unwrap();
+    let frame = VoxelToPatient::centred(shape, [SPACING_MM; 3], centre).expect("a grid");
     let axis = Vec3::new(0.64, -0.60, -0.48).normalize();
     const MOMENTS: usize = 5;
     let mut sum = vec![0.0f32; 64_000];
@@ -108,7 +108,7 @@ fn gate(index: usize) -> Volume {
         &[kernel(), kernel(), kernel()],
         &Monitor::silent(),
     )
-    .unwrap();
+    .expect("nobody cancels");
     Volume {
         shape,
         voxels: sum,
@@ -125,7 +125,7 @@ fn gates() -> &'static [Volume] {
 /// The beat of gates in separate files.
 fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedError> {
     let file = |(index, gate): (usize, &Volume)| {
-        let bytes = nifti::write(gate, StoredType::Float32, false).unwrap();
+        let bytes = nifti::write(gate, StoredType::Float32, false).expect("floats fit");
         VolumeFile::in_memory(format!("gate{index}.nii"), bytes)
     };
     let files: Vec<VolumeFile> = gates.iter().enumerate().map(file).collect();
@@ -141,7 +141,7 @@ fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedErro
 
 fn whole() -> &'static GatedHeart {
     static WHOLE: OnceLock<GatedHeart> = OnceLock::new();
-    WHOLE.get_or_init(|| beat_of(gates(), BeatChoice::default()).unwrap())
+    WHOLE.get_or_init(|| beat_of(gates(), BeatChoice::default()).expect("a beat"))
 }
 
 fn codes(heart: &GatedHeart) -> Vec<String> {
