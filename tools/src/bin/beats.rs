@@ -60,6 +60,7 @@ fn set(priors: &mut Priors, name: &str, value: f64) -> Result<()> {
         "rim_level" => &mut priors.rim_level,
         "gain" => &mut priors.gain,
         "stretch" => &mut priors.stretch,
+        "still" => &mut priors.still,
         _ => bail!("there is no prior {name}"),
     };
     *field = value;

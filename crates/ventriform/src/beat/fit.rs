@@ -39,9 +39,12 @@ const GRID_MARGIN_MM: f64 = 20.0;
 const REACH_MM: [f64; 2] = [14.0, 10.0];
 /// Arc beyond the rim up to which voxels count, mm.
 const BEYOND_RIM_MM: f64 = 8.0;
-/// Steps after which EF is looked at, and the change of EF between two looks that counts as rest.
+/// Steps after which EF is looked at, and the change of EF between two looks that counts as rest. Early on EF may stand
+/// still while the other unknowns settle, so rest counts only when it lasts for two looks, after the least steps.
 const STEPS_BETWEEN_LOOKS: usize = 20;
 const EF_AT_REST: f64 = 0.002;
+const LOOKS_AT_REST: usize = 2;
+const MIN_STEPS: usize = 120;
 /// Fits until a known volume of muscle is met, and the deviation of the thickness in them, mm.
 const MUSCLE_FITS: usize = 2;
 const KNOWN_THICKNESS_SD_MM: f64 = 0.1;
@@ -253,7 +256,7 @@ fn minimise(
     let unscaled =
         |point: &[f64]| -> Vec<f64> { point.iter().zip(&scales).map(|(y, s)| y * s).collect() };
     let mut first = None;
-    let mut last_ef = f64::NAN;
+    let (mut last_ef, mut at_rest) = (f64::NAN, 0);
     let found = lbfgs::minimise(
         start.iter().zip(&scales).map(|(x, s)| x / s).collect(),
         &bounds,
@@ -267,7 +270,12 @@ fn minimise(
             monitor.report(Stage::Beat, steps as f64 / max_steps as f64)?;
             if steps % STEPS_BETWEEN_LOOKS == 0 {
                 let ef = ejection_fraction(&curve(&objective, &unscaled(point), CURVE_MOMENTS));
-                if (ef - last_ef).abs() < EF_AT_REST {
+                at_rest = if (ef - last_ef).abs() < EF_AT_REST {
+                    at_rest + 1
+                } else {
+                    0
+                };
+                if at_rest >= LOOKS_AT_REST && steps >= MIN_STEPS {
                     return Ok(true);
                 }
                 last_ef = ef;

@@ -3,7 +3,7 @@
 use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE};
 
 /// Share of the orders of the gates that may be as smooth as theirs.
-const ORDERS_AS_SMOOTH: f64 = 0.1;
+const ORDERS_AS_SMOOTH: f64 = 0.2;
 /// EF below which noise alone would show as much, per cent.
 const LEAST_EF_PERCENT: f64 = 5.0;
 /// Share of the wall that may be too dark to show its motion.
@@ -48,7 +48,7 @@ pub enum BeatFlag {
     },
     /// A part of the wall is too dark to show its motion.
     #[error(
-        "{:.0} % of the wall takes up too little to show how it moves; its motion follows the wall beside it, so EF \
+        "{:.0} % of the wall takes up too little to show how it moves; little motion was assumed there, so EF \
          and the figures of these segments are less certain",
         100.0 * share
     )]

@@ -14,7 +14,7 @@ use ventriform::mesh::intersections::self_intersections;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{ReadLimits, VolumeError, VolumeFile};
+use ventriform::volume::{ReadLimits, VolumeError, VolumeFile, read_gates};
 
 /// Length of wall basal of the ellipsoid's centre, mm.
 const BASE_MM: f64 = 14.0;
@@ -338,4 +338,60 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
     };
     let heavy = beat_of(gates(), heavy).unwrap_err();
     assert_eq!(heavy.to_string(), "`mass_g` is 10000; it must be 20 to 600");
+}
+
+/// Volumes of a file whose header says that they are no gates are taken for gates only where the caller says so.
+#[test]
+fn a_file_that_denies_its_gates_needs_the_callers_word() {
+    let made = four_dimensional(60.0);
+    let files = [VolumeFile::in_memory("dynamic.nii", made)];
+    let read = |gated| read_gates(&files, gated, &ReadLimits::default(), &Monitor::silent());
+    let refused = read(false).unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            VolumeError::FrameNeeded {
+                frames: 8,
+                why: Some(_)
+            }
+        ),
+        "{refused}"
+    );
+    let gates_read = read(true).unwrap().gates;
+    for (read, made) in gates_read.iter().zip(gates()) {
+        assert_eq!(read.voxels, made.voxels);
+    }
+    let one = [VolumeFile::in_memory("beat.nii", four_dimensional(0.1))];
+    assert_eq!(
+        read_gates(&one, false, &ReadLimits::default(), &Monitor::silent())
+            .unwrap()
+            .gates
+            .len(),
+        8
+    );
+    // Together more voxels than a volume may have.
+    let limits = ReadLimits {
+        voxels: 100_000,
+        ..ReadLimits::default()
+    };
+    let large = read_gates(&one, false, &limits, &Monitor::silent()).unwrap_err();
+    assert!(
+        matches!(large, VolumeError::TooLarge { asked: 512_000, .. }),
+        "{large}"
+    );
+}
+
+/// The gates as one NIfTI-1 file whose volumes are `seconds` apart.
+fn four_dimensional(seconds: f32) -> Vec<u8> {
+    let mut bytes = nifti::write(&gates()[0], StoredType::Float32, false).expect("floats fit");
+    bytes.truncate(352);
+    bytes[40..42].copy_from_slice(&4i16.to_le_bytes());
+    bytes[48..50].copy_from_slice(&8i16.to_le_bytes());
+    bytes[92..96].copy_from_slice(&seconds.to_le_bytes());
+    // Millimetres and seconds.
+    bytes[123] = 2 | 8;
+    for gate in gates() {
+        bytes.extend(gate.voxels.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    bytes
 }

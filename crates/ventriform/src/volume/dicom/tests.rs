@@ -365,6 +365,72 @@ fn gates_are_volumes_of_their_own() {
     );
 }
 
+/// Two gates of two slices, of one R-R interval or of two, and what the file says of the beats.
+fn gates_with_timing(intervals: Vec<u16>, slots: Vec<u16>) -> Vec<u8> {
+    let mut elements = gated();
+    elements.insert((0x54, 0x60), ("US", Shorts(intervals)));
+    elements.insert((0x54, 0x70), ("US", Shorts(slots)));
+    let data = BTreeMap::from([
+        ((0x18, 0x1062), ("IS", Text("850"))),
+        ((0x18, 0x1063), ("DS", Text("212.5"))),
+        ((0x18, 0x1081), ("IS", Text("700"))),
+        ((0x18, 0x1082), ("IS", Text("1000"))),
+        ((0x18, 0x1083), ("IS", Text("300"))),
+        ((0x18, 0x1084), ("IS", Text("100"))),
+    ]);
+    let gate = BTreeMap::from([((0x54, 0x63), ("SQ", Items(vec![data])))]);
+    elements.insert((0x54, 0x62), ("SQ", Items(vec![gate])));
+    Encoding::Explicit.file(&elements)
+}
+
+#[test]
+fn every_gate_is_read_with_the_timing_of_the_beats() {
+    let read = |bytes: &[u8]| {
+        let files = [VolumeFile::in_memory("test", bytes)];
+        let limits = ReadLimits::default();
+        crate::volume::read_gates(&files, false, &limits, &Monitor::silent()).unwrap()
+    };
+    let one = gates_with_timing(vec![1; 8], vec![1, 1, 2, 2, 3, 3, 4, 4]);
+    let reading = read(&one);
+    assert_eq!(reading.gates.len(), 4);
+    for (index, gate) in reading.gates.iter().enumerate() {
+        let alone = read_frame(one.clone(), Some(index)).unwrap();
+        assert_eq!(gate.voxels, alone.volume.voxels);
+    }
+    let timing = reading.timing;
+    assert_eq!(
+        (timing.rr_ms, timing.frame_time_ms),
+        (Some(850.0), Some(212.5))
+    );
+    assert_eq!(
+        (timing.low_rr_ms, timing.high_rr_ms),
+        (Some(700.0), Some(1000.0))
+    );
+    assert_eq!(timing.rejected_share(), Some(0.25));
+    // Of two intervals that with the most counts is taken, and the other is named.
+    let two = gates_with_timing(vec![1, 1, 1, 1, 2, 2, 2, 2], vec![1, 1, 2, 2, 1, 1, 2, 2]);
+    let reading = read(&two);
+    let later = [2, 3].map(|frame| read_frame(two.clone(), Some(frame)).unwrap().volume.voxels);
+    let found: Vec<_> = reading
+        .gates
+        .iter()
+        .map(|gate| gate.voxels.clone())
+        .collect();
+    assert_eq!(found, later);
+    let told = |warning: &String| warning.contains("2 R-R intervals of 2 gates: interval 2");
+    assert!(reading.facts.warnings.iter().any(told));
+}
+
+#[test]
+fn a_timing_that_is_no_duration_is_refused_by_its_name() {
+    let mut elements = gated();
+    let data = BTreeMap::from([((0x18, 0x1062), ("IS", Text("-850")))]);
+    let gate = BTreeMap::from([((0x54, 0x63), ("SQ", Items(vec![data])))]);
+    elements.insert((0x54, 0x62), ("SQ", Items(vec![gate])));
+    let (field, value) = complaint(read_frame(Encoding::Explicit.file(&elements), Some(0)));
+    assert_eq!((field, &*value), ("Nominal Interval (0018,1062)", "-850"));
+}
+
 #[test]
 fn values_are_rescaled_trimmed_and_signed() {
     let scaled = changed(|e| {
