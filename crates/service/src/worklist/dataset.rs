@@ -1,5 +1,9 @@
 //! A data set as DICOM JSON (PS3.18 annex F): tags of eight hexadecimal digits, each with a value
 //! representation and values.
+//!
+//! A work item is answered as it was sent, so its elements stay JSON. `dicom-json` 0.9, tried on 18 elements, changes 8 of
+//! them when it reads and writes them (all parts of a person's name become the alphabetic one, a `BulkDataURI` is
+//! lost, an empty `Value` becomes an empty text, numbers become texts) and refuses a `null` item, which annex F allows.
 
 use serde_json::{Map, Value, json};
 
