@@ -1,8 +1,8 @@
 //! `ventriform beat`: one model in motion of a gated study.
 
 use super::limit_args::LimitArgs;
-use super::output::{create_folder, note, write_file};
-use super::segment::{MODEL_AUTO, mesh, parse_format};
+use super::output::note;
+use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs, UnusableArgument};
 use anyhow::{Result, anyhow};
@@ -86,15 +86,12 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
     let limits = args.limits.limits()?;
     let gates = volume_files(&args.input, &limits)?;
-    let named: Vec<&PathBuf> = (args.model.iter())
-        .filter(|model| model.as_os_str() != MODEL_AUTO)
-        .collect();
+    let stated = MeshStatement::default();
+    let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
     let order = GatedOrder {
         gates: &gates,
-        auto: named.len() < args.model.len(),
-        models: (named.into_iter())
-            .map(|path| mesh(path, &MeshStatement::default(), &limits))
-            .collect::<Result<_>>()?,
+        auto,
+        models,
         parameters: &parameters,
         choice: BeatChoice {
             gated: args.gated,
@@ -114,10 +111,7 @@ pub fn run(args: &BeatArgs) -> Result<()> {
         .and_then(|made| Ok((made.files(&args.formats, &monitor)?, made)));
     bar.finish();
     let (files, made) = made?;
-    create_folder(&args.output)?;
-    for file in &files {
-        write_file(&args.output.join(&file.name), &file.bytes)?;
-    }
+    write_all(&args.output, &files)?;
     note!("{}", headline(&made));
     let report = made.report();
     for warning in &report.warnings {

@@ -86,24 +86,18 @@ pub(super) fn parse_format(text: &str) -> Result<Format, String> {
 /// written unless the fit is complete.
 pub fn run(args: &SegmentArgs) -> Result<()> {
     let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
-    let named: Vec<&PathBuf> = args
-        .model
-        .iter()
-        .filter(|m| m.as_os_str() != MODEL_AUTO)
-        .collect();
     let limits = args.limits.limits()?;
     let volume = volume_files(&args.input, &limits)?;
     let dicom = args.dicom.order(&volume, parameters.frame, &limits)?;
     let whose = args.dicom.whose(&volume, parameters.frame, &limits)?;
     let stated = parameters.mask.mesh;
     let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
+    let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
-        auto: named.len() < args.model.len(),
-        models: (named.into_iter())
-            .map(|path| mesh(path, &stated, &limits))
-            .collect::<Result<_>>()?,
+        auto,
+        models,
         reader: args.reader.as_deref().map(reader).transpose()?,
         parameters: &parameters,
     };
@@ -141,8 +135,23 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     Ok(())
 }
 
+/// Whether the built-in hearts are among the models that were given, and the others, read.
+pub(super) fn chosen_models(
+    given: &[PathBuf],
+    stated: &MeshStatement,
+    limits: &ReadLimits,
+) -> Result<(bool, Vec<NamedMesh>)> {
+    let is_auto = |model: &&PathBuf| model.as_os_str() == MODEL_AUTO;
+    let named = given.iter().filter(|model| !is_auto(model));
+    let models = named.map(|path| mesh(path, stated, limits));
+    Ok((
+        given.iter().any(|model| is_auto(&model)),
+        models.collect::<Result<_>>()?,
+    ))
+}
+
 /// Reads a model.
-pub(super) fn mesh(path: &Path, stated: &MeshStatement, limits: &ReadLimits) -> Result<NamedMesh> {
+fn mesh(path: &Path, stated: &MeshStatement, limits: &ReadLimits) -> Result<NamedMesh> {
     let stem = path.file_stem().unwrap_or(path.as_os_str());
     Ok(NamedMesh {
         name: stem.to_string_lossy().into_owned(),
@@ -185,7 +194,7 @@ fn headline(s: &Segmentation) -> String {
     line
 }
 
-fn write_all(folder: &Path, files: &[NamedFile]) -> Result<()> {
+pub(super) fn write_all(folder: &Path, files: &[NamedFile]) -> Result<()> {
     create_folder(folder)?;
     for file in files {
         write_file(&folder.join(&file.name), &file.bytes)?;

@@ -26,6 +26,7 @@ use ventriform::segmentation::{
 };
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform_tools::{cases, name_of};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
@@ -51,15 +52,8 @@ const FIGURES: [&str; 17] = [
 ];
 
 fn main() -> Result<()> {
-    let mut cases: Vec<(String, PathBuf)> = Vec::new();
-    for folder in std::env::args().skip(1).map(PathBuf::from) {
-        let set = name_of(&folder);
-        for entry in std::fs::read_dir(&folder)? {
-            cases.push((set.clone(), entry?.path()));
-        }
-    }
-    cases.retain(|(_, case)| case.join("spect.nii.gz").exists());
-    cases.sort();
+    let folders = std::env::args().skip(1).map(PathBuf::from);
+    let cases = cases(folders, "spect.nii.gz")?;
     let rows: Vec<String> = cases
         .par_iter()
         .map(|(set, case)| row(set, case))
@@ -67,11 +61,6 @@ fn main() -> Result<()> {
     println!("set,case,heart,motion_mm,{}", FIGURES.join(","));
     println!("{}", rows.join("\n"));
     Ok(())
-}
-
-fn name_of(path: &Path) -> String {
-    let name = path.file_name().map(|name| name.to_string_lossy());
-    name.unwrap_or_default().into_owned()
 }
 
 fn row(set: &str, case: &Path) -> Result<String> {

@@ -35,6 +35,7 @@ use ventriform::report::MeasuredSurface;
 use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform_tools::{cases, name_of};
 
 /// Rays from one row of the table to the next. It has no factor in common with the rays of a row.
 const RAY_STRIDE: usize = 157;
@@ -60,14 +61,7 @@ fn main() -> Result<()> {
     let tables = folders
         .next()
         .ok_or("usage: wall_features TABLES FOLDER...")?;
-    let mut cases: Vec<(String, PathBuf)> = Vec::new();
-    for folder in folders {
-        for entry in std::fs::read_dir(&folder)? {
-            cases.push((name_of(&folder), entry?.path()));
-        }
-    }
-    cases.retain(|(_, case)| case.join("lv_surface.ply").exists());
-    cases.sort();
+    let cases = cases(folders, "lv_surface.ply")?;
     let rows: Vec<CaseRows> = cases
         .par_iter()
         .map(|(set, case)| rows(set, case))
@@ -95,11 +89,6 @@ fn main() -> Result<()> {
         rows.iter().map(|r| &*r.nodes).collect(),
     )?;
     Ok(())
-}
-
-fn name_of(path: &Path) -> String {
-    let name = path.file_name().map(|name| name.to_string_lossy());
-    name.unwrap_or_default().into_owned()
 }
 
 fn rows(set: &str, case: &Path) -> Result<CaseRows> {

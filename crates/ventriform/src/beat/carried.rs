@@ -4,9 +4,7 @@
 //! keeps its ray and the share of the wall's thickness at which it lies, so the order of nodes along a ray never
 //! changes, and the mesh encloses the muscle that the fit keeps.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
-use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, rim_at};
+use super::fields::{COLUMNS, Layout, Nodes, WallState};
 use super::start::StillWall;
 use crate::geometry::Vec3;
 use crate::model::wall::{self, RayCoordinates, VentricleWall};
@@ -40,12 +38,11 @@ impl CarriedNodes {
             // The ray of column n lies in the middle of its sector.
             let turn = (position.column + 0.5) / wall::RAY_COLUMNS as f64;
             let column = turn * COLUMNS as f64 % COLUMNS as f64;
-            let nodes = between(rows, arc / ROW_SPACING_MM, column);
-            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
-            let (enters, leaves) = (value(&inner), value(&outer));
+            let nodes = Nodes::at(rows, arc, column);
+            let (enters, leaves) = (nodes.value(&inner), nodes.value(&outer));
             let depth = (position.distance - enters) / (leaves - enters).max(1e-6);
             CarriedNode {
-                arc_share: arc / rim_at(&still.rim, column).max(1e-6),
+                arc_share: arc / nodes.rim(&still.rim).max(1e-6),
                 turn,
                 depth: depth.clamp(SHARES[0], SHARES[1]),
             }
@@ -61,23 +58,14 @@ impl CarriedNodes {
         state: &WallState,
         rim: &[f64],
     ) -> Vec<Vec3> {
-        let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
         let moved = |node: &CarriedNode| {
             let column = node.turn * COLUMNS as f64 % COLUMNS as f64;
-            let arc = node.arc_share * rim_at(rim, column);
-            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
-            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
-            let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
+            let arc = node.arc_share * Nodes::at(layout.rows, 0.0, column).rim(rim);
+            let nodes = Nodes::at(layout.rows, arc, column);
+            let (mid, thick) = (nodes.value(&state.mid_wall), nodes.value(&state.thickness));
             let distance = (mid + (node.depth - 0.5) * thick).max(0.0);
-            let (sin, cos) = (TAU * node.turn).sin_cos();
-            let across = coordinates.lateral * cos + coordinates.anterior * sin;
-            if arc < cap_arc {
-                let (s, c) = (arc / coordinates.cap_radius).sin_cos();
-                coordinates.focus + (coordinates.axis * c + across * s) * distance
-            } else {
-                let basal = (arc - cap_arc) * state.stretch;
-                coordinates.focus - coordinates.axis * basal + across * distance
-            }
+            let (start, direction) = coordinates.ray(arc, node.turn, state.stretch);
+            start + direction * distance
         };
         self.0.iter().map(moved).collect()
     }

@@ -236,26 +236,78 @@ impl StateGradient {
     }
 }
 
-/// Nodes and weights of the value of a field at a row and a column, both as numbers with fractions; rows beyond the
-/// ends count as the last ones.
-pub(super) fn between(rows: usize, row: f64, column: f64) -> [(usize, f64); 4] {
-    let row = row.clamp(0.0, (rows - 1) as f64);
-    let low = (row as usize).min(rows - 2);
-    let up = row - low as f64;
-    let left = column.floor();
-    let right = column - left;
-    let [left, next] = [left, left + 1.0].map(|c| (c as usize) % COLUMNS);
-    [
-        (low * COLUMNS + left, (1.0 - up) * (1.0 - right)),
-        (low * COLUMNS + next, (1.0 - up) * right),
-        ((low + 1) * COLUMNS + left, up * (1.0 - right)),
-        ((low + 1) * COLUMNS + next, up * right),
-    ]
+/// The four nodes about a point of the wall, and where it lies between them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Nodes {
+    row: usize,
+    columns: [usize; 2],
+    up: f64,
+    right: f64,
+    /// Whether the point lies between rows, not beyond the last one.
+    inside: bool,
 }
 
-/// The rim's arc at a column with a fraction, mm.
-pub(super) fn rim_at(rim: &[f64], column: f64) -> f64 {
-    let left = column as usize % COLUMNS;
-    let right = (left + 1) % COLUMNS;
-    rim[left] * (1.0 - column.fract()) + rim[right] * column.fract()
+impl Nodes {
+    /// About the point with this arc, mm, and column with a fraction; beyond the last row the value there continues.
+    pub fn at(rows: usize, arc: f64, column: f64) -> Self {
+        let row = (arc / ROW_SPACING_MM).max(0.0);
+        let low = (row as usize).min(rows - 2);
+        let left = (column as usize) % COLUMNS;
+        Self {
+            row: low,
+            columns: [left, (left + 1) % COLUMNS],
+            up: (row - low as f64).min(1.0),
+            right: column - column.floor(),
+            inside: row <= (rows - 1) as f64,
+        }
+    }
+
+    fn indices(&self) -> [usize; 4] {
+        let [left, right] = self.columns;
+        let (low, high) = (self.row * COLUMNS, (self.row + 1) * COLUMNS);
+        [low + left, low + right, high + left, high + right]
+    }
+
+    /// The value of a field.
+    pub fn value(&self, field: &[f64]) -> f64 {
+        let [a, b, c, d] = self.indices().map(|n| field[n]);
+        let low = a + self.right * (b - a);
+        let high = c + self.right * (d - c);
+        low + self.up * (high - low)
+    }
+
+    /// The change of a field by a millimetre of arc.
+    pub fn slope(&self, field: &[f64]) -> f64 {
+        if !self.inside {
+            return 0.0;
+        }
+        let [a, b, c, d] = self.indices().map(|n| field[n]);
+        ((1.0 - self.right) * (c - a) + self.right * (d - b)) / ROW_SPACING_MM
+    }
+
+    /// Adds what a change of the field's value here adds to the nodes.
+    pub fn add(&self, field: &mut [f64], what: f64) {
+        let weights = [
+            (1.0 - self.up) * (1.0 - self.right),
+            (1.0 - self.up) * self.right,
+            self.up * (1.0 - self.right),
+            self.up * self.right,
+        ];
+        for (node, weight) in self.indices().into_iter().zip(weights) {
+            field[node] += weight * what;
+        }
+    }
+
+    /// The arc of the rim in the point's column, mm.
+    pub fn rim(&self, rim: &[f64]) -> f64 {
+        let [left, right] = self.columns;
+        (1.0 - self.right) * rim[left] + self.right * rim[right]
+    }
+
+    /// Adds what a change of the rim's arc here adds to that of the columns.
+    pub fn add_to_rim(&self, rim: &mut [f64], what: f64) {
+        let [left, right] = self.columns;
+        rim[left] += (1.0 - self.right) * what;
+        rim[right] += self.right * what;
+    }
 }

@@ -4,7 +4,7 @@
 //! at every moment of the beat. The steps:
 //!
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis.
-//! 2. The fit starts from the summed image's wall, which stands still, with its calibrated thickness.
+//! 2. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
 //! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's stretch,
 //!    activity beside the wall, the gates' factors. It ends when EF has come to rest: the value falls by 95 per cent
 //!    in 60 steps while the motion is still a fifth too small.
@@ -12,12 +12,12 @@
 //! Guaranteed: the muscle of every column is the same at every moment; the same study gives the same figures on any
 //! number of threads.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::carried::CarriedNodes;
 use super::error::BeatError;
-use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, WallState, between, harmonics, rim_at};
+use super::fields::{COLUMNS, Layout, Nodes, ROW_SPACING_MM, WallState, harmonics};
 use super::image::HeartGrid;
 use super::moment::WallMoment;
 use super::objective::{Objective, Observed, Priors};
@@ -60,7 +60,7 @@ pub struct BeatParameters {
     pub harmonics: Option<usize>,
     /// Most steps, 1..=2000. Default 400.
     pub max_steps: usize,
-    /// Volume of the muscle, ml, where it is known. Default: that of the summed image's anatomical wall.
+    /// Volume of the muscle, ml, where it is known. Default: the mean thickness of [`Priors`] is assumed.
     pub muscle_ml: Option<f64>,
 }
 
@@ -88,8 +88,6 @@ pub struct BeatFit {
     pub share_outside: f64,
     /// Steps made.
     pub steps: usize,
-    /// The function's value at the start and at the end, and the part of the latter that the images make.
-    pub values: [f64; 3],
 }
 
 /// Volumes at a moment, ml.
@@ -125,7 +123,7 @@ pub fn fit(
         &Field::cut_out(&study.sum, None, 0.0, monitor)?,
     );
     let outermost = still.walls.iter().map(|w| w[1]).fold(0.0, f64::max);
-    let basal = coordinates.rim_arc - FRAC_PI_2 * coordinates.cap_radius;
+    let basal = coordinates.rim_arc - coordinates.cap_arc();
     let grid = HeartGrid::new(
         &coordinates,
         basal + GRID_MARGIN_MM,
@@ -140,11 +138,12 @@ pub fn fit(
             Ok(grid.points.iter().map(value).collect())
         })
         .collect::<Result<Vec<Vec<f32>>, Cancelled>>()?;
+    let middle: Vec<f64> = (0..layout.nodes())
+        .map(|node| still.mid_wall(node))
+        .collect();
     let weights = (grid.positions())
         .map(|(arc, column, distance)| {
-            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
-            let mid: f64 = nodes.iter().map(|(n, w)| w * still.mid_wall(*n)).sum();
-            let far = distance - mid;
+            let far = distance - Nodes::at(layout.rows, arc, column).value(&middle);
             if far >= REACH_MM[0] || arc >= coordinates.rim_arc + BEYOND_RIM_MM {
                 0.0
             } else if far > REACH_MM[1] {
@@ -202,7 +201,6 @@ pub fn fit(
         objective,
         unknowns,
         steps,
-        values,
     } = made;
     Ok(BeatFit {
         objective,
@@ -212,7 +210,6 @@ pub fn fit(
         orders_as_smooth,
         share_outside,
         steps,
-        values,
     })
 }
 
@@ -243,7 +240,6 @@ struct Minimised {
     objective: Objective,
     unknowns: Vec<f64>,
     steps: usize,
-    values: [f64; 3],
 }
 
 fn minimise(
@@ -255,7 +251,6 @@ fn minimise(
     let (scales, bounds) = scales_and_bounds(&objective.layout, &start);
     let unscaled =
         |point: &[f64]| -> Vec<f64> { point.iter().zip(&scales).map(|(y, s)| y * s).collect() };
-    let mut first = None;
     let (mut last_ef, mut at_rest) = (f64::NAN, 0);
     let found = lbfgs::minimise(
         start.iter().zip(&scales).map(|(x, s)| x / s).collect(),
@@ -263,7 +258,6 @@ fn minimise(
         |point, gradient| {
             let value = objective.evaluate(&unscaled(point), gradient, monitor)?;
             gradient.iter_mut().zip(&scales).for_each(|(g, s)| *g *= s);
-            first.get_or_insert(value);
             Ok::<_, Cancelled>(value)
         },
         |point, steps| {
@@ -286,11 +280,6 @@ fn minimise(
     let unknowns = unscaled(&found.point);
     monitor.report(Stage::Beat, 1.0)?;
     Ok(Minimised {
-        values: [
-            first.unwrap_or(f64::NAN),
-            found.value,
-            objective.misfit(&unknowns, monitor)?,
-        ],
         unknowns,
         steps: found.steps,
         objective,
@@ -400,21 +389,10 @@ impl BeatFit {
             .collect()
     }
 
-    /// The factor of each gate's counts that the fit found beyond equal totals.
-    pub fn gains(&self) -> Vec<f64> {
-        let gains = self.unknowns[self.objective.layout.gains()].iter();
-        gains.map(|gain| gain.exp()).collect()
-    }
-
     /// The wall at `turns` of the beat, on the rays of the summed image's wall.
     pub fn moment(&self, turns: f64) -> WallMoment {
         let basis = harmonics(self.objective.layout.harmonics, turns, 0.0);
         self.wall_of(&basis)
-    }
-
-    /// The wall in the mean over a gate, from 0.
-    pub fn gate(&self, gate: usize) -> WallMoment {
-        self.wall_of(&self.objective.bases()[gate])
     }
 
     /// Number of gates.
@@ -469,13 +447,14 @@ fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
     let state: WallState = objective.conservation.state(layout, unknowns, basis);
     let rim = &unknowns[layout.rim()];
     let radius = objective.coordinates.cap_radius;
+    let cap_arc = objective.coordinates.cap_arc();
     let angle = TAU / PIECES as f64;
     let (mut cavity, mut wall) = (0.0, 0.0);
     let strips = ((layout.rows - 1) as f64 * ROW_SPACING_MM / STRIP_MM) as usize;
     for strip in 0..strips {
         let arc = (strip as f64 + 0.5) * STRIP_MM;
         let volume = |r: f64| {
-            if arc < FRAC_PI_2 * radius {
+            if arc < cap_arc {
                 r.powi(3) / 3.0 * (arc / radius).sin() * STRIP_MM / radius * angle
             } else {
                 r * r / 2.0 * angle * STRIP_MM * state.stretch
@@ -483,10 +462,9 @@ fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
         };
         for piece in 0..PIECES {
             let column = piece as f64 / PIECES as f64 * COLUMNS as f64;
-            let nodes = between(layout.rows, arc / ROW_SPACING_MM, column);
-            let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
-            let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
-            let on = ((rim_at(rim, column) - arc) / STRIP_MM + 0.5).clamp(0.0, 1.0);
+            let nodes = Nodes::at(layout.rows, arc, column);
+            let (mid, thick) = (nodes.value(&state.mid_wall), nodes.value(&state.thickness));
+            let on = ((nodes.rim(rim) - arc) / STRIP_MM + 0.5).clamp(0.0, 1.0);
             let inner = volume((mid - thick / 2.0).max(0.0));
             cavity += on * inner;
             wall += on * (volume(mid + thick / 2.0) - inner);

@@ -6,14 +6,13 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use super::fields::{COLUMNS, Layout, ROW_SPACING_MM, StateGradient, WallState};
+use super::fields::{COLUMNS, Layout, Nodes, StateGradient, WallState};
 use crate::geometry::Vec3;
+use crate::grid::blur::FWHM_PER_SIGMA;
 use crate::model::wall::RayCoordinates;
 
 /// Distance of the voxels of the grid about the heart, mm.
 pub(super) const GRID_STEP_MM: f64 = 4.0;
-/// Full width at half maximum of a Gaussian of deviation 1.
-const FWHM_PER_SIGMA: f64 = 2.354_82;
 
 /// Voxels about the heart, along its axis (slowest) and across.
 #[derive(Debug, Clone)]
@@ -140,8 +139,7 @@ impl HeartGrid {
             &activity.outside,
         ]
         .map(|field| nodes.value(field));
-        let [left, right] = nodes.columns;
-        let rim = (1.0 - nodes.right) * activity.rim[left] + nodes.right * activity.rim[right];
+        let rim = nodes.rim(&activity.rim);
         let beyond = voxel.distance - mid;
         Sample {
             nodes,
@@ -187,8 +185,7 @@ impl HeartGrid {
             nodes.add(&mut by_state.thickness, by_thick);
             nodes.add(&mut by_activity.uptake, by_uptake);
             nodes.add(&mut by_activity.outside, by_outside);
-            by_activity.rim[nodes.columns[0]] += (1.0 - nodes.right) * by_rim;
-            by_activity.rim[nodes.columns[1]] += nodes.right * by_rim;
+            nodes.add_to_rim(&mut by_activity.rim, by_rim);
             if !voxel.cap {
                 // The arc grows by this where the axis stretches.
                 let arc_by_stretch = voxel.along / (state.stretch * state.stretch);
@@ -216,66 +213,6 @@ fn voxel(coordinates: &RayCoordinates, [s, x, y]: [f64; 3]) -> Voxel {
         },
         column: (turn * COLUMNS as f64) % COLUMNS as f64,
         cap,
-    }
-}
-
-/// The four nodes about a place of the wall.
-#[derive(Debug, Clone, Copy)]
-struct Nodes {
-    row: usize,
-    columns: [usize; 2],
-    up: f64,
-    right: f64,
-    /// Whether the place lies between rows, not beyond the last one.
-    inside: bool,
-}
-
-impl Nodes {
-    fn at(rows: usize, arc: f64, column: f64) -> Self {
-        let row = (arc / ROW_SPACING_MM).max(0.0);
-        let low = (row as usize).min(rows - 2);
-        let left = (column as usize) % COLUMNS;
-        Self {
-            row: low,
-            columns: [left, (left + 1) % COLUMNS],
-            up: (row - low as f64).min(1.0),
-            right: column - column.floor(),
-            inside: row <= (rows - 1) as f64,
-        }
-    }
-
-    fn indices(&self) -> [usize; 4] {
-        let [left, right] = self.columns;
-        let (low, high) = (self.row * COLUMNS, (self.row + 1) * COLUMNS);
-        [low + left, low + right, high + left, high + right]
-    }
-
-    fn value(&self, field: &[f64]) -> f64 {
-        let [a, b, c, d] = self.indices().map(|n| field[n]);
-        let low = a + self.right * (b - a);
-        let high = c + self.right * (d - c);
-        low + self.up * (high - low)
-    }
-
-    /// The change of a field by a millimetre of arc.
-    fn slope(&self, field: &[f64]) -> f64 {
-        if !self.inside {
-            return 0.0;
-        }
-        let [a, b, c, d] = self.indices().map(|n| field[n]);
-        ((1.0 - self.right) * (c - a) + self.right * (d - b)) / ROW_SPACING_MM
-    }
-
-    fn add(&self, field: &mut [f64], what: f64) {
-        let weights = [
-            (1.0 - self.up) * (1.0 - self.right),
-            (1.0 - self.up) * self.right,
-            self.up * (1.0 - self.right),
-            self.up * self.right,
-        ];
-        for (node, weight) in self.indices().into_iter().zip(weights) {
-            field[node] += weight * what;
-        }
     }
 }
 

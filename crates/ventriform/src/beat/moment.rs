@@ -1,10 +1,8 @@
 //! The wall at one moment of the beat, as the rays of [`VentricleWall`](crate::model::wall::VentricleWall) meet it.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
-use super::fields::{COLUMNS as NODE_COLUMNS, Layout, ROW_SPACING_MM, WallState, between, rim_at};
+use super::fields::{COLUMNS as NODE_COLUMNS, Layout, Nodes, WallState};
 use crate::geometry::Vec3;
-use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, RayCoordinates};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, RayCoordinates, area_vector};
 
 /// Both surfaces of the wall at a moment; each ray follows the same muscle through the beat.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,33 +25,20 @@ impl WallMoment {
         rim: &[f64],
         row_spacing: f64,
     ) -> Self {
-        let cap_arc = FRAC_PI_2 * coordinates.cap_radius;
         let (mut inner, mut outer) = (Vec::new(), Vec::new());
         let (mut thickness, mut on) = (Vec::new(), Vec::new());
         for row in 0..RAY_ROWS {
             let arc = (row as f64 + 0.5) * row_spacing;
             for column in 0..RAY_COLUMNS {
                 let turn = (column as f64 + 0.5) / RAY_COLUMNS as f64;
-                let nodes = between(
-                    layout.rows,
-                    arc / ROW_SPACING_MM,
-                    turn * NODE_COLUMNS as f64,
-                );
-                let value = |f: &[f64]| nodes.iter().map(|(n, w)| w * f[*n]).sum::<f64>();
-                let (mid, thick) = (value(&state.mid_wall), value(&state.thickness));
-                let (sin, cos) = (TAU * turn).sin_cos();
-                let across = coordinates.lateral * cos + coordinates.anterior * sin;
-                let (start, direction) = if arc < cap_arc {
-                    let (s, c) = (arc / coordinates.cap_radius).sin_cos();
-                    (coordinates.focus, coordinates.axis * c + across * s)
-                } else {
-                    let basal = (arc - cap_arc) * state.stretch;
-                    (coordinates.focus - coordinates.axis * basal, across)
-                };
+                let nodes = Nodes::at(layout.rows, arc, turn * NODE_COLUMNS as f64);
+                let mid = nodes.value(&state.mid_wall);
+                let thick = nodes.value(&state.thickness);
+                let (start, direction) = coordinates.ray(arc, turn, state.stretch);
                 inner.push(start + direction * (mid - thick / 2.0).max(0.0));
                 outer.push(start + direction * (mid + thick / 2.0));
                 thickness.push(thick);
-                on.push(arc < rim_at(rim, turn * NODE_COLUMNS as f64));
+                on.push(arc < nodes.rim(rim));
             }
         }
         Self {
@@ -67,16 +52,9 @@ impl WallMoment {
 
 /// The area vector (outward) that each point of a surface of [`RAY_ROWS`] × [`RAY_COLUMNS`] points stands for, mm².
 pub(super) fn area_vectors(points: &[Vec3]) -> Vec<Vec3> {
-    let at = |row: usize, column: usize| points[row * RAY_COLUMNS + column % RAY_COLUMNS];
-    let mut areas = Vec::with_capacity(points.len());
-    for row in 0..RAY_ROWS {
-        let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
-        for column in 0..RAY_COLUMNS {
-            let along = (at(down, column) - at(up, column)) / (down - up) as f64;
-            let around = (at(row, column + 1) - at(row, column + RAY_COLUMNS - 1)) / 2.0;
-            areas.push(around.cross(&along));
-        }
-    }
+    let at = |row: usize, column: usize| &points[row * RAY_COLUMNS + column];
+    let of = |ray: usize| area_vector(at, ray / RAY_COLUMNS, ray % RAY_COLUMNS);
+    let mut areas: Vec<Vec3> = (0..points.len()).map(of).collect();
     let middle = points.iter().sum::<Vec3>() / points.len() as f64;
     let outward: f64 = (points.iter().zip(&areas))
         .map(|(p, a)| a.dot(&(p - middle)))

@@ -77,6 +77,8 @@ pub(super) struct Objective {
     priors: Priors,
     /// Share of the wall's area at each node, apical of the rim.
     areas: Vec<f64>,
+    /// Sum of the weights over voxels and gates.
+    total_weight: f64,
 }
 
 /// The gates on the grid about the heart, and what is known of the wall from their sum.
@@ -117,7 +119,9 @@ impl Objective {
             .collect();
         let sum: f64 = areas.iter().sum();
         areas.iter_mut().for_each(|a| *a /= sum);
+        let voxels: f64 = observed.weights.iter().map(|w| f64::from(*w)).sum();
         Self {
+            total_weight: voxels * observed.gate_weights.iter().sum::<f64>(),
             conservation: Conservation::new(&coordinates, &layout),
             blur: Blur::new(grid.shape, resolution_mm),
             layout,
@@ -176,13 +180,11 @@ impl Objective {
         let layout = &self.layout;
         let activity = self.activity(unknowns);
         let observed = &self.observed;
-        let voxels: f64 = observed.weights.iter().map(|w| f64::from(*w)).sum();
-        let total = voxels * observed.gate_weights.iter().sum::<f64>();
         let gates: Vec<_> = (0..layout.gates)
             .into_par_iter()
             .map(|gate| {
                 monitor.check()?;
-                let scale = 1e4 * observed.gate_weights[gate] / total;
+                let scale = 1e4 * observed.gate_weights[gate] / self.total_weight;
                 let state = self
                     .conservation
                     .state(layout, unknowns, &observed.bases[gate]);
@@ -239,13 +241,6 @@ impl Objective {
         }
         value += self.add_priors(unknowns, gradient);
         Ok(value)
-    }
-
-    /// The part of the value that the images make.
-    pub fn misfit(&self, unknowns: &[f64], monitor: &Monitor) -> Result<f64, Cancelled> {
-        let mut gradient = vec![0.0; unknowns.len()];
-        let all = self.evaluate(unknowns, &mut gradient, monitor)?;
-        Ok(all - self.add_priors(unknowns, &mut gradient))
     }
 
     fn add_priors(&self, unknowns: &[f64], gradient: &mut [f64]) -> f64 {

@@ -3,8 +3,6 @@
 //! In: the anatomical wall that was fitted to the summed image, and that image. Out: for every node of the fields the
 //! distances at which the wall begins and ends and the image's largest value on the way through it, and the rim.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
-
 use super::fields::{COLUMNS, Layout, ROW_SPACING_MM};
 use crate::grid::field::Field;
 use crate::model::wall::{self, RayCoordinates, VentricleWall};
@@ -94,16 +92,8 @@ fn peak(
     [enters, leaves]: [f64; 2],
 ) -> f64 {
     let arc = (node / COLUMNS) as f64 * ROW_SPACING_MM;
-    let (sin, cos) = (TAU * (node % COLUMNS) as f64 / COLUMNS as f64).sin_cos();
-    let across = coordinates.lateral * cos + coordinates.anterior * sin;
-    let angle = arc / coordinates.cap_radius;
-    let (start, direction) = if angle < FRAC_PI_2 {
-        let direction = coordinates.axis * angle.cos() + across * angle.sin();
-        (coordinates.focus, direction)
-    } else {
-        let basal = arc - FRAC_PI_2 * coordinates.cap_radius;
-        (coordinates.focus - coordinates.axis * basal, across)
-    };
+    let turn = (node % COLUMNS) as f64 / COLUMNS as f64;
+    let (start, direction) = coordinates.ray(arc, turn, 1.0);
     let length = leaves - enters + 2.0 * PEAK_MARGIN_MM;
     (0..=PEAK_SAMPLES)
         .map(|n| enters - PEAK_MARGIN_MM + length * n as f64 / PEAK_SAMPLES as f64)

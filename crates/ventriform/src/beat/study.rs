@@ -55,7 +55,7 @@ impl GatedStudy {
                 });
             }
         }
-        let counts: Vec<f64> = gates.iter().map(total).collect();
+        let counts: Vec<f64> = gates.iter().map(Volume::counts).collect();
         if let Some(empty) = counts.iter().position(|counts| *counts <= 0.0) {
             return Err(BeatError::EmptyGate { gate: empty + 1 });
         }
@@ -96,9 +96,4 @@ fn same_place(a: &Volume, b: &Volume) -> bool {
         let index = Vec3::from_fn(|axis, _| f64::from(corner >> axis & 1) * last[axis]);
         (a.frame.to_patient(&index) - b.frame.to_patient(&index)).norm() < 0.01
     })
-}
-
-fn total(gate: &Volume) -> f64 {
-    let known = gate.voxels.iter().filter(|v| v.is_finite());
-    known.map(|v| f64::from(*v)).sum()
 }

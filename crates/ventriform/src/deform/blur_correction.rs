@@ -10,10 +10,8 @@
 //! Neglected: the wall's curvature, activity in the blood, uptake that varies across the wall.
 //! Walls thinner than F / 2 can hardly be distinguished; the result is at least F / 2.
 
+use crate::grid::blur::FWHM_PER_SIGMA;
 use std::f64::consts::SQRT_2;
-
-/// Standard deviations in a full width at half maximum.
-const SIGMAS_PER_FWHM: f64 = 2.354_820_045;
 
 /// Thickness that a blur of `resolution` mm (full width at half maximum) adds to a wall that
 /// looks `apparent` mm thick, mm.
@@ -51,7 +49,7 @@ pub fn resolution_of(thickness: f64, apparent: f64) -> f64 {
 
 /// Full width at half maximum of a slab of `thickness` mm, blurred by `resolution` mm.
 fn width(thickness: f64, resolution: f64) -> f64 {
-    let scale = 1.0 / (SQRT_2 * resolution / SIGMAS_PER_FWHM);
+    let scale = 1.0 / (SQRT_2 * resolution / FWHM_PER_SIGMA);
     let half = 0.5 * thickness;
     let value = |x: f64| erf((x + half) * scale) - erf((x - half) * scale);
     let level = 0.5 * value(0.0);
@@ -100,7 +98,7 @@ mod tests {
         for resolution in [8.0, 11.5, 16.0] {
             for thickness in [8.5, 11.0, 15.0] {
                 // The slab convolved numerically.
-                let s = resolution / SIGMAS_PER_FWHM;
+                let s = resolution / FWHM_PER_SIGMA;
                 let step = 0.01;
                 let value = |x: f64| -> f64 {
                     (0..(thickness / step) as usize)

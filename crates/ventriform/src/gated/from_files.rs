@@ -28,6 +28,8 @@ pub struct GatedHeart {
     pub parameters: FitParameters,
     /// The parameters of the beat.
     pub choice: BeatChoice,
+    /// The R-R interval, ms: as given, or as the file states it.
+    pub rr_ms: Option<f64>,
 }
 
 /// Makes the beat of the study of `order`.
@@ -78,10 +80,7 @@ pub fn from_files(
         &beat_parameters,
         monitor,
     )?;
-    let rr_ms = order
-        .choice
-        .rr_ms
-        .or_else(|| reading.timing.rr_of(study.gates.len()));
+    let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
     let beat = Beat::of(fitted, &study, map, rr_ms);
     reading.gates = study.gates;
     Ok(GatedHeart {
@@ -90,17 +89,12 @@ pub fn from_files(
         beat,
         parameters,
         choice: order.choice,
+        rr_ms,
         segmentation,
     })
 }
 
 impl GatedHeart {
-    /// The R-R interval, ms: as given, or as the file states it.
-    pub fn rr_ms(&self) -> Option<f64> {
-        let stated = || self.reading.timing.rr_of(self.reading.gates.len());
-        self.choice.rr_ms.or_else(stated)
-    }
-
     /// Warnings about the files.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.reading.facts.warnings.clone();
@@ -129,7 +123,7 @@ impl GatedHeart {
         parameters.extend(self.choice.to_json());
         let parts = BeatParts {
             segment_names: names,
-            rr_ms: self.rr_ms(),
+            rr_ms: self.rr_ms,
             timing: self.reading.timing.clone(),
             long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),
             resolution: segmentation
@@ -138,10 +132,7 @@ impl GatedHeart {
             template: segmentation.candidates[segmentation.chosen].name.clone(),
             confidence: segmentation.fit.judgement.confidence,
             flags: (segmentation.fit.judgement.flags.iter())
-                .map(|flag| RaisedFlag {
-                    code: flag.code().to_owned(),
-                    reason: flag.to_string(),
-                })
+                .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),
             parameters,
             input: FileFacts::of(&self.reading.facts),

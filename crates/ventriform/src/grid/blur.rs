@@ -7,6 +7,9 @@
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 
+/// Full width at half maximum of a Gaussian over its standard deviation.
+pub const FWHM_PER_SIGMA: f64 = 2.354_820_045;
+
 /// Half of a symmetric kernel: the weights of the offsets 0, 1, 2, ... They add up to 1 over both
 /// sides.
 #[derive(Debug, Clone)]

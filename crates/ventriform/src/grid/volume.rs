@@ -148,6 +148,12 @@ impl Volume {
         }
     }
 
+    /// The sum of all values that are finite: the counts of a scan.
+    pub fn counts(&self) -> f64 {
+        let known = self.voxels.iter().filter(|value| value.is_finite());
+        known.map(|value| f64::from(*value)).sum()
+    }
+
     /// The value of voxel (i, j, k).
     ///
     /// # Panics

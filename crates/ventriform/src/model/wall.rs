@@ -132,6 +132,37 @@ pub fn carried(cup: &Cup, before: &TriMesh, after: &TriMesh) -> Cup {
     }
 }
 
+impl RayCoordinates {
+    /// Arc at which the cap ends, mm.
+    pub fn cap_arc(&self) -> f64 {
+        FRAC_PI_2 * self.cap_radius
+    }
+
+    /// Start and unit direction of the ray at an arc, mm, and an angle about the axis, turns, where the axis basal of
+    /// the focus is `stretch` times as long.
+    pub fn ray(&self, arc: f64, turn: f64, stretch: f64) -> (Vec3, Vec3) {
+        let (sin, cos) = (TAU * turn).sin_cos();
+        let across = self.lateral * cos + self.anterior * sin;
+        if arc < self.cap_arc() {
+            let (s, c) = (arc / self.cap_radius).sin_cos();
+            (self.focus, self.axis * c + across * s)
+        } else {
+            let basal = (arc - self.cap_arc()) * stretch;
+            (self.focus - self.axis * basal, across)
+        }
+    }
+}
+
+/// The vector of the area that a point of a surface of [`RAY_ROWS`] × [`RAY_COLUMNS`] points stands for, mm². `at` gives the
+/// point of a row and a column.
+pub fn area_vector<'a>(at: impl Fn(usize, usize) -> &'a Vec3, row: usize, column: usize) -> Vec3 {
+    let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
+    let along = (at(down, column) - at(up, column)) / (down - up) as f64;
+    let [left, right] = [RAY_COLUMNS - 1, 1].map(|step| (column + step) % RAY_COLUMNS);
+    let around = (at(row, right) - at(row, left)) / 2.0;
+    along.cross(&around)
+}
+
 impl VentricleWall {
     /// Casts rays through `mesh` from the axis of `cup`; `superior` is the patient's superior
     /// direction, a unit vector.

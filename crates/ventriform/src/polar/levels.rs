@@ -1,7 +1,7 @@
 //! The four levels of the wall along the long axis: basal, mid, apical, apex.
 
 use crate::geometry::Vec3;
-use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
+use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall, area_vector};
 
 /// A part of the wall along the long axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,11 +123,7 @@ impl MiddleSurface {
 
     /// The area that a ray stands for, mm².
     pub fn area(&self, row: usize, column: usize) -> f64 {
-        let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
-        let along = (self.at(down, column) - self.at(up, column)) / (down - up) as f64;
-        let [left, right] = [RAY_COLUMNS - 1, 1].map(|step| (column + step) % RAY_COLUMNS);
-        let around = (self.at(row, right) - self.at(row, left)) / 2.0;
-        along.cross(&around).norm()
+        area_vector(|row, column| self.at(row, column), row, column).norm()
     }
 }
 

@@ -204,10 +204,10 @@ impl BeatReport {
         let of_gates = 1.0 - cavity(&beat.end_systole) / cavity(&beat.end_diastole);
         let codes: Vec<&str> = beat.flags.iter().map(|flag| flag.code()).collect();
         let reliable = !codes.contains(&"phase_unreliable") && beat.ef_percent.is_some();
-        let raised = beat.flags.iter().map(|flag| RaisedFlag {
-            code: flag.code().to_owned(),
-            reason: flag.to_string(),
-        });
+        let raised = beat
+            .flags
+            .iter()
+            .map(|flag| RaisedFlag::new(flag.code(), flag));
         let step = 360.0 / beat.curve.len() as f64;
         let names = &parts.segment_names;
         Self {

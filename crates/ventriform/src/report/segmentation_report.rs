@@ -17,6 +17,7 @@ use crate::polar::PolarSummary;
 use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::fmt::Display;
 
 /// The report of a segmentation. Lengths are millimetres in the patient frame LPS.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -164,6 +165,16 @@ pub struct RaisedFlag {
     pub reason: String,
 }
 
+impl RaisedFlag {
+    /// A flag with this stable name, whose text says what was found.
+    pub fn new(code: &str, flag: &impl Display) -> Self {
+        Self {
+            code: code.to_owned(),
+            reason: flag.to_string(),
+        }
+    }
+}
+
 /// The parts of a [`SegmentationReport`] beside the fit.
 #[derive(Debug)]
 pub struct SegmentationParts {
@@ -219,10 +230,7 @@ impl SegmentationReport {
             measures: parts.measures,
             polar: parts.polar,
             flags: (judgement.flags.iter())
-                .map(|flag| RaisedFlag {
-                    code: flag.code().to_owned(),
-                    reason: flag.to_string(),
-                })
+                .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),
             mask_rule: "a voxel belongs to the mask if its centre lies inside the surface".into(),
             parameters: parts.parameters,

@@ -43,7 +43,9 @@ impl GatedReading {
         }
         let each = timing.gates_per_interval.unwrap_or(gates.len());
         if each > 0 && each < gates.len() && gates.len().is_multiple_of(each) {
-            let counts: Vec<f64> = gates.chunks(each).map(counts_of).collect();
+            let counts: Vec<f64> = (gates.chunks(each))
+                .map(|gates| gates.iter().map(Volume::counts).sum())
+                .collect();
             let main = (1..counts.len()).fold(0, |m, n| if counts[n] > counts[m] { n } else { m });
             facts.warnings.push(format!(
                 "The file has {} R-R intervals of {each} gates: interval {} has the most counts and was taken.",
@@ -65,12 +67,4 @@ impl GatedReading {
             stated_grid: first.stated_grid,
         })
     }
-}
-
-fn counts_of(gates: &[Volume]) -> f64 {
-    let values = gates.iter().flat_map(|gate| &gate.voxels);
-    values
-        .filter(|v| v.is_finite())
-        .map(|v| f64::from(*v))
-        .sum()
 }

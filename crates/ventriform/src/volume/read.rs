@@ -84,12 +84,7 @@ pub fn read_gates(
         return Err(open::because(needed, opened.file.why_not_gated()));
     }
     if voxels > limits.voxels {
-        return Err(VolumeError::TooLarge {
-            file: header.file.to_owned(),
-            what: "voxels in its gates",
-            asked: voxels,
-            limit: limits.voxels,
-        });
+        return Err(too_many_voxels(header.file, voxels, limits));
     }
     let timing = opened.file.gate_timing();
     let one = |frame: usize| {
@@ -99,6 +94,16 @@ pub fn read_gates(
     let mut readings: Vec<Reading> = (0..frames).map(one).collect::<Result<_, _>>()?;
     readings[0].facts.warnings.append(&mut opened.notes);
     GatedReading::of(readings, timing)
+}
+
+/// Gates that have together more voxels than a volume may.
+fn too_many_voxels(file: &str, asked: u64, limits: &ReadLimits) -> VolumeError {
+    VolumeError::TooLarge {
+        file: file.to_owned(),
+        what: "voxels in its gates",
+        asked,
+        limit: limits.voxels,
+    }
 }
 
 /// Reads files that hold one gate each, as long as they have together no more voxels than a volume may.
@@ -114,12 +119,7 @@ fn one_by_one(
         let reading = read(own, &ReadOptions::default(), limits, &part)?.usable()?;
         voxels += reading.volume.voxels.len() as u64;
         if voxels > limits.voxels {
-            return Err(VolumeError::TooLarge {
-                file: file.name().to_owned(),
-                what: "voxels in its gates",
-                asked: voxels,
-                limit: limits.voxels,
-            });
+            return Err(too_many_voxels(file.name(), voxels, limits));
         }
         readings.push(reading);
     }
