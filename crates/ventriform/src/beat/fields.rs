@@ -285,17 +285,28 @@ impl Nodes {
         ((1.0 - self.right) * (c - a) + self.right * (d - b)) / ROW_SPACING_MM
     }
 
+    /// The nodes, and their shares in the value of a field.
+    pub fn shares(&self) -> [(usize, f64); 4] {
+        let [a, b, c, d] = self.indices();
+        [
+            (a, (1.0 - self.up) * (1.0 - self.right)),
+            (b, (1.0 - self.up) * self.right),
+            (c, self.up * (1.0 - self.right)),
+            (d, self.up * self.right),
+        ]
+    }
+
     /// Adds what a change of the field's value here adds to the nodes.
     pub fn add(&self, field: &mut [f64], what: f64) {
-        let weights = [
-            (1.0 - self.up) * (1.0 - self.right),
-            (1.0 - self.up) * self.right,
-            self.up * (1.0 - self.right),
-            self.up * self.right,
-        ];
-        for (node, weight) in self.indices().into_iter().zip(weights) {
-            field[node] += weight * what;
+        for (node, share) in self.shares() {
+            field[node] += share * what;
         }
+    }
+
+    /// The columns on both sides, and their shares in the arc of the rim.
+    pub fn rim_shares(&self) -> [(usize, f64); 2] {
+        let [left, right] = self.columns;
+        [(left, 1.0 - self.right), (right, self.right)]
     }
 
     /// The arc of the rim in the point's column, mm.
@@ -306,8 +317,8 @@ impl Nodes {
 
     /// Adds what a change of the rim's arc here adds to that of the columns.
     pub fn add_to_rim(&self, rim: &mut [f64], what: f64) {
-        let [left, right] = self.columns;
-        rim[left] += (1.0 - self.right) * what;
-        rim[right] += self.right * what;
+        for (column, share) in self.rim_shares() {
+            rim[column] += share * what;
+        }
     }
 }

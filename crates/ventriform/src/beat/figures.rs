@@ -6,6 +6,7 @@
 
 use super::fit::{BeatFit, Volumes};
 use super::flags::{self, BeatFlag, FlagFacts};
+use super::intervals::Intervals;
 use super::moment::{Contraction, WallMoment, area_vectors};
 use super::phase::{Phases, circular_mean};
 use super::study::GatedStudy;
@@ -71,6 +72,8 @@ pub struct Beat {
     pub end_systole: Extreme,
     /// Share of the end-diastolic volume that is ejected, per cent; `None` if the gates are no beat.
     pub ef_percent: Option<f64>,
+    /// Intervals about the figures; that of EF stands also where there is no beat.
+    pub intervals: Intervals,
     /// Rates, or why there are none.
     pub rates: Result<Rates, String>,
     /// Segments 1 to 17; those without wall are left out.
@@ -112,6 +115,11 @@ impl Beat {
         Self {
             rates: rates(&curve, fit.gate_count(), end_systole.turns, rr_ms),
             factors: study.factors.clone(),
+            intervals: Intervals::about(
+                end_diastole.cavity_ml,
+                end_systole.cavity_ml,
+                fit.dark_share(),
+            ),
             ef_percent: (!denied).then_some(ejected),
             fit,
             curve,

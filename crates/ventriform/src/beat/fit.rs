@@ -6,8 +6,10 @@
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis.
 //! 2. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
 //! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's stretch,
-//!    activity beside the wall, the gates' factors. It ends when EF has come to rest: the value falls by 95 per cent
-//!    in 60 steps while the motion is still a fifth too small.
+//!    activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which the motion
+//!    is a fifth too small after 60 steps, though the value has fallen by 95 per cent. It ends when EF is at rest.
+//! 4. The summed image's resolution holds the blur by the motion. Once the motion is nearly found, its part is taken
+//!    off.
 //!
 //! Guaranteed: the muscle of every column is the same at every moment; the same study gives the same figures on any
 //! number of threads.
@@ -16,6 +18,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use super::carried::CarriedNodes;
+use super::curvature::Curvature;
 use super::error::BeatError;
 use super::fields::{COLUMNS, Layout, Nodes, ROW_SPACING_MM, WallState, harmonics};
 use super::image::HeartGrid;
@@ -39,12 +42,13 @@ const GRID_MARGIN_MM: f64 = 20.0;
 const REACH_MM: [f64; 2] = [14.0, 10.0];
 /// Arc beyond the rim up to which voxels count, mm.
 const BEYOND_RIM_MM: f64 = 8.0;
-/// Steps after which EF is looked at, and the change of EF between two looks that counts as rest. Early on EF may stand
-/// still while the other unknowns settle, so rest counts only when it lasts for two looks, after the least steps.
-const STEPS_BETWEEN_LOOKS: usize = 20;
+/// Steps after which the curvature is taken anew, and the width of the gates with it: the motion is nearly found.
+const STEPS_OF_ONE_CURVATURE: [usize; 2] = [15, 30];
+/// Steps after which EF is looked at, and the change of EF between two looks that counts as rest. Rest counts only when
+/// it lasts for two looks.
+const STEPS_BETWEEN_LOOKS: usize = 10;
 const EF_AT_REST: f64 = 0.002;
 const LOOKS_AT_REST: usize = 2;
-const MIN_STEPS: usize = 120;
 /// Fits until a known volume of muscle is met, and the deviation of the thickness in them, mm.
 const MUSCLE_FITS: usize = 2;
 const KNOWN_THICKNESS_SD_MM: f64 = 0.1;
@@ -182,7 +186,13 @@ pub fn fit(
         observed,
         priors.clone(),
     );
-    let mut made = minimise(objective, start, parameters.max_steps, monitor)?;
+    let mut made = minimise(
+        objective,
+        start,
+        resolution_mm,
+        parameters.max_steps,
+        monitor,
+    )?;
     if let Some(muscle_ml) = parameters.muscle_ml {
         for _ in 0..MUSCLE_FITS {
             let Minimised {
@@ -194,7 +204,13 @@ pub fn fit(
             let found_ml = volumes(&objective, &unknowns, &still).wall_ml;
             let mean = objective.mean_thickness(&unknowns) * muscle_ml / found_ml;
             let objective = objective.with_mean_thickness(mean, KNOWN_THICKNESS_SD_MM);
-            made = minimise(objective, unknowns, parameters.max_steps, monitor)?;
+            made = minimise(
+                objective,
+                unknowns,
+                resolution_mm,
+                parameters.max_steps,
+                monitor,
+            )?;
         }
     }
     let Minimised {
@@ -243,45 +259,44 @@ struct Minimised {
 }
 
 fn minimise(
-    objective: Objective,
+    mut objective: Objective,
     start: Vec<f64>,
+    resolution_mm: f64,
     max_steps: usize,
     monitor: &Monitor,
 ) -> Result<Minimised, BeatError> {
-    let (scales, bounds) = scales_and_bounds(&objective.layout, &start);
-    let unscaled =
-        |point: &[f64]| -> Vec<f64> { point.iter().zip(&scales).map(|(y, s)| y * s).collect() };
-    let (mut last_ef, mut at_rest) = (f64::NAN, 0);
-    let found = lbfgs::minimise(
-        start.iter().zip(&scales).map(|(x, s)| x / s).collect(),
-        &bounds,
-        |point, gradient| {
-            let value = objective.evaluate(&unscaled(point), gradient, monitor)?;
-            gradient.iter_mut().zip(&scales).for_each(|(g, s)| *g *= s);
-            Ok::<_, Cancelled>(value)
-        },
-        |point, steps| {
-            monitor.report(Stage::Beat, steps as f64 / max_steps as f64)?;
-            if steps % STEPS_BETWEEN_LOOKS == 0 {
-                let ef = ejection_fraction(&curve(&objective, &unscaled(point), CURVE_MOMENTS));
-                at_rest = if (ef - last_ef).abs() < EF_AT_REST {
-                    at_rest + 1
-                } else {
-                    0
-                };
-                if at_rest >= LOOKS_AT_REST && steps >= MIN_STEPS {
-                    return Ok(true);
+    let (typical, bounds) = steps_and_bounds(&objective.layout, &start);
+    let (mut unknowns, mut steps) = (start, 0);
+    let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
+    for stage_steps in stages {
+        objective.take_motion_off(resolution_mm, &unknowns);
+        let curvature = Curvature::of(&objective, &unknowns, &typical, monitor)?;
+        let (mut last_ef, mut looks_at_rest) = (f64::NAN, 0);
+        let found = lbfgs::minimise(
+            unknowns,
+            &bounds,
+            |vector| curvature.solve(vector),
+            |point, gradient| objective.evaluate(point, gradient, monitor),
+            |point, stage| {
+                monitor.report(Stage::Beat, (steps + stage) as f64 / max_steps as f64)?;
+                if stage_steps.is_none() && stage % STEPS_BETWEEN_LOOKS == 0 {
+                    let ef = ejection_fraction(&curve(&objective, point, CURVE_MOMENTS));
+                    let at_rest = (ef - last_ef).abs() < EF_AT_REST;
+                    looks_at_rest = if at_rest { looks_at_rest + 1 } else { 0 };
+                    last_ef = ef;
                 }
-                last_ef = ef;
-            }
-            Ok(steps >= max_steps)
-        },
-    )?;
-    let unknowns = unscaled(&found.point);
+                Ok(looks_at_rest == LOOKS_AT_REST
+                    || Some(stage) == stage_steps
+                    || steps + stage >= max_steps)
+            },
+        )?;
+        unknowns = found.point;
+        steps += found.steps;
+    }
     monitor.report(Stage::Beat, 1.0)?;
     Ok(Minimised {
         unknowns,
-        steps: found.steps,
+        steps,
         objective,
     })
 }
@@ -335,13 +350,13 @@ fn dark_nodes(layout: &Layout, still: &StillWall, relative: &[f64]) -> Vec<f64> 
         .collect()
 }
 
-/// By what each unknown is divided so that all change about equally, and its bounds after that.
-fn scales_and_bounds(layout: &Layout, start: &[f64]) -> (Vec<f64>, Vec<[f64; 2]>) {
-    let mut scales = vec![1.0; layout.len()];
+/// Usual size of a change of each unknown, and its bounds.
+fn steps_and_bounds(layout: &Layout, start: &[f64]) -> (Vec<f64>, Vec<[f64; 2]>) {
+    let mut steps = vec![1.0; layout.len()];
     let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; layout.len()];
-    let mut set = |range: Range<usize>, scale: f64, bound: [f64; 2]| {
-        scales[range.clone()].fill(scale);
-        bounds[range].fill(bound.map(|bound| bound / scale));
+    let mut set = |range: Range<usize>, step: f64, bound: [f64; 2]| {
+        steps[range.clone()].fill(step);
+        bounds[range].fill(bound);
     };
     let rim = start[layout.rim()].iter().sum::<f64>() / COLUMNS as f64;
     set(layout.mid_wall(), 1.0, [5.0, 60.0]);
@@ -355,7 +370,7 @@ fn scales_and_bounds(layout: &Layout, start: &[f64]) -> (Vec<f64>, Vec<[f64; 2]>
     set(layout.stretch(), 0.03, [-0.2, 0.2]);
     set(layout.blood()..layout.blood() + 1, 0.3, [-4.0, -0.5]);
     set(layout.gains(), 0.02, [-0.2, 0.2]);
-    (scales, bounds)
+    (steps, bounds)
 }
 
 /// The share of the largest volume of a curve that is ejected.

@@ -117,10 +117,15 @@ impl HeartGrid {
             .map(move |voxel| (voxel.arc(cap_arc, 1.0), voxel.column, voxel.distance))
     }
 
+    /// The wall at every voxel.
+    pub fn samples(&self, layout: &Layout, state: &WallState, activity: &Activity) -> Vec<Sample> {
+        let sample = |voxel: &Voxel| self.sample(layout, voxel, state, activity);
+        self.voxels.iter().map(sample).collect()
+    }
+
     /// The activity of every voxel.
-    pub fn paint(&self, layout: &Layout, state: &WallState, activity: &Activity) -> Vec<f32> {
-        let paint = |voxel: &Voxel| self.sample(layout, voxel, state, activity).value() as f32;
-        self.voxels.iter().map(paint).collect()
+    pub fn paint(samples: &[Sample]) -> Vec<f32> {
+        samples.iter().map(|sample| sample.value() as f32).collect()
     }
 
     fn sample(
@@ -156,48 +161,77 @@ impl HeartGrid {
     /// `by_voxel`.
     pub fn gradient(
         &self,
-        layout: &Layout,
+        samples: &[Sample],
         state: &WallState,
         activity: &Activity,
         by_voxel: &[f32],
         by_state: &mut StateGradient,
         by_activity: &mut ActivityGradient,
     ) {
-        for (voxel, by) in self.voxels.iter().zip(by_voxel) {
+        for ((voxel, sample), by) in self.voxels.iter().zip(samples).zip(by_voxel) {
             let by = f64::from(*by);
             if by == 0.0 {
                 continue;
             }
-            let sample = self.sample(layout, voxel, state, activity);
             let nodes = &sample.nodes;
-            let [oi, oo, ob] = [sample.inner, sample.outer, sample.apical].map(|r| r.share);
-            let (u, b) = (sample.uptake, sample.outside);
-            let by_inner =
-                by * (u * oo * ob - sample.blood + b * oo * (1.0 - ob)) * sample.inner.slope;
-            let by_outer = by * (u * oi * ob - b + b * oi * (1.0 - ob)) * sample.outer.slope;
-            let by_rim = by * (u - b) * oi * oo * sample.apical.slope;
-            let by_mid = by_outer - by_inner;
-            let by_thick = (by_inner + by_outer) / 2.0;
-            let by_uptake = by * oi * oo * ob;
-            let by_outside = by * ((1.0 - oo) + oi * oo * (1.0 - ob));
-            by_activity.blood += by * (1.0 - oi);
-            nodes.add(&mut by_state.mid_wall, by_mid);
-            nodes.add(&mut by_state.thickness, by_thick);
-            nodes.add(&mut by_activity.uptake, by_uptake);
-            nodes.add(&mut by_activity.outside, by_outside);
-            nodes.add_to_rim(&mut by_activity.rim, by_rim);
-            if !voxel.cap {
-                // The arc grows by this where the axis stretches.
-                let arc_by_stretch = voxel.along / (state.stretch * state.stretch);
-                let by_arc = nodes.slope(&state.mid_wall) * by_mid
-                    + nodes.slope(&state.thickness) * by_thick
-                    + nodes.slope(&activity.uptake) * by_uptake
-                    + nodes.slope(&activity.outside) * by_outside
-                    - by_rim;
-                by_state.stretch += by_arc * arc_by_stretch;
-            }
+            let change = sample.change();
+            by_activity.blood += by * change.blood;
+            nodes.add(&mut by_state.mid_wall, by * change.mid_wall);
+            nodes.add(&mut by_state.thickness, by * change.thickness);
+            nodes.add(&mut by_activity.uptake, by * change.uptake);
+            nodes.add(&mut by_activity.outside, by * change.outside);
+            nodes.add_to_rim(&mut by_activity.rim, by * change.rim);
+            by_state.stretch += by * stretch_change(voxel, sample, &change, state, activity);
         }
     }
+
+    /// Calls `add` for every voxel with its index, the nodes about it, the change of its activity by each part of the
+    /// wall, and that by the stretch of the long axis.
+    pub fn changes(
+        &self,
+        samples: &[Sample],
+        state: &WallState,
+        activity: &Activity,
+        mut add: impl FnMut(usize, &Nodes, &Change, f64),
+    ) {
+        for (index, (voxel, sample)) in self.voxels.iter().zip(samples).enumerate() {
+            let change = sample.change();
+            let by_stretch = stretch_change(voxel, sample, &change, state, activity);
+            add(index, &sample.nodes, &change, by_stretch);
+        }
+    }
+}
+
+/// The change of a voxel's activity by the stretch of the long axis: the arc at the voxel shrinks.
+fn stretch_change(
+    voxel: &Voxel,
+    sample: &Sample,
+    change: &Change,
+    state: &WallState,
+    activity: &Activity,
+) -> f64 {
+    if voxel.cap {
+        return 0.0;
+    }
+    let arc_by_stretch = voxel.along / (state.stretch * state.stretch);
+    let nodes = &sample.nodes;
+    let by_arc = nodes.slope(&state.mid_wall) * change.mid_wall
+        + nodes.slope(&state.thickness) * change.thickness
+        + nodes.slope(&activity.uptake) * change.uptake
+        + nodes.slope(&activity.outside) * change.outside
+        - change.rim;
+    by_arc * arc_by_stretch
+}
+
+/// The change of a voxel's activity by a unit of each value of the wall at the voxel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change {
+    pub mid_wall: f64,
+    pub thickness: f64,
+    pub uptake: f64,
+    pub outside: f64,
+    pub rim: f64,
+    pub blood: f64,
 }
 
 fn voxel(coordinates: &RayCoordinates, [s, x, y]: [f64; 3]) -> Voxel {
@@ -238,7 +272,9 @@ impl Ramp {
     }
 }
 
-struct Sample {
+/// The wall at a voxel.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
     nodes: Nodes,
     uptake: f64,
     outside: f64,
@@ -254,6 +290,21 @@ impl Sample {
         self.uptake * oi * oo * ob
             + self.blood * (1.0 - oi)
             + self.outside * ((1.0 - oo) + oi * oo * (1.0 - ob))
+    }
+
+    fn change(&self) -> Change {
+        let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.share);
+        let (u, b) = (self.uptake, self.outside);
+        let by_inner = (u * oo * ob - self.blood + b * oo * (1.0 - ob)) * self.inner.slope;
+        let by_outer = (u * oi * ob - b + b * oi * (1.0 - ob)) * self.outer.slope;
+        Change {
+            mid_wall: by_outer - by_inner,
+            thickness: (by_inner + by_outer) / 2.0,
+            uptake: oi * oo * ob,
+            outside: (1.0 - oo) + oi * oo * (1.0 - ob),
+            rim: (u - b) * oi * oo * self.apical.slope,
+            blood: 1.0 - oi,
+        }
     }
 }
 
@@ -303,6 +354,12 @@ impl Blur {
     /// Blurs `values`.
     pub fn apply(&self, values: &[f32]) -> Vec<f32> {
         along_axes(values, self.shape, &self.rows)
+    }
+
+    /// The first voxel along `axis` that the blurred voxel `at` takes from, and the weights from there on.
+    pub fn weights(&self, axis: usize, at: usize) -> (usize, &[f32]) {
+        let (first, weights) = &self.rows[axis][at];
+        (*first, weights)
     }
 
     /// The transposed blur, for gradients.

@@ -8,7 +8,7 @@
 //!    periodic, and the wall's image is blurred by the resolution before it is compared ([`objective`]). Gates that are
 //!    fitted one by one let the muscle swing by a fifth.
 //! 3. [`figures`] takes end diastole and end systole from the curve, after the gates' width was taken off.
-//! 4. [`flags`] says where the figures mean little.
+//! 4. [`intervals`] says how far the figures may be off, and [`flags`] where they mean little.
 //!
 //! Guaranteed: the volume of the muscle changes by less than 3 per cent over the beat; gates that begin elsewhere in the
 //! cycle give the same figures, moved; without a beat there is no ejection fraction.
@@ -17,13 +17,16 @@
 //! volume of muscle; a millimetre moves the ejection fraction by about 1.5 points. Where the wall is dark, its motion
 //! is assumed to be small. There are no normal limits.
 
+mod calibration;
 mod carried;
+mod curvature;
 mod error;
 mod fields;
 pub mod figures;
 pub mod fit;
 pub mod flags;
 mod image;
+pub mod intervals;
 pub mod moment;
 mod objective;
 mod order;
@@ -35,6 +38,7 @@ pub use error::BeatError;
 pub use figures::{Beat, Extreme, Rates, SegmentMotion};
 pub use fit::{BeatFit, BeatParameters, Volumes, fit};
 pub use flags::BeatFlag;
+pub use intervals::Intervals;
 pub use moment::{Contraction, WallMoment};
 pub use objective::Priors;
 pub use phase::Phases;

@@ -6,12 +6,17 @@
 //! summed image; the gates' factors are near 1; where the wall is dark it moves little.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use std::ops::Range;
 
 use super::fields::{COLUMNS, Conservation, Layout, ROW_SPACING_MM, StateGradient};
 use super::image::{Activity, ActivityGradient, Blur, HeartGrid};
+use crate::grid::blur::FWHM_PER_SIGMA;
 use crate::model::wall::RayCoordinates;
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
+
+/// Value of the function where voxels are off by the wall's own uptake in the mean.
+pub(super) const VALUE_SCALE: f64 = 1e4;
 
 /// What is known of walls before the image is looked at, and its weights: each adds a square to the function, whose
 /// unit is 1e-4 of the squared uptake in the mean over voxels.
@@ -60,7 +65,7 @@ impl Default for Priors {
             rim_level: 0.02,
             gain: 2e3,
             stretch: 30.0,
-            still: 0.2,
+            still: 0.05,
         }
     }
 }
@@ -72,8 +77,8 @@ pub(super) struct Objective {
     pub coordinates: RayCoordinates,
     pub conservation: Conservation,
     pub grid: HeartGrid,
-    blur: Blur,
-    observed: Observed,
+    pub blur: Blur,
+    pub observed: Observed,
     priors: Priors,
     /// Share of the wall's area at each node, apical of the rim.
     areas: Vec<f64>,
@@ -151,6 +156,28 @@ impl Objective {
         self
     }
 
+    /// Takes the blur by the motion at `unknowns` off `resolution_mm`, the full width at half maximum of a point in the
+    /// sum of the gates: a single gate has less of it.
+    pub fn take_motion_off(&mut self, resolution_mm: f64, unknowns: &[f64]) {
+        /// Least width, as a share of the sum's.
+        const LEAST_SHARE: f64 = 0.75;
+        let squares =
+            resolution_mm.powi(2) - FWHM_PER_SIGMA.powi(2) * self.motion_variance(unknowns);
+        let width = squares.max(0.0).sqrt().max(LEAST_SHARE * resolution_mm);
+        self.blur = Blur::new(self.grid.shape, width);
+    }
+
+    /// Variance of the distance of the wall over the beat, in the mean over the wall, mm².
+    fn motion_variance(&self, unknowns: &[f64]) -> f64 {
+        let mut variance = 0.0;
+        for index in 0..2 * self.layout.harmonics {
+            let motion = &unknowns[self.layout.motion(index)];
+            let squares = motion.iter().zip(&self.areas).map(|(a, area)| a * a * area);
+            variance += squares.sum::<f64>() / 2.0;
+        }
+        variance
+    }
+
     /// Mean thickness of the wall, mm.
     pub fn mean_thickness(&self, unknowns: &[f64]) -> f64 {
         let thickness = &unknowns[self.layout.thickness()];
@@ -184,13 +211,13 @@ impl Objective {
             .into_par_iter()
             .map(|gate| {
                 monitor.check()?;
-                let scale = 1e4 * observed.gate_weights[gate] / self.total_weight;
+                let scale = VALUE_SCALE * observed.gate_weights[gate] / self.total_weight;
                 let state = self
                     .conservation
                     .state(layout, unknowns, &observed.bases[gate]);
                 let gain = unknowns[layout.gains().start + gate].exp() as f32;
-                let painted = self.grid.paint(layout, &state, &activity);
-                let seen = self.blur.apply(&painted);
+                let samples = self.grid.samples(layout, &state, &activity);
+                let seen = self.blur.apply(&HeartGrid::paint(&samples));
                 let (mut value, mut by_gain) = (0.0, 0.0);
                 let by_seen: Vec<f32> = (0..seen.len())
                     .map(|v| {
@@ -205,7 +232,7 @@ impl Objective {
                 let mut by_state = StateGradient::zero(layout);
                 let mut by_activity = ActivityGradient::zero(layout);
                 self.grid.gradient(
-                    layout,
+                    &samples,
                     &state,
                     &activity,
                     &by_voxel,
@@ -239,31 +266,36 @@ impl Objective {
             }
             gradient[layout.blood()] += by_activity.blood * activity.blood;
         }
-        value += self.add_priors(unknowns, gradient);
+        for (range, weight) in self.smooth_fields() {
+            let field = &unknowns[range.clone()];
+            value += weight * self.roughness(field, weight, &mut gradient[range]);
+        }
+        value += self.add_levels(unknowns, gradient);
         Ok(value)
     }
 
-    fn add_priors(&self, unknowns: &[f64], gradient: &mut [f64]) -> f64 {
+    /// The fields, and the weight of each one's roughness.
+    pub fn smooth_fields(&self) -> Vec<(Range<usize>, f64)> {
         let (layout, priors) = (&self.layout, &self.priors);
-        let mut value = 0.0;
-        let fields = [
+        let motion = (0..2 * layout.harmonics).map(|index| {
+            let order = (index % layout.harmonics + 1) as f64;
+            (layout.motion(index), priors.motion * order)
+        });
+        let still = [
             (layout.mid_wall(), priors.mid_wall),
             (layout.thickness(), priors.thickness),
             (layout.uptake(), priors.uptake),
             (layout.outside(), priors.outside),
         ];
-        for (range, weight) in fields {
-            value += self.roughness(&unknowns[range.clone()], weight, &mut gradient[range]);
-        }
+        still.into_iter().chain(motion).collect()
+    }
+
+    /// The priors of levels, not of smoothness; their gradient is added.
+    pub fn add_levels(&self, unknowns: &[f64], gradient: &mut [f64]) -> f64 {
+        let (layout, priors) = (&self.layout, &self.priors);
+        let mut value = 0.0;
         for index in 0..2 * layout.harmonics {
             let range = layout.motion(index);
-            let order = (index % layout.harmonics + 1) as f64;
-            let weight = priors.motion * order;
-            value += self.roughness(
-                &unknowns[range.clone()],
-                weight,
-                &mut gradient[range.clone()],
-            );
             for (node, dark) in self.observed.dark.iter().enumerate() {
                 let a = unknowns[range.start + node];
                 value += priors.still * dark * a * a;
@@ -316,8 +348,9 @@ impl Objective {
         value
     }
 
-    /// Weighted squares of the second differences of a field, along columns and about the axis; its gradient is added.
-    fn roughness(&self, field: &[f64], weight: f64, gradient: &mut [f64]) -> f64 {
+    /// Squares of the second differences of a field, along columns and about the axis; `weight` times its gradient is
+    /// added.
+    pub fn roughness(&self, field: &[f64], weight: f64, gradient: &mut [f64]) -> f64 {
         let rows = self.layout.rows;
         let mut value = 0.0;
         for row in 1..rows - 1 {
@@ -325,7 +358,7 @@ impl Objective {
                 let node = row * COLUMNS + column;
                 let [before, after] = [node - COLUMNS, node + COLUMNS];
                 let d = field[before] - 2.0 * field[node] + field[after];
-                value += weight * d * d;
+                value += d * d;
                 gradient[before] += 2.0 * weight * d;
                 gradient[node] -= 4.0 * weight * d;
                 gradient[after] += 2.0 * weight * d;
@@ -335,23 +368,23 @@ impl Objective {
             let arc = row as f64 * ROW_SPACING_MM;
             let circle = around(&self.coordinates, arc).max(0.15);
             let spacing = TAU * self.coordinates.cap_radius / COLUMNS as f64 / ROW_SPACING_MM;
-            let around = weight * (1.0 / (circle * circle)).min(20.0) / (spacing * spacing);
+            let around = (1.0 / (circle * circle)).min(20.0) / (spacing * spacing);
             let start = row * COLUMNS;
             for column in 0..COLUMNS {
                 let [before, node, after] =
                     [column + COLUMNS - 1, column, column + 1].map(|c| start + c % COLUMNS);
                 let d = field[before] - 2.0 * field[node] + field[after];
                 value += around * d * d;
-                gradient[before] += 2.0 * around * d;
-                gradient[node] -= 4.0 * around * d;
-                gradient[after] += 2.0 * around * d;
+                gradient[before] += 2.0 * weight * around * d;
+                gradient[node] -= 4.0 * weight * around * d;
+                gradient[after] += 2.0 * weight * around * d;
             }
-            let together = weight * 6.0 * (-(arc / 8.0).powi(2)).exp();
+            let together = 6.0 * (-(arc / 8.0).powi(2)).exp();
             let mean = field[start..start + COLUMNS].iter().sum::<f64>() / COLUMNS as f64;
             for node in start..start + COLUMNS {
                 let d = field[node] - mean;
                 value += together * d * d;
-                gradient[node] += 2.0 * together * d;
+                gradient[node] += 2.0 * weight * together * d;
             }
         }
         value
@@ -364,13 +397,13 @@ fn around(coordinates: &RayCoordinates, arc: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::fields::harmonics;
     use super::*;
     use crate::geometry::Vec3;
 
     /// Three gates of a small wall, and unknowns away from every border of a ramp's kink as far as chance goes.
-    fn scene() -> (Objective, Vec<f64>) {
+    pub fn scene() -> (Objective, Vec<f64>) {
         let coordinates = RayCoordinates {
             focus: Vec3::zeros(),
             axis: Vec3::z(),
@@ -424,6 +457,20 @@ mod tests {
         let objective =
             Objective::new(layout, coordinates, grid, 12.0, observed, Priors::default());
         (objective, unknowns)
+    }
+
+    impl Objective {
+        /// The same function, but every gate is what `unknowns` describe.
+        pub fn met_by(mut self, unknowns: &[f64]) -> Self {
+            let activity = self.activity(unknowns);
+            let images = (self.observed.bases.iter()).map(|basis| {
+                let state = self.conservation.state(&self.layout, unknowns, basis);
+                let samples = self.grid.samples(&self.layout, &state, &activity);
+                self.blur.apply(&HeartGrid::paint(&samples))
+            });
+            self.observed.images = images.collect();
+            self
+        }
     }
 
     /// The gradient against differences of the value, for some unknowns of every kind.

@@ -33,6 +33,9 @@ pub struct Minimum {
 
 /// Minimises a function from `start`, within `bounds` (least and greatest value of each variable).
 ///
+/// `solve` multiplies by the inverse of a guess at the second derivatives, symmetric and positive definite: the better
+/// the guess, the fewer the steps.
+///
 /// `function` writes the gradient at a point and returns the value. `done` is asked after every step with the point
 /// and the number of steps; an error of either ends the search.
 ///
@@ -41,6 +44,7 @@ pub struct Minimum {
 pub fn minimise<E>(
     start: Vec<f64>,
     bounds: &[[f64; 2]],
+    solve: impl Fn(&mut [f64]),
     mut function: impl FnMut(&[f64], &mut [f64]) -> Result<f64, E>,
     mut done: impl FnMut(&[f64], usize) -> Result<bool, E>,
 ) -> Result<Minimum, E> {
@@ -61,19 +65,18 @@ pub fn minimise<E>(
         let free: Vec<f64> = (0..count)
             .map(|i| if held(i) { 0.0 } else { gradient[i] })
             .collect();
-        let mut direction = descent(&free, &memory);
+        let mut direction = descent(&free, &memory, &solve);
         (0..count)
             .filter(|i| held(*i))
             .for_each(|i| direction[i] = 0.0);
         if dot(&direction, &free) >= 0.0 {
             memory.clear();
-            direction = free.iter().map(|g| -g).collect();
+            direction = descent(&free, &memory, &solve);
+            (0..count)
+                .filter(|i| held(*i))
+                .for_each(|i| direction[i] = 0.0);
         }
-        let mut length = if memory.is_empty() {
-            1.0 / dot(&free, &free).sqrt().max(1e-300)
-        } else {
-            1.0
-        };
+        let mut length = 1.0;
         let mut lower = None;
         for _ in 0..MAX_HALVINGS {
             for i in 0..count {
@@ -105,7 +108,10 @@ pub fn minimise<E>(
             if memory.len() == MEMORY_STEPS {
                 memory.pop_front();
             }
+            let mut solved = turn.clone();
+            solve(&mut solved);
             memory.push_back(Step {
+                scale: curvature / dot(&turn, &solved),
                 change,
                 turn,
                 curvature,
@@ -130,9 +136,11 @@ struct Step {
     change: Vec<f64>,
     turn: Vec<f64>,
     curvature: f64,
+    /// The guess at the second derivatives over those seen in the step.
+    scale: f64,
 }
 
-fn descent(gradient: &[f64], memory: &VecDeque<Step>) -> Vec<f64> {
+fn descent(gradient: &[f64], memory: &VecDeque<Step>, solve: impl Fn(&mut [f64])) -> Vec<f64> {
     let mut direction: Vec<f64> = gradient.iter().map(|g| -g).collect();
     let mut shares = Vec::with_capacity(memory.len());
     for step in memory.iter().rev() {
@@ -140,9 +148,9 @@ fn descent(gradient: &[f64], memory: &VecDeque<Step>) -> Vec<f64> {
         add(&mut direction, -share, &step.turn);
         shares.push(share);
     }
+    solve(&mut direction);
     if let Some(last) = memory.back() {
-        let scale = last.curvature / dot(&last.turn, &last.turn);
-        direction.iter_mut().for_each(|d| *d *= scale);
+        direction.iter_mut().for_each(|d| *d *= last.scale);
     }
     for (step, share) in memory.iter().zip(shares.into_iter().rev()) {
         let back = dot(&step.turn, &direction) / step.curvature;
@@ -181,11 +189,16 @@ mod tests {
         Ok(value)
     }
 
+    /// A guess that makes the first step a small one.
+    fn gentle(gradient: &mut [f64]) {
+        gradient.iter_mut().for_each(|g| *g *= 1e-3);
+    }
+
     #[test]
     fn the_valley_of_rosenbrock_is_walked_to_its_end() {
         let bounds = vec![[-5.0, 5.0]; 10];
         let start = vec![-1.2; 10];
-        let found = minimise(start, &bounds, valley, |_, steps| Ok(steps >= 500)).unwrap();
+        let found = minimise(start, &bounds, gentle, valley, |_, steps| Ok(steps >= 500)).unwrap();
         assert!(found.steps < 500, "{}", found.steps);
         for x in found.point {
             assert!((x - 1.0).abs() < 1e-4, "{x}");
@@ -201,6 +214,7 @@ mod tests {
         let found = minimise(
             vec![-1.2; 4],
             &bounds,
+            gentle,
             |x, g| {
                 inside &= x[0] <= 0.5;
                 valley(x, g)

@@ -24,6 +24,12 @@ pub struct BeatReport {
     pub sv_ml: f64,
     /// Ejection fraction, per cent; `null` if the gates are no beat (flag `no_contraction`).
     pub ef_percent: Option<f64>,
+    /// Interval about EDV that holds the true volume of nine of ten hearts.
+    pub edv_interval_ml: [f64; 2],
+    /// The same about ESV.
+    pub esv_interval_ml: [f64; 2],
+    /// The same about EF; `null` if there is none.
+    pub ef_interval_percent: Option<[f64; 2]>,
     /// Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
     pub ef_of_gates_percent: Option<f64>,
     /// The gate with the largest cavity.
@@ -215,6 +221,11 @@ impl BeatReport {
             esv_ml: round(beat.end_systole.cavity_ml),
             sv_ml: round(beat.stroke_ml()),
             ef_percent: beat.ef_percent.map(round),
+            edv_interval_ml: beat.intervals.edv_ml.map(round),
+            esv_interval_ml: beat.intervals.esv_ml.map(round),
+            ef_interval_percent: beat
+                .ef_percent
+                .map(|_| beat.intervals.ef_percent.map(round)),
             ef_of_gates_percent: beat.ef_percent.map(|_| round(100.0 * of_gates)),
             end_diastole_gate: beat.end_diastole.gate + 1,
             end_systole_gate: beat.end_systole.gate + 1,
