@@ -50,9 +50,12 @@ class Service:
                 time.sleep(0.05)
         sys.exit(f"the service did not start: {open(folder + '.log').read()[-500:]}")
 
-    def memory(self, what="VmHWM"):
+    def figure(self, name):
         status = open(f"/proc/{self.process.pid}/status").read()
-        return int(re.search(what + r":\s+(\d+)", status)[1]) >> 10
+        return int(re.search(name + r":\s+(\d+)", status)[1])
+
+    def memory(self, what="VmHWM"):
+        return self.figure(what) >> 10
 
     def ask(self, method, path, body=None, headers=None, timeout=30):
         request = urllib.request.Request(self.url + path, data=body, method=method, headers=headers or {})
@@ -169,6 +172,31 @@ def zip64(service):
 def half_uploads(service):
     body = bytes((1 << 20) - 1)
     return held(service, lambda _: head("POST", "/v1/volumes", 2_000_000) + body, 900)
+
+
+# Threads of few_threads for work that blocks, and those that the service may start beside them: for jobs and signals.
+BLOCKING_THREADS, OTHER_THREADS = 4, 4
+
+
+def few_threads(service):
+    """Half uploads, of which each waits for a thread; without a bound there is one thread for each that writes."""
+    most, over = [service.figure("Threads")], threading.Event()
+    before = most[0]
+
+    def watch():
+        while not over.wait(0.002):
+            most.append(service.figure("Threads"))
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    said = held(service, lambda _: head("POST", "/v1/volumes", 2_000_000) + bytes((1 << 20) - 1), 400)
+    over.set()
+    watcher.join()
+    assert max(most) <= before + BLOCKING_THREADS + OTHER_THREADS, f"{max(most)} threads, {before} before"
+    return f"{said}, {max(most)} threads, {before} before"
+
+
+FLAGS = {few_threads: ["--blocking-threads", str(BLOCKING_THREADS)]}
 
 
 def half_json(service):
@@ -298,7 +326,7 @@ def wavelet_voxels(service, count=40, seconds=8):
     return held(service, lambda number: requests[number % 2], count, seconds)
 
 
-ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
+ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, few_threads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
 
 
 # Memory of the service: a third of the limit is left for attacks that come together.
@@ -307,7 +335,7 @@ MOST_MEBIBYTES = 640
 
 def attempt(attack, program, patience):
     with tempfile.TemporaryDirectory() as folder:
-        service = Service(program, folder + "/data", "--queue-limit", "1000")
+        service = Service(program, folder + "/data", "--queue-limit", "1000", *FLAGS.get(attack, []))
         honest = Honest(service, nifti())
         honest.start()
         said, wrong = "", []

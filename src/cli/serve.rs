@@ -18,9 +18,9 @@ use ventriform_service::work::Engine;
 /// How long the health check waits for an answer.
 const HEALTH_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Threads for work that blocks: files, decoding. tokio's 512 have stacks of 1 GiB together; where a disk is slow, as many
-/// uploads at once as threads would take them, and the service dies at its limit of memory. Work waits for a thread.
-const MAX_BLOCKING_THREADS: usize = 64;
+/// Threads for work that blocks, if the settings name no number. tokio's 512 have stacks of 1 GiB together: where a disk
+/// is slow, as many uploads at once would take them, and the service would die at its limit of memory.
+const DEFAULT_BLOCKING_THREADS: usize = 64;
 
 /// Run the HTTP service until Ctrl-C or SIGTERM
 #[derive(Debug, Args)]
@@ -69,7 +69,7 @@ pub fn run(args: &ServeArgs) -> Result<()> {
     let mut runtime = tokio::runtime::Builder::new_multi_thread();
     runtime
         .enable_all()
-        .max_blocking_threads(MAX_BLOCKING_THREADS);
+        .max_blocking_threads(settings.blocking_threads.or(DEFAULT_BLOCKING_THREADS));
     runtime.build()?.block_on(async {
         let running = server::start(settings, engine, listener).await?;
         let dicom = running.dicom_address();

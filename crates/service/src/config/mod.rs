@@ -320,6 +320,9 @@ settings! {
     /// Memory that bodies of requests and answers take together, shared out between clients: one alone has
     /// at most half of it. Requests beyond that wait for two seconds, then they are answered with status 503
     request_memory: Size = "128MiB";
+    /// Threads for work that blocks (files, decoding); more of it waits for one. `auto` is 64. Each takes up to
+    /// 2 MiB of memory
+    blocking_threads: Count = "auto";
     /// Longest time a request with `Prefer: wait` waits. It is shorter than usual proxies wait for an
     /// answer (HAProxy 50s, nginx 60s), which would answer in its place
     wait_limit: Span = "45s";
