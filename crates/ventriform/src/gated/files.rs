@@ -3,12 +3,14 @@
 use super::error::GatedError;
 use super::from_files::GatedHeart;
 use super::pictures;
+use crate::beat::SegmentMotion;
 use crate::export::dicom::Structure;
 use crate::export::{self, Format, Metadata};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
+use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Monitor, Stage};
 use crate::report::BeatReport;
 use crate::segmentation::{NamedFile, SegmentationFilesError, json_file};
@@ -16,7 +18,8 @@ use crate::volume::nifti::{self, LabelEntry};
 use std::fmt::Write as _;
 
 impl GatedHeart {
-    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, the meshes of end diastole and end systole and
+    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, polar maps (`polar.svg` and `polar.json`, also
+    /// `polar_ed`, `polar_es`, `polar_motion`, `polar_thickening` and `polar_phase`), the meshes of end diastole and end systole and
     /// of every gate in `formats`, and every gate's labels (wall 1, cavity 2) on the grid of the gates.
     ///
     /// # Errors
@@ -30,8 +33,8 @@ impl GatedHeart {
         let report = self.report();
         let mut files = vec![
             json_file("beat.json", &report),
-            text_file("curve.svg", "image/svg+xml", pictures::curve(&report)),
-            text_file("phase.svg", "image/svg+xml", pictures::phase(&report)),
+            svg_file("curve.svg", pictures::curve(&report)),
+            svg_file("phase.svg", pictures::phase(&report)),
             text_file("gates.csv", "text/csv; charset=utf-8", gates_csv(&report)),
             text_file(
                 "segments.csv",
@@ -39,6 +42,7 @@ impl GatedHeart {
                 segments_csv(&report),
             ),
         ];
+        files.extend(self.maps(monitor)?);
         let meshes = self.beat.fit.carried(&self.wall.mesh, &self.wall.wall);
         let ends = [
             ("mesh_ed".to_owned(), self.beat.end_diastole.gate),
@@ -63,6 +67,66 @@ impl GatedHeart {
         }
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
+    }
+
+    /// Polar maps as pictures and as numbers: the uptake of all gates, of end diastole and of end systole, each in per cent
+    /// of its own brightest quarter, and motion, thickening and phase.
+    fn maps(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {
+        let Some(map) = &self.segmentation.polar else {
+            return Ok(Vec::new());
+        };
+        let beat = &self.beat;
+        let at = |turns: f64| map.with_largest(&beat.counts.at(turns));
+        let mut files = Vec::new();
+        for (name, map) in [
+            ("polar", map.clone()),
+            ("polar_ed", at(beat.end_diastole.turns)),
+            ("polar_es", at(beat.end_systole.turns)),
+        ] {
+            monitor.check()?;
+            files.push(svg_file(&format!("{name}.svg"), polar::svg(&map)));
+            files.push(json_file(&format!("{name}.json"), &PolarDocument::of(&map)));
+        }
+        for figure in WallFigure::ALL {
+            monitor.check()?;
+            let figure = self.figure_map(map, figure);
+            let name = format!("polar_{}", figure.figure.as_str());
+            files.push(svg_file(&format!("{name}.svg"), polar::figure_svg(&figure)));
+            files.push(json_file(
+                &format!("{name}.json"),
+                &FigureDocument::of(&figure),
+            ));
+        }
+        Ok(files)
+    }
+
+    fn figure_map<'a>(&self, map: &'a PolarMap, figure: WallFigure) -> FigureMap<'a> {
+        let beat = &self.beat;
+        let contraction = &beat.contraction;
+        let on_wall = |ray: usize| contraction.areas[ray] > 0.0 && map.pixels[ray].is_some();
+        let of_ray = |ray: usize| match figure {
+            WallFigure::Motion => Some(contraction.motion_mm[ray]),
+            WallFigure::Thickening => Some(contraction.thickening_percent[ray]),
+            WallFigure::Phase => beat.phases.degrees[ray],
+        };
+        let of_segment = |segment: &SegmentMotion| match figure {
+            WallFigure::Motion => Some(segment.motion_mm),
+            WallFigure::Thickening => Some(segment.thickening_percent),
+            WallFigure::Phase => segment.phase_degrees,
+        };
+        FigureMap {
+            map,
+            figure,
+            values: (0..map.pixels.len())
+                .map(|ray| of_ray(ray).filter(|_| on_wall(ray)))
+                .collect(),
+            segments: std::array::from_fn(|index| {
+                let mut segments = beat.segments.iter();
+                segments
+                    .find(|segment| segment.segment == index + 1)
+                    .and_then(of_segment)
+            }),
+        }
     }
 
     /// The wall as 1 and the cavity as 2 in a gate.
@@ -104,6 +168,10 @@ impl GatedHeart {
     }
 }
 
+fn svg_file(name: &str, text: String) -> NamedFile {
+    text_file(name, "image/svg+xml", text)
+}
+
 fn text_file(name: &str, media_type: &'static str, text: String) -> NamedFile {
     NamedFile {
         name: name.to_owned(),
@@ -126,17 +194,20 @@ fn gates_csv(report: &BeatReport) -> String {
 }
 
 fn segments_csv(report: &BeatReport) -> String {
-    let mut text = String::from("segment,name,motion_mm,thickening_percent,phase_degrees\n");
+    let mut text = String::from(
+        "segment,name,motion_mm,thickening_percent,thickening_counts_percent,phase_degrees\n",
+    );
     for segment in &report.segments {
-        let phase = segment.phase_degrees.map(|phase| phase.to_string());
+        let known = |figure: Option<f64>| figure.map(|figure| figure.to_string());
         let _ = writeln!(
             text,
-            "{},\"{}\",{},{},{}",
+            "{},\"{}\",{},{},{},{}",
             segment.segment,
             segment.name,
             segment.motion_mm,
             segment.thickening_percent,
-            phase.unwrap_or_default()
+            known(segment.thickening_counts_percent).unwrap_or_default(),
+            known(segment.phase_degrees).unwrap_or_default()
         );
     }
     text

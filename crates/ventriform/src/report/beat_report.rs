@@ -122,6 +122,9 @@ pub struct SegmentMotionReport {
     pub motion_mm: f64,
     /// Thickening, end diastole to end systole.
     pub thickening_percent: f64,
+    /// The same by the counts of the wall, a second opinion: lower by what the image's filter takes; `null` where the
+    /// wall has no counts.
+    pub thickening_counts_percent: Option<f64>,
     /// Phase of the greatest thickness; `null` where the segment does not move.
     pub phase_degrees: Option<f64>,
 }
@@ -283,6 +286,7 @@ impl SegmentMotionReport {
             name: name.to_owned(),
             motion_mm: round(segment.motion_mm),
             thickening_percent: round(segment.thickening_percent),
+            thickening_counts_percent: segment.thickening_counts_percent.map(round),
             phase_degrees: segment.phase_degrees.map(round),
         }
     }
