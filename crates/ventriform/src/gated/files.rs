@@ -4,23 +4,31 @@ use super::error::GatedError;
 use super::from_files::GatedHeart;
 use super::pictures;
 use crate::beat::SegmentMotion;
-use crate::export::dicom::Structure;
+use crate::export::animated::{self, Cycle};
+use crate::export::dicom::{
+    BeatObject, DicomBeat, DicomError, DicomObject, EndResults, Moment, SourceScan, Structure,
+};
 use crate::export::{self, Format, Metadata};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
 use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
-use crate::progress::{Monitor, Stage};
-use crate::report::BeatReport;
-use crate::segmentation::{NamedFile, SegmentationFilesError, json_file};
+use crate::progress::{Cancelled, Monitor, Stage};
+use crate::report::{self, BeatReport};
+use crate::segmentation::{NamedFile, SegmentationFilesError, json_file, json_line};
+use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
+use serde_json::json;
 use std::fmt::Write as _;
+
+/// Length of the animation's cycle where the R-R interval is not known, s.
+const UNKNOWN_CYCLE_S: f64 = 1.0;
 
 impl GatedHeart {
     /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, polar maps (`polar.svg` and `polar.json`, also
     /// `polar_ed`, `polar_es`, `polar_motion`, `polar_thickening` and `polar_phase`), the meshes of end diastole and end systole and
-    /// of every gate in `formats`, and every gate's labels (wall 1, cavity 2) on the grid of the gates.
+    /// of every gate in `formats`, `mesh.glb` (the beat as an animation), and every gate's labels (wall 1, cavity 2) on the grid of the gates.
     ///
     /// # Errors
     /// [`SegmentationFilesError`].
@@ -43,16 +51,20 @@ impl GatedHeart {
             ),
         ];
         files.extend(self.maps(monitor)?);
-        let meshes = self.beat.fit.carried(&self.wall.mesh, &self.wall.wall);
+        let meshes = self.meshes();
         let ends = [
             ("mesh_ed".to_owned(), self.beat.end_diastole.gate),
             ("mesh_es".to_owned(), self.beat.end_systole.gate),
         ];
         let gates = (0..meshes.len()).map(|gate| (format!("mesh_gate{:02}", gate + 1), gate));
+        let known = self.metadata(&report, monitor)?;
         for (name, gate) in ends.into_iter().chain(gates) {
             for format in formats {
                 monitor.check()?;
-                let metadata = Metadata::new(format!("Left ventricle, gate {}", gate + 1));
+                let metadata = Metadata {
+                    title: format!("Left ventricle, gate {}", gate + 1),
+                    ..known.clone()
+                };
                 files.push(NamedFile {
                     name: format!("{name}.{}", format.extension()),
                     media_type: format.media_type(),
@@ -60,6 +72,16 @@ impl GatedHeart {
                 });
             }
         }
+        let cycle = Cycle {
+            meshes: &meshes,
+            rest: self.beat.end_diastole.gate,
+            seconds: self.rr_ms.map_or(UNKNOWN_CYCLE_S, |ms| ms / 1000.0),
+        };
+        files.push(NamedFile {
+            name: "mesh.glb".into(),
+            media_type: Format::Glb.media_type(),
+            bytes: animated::encode(&cycle, &known)?,
+        });
         for (gate, mesh) in meshes.iter().enumerate() {
             let done = gate as f64 / meshes.len() as f64;
             monitor.report(Stage::Export, done)?;
@@ -129,6 +151,82 @@ impl GatedHeart {
         }
     }
 
+    /// The wall of every gate, in the mean over its width, LPS mm.
+    fn meshes(&self) -> Vec<TriMesh> {
+        self.beat.fit.carried(&self.wall.mesh, &self.wall.wall)
+    }
+
+    /// What is known of the meshes: parts and uptake are those of the gates' sum, whose nodes they have.
+    fn metadata(&self, report: &BeatReport, monitor: &Monitor<'_>) -> Result<Metadata, Cancelled> {
+        let scan = self.reading.provenance();
+        let figures = json!({
+            "edv_ml": report.edv_ml, "esv_ml": report.esv_ml, "ef_percent": report.ef_percent,
+        });
+        Ok(Metadata {
+            frame_of_reference_uid: scan.and_then(|scan| scan.frame_of_reference_uid.clone()),
+            quality: report::object(&figures),
+            parts: self.segmentation.parts(&self.wall.mesh, monitor)?,
+            field: self.segmentation.uptake(&self.wall.mesh),
+            ..Metadata::new("Left ventricle")
+        })
+    }
+
+    /// End diastole and end systole as scans with the given identity, each with the images or frames of its gate.
+    pub fn scans(&self, identity: &Provenance, made: &Moment) -> [SourceScan; 2] {
+        let placed = self.reading.facts.affine_source.is_placed();
+        [&self.beat.end_diastole, &self.beat.end_systole].map(|end| {
+            let volume = &self.reading.gates[end.gate];
+            let known = match self.reading.scans.get(end.gate) {
+                Some(own) => Provenance {
+                    series_uid: own.series_uid.clone(),
+                    sop_class_uid: own.sop_class_uid.clone(),
+                    sop_instance_uid: own.sop_instance_uid.clone(),
+                    instance_uids: own.instance_uids.clone(),
+                    slice_frames: own.slice_frames.clone(),
+                    ..identity.clone()
+                },
+                None => identity.clone(),
+            };
+            let frame = volume.frame.clone();
+            SourceScan::new(known, frame, volume.shape, placed, made.clone())
+        })
+    }
+
+    /// Segmentations of both ends and the figures as DICOM objects of `scans`, those of end diastole and end systole
+    /// (see [`GatedHeart::scans`]).
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn dicom_files(&self, scans: &[SourceScan; 2]) -> Result<Vec<NamedFile>, DicomError> {
+        let ends = [self.beat.end_diastole.gate, self.beat.end_systole.gate];
+        let meshes = self.meshes();
+        // A silent monitor is never cancelled.
+        let masks = ends.map(|gate| self.masks(gate, &meshes[gate], &Monitor::silent()));
+        let masks = masks.map(|masks| {
+            let empty = || Mask::empty(self.reading.gates[0].shape);
+            masks.unwrap_or_else(|Cancelled| [empty(), empty()])
+        });
+        let report = self.report();
+        let text = json_line(&report);
+        let end = |end: usize| EndResults {
+            scan: &scans[end],
+            wall: &masks[end][0],
+            cavity: &masks[end][1],
+            mesh: &meshes[ends[end]],
+        };
+        let results = DicomBeat::new(self.structure(), [end(0), end(1)], &report, &text);
+        BeatObject::ALL
+            .into_iter()
+            .map(|object| {
+                Ok(NamedFile {
+                    name: object.file_name().into(),
+                    media_type: DicomObject::MEDIA_TYPE,
+                    bytes: results.write(object)?,
+                })
+            })
+            .collect()
+    }
+
     /// The wall as 1 and the cavity as 2 in a gate.
     fn labels(
         &self,
@@ -137,12 +235,11 @@ impl GatedHeart {
         monitor: &Monitor<'_>,
     ) -> Result<NamedFile, SegmentationFilesError> {
         let volume = &self.reading.gates[gate];
-        let wall = voxelise(mesh, volume.shape, &volume.frame);
-        let cavity = self.cavity(mesh, &wall, gate, monitor)?;
+        let [wall, cavity] = self.masks(gate, mesh, monitor)?;
         let labels: Vec<u8> = (wall.voxels.iter().zip(&cavity.voxels))
             .map(|(wall, cavity)| if *wall { 1 } else { 2 * u8::from(*cavity) })
             .collect();
-        let segments = Structure::of(self.parameters.organ.as_str()).segments(true);
+        let segments = self.structure().segments(true);
         let entries: Vec<LabelEntry> = segments.iter().map(|segment| segment.entry).collect();
         let stated = self.reading.stated_grid.as_ref();
         let grid = (volume.shape, &volume.frame);
@@ -151,20 +248,37 @@ impl GatedHeart {
         SegmentationFilesError::nifti(name, bytes)
     }
 
+    fn structure(&self) -> Structure {
+        Structure::of(self.parameters.organ.as_str())
+    }
+
+    /// Wall and cavity of a gate on the grid of the gates.
+    fn masks(
+        &self,
+        gate: usize,
+        mesh: &TriMesh,
+        monitor: &Monitor<'_>,
+    ) -> Result<[Mask; 2], Cancelled> {
+        let volume = &self.reading.gates[gate];
+        let wall = voxelise(mesh, volume.shape, &volume.frame);
+        let cavity = self.cavity(mesh, &wall, gate, monitor)?;
+        Ok([wall, cavity])
+    }
+
     fn cavity(
         &self,
         mesh: &TriMesh,
         wall: &Mask,
         gate: usize,
         monitor: &Monitor<'_>,
-    ) -> Result<Mask, SegmentationFilesError> {
+    ) -> Result<Mask, Cancelled> {
         let model = &self.segmentation.fit.model;
         let (Some(cup), Some(orientation)) = (&model.cup, &model.patient_orientation) else {
             return Ok(Mask::empty(wall.shape));
         };
         let cup: &Cup = cup;
         let seen = VentricleWall::new(mesh, cup, &orientation.superior, monitor)?;
-        Ok(seen.cavity(wall, &self.reading.gates[gate].frame, monitor)?)
+        seen.cavity(wall, &self.reading.gates[gate].frame, monitor)
     }
 }
 

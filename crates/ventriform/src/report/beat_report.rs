@@ -5,7 +5,7 @@
 use super::fit_report::LongAxis;
 use super::input::FileFacts;
 use super::json_number::round;
-use super::segmentation_report::{RaisedFlag, Resolution};
+use super::segmentation_report::{RaisedFlag, Resolution, SegmentationReport};
 use crate::beat::phase::HISTOGRAM_BINS;
 use crate::beat::{Beat, Extreme, SegmentMotion};
 use crate::volume::GateTiming;
@@ -44,6 +44,8 @@ pub struct BeatReport {
     pub no_rates: Option<String>,
     /// Muscle of the wall in the mean of the beat.
     pub wall_ml: f64,
+    /// Its mass, grams, at the density of muscle, 1.05 g/ml.
+    pub mass_g: f64,
     /// Its greatest change over the beat, per cent.
     pub wall_swing_percent: f64,
     /// The wall's segments (AHA).
@@ -244,6 +246,7 @@ impl BeatReport {
             }),
             no_rates: beat.rates.as_ref().err().cloned(),
             wall_ml: round(mean),
+            mass_g: round(SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean),
             wall_swing_percent: round(100.0 * swing / mean),
             segments: (beat.segments.iter())
                 .map(|segment| SegmentMotionReport::of(segment, &names[segment.segment - 1]))
