@@ -66,7 +66,7 @@ pub struct BeatReport {
     pub confidence: f64,
     /// Steps of the joint fit.
     pub steps: usize,
-    /// Reasons to look closer: of the fit to the gates' sum, then of the beat.
+    /// Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat.
     pub flags: Vec<RaisedFlag>,
     /// Every parameter, defaults written out.
     pub parameters: Map<String, Value>,
@@ -186,7 +186,7 @@ pub struct BeatParts {
     pub template: String,
     /// Confidence of that fit.
     pub confidence: f64,
-    /// Flags of that fit.
+    /// Flags of that fit, and of what the file says of the beats.
     pub flags: Vec<RaisedFlag>,
     /// Every parameter.
     pub parameters: Map<String, Value>,
