@@ -248,7 +248,7 @@ const BEAT_FIGURES: &[Figure<BeatReport>] = &[
     figure(
         |r| Some(r.rates.as_ref()?.time_to_peak_filling_ms),
         own(
-            "TIME-TO-PEAK-FILLING",
+            "PEAK-FILLING-MS",
             "Time from end systole to the peak filling rate",
         ),
         MILLISECOND,
@@ -298,7 +298,7 @@ const SEGMENT_FIGURES: &[Figure<SegmentMotionReport>] = &[
     ),
     figure(
         |s| s.thickening_counts_percent,
-        own("THICKENING-COUNTS", "Thickening by counts"),
+        own("THICKENING-COUNT", "Thickening by counts"),
         PERCENT,
     ),
     figure(
