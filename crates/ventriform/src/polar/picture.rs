@@ -27,10 +27,6 @@ const BRIGHT_SHARE: f64 = 0.62;
 struct Palette {
     /// Dark to bright, equal steps of lightness (a polyline through matplotlib's `inferno`).
     colours: [[f64; 3]; 6],
-    /// A wall that moves outward, or gets thinner.
-    outward: Rgb,
-    /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has them).
-    cycle: [[f64; 3]; 12],
     /// Outside of the wall.
     no_wall: Rgb,
     /// The line about the wall below the threshold.
@@ -40,6 +36,20 @@ struct Palette {
 static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
     serde_json::from_str(include_str!("../../assets/uptake.json"))
         .expect("the file holds what `Palette` names")
+});
+
+/// The colours of other figures than uptake, beside those of [`Palette`].
+#[derive(Deserialize)]
+struct FigurePalette {
+    /// A wall that moves outward, or gets thinner.
+    outward: Rgb,
+    /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has them).
+    cycle: [[f64; 3]; 12],
+}
+
+static FIGURE_PALETTE: LazyLock<FigurePalette> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../assets/figures.json"))
+        .expect("the file holds what `FigurePalette` names")
 });
 
 const BORDER_COLOUR: Rgb = [200; 3];
@@ -70,7 +80,7 @@ pub fn figure_svg(figure: &FigureMap<'_>) -> String {
     let what = figure.figure;
     let colour_at = |value: f64| match what {
         WallFigure::Phase => cycle_colour(value / 360.0),
-        _ if value < 0.0 => PALETTE.outward,
+        _ if value < 0.0 => FIGURE_PALETTE.outward,
         _ => colour(value / what.range()[1]),
     };
     let shade = |row: usize, column: usize| {
@@ -209,7 +219,7 @@ fn colour(share: f64) -> Rgb {
 
 /// The colour of a place of the cycle, 0..1.
 fn cycle_colour(turns: f64) -> Rgb {
-    let colours = &PALETTE.cycle;
+    let colours = &FIGURE_PALETTE.cycle;
     let at = turns.rem_euclid(1.0) * colours.len() as f64;
     let step = (at as usize).min(colours.len() - 1);
     between(

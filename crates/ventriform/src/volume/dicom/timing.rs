@@ -11,8 +11,8 @@ use super::attributes::{
     FRAME_INTERVALS_ACQUIRED, FRAME_INTERVALS_REJECTED, FRAME_LOW_RR, FRAME_RR_NOMINAL, FRAME_TIME,
     FRAME_TRIGGER_DELAY, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
     GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, HEART_RATE, HIGH_RR_VALUE,
-    INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL, SERIES_TYPE,
-    TIME_SLOT_VECTOR, TIME_SLOTS,
+    INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL,
+    OLD_TRIGGER_TIME, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
 };
 
 /// Milliseconds of a minute.
@@ -83,13 +83,19 @@ pub(super) fn is_of_gates(a: &Attributes) -> bool {
 /// Whether the `frames` of an Enhanced image of uptake show several moments of the beat.
 pub(super) fn has_gates(a: &Attributes, frames: usize) -> bool {
     let uptake = matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT"));
-    let moments = [FRAME_TRIGGER_DELAY, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE];
-    let differ = |attribute: &Attribute| {
-        let mut values = (0..frames).map(|frame| a.double(*attribute, Some(frame)));
-        let first = values.next().flatten();
-        first.is_some() && values.any(|value| value.is_some() && value != first)
+    let differ = |value: &dyn Fn(usize) -> Option<f64>| {
+        let first = value(0);
+        first.is_some() && (1..frames).any(|frame| value(frame).is_some_and(|v| Some(v) != first))
     };
-    uptake && moments.iter().any(differ)
+    let moments = [FRAME_TRIGGER_DELAY, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE];
+    let of_groups =
+        || (moments.iter()).any(|moment| differ(&|frame| a.double(*moment, Some(frame))));
+    // Images that were made of single ones keep their Trigger Time.
+    let of_old = |frame| {
+        let time = a.decimals_of::<1>(OLD_TRIGGER_TIME, Some(frame));
+        time.ok().flatten().map(|[ms]| ms)
+    };
+    uptake && (of_groups() || differ(&of_old))
 }
 
 fn number(

@@ -667,32 +667,40 @@ fn a_series_of_gated_pet_is_read_gate_by_gate() {
     }
 }
 
-/// Frames of an Enhanced PET image in two gates of two slices, each as `told` says.
+/// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was made
+/// of single ones, their Trigger Time.
 #[test]
 fn an_enhanced_image_of_several_moments_of_the_beat_is_gated() {
-    let said = |tag: (u16, u16), value: f64| {
-        let mut cardiac = item(tag, "FD", Double(value));
-        cardiac.extend([
-            ((0x18, 0x1081), ("IS", Text("700"))),
-            ((0x18, 0x1082), ("IS", Text("1100"))),
-            ((0x18, 0x1083), ("IS", Text("90"))),
-            ((0x18, 0x1084), ("IS", Text("10"))),
-            ((0x20, 0x9251), ("FD", Double(880.0))),
-        ]);
-        group((0x18, 0x9118), cardiac)
-    };
     let of = |tag: (u16, u16), modality: &'static str| {
+        let said = |moment: usize| match tag {
+            (0x18, 0x1060) => {
+                let time = ["50", "0"][moment];
+                vec![group((0x20, 0x9171), item(tag, "DS", Text(time)))]
+            }
+            _ => {
+                let mut cardiac = item(tag, "FD", Double([50.0, 0.0][moment]));
+                cardiac.extend([
+                    ((0x18, 0x1081), ("IS", Text("700"))),
+                    ((0x18, 0x1083), ("IS", Text("90"))),
+                    ((0x18, 0x1084), ("IS", Text("10"))),
+                    ((0x20, 0x9251), ("FD", Double(880.0))),
+                ]);
+                vec![group((0x18, 0x9118), cardiac)]
+            }
+        };
         let frame = |n: usize| {
             let height = ["1\\2\\0", "1\\2\\3"][n % 2];
-            BTreeMap::from([
+            let mut frame = BTreeMap::from([
                 group((0x20, 0x9113), item((0x20, 0x32), "DS", Text(height))),
                 group((0x28, 0x9145), item((0x28, 0x1053), "DS", Text("1"))),
-                // The later gate is stored first.
-                said(tag, [50.0, 0.0][n / 2]),
-            ])
+            ]);
+            // The later gate is stored first.
+            frame.extend(said(n / 2));
+            frame
         };
         let mut elements = enhanced();
-        elements.insert((0x5200, 0x9230), ("SQ", Items((0..4).map(frame).collect())));
+        let frames = (0..4).map(frame).collect();
+        elements.insert((0x5200, 0x9230), ("SQ", Items(frames)));
         elements.insert((0x08, 0x60), ("CS", Text(modality)));
         let files = [VolumeFile::in_memory(
             "test",
@@ -700,14 +708,21 @@ fn an_enhanced_image_of_several_moments_of_the_beat_is_gated() {
         )];
         crate::volume::read_gates(&files, false, &ReadLimits::default(), &Monitor::silent())
     };
-    for tag in [(0x20, 0x9153), (0x20, 0x9252), (0x20, 0x9241)] {
+    for tag in [
+        (0x20, 0x9153),
+        (0x20, 0x9252),
+        (0x20, 0x9241),
+        (0x18, 0x1060),
+    ] {
         let reading = of(tag, "PT").unwrap();
         let first = |gate: usize| reading.gates[gate].voxels[0];
         assert_eq!([first(0), first(1)], [12.0, 0.0]);
         assert_eq!(reading.scans[1].slice_frames, [1, 2]);
-        assert_eq!(reading.timing.rr_ms, Some(880.0));
-        assert_eq!(reading.timing.low_rr_ms, Some(700.0));
-        assert_eq!(reading.timing.rejected_share(), Some(0.1));
+        if tag != (0x18, 0x1060) {
+            assert_eq!(reading.timing.rr_ms, Some(880.0));
+            assert_eq!(reading.timing.low_rr_ms, Some(700.0));
+            assert_eq!(reading.timing.rejected_share(), Some(0.1));
+        }
         // A film of a heart is no image of uptake.
         let film = of(tag, "MR").unwrap_err();
         assert!(matches!(film, VolumeError::FrameNeeded { .. }), "{film}");
