@@ -2,9 +2,9 @@
 
 usage: gated_phantom.py FOLDER OUT.nii.gz [GATES]
 
-FOLDER holds spect.nii.gz and lv_truth.nii.gz of `ventriform phantom`. Writes a 4-D NIfTI file of 8 gates (or GATES),
-whose distance of volumes says that they are moments of one beat. End systole lies at three eighths of the cycle, where every length about the heart
-is a tenth shorter: a beat for checks of files, not of figures.
+FOLDER holds spect.nii.gz and lv_truth.nii.gz of `ventriform phantom`. Writes a 4-D NIfTI file of 8 gates (or GATES). End
+systole lies at three eighths of the cycle, where every length about the heart is a tenth shorter and the counts are the
+same: a beat for checks of files, not of figures.
 """
 import sys
 
@@ -23,7 +23,7 @@ def zoomed(voxels, centre, scale):
         at = np.clip(middle + (np.arange(count) - middle) / scale, 0, count - 1)
         weights = np.clip(1 - np.abs(at[:, None] - np.arange(count)), 0, None)
         voxels = np.moveaxis(np.tensordot(weights, voxels, (1, axis)), 0, axis)
-    return voxels
+    return voxels / scale**3
 
 
 def beat(folder, gates=8):

@@ -3,7 +3,7 @@
 //! In: the gates, scaled to equal counts, and the fitted wall. Out: for every ray of the wall the largest count on the way
 //! through it, as a periodic function of time. A wall thinner than the image's resolution looks the brighter the
 //! thicker it is (Galt, Garcia, Robbins, IEEE Transactions on Medical Imaging 9, 1990), so the change of the counts is
-//! that of the thickness, as far as the image's filter lets it through: on simulated studies 0.6 of it.
+//! that of the thickness, as far as the image's filter lets it through: on simulated studies about half of it.
 //!
 //! 1. Each gate is blurred a little, because the largest of many noisy values is too large.
 //! 2. The largest value is taken within [`REACH_MM`] of the middle of the wall, where the fit has it in that gate.

@@ -588,10 +588,7 @@ fn archives_cost_no_more_than_they_hold() {
 }
 
 /// A series of gated PET: for each of `gates` two slices, told apart by `told`.
-fn gated_pet(
-    gates: usize,
-    told: fn(usize, usize) -> Vec<((u16, u16), (&'static str, Value))>,
-) -> Vec<Elements> {
+fn gated_pet(gates: usize, told: fn(usize, usize) -> Elements) -> Vec<Elements> {
     let slice = |gate: usize, slice: usize| {
         let mut elements = ct("0", (100 * gate + 10 * slice) as u16);
         elements.extend([
@@ -624,14 +621,14 @@ fn gated_pet(
 /// beat whatever the order of the files.
 #[test]
 fn a_series_of_gated_pet_is_read_gate_by_gate() {
-    type Said = fn(usize, usize) -> Vec<((u16, u16), (&'static str, Value))>;
+    type Said = fn(usize, usize) -> Elements;
     let by_trigger: Said = |gate, _| {
         let ms = 112.5 * gate as f64;
-        vec![((0x18, 0x1060), ("DS", written(ms)))]
+        item((0x18, 0x1060), "DS", written(ms))
     };
     let by_index: Said = |gate, slice| {
         let index = (2 * gate + slice + 1) as u16;
-        vec![((0x54, 0x1330), ("US", Shorts(vec![index])))]
+        item((0x54, 0x1330), "US", Shorts(vec![index]))
     };
     for told in [by_trigger, by_index] {
         let mut slices = gated_pet(8, told);
