@@ -12,7 +12,7 @@ use super::attributes::{
     FRAME_TRIGGER_DELAY, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
     GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, HEART_RATE, HIGH_RR_VALUE,
     INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL,
-    OLD_TRIGGER_TIME, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
+    OLD_TRIGGER_TIME, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
 };
 
 /// Milliseconds of a minute.
@@ -41,6 +41,9 @@ pub(super) fn of(a: &Attributes) -> Result<GateTiming, VolumeError> {
 /// # Errors
 /// As for [`of`].
 pub(super) fn of_slice(a: &Attributes) -> Result<GateTiming, VolumeError> {
+    let first = |attribute| a.shorts(attribute).first().copied().map(usize::from);
+    let slots = first(TIME_SLOTS);
+    let several = first(RR_INTERVALS).is_some_and(|intervals| intervals > 1);
     let of_rate = duration(a, HEART_RATE, None)?.map(|rate| MINUTE_MS / rate);
     Ok(GateTiming {
         frame_time_ms: duration(a, FRAME_TIME, None)?,
@@ -49,7 +52,7 @@ pub(super) fn of_slice(a: &Attributes) -> Result<GateTiming, VolumeError> {
         high_rr_ms: duration(a, HIGH_RR_VALUE, None)?,
         beats_accepted: number(a, INTERVALS_ACQUIRED, None)?,
         beats_rejected: number(a, INTERVALS_REJECTED, None)?,
-        gates_per_interval: a.shorts(TIME_SLOTS).first().copied().map(usize::from),
+        gates_per_interval: several.then_some(slots).flatten(),
     })
 }
 
