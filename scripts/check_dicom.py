@@ -12,6 +12,8 @@ C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the sam
 - mesh.dcm: every vertex of the STL within 0.01 mm, also of the glTF's; surface.dcm: points and triangles;
 - measurements.dcm, read by highdicom and by dcmqi: the volumes of report.json, each of wall, cavity, and the apparent
   and anatomical ones in a group whose site and method say which it is;
+- of a beat of 16 gates: mask_ed.dcm and mask_es.dcm, as mask.dcm, whose frames refer to the frames of their own gate;
+  measurements.dcm, read by highdicom and by dcmqi: the figures of beat.json;
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
@@ -24,6 +26,7 @@ import sys
 from pathlib import Path
 
 import highdicom
+import gated_phantom
 import nibabel
 import numpy as np
 import pydicom
@@ -38,7 +41,8 @@ NAMES = ["mask", "contours", "mesh", "surface", "measurements", "polar", "page"]
 
 
 def nm(path, voxels, affine, number, gates=1):
-    """A reconstructed NM image of voxels[i, j, k]; `affine` maps indices to LPS mm and has right angles."""
+    """A reconstructed NM image of voxels[i, j, k], the same in all gates, or voxels[i, j, k, gate]; `affine` maps indices
+    to LPS mm and has right angles."""
     steps = affine[:3, :3]
     spacing = np.linalg.norm(steps, axis=0)
     rows, columns = steps[:, 0] / spacing[0], steps[:, 1] / spacing[1]
@@ -72,13 +76,21 @@ def nm(path, voxels, affine, number, gates=1):
         data.FrameIncrementPointer = [0x00540060, 0x00540070, 0x00540080]
         data.RRIntervalVector = [1] * len(order)
         data.TimeSlotVector = [int(f) // slices + 1 for f in order]
+        beats, gating = Dataset(), Dataset()
+        beats.FrameTime = f"{gated_phantom.RR_MS / gates:.6g}"
+        beats.NominalInterval, beats.LowRRValue, beats.HighRRValue = gated_phantom.RR_MS, 800, 1000
+        beats.IntervalsAcquired, beats.IntervalsRejected = 400, 20
+        gating.DataInformationSequence = [beats]
+        data.GatedInformationSequence = [gating]
     else:
         data.FrameIncrementPointer = 0x00540080
     detector = Dataset()
     detector.ImageOrientationPatient = [float(f"{x:.10f}") for x in (*rows, *columns)]
     detector.ImagePositionPatient = [float(f"{x:.6f}") for x in affine[:3, 3]]
     data.DetectorInformationSequence = [detector]
-    frames = np.concatenate([voxels.transpose(2, 1, 0)] * gates)[order]
+    if voxels.ndim == 3:
+        voxels = np.stack([voxels] * gates, 3)
+    frames = voxels.transpose(3, 2, 1, 0).reshape(-1, *voxels.shape[1::-1])[order]
     data.PixelData = frames.astype("<u2").tobytes()
     data["PixelData"].VR = "OW"
     meta = FileMetaDataset()
@@ -273,6 +285,56 @@ def check_measurements(out, report, seg):
             assert other["measurementMethod"]["CodeValue"] == method, other
 
 
+def check_beat(program, folder):
+    """The objects of a beat, beside beat.json and the labels of its gates."""
+    here = folder / "beat"
+    here.mkdir()
+    voxels, affine = gated_phantom.beat(folder / "phantom", gates=16)
+    affine = LPS @ affine
+    nm(here / "nm.dcm", voxels, affine, 99, gates=16)
+    out = here / "out"
+    subprocess.run([program, "beat", here / "nm.dcm", "-o", out, "--dicom"], check=True, capture_output=True)
+    report = json.loads((out / "beat.json").read_text())
+    source = pydicom.dcmread(here / "nm.dcm")
+    for name, gate in ("ed", report["end_diastole_gate"]), ("es", report["end_systole_gate"]):
+        check_object(pydicom.dcmread(out / f"mask_{name}.dcm"))
+        seg = highdicom.seg.segread(out / f"mask_{name}.dcm")
+        labels = np.asarray(nibabel.load(out / f"labels_gate{gate:02}.nii.gz").dataobj)
+        volume = seg.get_volume(combine_segments=True)
+        for label in 1, 2:
+            assert same_voxels(volume.array == label, volume.affine, labels == label, affine), name
+        own = {n + 1 for n, slot in enumerate(source.TimeSlotVector) if slot == gate}
+        named = {frame.DerivationImageSequence[0].SourceImageSequence[0].ReferencedFrameNumber
+                 for frame in seg.PerFrameFunctionalGroupsSequence}
+        assert named == own, (name, named, own)
+    check_object(pydicom.dcmread(out / "measurements.dcm"))
+    wanted = {"8821-1": report["edv_ml"], "8823-7": report["esv_ml"], "90096001": report["sv_ml"],
+              "70822001": report["ef_percent"], "122447": report["mass_g"],
+              "122616": report["rates"]["peak_ejection_edv_per_s"],
+              "122618": report["rates"]["peak_filling_edv_per_s"], "PHASE-SD": report["phase"]["sd_degrees"],
+              "PHASE-BANDWIDTH": report["phase"]["bandwidth_degrees"]}
+    sr = highdicom.sr.srread(out / "measurements.dcm")
+    groups = sr.content.get_image_measurement_groups()
+    ends = {g.tracking_identifier.split(", ")[-1]: {c.value.value for c in g[0].ContentSequence
+            if c.name.value == "246092007"} for g in groups if ", " in g.tracking_identifier}
+    assert ends == {"end diastole": {"416190007"}, "end systole": {"416430001"}}, ends
+    assert len(groups) == 3 + len(report["segments"]), len(groups)
+    found = {m.name.value: float(m.value) for g in groups[:3] for m in g.get_measurements()}
+    program = Path(sys.executable).parent / "tid1500reader"
+    read = out / "measurements.json"
+    subprocess.run([program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read],
+                   check=True, capture_output=True)
+    named = json.loads(read.read_text())["Measurements"]
+    other = {m["quantity"]["CodeValue"]: float(m["value"]) for g in named[:3] for m in g["measurementItems"]}
+    for code, value in wanted.items():
+        assert np.isclose(found[code], value) and np.isclose(other[code], value), (code, found, other, value)
+    for group, segment in zip(groups[3:], report["segments"]):
+        found = {m.name.value: float(m.value) for m in group.get_measurements()}
+        assert np.isclose(found["59092-7"], segment["thickening_percent"]), segment
+        assert np.isclose(found["60797005"], segment["motion_mm"]), segment
+    print(f"beat: EF {report['ef_percent']} %, 3 objects as they must be")
+
+
 def check_object(data):
     assert not any(e.tag.is_private for e in data.iterall()), data.SOPClassUID.name
     check_attributes(data)
@@ -316,6 +378,7 @@ def main():
             check_object(data)
         check_results(out, mask, affine)
         print(f"{name}: {mask.sum()} voxels, 7 objects as they must be")
+    check_beat(program, folder)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Checks the DICOM objects of `ventriform segment --dicom` by other programs.
+# Checks the DICOM objects of `ventriform segment --dicom` and `ventriform beat --dicom` by other programs.
 #
 #   scripts/check_dicom.sh                    four ways to store the scan, about a minute
 #   scripts/check_dicom.sh --orientations     all 48 orders and directions of the axes
 #
 # scripts/check_dicom.py writes NM files of one simulated scan (both signs of Spacing Between Slices, oblique,
-# gated), segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy (dicom3tools) checks
+# gated) and of one simulated beat, segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy (dicom3tools) checks
 # every object, dcmdump (dcmtk) reads it. scripts/check_names.py compares every character set with pydicom. Exits with 1 if anything is wrong.
 #
 # PYTHON: an interpreter that has numpy, nibabel, pydicom, highdicom and dcmqi. Without it the script installs

@@ -1,5 +1,6 @@
 //! `ventriform beat`: one model in motion of a gated study.
 
+use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
 use super::output::note;
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
@@ -21,8 +22,10 @@ use ventriform_service::work::problems::Explain;
   ventriform beat gated.dcm -o out --mass-g 130
   ventriform beat gate1.nii.gz gate2.nii.gz ... gate8.nii.gz -o out --rr-ms 850
 Writes beat.json (EDV, ESV, EF, curve, motion, thickening and phase of each segment, flags), curve.svg, phase.svg, gates.csv,
-segments.csv, mesh_ed.glb and mesh_es.glb (end diastole and end systole), mesh_gate01.glb, ... (or the formats given by
---format; all have the same nodes and triangles) and labels_gate01.nii.gz, ... (wall 1, cavity 2).
+segments.csv, polar maps (polar.svg and polar.json: uptake of all gates; polar_ed, polar_es, polar_motion, polar_thickening,
+polar_phase), mesh.glb (the beat as an animation), mesh_ed.glb and mesh_es.glb (end diastole and end systole),
+mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes and triangles) and labels_gate01.nii.gz, ...
+(wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {
     /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in their order
@@ -55,6 +58,8 @@ pub struct BeatArgs {
     #[command(flatten)]
     fit: FitArgs,
     #[command(flatten)]
+    dicom: DicomArgs,
+    #[command(flatten)]
     limits: LimitArgs,
 }
 
@@ -86,6 +91,7 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
     let limits = args.limits.limits()?;
     let gates = volume_files(&args.input, &limits)?;
+    let dicom = args.dicom.order_of_gates(&gates, &limits)?;
     let stated = MeshStatement::default();
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
     let order = GatedOrder {
@@ -110,7 +116,11 @@ pub fn run(args: &BeatArgs) -> Result<()> {
         .map_err(|error| anyhow!(error.with_advice()))
         .and_then(|made| Ok((made.files(&args.formats, &monitor)?, made)));
     bar.finish();
-    let (files, made) = made?;
+    let (mut files, made) = made?;
+    if let Some(order) = dicom {
+        let objects = made.dicom_files(&order.of_beat(&made));
+        files.extend(objects.map_err(|error| anyhow!(error.with_advice()))?);
+    }
     write_all(&args.output, &files)?;
     note!("{}", headline(&made));
     let report = made.report();

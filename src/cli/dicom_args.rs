@@ -7,6 +7,7 @@ use time::{OffsetDateTime, UtcOffset};
 use ventriform::export::dicom::{
     Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
 };
+use ventriform::gated::GatedHeart;
 use ventriform::progress::Monitor;
 use ventriform::segmentation::SegmentedVolume;
 use ventriform::volume::Provenance;
@@ -120,6 +121,23 @@ impl DicomArgs {
         }))
     }
 
+    /// As [`DicomArgs::order`], of the gates of one beat: one file with all, or one for each.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn order_of_gates(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<DicomOrder>> {
+        // Files of one gate each are not one volume; whose scan they are says the first.
+        let one = || self.order(&files[..files.len().min(1)], Some(0), limits);
+        match self.order(files, Some(0), limits) {
+            Err(error) if files.len() > 1 => one().map_err(|_| error),
+            order => order,
+        }
+    }
+
     /// Whose scan the report names: what `files` say, completed by the flags; nobody with
     /// `--deidentify`.
     ///
@@ -182,8 +200,19 @@ impl DicomOrder {
     /// The scan that the objects of `made` belong to.
     pub(super) fn of(self, made: &SegmentedVolume) -> SourceScan {
         let scan = made.scan(self.identity, self.made);
-        match self.deidentify {
-            Some((how, stated)) => scan.deidentified(&how, &stated),
+        Self::anonymous(scan, self.deidentify.as_ref())
+    }
+
+    /// End diastole and end systole as the scans that the objects of `made` belong to.
+    pub(super) fn of_beat(self, made: &GatedHeart) -> [SourceScan; 2] {
+        let scans = made.scans(&self.identity, &self.made);
+        scans.map(|scan| Self::anonymous(scan, self.deidentify.as_ref()))
+    }
+
+    /// The scan, without the patient's identity if that is asked for.
+    fn anonymous(scan: SourceScan, how: Option<&(Deidentification, StatedIdentity)>) -> SourceScan {
+        match how {
+            Some((how, stated)) => scan.deidentified(how, stated),
             None => scan,
         }
     }

@@ -7,7 +7,7 @@
 //! Every folder holds gated.nii.gz and params.json, as the simulator of gated hearts writes them: "result" with edv_ml,
 //! esv_ml, ef, and segments with motion_mm, thickening_percent and contraction (below .25: akinetic). Prints a row for
 //! each study, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and deviation of
-//! motion and thickening over all segments, and how well thickening finds the akinetic ones. PRIOR names a field of
+//! motion and thickening (also by counts) over all segments, and how well thickening finds the akinetic ones. PRIOR names a field of
 //! [`Priors`], or `resolution_more_mm`.
 
 use anyhow::{Context, Result, anyhow, bail};
@@ -112,6 +112,8 @@ struct Table {
     esv: Pairs,
     motion: Pairs,
     thickening: Pairs,
+    /// Thickening by counts.
+    counts: Pairs,
     /// Thickening and whether the segment is akinetic.
     akinetic: Vec<(f64, bool)>,
     /// Correlation of the thickening within each heart that has akinetic segments.
@@ -153,7 +155,10 @@ impl Table {
             let akinetic = known("contraction") < AKINETIC_CONTRACTION;
             has_akinetic |= akinetic;
             self.motion.push((found.motion_mm, known("motion_mm")));
-            own.push((found.thickening_percent, known("thickening_percent")));
+            let thickening = known("thickening_percent");
+            own.push((found.thickening_percent, thickening));
+            let counts = found.thickening_counts_percent.into_iter();
+            self.counts.extend(counts.map(|found| (found, thickening)));
             self.akinetic.push((found.thickening_percent, akinetic));
         }
         if has_akinetic {
@@ -181,6 +186,7 @@ impl Table {
         for (name, pairs) in [
             ("motion, mm", &self.motion),
             ("thickening, points", &self.thickening),
+            ("thickening by counts, points", &self.counts),
         ] {
             let (bias, sd, _) = off(pairs.iter().map(|(f, t)| f - t));
             println!(

@@ -4,6 +4,7 @@
 //! diastole and end systole are the extremes of the volume curve, from which the gates' width has been taken off; the
 //! gates nearest to them are named too. Segments are means over the area of their inner surface at end diastole.
 
+use super::counts::WallCounts;
 use super::fit::{BeatFit, Volumes};
 use super::flags::{self, BeatFlag, FlagFacts};
 use super::intervals::Intervals;
@@ -51,6 +52,8 @@ pub struct SegmentMotion {
     pub motion_mm: f64,
     /// Thickening from end diastole to end systole, per cent.
     pub thickening_percent: f64,
+    /// The same by the counts of the wall, per cent; `None` without counts at end diastole.
+    pub thickening_counts_percent: Option<f64>,
     /// Phase of the greatest thickness, degrees; `None` where the segment does not move.
     pub phase_degrees: Option<f64>,
 }
@@ -82,6 +85,8 @@ pub struct Beat {
     pub phases: Phases,
     /// Motion and thickening of every ray.
     pub contraction: Contraction,
+    /// Counts of every ray.
+    pub counts: WallCounts,
     /// Reasons to look closer.
     pub flags: Vec<BeatFlag>,
 }
@@ -97,7 +102,9 @@ impl Beat {
         let after = fit.moment(end_systole.turns);
         let contraction = Contraction::between(&before, &after);
         let phases = phases(&fit, &before);
-        let segments = segments(map, &contraction, &phases);
+        let counts = WallCounts::of(study, &fit);
+        let ends = [end_diastole, end_systole].map(|end| counts.at(end.turns));
+        let segments = segments(map, &contraction, &phases, &ends);
         let ejected = 100.0 * (1.0 - end_systole.cavity_ml / end_diastole.cavity_ml);
         let flags = flags::of(&FlagFacts {
             orders_as_smooth: fit.orders_as_smooth,
@@ -129,6 +136,7 @@ impl Beat {
             segments,
             phases,
             contraction,
+            counts,
             flags,
         }
     }
@@ -167,7 +175,13 @@ fn phases(fit: &BeatFit, diastole: &WallMoment) -> Phases {
     Phases::of(&thickness, &areas)
 }
 
-fn segments(map: &PolarMap, contraction: &Contraction, phases: &Phases) -> Vec<SegmentMotion> {
+/// `counts` are those of every ray at end diastole and at end systole.
+fn segments(
+    map: &PolarMap,
+    contraction: &Contraction,
+    phases: &Phases,
+    counts: &[Vec<f64>; 2],
+) -> Vec<SegmentMotion> {
     let of = |segment: usize| {
         let own: Vec<usize> = (0..contraction.areas.len())
             .filter(|ray| contraction.areas[*ray] > 0.0)
@@ -187,8 +201,11 @@ fn segments(map: &PolarMap, contraction: &Contraction, phases: &Phases) -> Vec<S
                 Some((phases.degrees[*ray]?, weight))
             })
             .collect();
+        // The quotient of the means: single dark rays have no quotient.
+        let [before, after] = [0, 1].map(|end| mean(&counts[end]));
         (area > 0.0).then(|| SegmentMotion {
             segment,
+            thickening_counts_percent: (before > 0.0).then(|| 100.0 * (after / before - 1.0)),
             motion_mm: mean(&contraction.motion_mm),
             thickening_percent: mean(&contraction.thickening_percent),
             phase_degrees: Some(circular_mean(&moving)).filter(|mean| mean.is_finite()),

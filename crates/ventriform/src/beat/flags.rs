@@ -16,6 +16,8 @@ const MOVING_SHARE: f64 = 2.0 / 3.0;
 const OUTSIDE_SHARE: f64 = 0.01;
 /// Motion of a segment outward that is told, mm.
 const OUTWARD_MOTION_MM: f64 = -1.0;
+/// Share of the beats that may be rejected.
+const REJECTED_SHARE: f64 = 0.2;
 
 /// A reason to look closer at a beat.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -82,6 +84,15 @@ pub enum BeatFlag {
         /// Share of the voxels about the wall.
         share: f64,
     },
+    /// Many beats were rejected.
+    #[error(
+        "{:.0} % of the beats were rejected: the heart beat irregularly, and the gates show the rest",
+        100.0 * share
+    )]
+    BeatsRejected {
+        /// Share of the beats, 0..=1.
+        share: f64,
+    },
     /// Segments move outward.
     #[error(
         "segments move outward from end diastole to end systole: {}",
@@ -103,8 +114,14 @@ impl BeatFlag {
             Self::SmallHeart { .. } => "small_heart",
             Self::PhaseUnreliable { .. } => "phase_unreliable",
             Self::LeavesField { .. } => "leaves_field",
+            Self::BeatsRejected { .. } => "beats_rejected",
             Self::OutwardMotion { .. } => "outward_motion",
         }
+    }
+
+    /// The flag of a study of which the file says that this share of the beats was rejected.
+    pub fn of_rejected(share: f64) -> Option<Self> {
+        (share > REJECTED_SHARE).then_some(Self::BeatsRejected { share })
     }
 
     /// Whether the gates are no beat, so that no EF is given.

@@ -8,7 +8,8 @@
 //!    periodic, and the wall's image is blurred by the resolution before it is compared ([`objective`]). Gates that are
 //!    fitted one by one let the muscle swing by a fifth.
 //! 3. [`figures`] takes end diastole and end systole from the curve, after the gates' width was taken off.
-//! 4. [`intervals`] says how far the figures may be off, and [`flags`] where they mean little.
+//! 4. [`counts`] gives a second opinion on thickening, from the gates' brightness.
+//! 5. [`intervals`] says how far the figures may be off, and [`flags`] where they mean little.
 //!
 //! Guaranteed: the volume of the muscle changes by less than 3 per cent over the beat; gates that begin elsewhere in the
 //! cycle give the same figures, moved; without a beat there is no ejection fraction.
@@ -19,6 +20,7 @@
 
 mod calibration;
 mod carried;
+pub mod counts;
 mod curvature;
 mod error;
 mod fields;
@@ -34,6 +36,7 @@ pub mod phase;
 mod start;
 pub mod study;
 
+pub use counts::WallCounts;
 pub use error::BeatError;
 pub use figures::{Beat, Extreme, Rates, SegmentMotion};
 pub use fit::{BeatFit, BeatParameters, Volumes, fit};

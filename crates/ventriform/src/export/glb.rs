@@ -2,6 +2,7 @@
 
 use super::{ExportError, Format, Metadata, gltf};
 use crate::mesh::TriMesh;
+use serde_json::Value;
 
 /// A GLB file: a header, a JSON chunk and a binary chunk, each a multiple of 4 bytes long.
 ///
@@ -9,6 +10,14 @@ use crate::mesh::TriMesh;
 /// See [`gltf::document`]; [`ExportError::TooLarge`] beyond 4 GiB.
 pub fn encode(mesh: &TriMesh, metadata: &Metadata) -> Result<Vec<u8>, ExportError> {
     let (document, buffer) = gltf::document(mesh, metadata)?;
+    container(&document, &buffer)
+}
+
+/// Document and buffer, a multiple of 4 bytes long, in one file.
+///
+/// # Errors
+/// [`ExportError::TooLarge`] beyond 4 GiB.
+pub(super) fn container(document: &Value, buffer: &[u8]) -> Result<Vec<u8>, ExportError> {
     let mut json = document.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
 

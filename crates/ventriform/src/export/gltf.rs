@@ -31,8 +31,8 @@ const PATIENT_TO_WORLD: [f64; 16] = [
 // Numbers of component types and buffer targets in the specification.
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
-const FLOAT_COMPONENT: u32 = 5126;
-const ARRAY_BUFFER: u32 = 34962;
+pub(super) const FLOAT_COMPONENT: u32 = 5126;
+pub(super) const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 /// A glTF file with its buffer embedded.
@@ -198,7 +198,7 @@ pub fn document(mesh: &TriMesh, metadata: &Metadata) -> Result<(Value, Vec<u8>),
 }
 
 /// Appends `entry` to a list; returns its place.
-fn push(list: &mut Value, entry: Value) -> usize {
+pub(super) fn push(list: &mut Value, entry: Value) -> usize {
     let list = list.as_array_mut();
     list.map_or(0, |list| {
         list.push(entry);
@@ -298,7 +298,7 @@ fn bytes_of(
 }
 
 /// The smallest and largest coordinates, as `f64`, whose decimals represent an `f32` exactly.
-fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
+pub(super) fn extent(positions: &[[f32; 3]]) -> ([f64; 3], [f64; 3]) {
     let mut min = [f32::INFINITY; 3];
     let mut max = [f32::NEG_INFINITY; 3];
     for p in positions {

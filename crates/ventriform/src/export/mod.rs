@@ -28,10 +28,13 @@
 //! PLY files, `part` of JSON files; OBJ files have a group and glTF files a primitive of each part, named
 //! after it. STL files cannot hold it. [`mod@open_part`] cuts a part out as an open surface.
 //!
+//! [`mod@animated`] writes a surface in motion as GLB.
+//!
 //! Guaranteed: the same mesh and metadata give the same bytes; vertices stay distinct in single
 //! precision (see `single.rs`). Not checked: whether the mesh is a manifold; see
 //! [`crate::mesh::topology`].
 
+pub mod animated;
 pub mod dicom;
 mod glb;
 mod gltf;
@@ -295,6 +298,12 @@ pub enum ExportError {
     Inseparable {
         /// Index of the vertex.
         vertex: usize,
+    },
+    /// A mesh of a cycle has not the vertices and triangles of the others, or is not there.
+    #[error("mesh {index} of the cycle has not the vertices and triangles of the others")]
+    OtherMesh {
+        /// Its place in the cycle.
+        index: usize,
     },
     /// The mesh has more bytes or elements than the format can count.
     #[error("the mesh is too large for {format}")]

@@ -3,21 +3,32 @@
 use super::error::GatedError;
 use super::from_files::GatedHeart;
 use super::pictures;
-use crate::export::dicom::Structure;
+use crate::beat::SegmentMotion;
+use crate::export::animated::{self, Cycle};
+use crate::export::dicom::{
+    BeatObject, DicomBeat, DicomError, DicomObject, EndResults, Moment, SourceScan, Structure,
+};
 use crate::export::{self, Format, Metadata};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
-use crate::progress::{Monitor, Stage};
-use crate::report::BeatReport;
-use crate::segmentation::{NamedFile, SegmentationFilesError, json_file};
+use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
+use crate::progress::{Cancelled, Monitor, Stage};
+use crate::report::{self, BeatReport};
+use crate::segmentation::{NamedFile, SegmentationFilesError, json_file, json_line};
+use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
+use serde_json::json;
 use std::fmt::Write as _;
 
+/// Length of the animation's cycle where the R-R interval is not known, s.
+const UNKNOWN_CYCLE_S: f64 = 1.0;
+
 impl GatedHeart {
-    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, the meshes of end diastole and end systole and
-    /// of every gate in `formats`, and every gate's labels (wall 1, cavity 2) on the grid of the gates.
+    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, polar maps (`polar.svg` and `polar.json`, also
+    /// `polar_ed`, `polar_es`, `polar_motion`, `polar_thickening` and `polar_phase`), the meshes of end diastole and end systole and
+    /// of every gate in `formats`, `mesh.glb` (the beat as an animation), and every gate's labels (wall 1, cavity 2) on the grid of the gates.
     ///
     /// # Errors
     /// [`SegmentationFilesError`].
@@ -30,8 +41,8 @@ impl GatedHeart {
         let report = self.report();
         let mut files = vec![
             json_file("beat.json", &report),
-            text_file("curve.svg", "image/svg+xml", pictures::curve(&report)),
-            text_file("phase.svg", "image/svg+xml", pictures::phase(&report)),
+            svg_file("curve.svg", pictures::curve(&report)),
+            svg_file("phase.svg", pictures::phase(&report)),
             text_file("gates.csv", "text/csv; charset=utf-8", gates_csv(&report)),
             text_file(
                 "segments.csv",
@@ -39,16 +50,21 @@ impl GatedHeart {
                 segments_csv(&report),
             ),
         ];
-        let meshes = self.beat.fit.carried(&self.wall.mesh, &self.wall.wall);
+        files.extend(self.maps(monitor)?);
+        let meshes = self.meshes();
         let ends = [
             ("mesh_ed".to_owned(), self.beat.end_diastole.gate),
             ("mesh_es".to_owned(), self.beat.end_systole.gate),
         ];
         let gates = (0..meshes.len()).map(|gate| (format!("mesh_gate{:02}", gate + 1), gate));
+        let known = self.metadata(&report, monitor)?;
         for (name, gate) in ends.into_iter().chain(gates) {
             for format in formats {
                 monitor.check()?;
-                let metadata = Metadata::new(format!("Left ventricle, gate {}", gate + 1));
+                let metadata = Metadata {
+                    title: format!("Left ventricle, gate {}", gate + 1),
+                    ..known.clone()
+                };
                 files.push(NamedFile {
                     name: format!("{name}.{}", format.extension()),
                     media_type: format.media_type(),
@@ -56,6 +72,16 @@ impl GatedHeart {
                 });
             }
         }
+        let cycle = Cycle {
+            meshes: &meshes,
+            rest: self.beat.end_diastole.gate,
+            seconds: self.rr_ms.map_or(UNKNOWN_CYCLE_S, |ms| ms / 1000.0),
+        };
+        files.push(NamedFile {
+            name: "mesh.glb".into(),
+            media_type: Format::Glb.media_type(),
+            bytes: animated::encode(&cycle, &known)?,
+        });
         for (gate, mesh) in meshes.iter().enumerate() {
             let done = gate as f64 / meshes.len() as f64;
             monitor.report(Stage::Export, done)?;
@@ -63,6 +89,142 @@ impl GatedHeart {
         }
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
+    }
+
+    /// Polar maps as pictures and as numbers: the uptake of all gates, of end diastole and of end systole, each in per cent
+    /// of its own brightest quarter, and motion, thickening and phase.
+    fn maps(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {
+        let Some(map) = &self.segmentation.polar else {
+            return Ok(Vec::new());
+        };
+        let beat = &self.beat;
+        let at = |turns: f64| map.with_largest(&beat.counts.at(turns));
+        let mut files = Vec::new();
+        for (name, map) in [
+            ("polar", map.clone()),
+            ("polar_ed", at(beat.end_diastole.turns)),
+            ("polar_es", at(beat.end_systole.turns)),
+        ] {
+            monitor.check()?;
+            files.push(svg_file(&format!("{name}.svg"), polar::svg(&map)));
+            files.push(json_file(&format!("{name}.json"), &PolarDocument::of(&map)));
+        }
+        for figure in WallFigure::ALL {
+            monitor.check()?;
+            let figure = self.figure_map(map, figure);
+            let name = format!("polar_{}", figure.figure.as_str());
+            files.push(svg_file(&format!("{name}.svg"), polar::figure_svg(&figure)));
+            files.push(json_file(
+                &format!("{name}.json"),
+                &FigureDocument::of(&figure),
+            ));
+        }
+        Ok(files)
+    }
+
+    fn figure_map<'a>(&self, map: &'a PolarMap, figure: WallFigure) -> FigureMap<'a> {
+        let beat = &self.beat;
+        let contraction = &beat.contraction;
+        let on_wall = |ray: usize| contraction.areas[ray] > 0.0 && map.pixels[ray].is_some();
+        let of_ray = |ray: usize| match figure {
+            WallFigure::Motion => Some(contraction.motion_mm[ray]),
+            WallFigure::Thickening => Some(contraction.thickening_percent[ray]),
+            WallFigure::Phase => beat.phases.degrees[ray],
+        };
+        let of_segment = |segment: &SegmentMotion| match figure {
+            WallFigure::Motion => Some(segment.motion_mm),
+            WallFigure::Thickening => Some(segment.thickening_percent),
+            WallFigure::Phase => segment.phase_degrees,
+        };
+        FigureMap {
+            map,
+            figure,
+            values: (0..map.pixels.len())
+                .map(|ray| of_ray(ray).filter(|_| on_wall(ray)))
+                .collect(),
+            segments: std::array::from_fn(|index| {
+                let mut segments = beat.segments.iter();
+                segments
+                    .find(|segment| segment.segment == index + 1)
+                    .and_then(of_segment)
+            }),
+        }
+    }
+
+    /// The wall of every gate, in the mean over its width, LPS mm.
+    fn meshes(&self) -> Vec<TriMesh> {
+        self.beat.fit.carried(&self.wall.mesh, &self.wall.wall)
+    }
+
+    /// What is known of the meshes: parts and uptake are those of the gates' sum, whose nodes they have.
+    fn metadata(&self, report: &BeatReport, monitor: &Monitor<'_>) -> Result<Metadata, Cancelled> {
+        let scan = self.reading.provenance();
+        let figures = json!({
+            "edv_ml": report.edv_ml, "esv_ml": report.esv_ml, "ef_percent": report.ef_percent,
+        });
+        Ok(Metadata {
+            frame_of_reference_uid: scan.and_then(|scan| scan.frame_of_reference_uid.clone()),
+            quality: report::object(&figures),
+            parts: self.segmentation.parts(&self.wall.mesh, monitor)?,
+            field: self.segmentation.uptake(&self.wall.mesh),
+            ..Metadata::new("Left ventricle")
+        })
+    }
+
+    /// End diastole and end systole as scans with the given identity, each with the images or frames of its gate.
+    pub fn scans(&self, identity: &Provenance, made: &Moment) -> [SourceScan; 2] {
+        let placed = self.reading.facts.affine_source.is_placed();
+        [&self.beat.end_diastole, &self.beat.end_systole].map(|end| {
+            let volume = &self.reading.gates[end.gate];
+            let known = match self.reading.scans.get(end.gate) {
+                Some(own) => Provenance {
+                    series_uid: own.series_uid.clone(),
+                    sop_class_uid: own.sop_class_uid.clone(),
+                    sop_instance_uid: own.sop_instance_uid.clone(),
+                    instance_uids: own.instance_uids.clone(),
+                    slice_frames: own.slice_frames.clone(),
+                    ..identity.clone()
+                },
+                None => identity.clone(),
+            };
+            let frame = volume.frame.clone();
+            SourceScan::new(known, frame, volume.shape, placed, made.clone())
+        })
+    }
+
+    /// Segmentations of both ends and the figures as DICOM objects of `scans`, those of end diastole and end systole
+    /// (see [`GatedHeart::scans`]).
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn dicom_files(&self, scans: &[SourceScan; 2]) -> Result<Vec<NamedFile>, DicomError> {
+        let ends = [self.beat.end_diastole.gate, self.beat.end_systole.gate];
+        let meshes = self.meshes();
+        // A silent monitor is never cancelled.
+        let masks = ends.map(|gate| self.masks(gate, &meshes[gate], &Monitor::silent()));
+        let masks = masks.map(|masks| {
+            let empty = || Mask::empty(self.reading.gates[0].shape);
+            masks.unwrap_or_else(|Cancelled| [empty(), empty()])
+        });
+        let report = self.report();
+        let text = json_line(&report);
+        let end = |end: usize| EndResults {
+            scan: &scans[end],
+            wall: &masks[end][0],
+            cavity: &masks[end][1],
+            mesh: &meshes[ends[end]],
+        };
+        let results = DicomBeat::new(self.structure(), [end(0), end(1)], &report, &text);
+        BeatObject::ALL
+            .into_iter()
+            .map(|object| {
+                Ok(NamedFile {
+                    name: object.file_name().into(),
+                    media_type: DicomObject::MEDIA_TYPE,
+                    bytes: results.write(object)?,
+                })
+            })
+            .collect()
     }
 
     /// The wall as 1 and the cavity as 2 in a gate.
@@ -73,12 +235,11 @@ impl GatedHeart {
         monitor: &Monitor<'_>,
     ) -> Result<NamedFile, SegmentationFilesError> {
         let volume = &self.reading.gates[gate];
-        let wall = voxelise(mesh, volume.shape, &volume.frame);
-        let cavity = self.cavity(mesh, &wall, gate, monitor)?;
+        let [wall, cavity] = self.masks(gate, mesh, monitor)?;
         let labels: Vec<u8> = (wall.voxels.iter().zip(&cavity.voxels))
             .map(|(wall, cavity)| if *wall { 1 } else { 2 * u8::from(*cavity) })
             .collect();
-        let segments = Structure::of(self.parameters.organ.as_str()).segments(true);
+        let segments = self.structure().segments(true);
         let entries: Vec<LabelEntry> = segments.iter().map(|segment| segment.entry).collect();
         let stated = self.reading.stated_grid.as_ref();
         let grid = (volume.shape, &volume.frame);
@@ -87,21 +248,42 @@ impl GatedHeart {
         SegmentationFilesError::nifti(name, bytes)
     }
 
+    fn structure(&self) -> Structure {
+        Structure::of(self.parameters.organ.as_str())
+    }
+
+    /// Wall and cavity of a gate on the grid of the gates.
+    fn masks(
+        &self,
+        gate: usize,
+        mesh: &TriMesh,
+        monitor: &Monitor<'_>,
+    ) -> Result<[Mask; 2], Cancelled> {
+        let volume = &self.reading.gates[gate];
+        let wall = voxelise(mesh, volume.shape, &volume.frame);
+        let cavity = self.cavity(mesh, &wall, gate, monitor)?;
+        Ok([wall, cavity])
+    }
+
     fn cavity(
         &self,
         mesh: &TriMesh,
         wall: &Mask,
         gate: usize,
         monitor: &Monitor<'_>,
-    ) -> Result<Mask, SegmentationFilesError> {
+    ) -> Result<Mask, Cancelled> {
         let model = &self.segmentation.fit.model;
         let (Some(cup), Some(orientation)) = (&model.cup, &model.patient_orientation) else {
             return Ok(Mask::empty(wall.shape));
         };
         let cup: &Cup = cup;
         let seen = VentricleWall::new(mesh, cup, &orientation.superior, monitor)?;
-        Ok(seen.cavity(wall, &self.reading.gates[gate].frame, monitor)?)
+        seen.cavity(wall, &self.reading.gates[gate].frame, monitor)
     }
+}
+
+fn svg_file(name: &str, text: String) -> NamedFile {
+    text_file(name, "image/svg+xml", text)
 }
 
 fn text_file(name: &str, media_type: &'static str, text: String) -> NamedFile {
@@ -126,17 +308,20 @@ fn gates_csv(report: &BeatReport) -> String {
 }
 
 fn segments_csv(report: &BeatReport) -> String {
-    let mut text = String::from("segment,name,motion_mm,thickening_percent,phase_degrees\n");
+    let mut text = String::from(
+        "segment,name,motion_mm,thickening_percent,thickening_counts_percent,phase_degrees\n",
+    );
     for segment in &report.segments {
-        let phase = segment.phase_degrees.map(|phase| phase.to_string());
+        let known = |figure: Option<f64>| figure.map(|figure| figure.to_string());
         let _ = writeln!(
             text,
-            "{},\"{}\",{},{},{}",
+            "{},\"{}\",{},{},{},{}",
             segment.segment,
             segment.name,
             segment.motion_mm,
             segment.thickening_percent,
-            phase.unwrap_or_default()
+            known(segment.thickening_counts_percent).unwrap_or_default(),
+            known(segment.phase_degrees).unwrap_or_default()
         );
     }
     text

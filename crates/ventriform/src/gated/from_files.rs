@@ -2,7 +2,7 @@
 
 use super::error::GatedError;
 use super::order::{BeatChoice, GatedOrder};
-use crate::beat::{self, Beat, BeatError, BeatParameters, GatedStudy};
+use crate::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::deform::WallSurface;
 use crate::parameters::{FitParameters, Parameters};
 use crate::polar::SEGMENT_NAMES;
@@ -95,23 +95,6 @@ pub fn from_files(
 }
 
 impl GatedHeart {
-    /// Warnings about the files.
-    pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = self.reading.facts.warnings.clone();
-        if let Some(share) = self
-            .reading
-            .timing
-            .rejected_share()
-            .filter(|share| *share > 0.2)
-        {
-            warnings.push(format!(
-                "{:.0} % of the beats were rejected: the heart beat irregularly, and the gates show the rest.",
-                100.0 * share
-            ));
-        }
-        warnings
-    }
-
     /// The report.
     pub fn report(&self) -> BeatReport {
         let segmentation = &self.segmentation;
@@ -121,6 +104,7 @@ impl GatedHeart {
         };
         let mut parameters = self.parameters.to_json();
         parameters.extend(self.choice.to_json());
+        let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let parts = BeatParts {
             segment_names: names,
             rr_ms: self.rr_ms,
@@ -133,10 +117,11 @@ impl GatedHeart {
             confidence: segmentation.fit.judgement.confidence,
             flags: (segmentation.fit.judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
+                .chain(rejected.map(|flag| RaisedFlag::new(flag.code(), &flag)))
                 .collect(),
             parameters,
             input: FileFacts::of(&self.reading.facts),
-            warnings: self.warnings(),
+            warnings: self.reading.facts.warnings.clone(),
         };
         BeatReport::new(&self.beat, parts)
     }

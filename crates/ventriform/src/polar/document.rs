@@ -1,5 +1,6 @@
-//! The polar map as it is written in `polar.json` and summed up in reports.
+//! The polar map as it is written in `polar.json` and summed up in reports, and maps of other figures.
 
+use super::figure::{FigureMap, WallFigure};
 use super::picture::rings;
 use super::{PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
 use serde::{Deserialize, Serialize};
@@ -87,6 +88,47 @@ pub struct PolarSegment {
     pub area_mm2: f64,
 }
 
+/// A figure of the wall on a polar map, as it is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FigureDocument {
+    /// The figure.
+    pub figure: WallFigure,
+    /// Its unit: `mm`, `%` or `degrees` of the cycle.
+    pub unit: String,
+    /// The values of the first and the last colour of the drawn map.
+    pub range: [f64; 2],
+    /// Rows of pixels, from apex to base.
+    pub rows: usize,
+    /// Columns of pixels, around the axis.
+    pub columns: usize,
+    /// Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
+    pub orientation: String,
+    /// The 17 segments.
+    pub segments: Vec<FigureSegment>,
+    /// The pixels; null where there is no wall, or none that moves.
+    pub values: Vec<Vec<Option<f64>>>,
+    /// The number of the segment to which each pixel belongs.
+    pub segment_of: Vec<Vec<usize>>,
+    /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+    /// end; row n reaches from n to n + 1.
+    pub level_ends: Vec<[f64; 4]>,
+    /// The radii at which these levels end on the drawn map, as shares of its own.
+    pub rings: [f64; 4],
+}
+
+/// The mean of a figure over a segment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FigureSegment {
+    /// 1 to 17.
+    pub number: usize,
+    /// Its name.
+    pub name: String,
+    /// The mean; null where there is none.
+    pub mean: Option<f64>,
+}
+
 fn round(x: f64) -> f64 {
     (100.0 * x).round() / 100.0
 }
@@ -140,15 +182,58 @@ impl PolarDocument {
         };
         let pixels = map.pixels.chunks(RAY_COLUMNS);
         let pixels = pixels.map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect());
-        let numbers = |row| (0..RAY_COLUMNS).map(move |column| map.segment_of(row, column));
-        let ends = map.levels.ends().iter();
-        let ends = ends.map(|ends| ends.map(|rows| (1e3 * rows).round() / 1e3));
         Self {
             summary: PolarSummary::of(map),
             values_percent: pixels.collect(),
-            segment_of: (0..RAY_ROWS).map(|row| numbers(row).collect()).collect(),
-            level_ends: Some(ends.collect()),
-            rings: Some(rings(map).map(|share| (1e4 * share).round() / 1e4).into()),
+            segment_of: segment_numbers(map),
+            level_ends: Some(level_ends(map)),
+            rings: Some(ring_shares(map).into()),
         }
     }
+}
+
+impl FigureDocument {
+    /// The figure with where the picture has it.
+    pub fn of(figure: &FigureMap<'_>) -> Self {
+        let map = figure.map;
+        let segment = |(index, mean): (usize, &Option<f64>)| FigureSegment {
+            number: index + 1,
+            name: map.name_of(index + 1),
+            mean: mean.map(round),
+        };
+        let rows = figure.values.chunks(RAY_COLUMNS);
+        Self {
+            figure: figure.figure,
+            unit: figure.figure.unit().to_owned(),
+            range: figure.figure.range(),
+            rows: RAY_ROWS,
+            columns: RAY_COLUMNS,
+            orientation: map.orientation.as_str().to_owned(),
+            segments: figure.segments.iter().enumerate().map(segment).collect(),
+            values: rows
+                .map(|row| row.iter().map(|value| value.map(round)).collect())
+                .collect(),
+            segment_of: segment_numbers(map),
+            level_ends: level_ends(map),
+            rings: ring_shares(map),
+        }
+    }
+}
+
+/// The number of the segment to which each pixel belongs.
+fn segment_numbers(map: &PolarMap) -> Vec<Vec<usize>> {
+    let numbers = |row| (0..RAY_COLUMNS).map(move |column| map.segment_of(row, column));
+    (0..RAY_ROWS).map(|row| numbers(row).collect()).collect()
+}
+
+/// For every column, where the levels end, in rows.
+fn level_ends(map: &PolarMap) -> Vec<[f64; 4]> {
+    let ends = map.levels.ends().iter();
+    let ends = ends.map(|ends| ends.map(|rows| (1e3 * rows).round() / 1e3));
+    ends.collect()
+}
+
+/// The radii at which the levels end on the drawn map.
+fn ring_shares(map: &PolarMap) -> [f64; 4] {
+    rings(map).map(|share| (1e4 * share).round() / 1e4)
 }

@@ -5,8 +5,8 @@
 //!
 //! 1. The image is blurred ([`PolarParameters::blur`]), because the largest of many noisy values
 //!    is too large.
-//! 2. Along each ray, the largest and the mean value are taken between the inner and the outer
-//!    surface, extended by [`PolarParameters::extension`] on both sides.
+//! 2. Along each ray, the largest value is taken between the inner and the outer surface, extended by
+//!    [`PolarParameters::extension`] on both sides.
 //! 3. The reference, 100 per cent, is the mean of the largest values over the hottest quarter of
 //!    this patient's wall. A high percentile would follow the noise of a few pixels.
 //! 4. Means over the 17 segments of the American Heart Association (Cerqueira et al., Circulation
@@ -28,6 +28,8 @@
 //! shown but not counted, and over the next [`PolarParameters::rim_fade`] millimetres the weight rises to 1,
 //! so that a small change of the fit does not add or remove a whole ray.
 //!
+//! [`FigureMap`] lays other figures of the same wall flat, such as its motion over a beat.
+//!
 //! Where nothing tells which side of the wall is anterior ([`OrientationSource::Unknown`]), the map has its
 //! levels, but neither names of sides nor territories.
 //!
@@ -36,12 +38,16 @@
 //! 30 % below the apex in a heart of even uptake.
 
 mod document;
+mod figure;
 mod levels;
 mod picture;
 
-pub use document::{PolarDocument, PolarSegment, PolarSummary, PolarTerritory};
+pub use document::{
+    FigureDocument, FigureSegment, PolarDocument, PolarSegment, PolarSummary, PolarTerritory,
+};
+pub use figure::{FigureMap, WallFigure};
 pub use levels::{Level, Levels};
-pub use picture::{colour_of, png, svg};
+pub use picture::{colour_of, figure_svg, png, svg};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -100,8 +106,6 @@ impl Default for PolarParameters {
 pub struct Pixel {
     /// Largest value on the way through the wall.
     pub max: f64,
-    /// Mean value on the way through the wall.
-    pub mean: f64,
     /// Area of wall that the ray stands for, mm².
     pub area: f64,
     /// Share of that area that counts: 0 at the rim, 1 far from it.
@@ -215,6 +219,56 @@ impl PolarMap {
         }
     }
 
+    /// The map of these pixels, counted by the volume's frame.
+    fn through(
+        pixels: Vec<Option<Pixel>>,
+        levels: Levels,
+        threshold: f64,
+        projection: Projection,
+    ) -> Self {
+        let reference = reference(&pixels);
+        let limit = threshold * reference;
+        let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
+        let segments: [Segment; 17] = std::array::from_fn(|s| {
+            let own = indexed()
+                .filter(|(i, _)| segment_of(&levels, i / RAY_COLUMNS, i % RAY_COLUMNS) == s + 1);
+            summarise(s + 1, own.map(|(_, p)| p), reference, limit)
+        });
+        let territories = ARTERY_NAMES.map(|name| {
+            let own = segments.iter().filter(|s| territory(s.number) == name);
+            let (mean_percent, extent_percent, area) = together(own);
+            Territory {
+                name,
+                mean_percent,
+                extent_percent,
+                area,
+            }
+        });
+        let (_, extent_percent, _) = together(segments.iter());
+        Self {
+            reference,
+            threshold,
+            segments,
+            territories,
+            extent_percent,
+            levels,
+            projection,
+            orientation: OrientationSource::default(),
+            pixels,
+        }
+    }
+
+    /// The map of another image of the same wall, such as a gate: `largest` are the largest values on each ray. Places,
+    /// areas and sides stay.
+    #[must_use]
+    pub fn with_largest(&self, largest: &[f64]) -> Self {
+        let pixels = (self.pixels.iter().zip(largest))
+            .map(|(pixel, max)| pixel.map(|pixel| Pixel { max: *max, ..pixel }))
+            .collect();
+        Self::through(pixels, self.levels.clone(), self.threshold, self.projection)
+            .counted_by(self.orientation)
+    }
+
     /// Whether it is known which side of the map is anterior.
     pub fn is_oriented(&self) -> bool {
         self.orientation != OrientationSource::Unknown
@@ -304,36 +358,7 @@ pub fn map(
             Some(Pixel { weight, ..pixel })
         })
         .collect();
-    let reference = reference(&pixels);
-    let limit = parameters.threshold * reference;
-    let indexed = || (0..pixels.len()).filter_map(|i| Some((i, pixels[i]?)));
-    let segments: [Segment; 17] = std::array::from_fn(|s| {
-        let own = indexed()
-            .filter(|(i, _)| segment_of(&levels, i / RAY_COLUMNS, i % RAY_COLUMNS) == s + 1);
-        summarise(s + 1, own.map(|(_, p)| p), reference, limit)
-    });
-    let territories = ARTERY_NAMES.map(|name| {
-        let own = segments.iter().filter(|s| territory(s.number) == name);
-        let (mean_percent, extent_percent, area) = together(own);
-        Territory {
-            name,
-            mean_percent,
-            extent_percent,
-            area,
-        }
-    });
-    let (_, extent_percent, _) = together(segments.iter());
-    PolarMap {
-        reference,
-        threshold: parameters.threshold,
-        segments,
-        territories,
-        extent_percent,
-        levels,
-        projection: parameters.projection,
-        orientation: OrientationSource::default(),
-        pixels,
-    }
+    PolarMap::through(pixels, levels, parameters.threshold, parameters.projection)
 }
 
 /// For every column, one more than the last row that meets the wall.
@@ -367,16 +392,13 @@ fn pixel(field: &Field, ray: &WallRay, area: f64, extension: f64) -> Option<Pixe
     let from = (enters - extension).max(0.0);
     let to = leaves + extension;
     let steps = ((to - from).ceil() as usize).clamp(1, 200);
-    let (mut max, mut sum) = (f64::NEG_INFINITY, 0.0);
+    let mut max = f64::NEG_INFINITY;
     for step in 0..=steps {
         let distance = from + (to - from) * step as f64 / steps as f64;
-        let value = field.at(&(ray.start + ray.direction * distance));
-        max = max.max(value);
-        sum += value;
+        max = max.max(field.at(&(ray.start + ray.direction * distance)));
     }
     Some(Pixel {
         max,
-        mean: sum / (steps + 1) as f64,
         area,
         weight: 1.0,
     })
@@ -595,6 +617,66 @@ mod tests {
             serde_json::from_str::<PolarDocument>(&text).unwrap(),
             document
         );
+    }
+
+    /// Colours of a phase meet where the cycle closes; outward motion has a colour of its own.
+    #[test]
+    fn other_figures_have_the_segments_of_the_map() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default());
+        let of = |figure: WallFigure, value: f64| FigureMap {
+            map: &map,
+            figure,
+            values: map
+                .pixels
+                .iter()
+                .map(|pixel| pixel.map(|_| value))
+                .collect(),
+            segments: std::array::from_fn(|index| (index > 0).then_some(value)),
+        };
+        let svg = |figure, value| figure_svg(&of(figure, value));
+        let tiles = |text: &str| text.matches("<polygon").count();
+        let [early, late] = [0.0, 360.0].map(|phase| svg(WallFigure::Phase, phase));
+        let fills = |text: &str| -> Vec<String> {
+            let all = text.split("fill=\"").skip(1);
+            all.map(|rest| rest.split('"').next().unwrap().to_owned())
+                .collect()
+        };
+        assert_eq!(fills(&early), fills(&late));
+        assert_eq!(tiles(&early), tiles(&super::svg(&map)));
+        assert!(svg(WallFigure::Motion, 6.0).contains(">mm</text>"));
+        assert_ne!(
+            fills(&svg(WallFigure::Motion, -2.0)),
+            fills(&svg(WallFigure::Motion, 0.0))
+        );
+        let document = FigureDocument::of(&of(WallFigure::Thickening, 37.123));
+        assert_eq!(document.segments[0].mean, None);
+        assert_eq!(document.segments[16].mean, Some(37.12));
+        assert_eq!(document.segment_of, PolarDocument::of(&map).segment_of);
+        let text = serde_json::to_string(&document).unwrap();
+        assert_eq!(
+            serde_json::from_str::<FigureDocument>(&text).unwrap(),
+            document
+        );
+    }
+
+    /// A gate has the wall of the sum, and its own reference.
+    #[test]
+    fn the_map_of_another_image_keeps_the_wall() {
+        let (volume, wall) = scene();
+        let map = map(&volume, &wall, &wall, &PolarParameters::default())
+            .counted_by(OrientationSource::Unknown);
+        let half = |pixel: &Option<Pixel>| pixel.map_or(7.0, |pixel| pixel.max / 2.0);
+        let largest: Vec<f64> = map.pixels.iter().map(half).collect();
+        let found = map.with_largest(&largest);
+        assert!((found.reference - map.reference / 2.0).abs() < 1e-9);
+        for (found, known) in found.segments.iter().zip(&map.segments) {
+            assert!((found.area - known.area).abs() < 1e-9);
+            let [found, known] = [found, known].map(|segment| segment.mean_percent.unwrap());
+            assert!((found - known).abs() < 1e-9);
+        }
+        assert_eq!(found.orientation, map.orientation);
+        assert_eq!(map.with_largest(&largest).pixels, found.pixels);
     }
 
     #[test]

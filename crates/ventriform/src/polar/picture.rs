@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::figure::{FigureMap, WallFigure};
 use super::{Level, PolarMap, Projection, RAY_COLUMNS, RAY_ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
 
@@ -17,6 +18,9 @@ const MAP_RADIUS_PX: f64 = 280.0;
 const MAP_CENTRE_PX: f64 = PICTURE_HEIGHT_PX as f64 / 2.0;
 /// Height of a line of text.
 const TEXT_HEIGHT_PX: f64 = 18.0;
+
+/// Share of the colours from which ink on them is black.
+const BRIGHT_SHARE: f64 = 0.62;
 
 /// The colours of maps, which the page (`web/src/viewer/colours.ts`) reads from the same file.
 #[derive(Deserialize)]
@@ -32,6 +36,20 @@ struct Palette {
 static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
     serde_json::from_str(include_str!("../../assets/uptake.json"))
         .expect("the file holds what `Palette` names")
+});
+
+/// The colours of other figures than uptake, beside those of [`Palette`].
+#[derive(Deserialize)]
+struct FigurePalette {
+    /// A wall that moves outward, or gets thinner.
+    outward: Rgb,
+    /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has them).
+    cycle: [[f64; 3]; 12],
+}
+
+static FIGURE_PALETTE: LazyLock<FigurePalette> = LazyLock::new(|| {
+    serde_json::from_str(include_str!("../../assets/figures.json"))
+        .expect("the file holds what `FigurePalette` names")
 });
 
 const BORDER_COLOUR: Rgb = [200; 3];
@@ -55,12 +73,62 @@ pub fn png(map: &PolarMap) -> Vec<u8> {
     drawing(map).image().png()
 }
 
+/// A figure of the wall as SVG: the same map, the segments' means, and a colour bar with the figure's unit.
+pub fn figure_svg(figure: &FigureMap<'_>) -> String {
+    let map = figure.map;
+    let rings = rings(map);
+    let what = figure.figure;
+    let colour_at = |value: f64| match what {
+        WallFigure::Phase => cycle_colour(value / 360.0),
+        _ if value < 0.0 => FIGURE_PALETTE.outward,
+        _ => colour(value / what.range()[1]),
+    };
+    let shade = |row: usize, column: usize| {
+        figure.values[row * RAY_COLUMNS + column].map_or(PALETTE.no_wall, &colour_at)
+    };
+    let means = figure.segments.iter().enumerate().map(|(index, mean)| {
+        let bright = match what {
+            WallFigure::Phase => true,
+            _ => mean.is_some_and(|mean| mean > BRIGHT_SHARE * what.range()[1]),
+        };
+        label(index + 1, *mean, bright, &rings)
+    });
+    let [least, most] = what.range();
+    let bar = ColourBar {
+        unit: what.unit(),
+        ticks: what.ticks(),
+        share: |value| (value - least) / (most - least),
+        colour: |share| colour_at(least + share * (most - least)),
+    };
+    Drawing {
+        title: format!("{}{}", what.title(), unknown_side(map)),
+        width: PICTURE_WIDTH_PX,
+        height: PICTURE_HEIGHT_PX,
+        shapes: tiles(map, &rings, shade)
+            .chain(borders(map, &rings))
+            .chain(means)
+            .chain(sides(map))
+            .chain(bar.shapes())
+            .collect(),
+    }
+    .svg()
+}
+
+/// The end of a title where no side is known.
+fn unknown_side(map: &PolarMap) -> &'static str {
+    if map.is_oriented() {
+        ""
+    } else {
+        "; orientation unknown"
+    }
+}
+
 fn drawing(map: &PolarMap) -> Drawing {
     let rings = rings(map);
-    let places = (0..RAY_ROWS).flat_map(|row| (0..RAY_COLUMNS).map(move |column| (row, column)));
-    let tiles = places.map(|(row, column)| VectorShape::Polygon {
-        corners: tile(map, &rings, row, column),
-        fill: shade(map, row, column),
+    let means = map.segments.iter().map(|segment| {
+        let mean = segment.mean_percent;
+        let bright = mean.is_some_and(|mean| mean > 100.0 * BRIGHT_SHARE);
+        label(segment.number, mean, bright, &rings)
     });
     Drawing {
         title: format!(
@@ -68,22 +136,32 @@ fn drawing(map: &PolarMap) -> Drawing {
             map.reference,
             100.0 * map.threshold,
             map.extent_percent,
-            if map.is_oriented() {
-                ""
-            } else {
-                "; orientation unknown"
-            }
+            unknown_side(map)
         ),
         width: PICTURE_WIDTH_PX,
         height: PICTURE_HEIGHT_PX,
-        shapes: tiles
+        shapes: tiles(map, &rings, |row, column| shade(map, row, column))
             .chain(threshold_line(map, &rings))
             .chain(borders(map, &rings))
-            .chain(labels(map, &rings))
-            .chain(colour_bar(map))
+            .chain(means)
+            .chain(sides(map))
+            .chain(uptake_bar(map))
             .chain(sums(map))
             .collect(),
     }
+}
+
+/// The pixels of the map in the colours of `shade` (row, column).
+fn tiles(
+    map: &PolarMap,
+    rings: &[f64; 4],
+    shade: impl Fn(usize, usize) -> Rgb,
+) -> impl Iterator<Item = VectorShape> {
+    let places = (0..RAY_ROWS).flat_map(|row| (0..RAY_COLUMNS).map(move |column| (row, column)));
+    places.map(move |(row, column)| VectorShape::Polygon {
+        corners: tile(map, rings, row, column),
+        fill: shade(row, column),
+    })
 }
 
 /// The radii at which the levels end, as shares of the map's.
@@ -136,10 +214,23 @@ fn colour(share: f64) -> Rgb {
     let colours = &PALETTE.colours;
     let at = share.clamp(0.0, 1.0) * (colours.len() - 1) as f64;
     let step = (at as usize).min(colours.len() - 2);
-    let t = at - step as f64;
-    std::array::from_fn(|c| {
-        (colours[step][c] + t * (colours[step + 1][c] - colours[step][c])).round() as u8
-    })
+    between(colours[step], colours[step + 1], at - step as f64)
+}
+
+/// The colour of a place of the cycle, 0..1.
+fn cycle_colour(turns: f64) -> Rgb {
+    let colours = &FIGURE_PALETTE.cycle;
+    let at = turns.rem_euclid(1.0) * colours.len() as f64;
+    let step = (at as usize).min(colours.len() - 1);
+    between(
+        colours[step],
+        colours[(step + 1) % colours.len()],
+        at - step as f64,
+    )
+}
+
+fn between(from: [f64; 3], to: [f64; 3], share: f64) -> Rgb {
+    std::array::from_fn(|c| (from[c] + share * (to[c] - from[c])).round() as u8)
 }
 
 /// The outline of one pixel of the map, slightly enlarged so that no gaps show between
@@ -220,21 +311,20 @@ fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     shapes
 }
 
-/// The segments' means and the letters of the four sides.
-fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = VectorShape> + 'a {
-    let means = map.segments.iter().map(|segment| {
-        let mean = segment.mean_percent;
-        let (share, turns) = label_place(segment.number, rings);
-        // Black on bright tiles, white on dark ones.
-        let bright = mean.is_some_and(|mean| mean > 62.0);
-        VectorShape::Label {
-            middle: screen(share, turns),
-            text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.0}")),
-            size: TEXT_HEIGHT_PX,
-            ink: if bright { BLACK_RGB } else { WHITE_RGB },
-            rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),
-        }
-    });
+/// The mean of a segment: black on bright tiles, white on dark ones.
+fn label(segment: usize, mean: Option<f64>, bright: bool, rings: &[f64; 4]) -> VectorShape {
+    let (share, turns) = label_place(segment, rings);
+    VectorShape::Label {
+        middle: screen(share, turns),
+        text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{:.0}", mean + 0.0)),
+        size: TEXT_HEIGHT_PX,
+        ink: if bright { BLACK_RGB } else { WHITE_RGB },
+        rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),
+    }
+}
+
+/// The letters of the four sides, or that they are not known.
+fn sides(map: &PolarMap) -> impl Iterator<Item = VectorShape> {
     let letters = SIDE_LETTERS
         .map(|(letter, turns)| text(screen(1.07, turns), letter.to_string()))
         .into_iter()
@@ -244,7 +334,7 @@ fn labels<'a>(map: &'a PolarMap, rings: &'a [f64; 4]) -> impl Iterator<Item = Ve
         "ORIENTATION UNKNOWN".to_owned(),
     );
     let unknown = (!map.is_oriented()).then_some(unknown);
-    means.chain(letters).chain(unknown)
+    letters.chain(unknown)
 }
 
 fn text(middle: Point, text: String) -> VectorShape {
@@ -268,37 +358,72 @@ fn label_place(segment: usize, rings: &[f64; 4]) -> (f64, f64) {
     }
 }
 
-/// The colours from 0 to 100 per cent, with the threshold.
-fn colour_bar(map: &PolarMap) -> Vec<VectorShape> {
-    const COLOUR_BAR_STEPS: usize = 100;
-    let (left, right, top, bottom) = (652.0, 676.0, 140.0, 500.0);
-    let height = |share: f64| bottom - (bottom - top) * share;
-    let mut shapes: Vec<VectorShape> = (0..COLOUR_BAR_STEPS)
-        .map(|step| {
-            let ends =
-                [step as f64, step as f64 + 1.03].map(|s| height(s / COLOUR_BAR_STEPS as f64));
-            VectorShape::Polygon {
-                corners: vec![
-                    [left, ends[0]],
-                    [right, ends[0]],
-                    [right, ends[1]],
-                    [left, ends[1]],
-                ],
-                fill: colour((step as f64 + 0.5) / COLOUR_BAR_STEPS as f64),
-            }
-        })
-        .collect();
-    for percent in [0, 25, 50, 75, 100] {
-        let y = height(f64::from(percent) / 100.0);
-        shapes.push(VectorShape::Line {
-            ends: [[right, y], [right + 6.0, y]],
-            stroke: BLACK_RGB,
-            width: 1.5,
-        });
-        shapes.push(text([right + 28.0, y], percent.to_string()));
+/// Left, right, top and bottom of the colour bar, pixels.
+const COLOUR_BAR_PX: [f64; 4] = [652.0, 676.0, 140.0, 500.0];
+
+/// The colours of a figure, with its unit.
+struct ColourBar<S: Fn(f64) -> f64, C: Fn(f64) -> Rgb> {
+    unit: &'static str,
+    ticks: &'static [f64],
+    /// Place of a value on the bar, 0 at the bottom to 1 on top.
+    share: S,
+    /// The colour of a place.
+    colour: C,
+}
+
+impl<S: Fn(f64) -> f64, C: Fn(f64) -> Rgb> ColourBar<S, C> {
+    fn shapes(&self) -> Vec<VectorShape> {
+        const COLOUR_BAR_STEPS: usize = 100;
+        let [left, right, top, _] = COLOUR_BAR_PX;
+        let mut shapes: Vec<VectorShape> = (0..COLOUR_BAR_STEPS)
+            .map(|step| {
+                let ends = [step as f64, step as f64 + 1.03]
+                    .map(|s| bar_height(s / COLOUR_BAR_STEPS as f64));
+                VectorShape::Polygon {
+                    corners: vec![
+                        [left, ends[0]],
+                        [right, ends[0]],
+                        [right, ends[1]],
+                        [left, ends[1]],
+                    ],
+                    fill: (self.colour)((step as f64 + 0.5) / COLOUR_BAR_STEPS as f64),
+                }
+            })
+            .collect();
+        for tick in self.ticks {
+            let y = bar_height((self.share)(*tick));
+            shapes.push(VectorShape::Line {
+                ends: [[right, y], [right + 6.0, y]],
+                stroke: BLACK_RGB,
+                width: 1.5,
+            });
+            shapes.push(text([right + 28.0, y], tick.to_string()));
+        }
+        shapes.push(text(
+            [(left + right) / 2.0, top - 24.0],
+            self.unit.to_owned(),
+        ));
+        shapes
     }
-    shapes.push(text([(left + right) / 2.0, top - 24.0], "%".to_owned()));
-    let y = height(map.threshold.clamp(0.0, 1.0));
+}
+
+/// The place on the screen of a share of the colour bar.
+fn bar_height(share: f64) -> f64 {
+    let [_, _, top, bottom] = COLOUR_BAR_PX;
+    bottom - (bottom - top) * share
+}
+
+/// The colours from 0 to 100 per cent, with the threshold.
+fn uptake_bar(map: &PolarMap) -> Vec<VectorShape> {
+    let bar = ColourBar {
+        unit: "%",
+        ticks: &[0.0, 25.0, 50.0, 75.0, 100.0],
+        share: |percent| percent / 100.0,
+        colour,
+    };
+    let mut shapes = bar.shapes();
+    let [left, right, ..] = COLOUR_BAR_PX;
+    let y = bar_height(map.threshold.clamp(0.0, 1.0));
     shapes.push(VectorShape::Line {
         ends: [[left - 6.0, y], [right + 6.0, y]],
         stroke: PALETTE.threshold,

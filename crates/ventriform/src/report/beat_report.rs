@@ -5,7 +5,7 @@
 use super::fit_report::LongAxis;
 use super::input::FileFacts;
 use super::json_number::round;
-use super::segmentation_report::{RaisedFlag, Resolution};
+use super::segmentation_report::{RaisedFlag, Resolution, SegmentationReport};
 use crate::beat::phase::HISTOGRAM_BINS;
 use crate::beat::{Beat, Extreme, SegmentMotion};
 use crate::volume::GateTiming;
@@ -50,6 +50,8 @@ pub struct BeatReport {
     pub no_rates: Option<String>,
     /// Muscle of the wall in the mean of the beat.
     pub wall_ml: f64,
+    /// Its mass, grams, at the density of muscle, 1.05 g/ml.
+    pub mass_g: f64,
     /// Its greatest change over the beat, per cent.
     pub wall_swing_percent: f64,
     /// The wall's segments (AHA).
@@ -70,7 +72,7 @@ pub struct BeatReport {
     pub confidence: f64,
     /// Steps of the joint fit.
     pub steps: usize,
-    /// Reasons to look closer: of the fit to the gates' sum, then of the beat.
+    /// Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat.
     pub flags: Vec<RaisedFlag>,
     /// Every parameter, defaults written out.
     pub parameters: Map<String, Value>,
@@ -128,6 +130,9 @@ pub struct SegmentMotionReport {
     pub motion_mm: f64,
     /// Thickening, end diastole to end systole.
     pub thickening_percent: f64,
+    /// The same by the counts of the wall, a second opinion: lower by what the image's filter takes; `null` where the
+    /// wall has no counts.
+    pub thickening_counts_percent: Option<f64>,
     /// Phase of the greatest thickness; `null` where the segment does not move.
     pub phase_degrees: Option<f64>,
 }
@@ -187,7 +192,7 @@ pub struct BeatParts {
     pub template: String,
     /// Confidence of that fit.
     pub confidence: f64,
-    /// Flags of that fit.
+    /// Flags of that fit, and of what the file says of the beats.
     pub flags: Vec<RaisedFlag>,
     /// Every parameter.
     pub parameters: Map<String, Value>,
@@ -252,6 +257,7 @@ impl BeatReport {
             }),
             no_rates: beat.rates.as_ref().err().cloned(),
             wall_ml: round(mean),
+            mass_g: round(SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean),
             wall_swing_percent: round(100.0 * swing / mean),
             segments: (beat.segments.iter())
                 .map(|segment| SegmentMotionReport::of(segment, &names[segment.segment - 1]))
@@ -294,6 +300,7 @@ impl SegmentMotionReport {
             name: name.to_owned(),
             motion_mm: round(segment.motion_mm),
             thickening_percent: round(segment.thickening_percent),
+            thickening_counts_percent: segment.thickening_counts_percent.map(round),
             phase_degrees: segment.phase_degrees.map(round),
         }
     }

@@ -4,6 +4,7 @@ use super::cavity::cavity;
 use super::from_files::{ExpertFacts, SegmentedVolume};
 use super::mask_place::MaskPlace;
 use super::region::region;
+use super::segment::Segmentation;
 use crate::deform::WallEdge;
 use crate::export::dicom::{DicomError, DicomObject, DicomResults, Moment, SourceScan, Structure};
 use crate::export::open_part::open_part;
@@ -16,8 +17,8 @@ use crate::polar::{self, PolarDocument};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationSummary};
 use crate::volume::Provenance;
+use crate::volume::Reading;
 use crate::volume::nifti::{self, LabelEntry, MaskError, StoredType};
-use crate::volume::{AffineSource, Reading};
 use serde::Serialize;
 
 /// The mask of the wall that was asked for.
@@ -184,36 +185,14 @@ impl SegmentedVolume {
         }
         let described = |(name, mesh, uncertainty): (&'static str, &'a TriMesh, &[f64])| {
             let metadata = Metadata {
-                parts: self.parts(mesh, monitor)?,
+                parts: self.segmentation.parts(mesh, monitor)?,
                 uncertainty: uncertainty.to_vec(),
-                field: self.uptake(mesh),
+                field: self.segmentation.uptake(mesh),
                 ..metadata.clone()
             };
             Ok((name, mesh, metadata))
         };
         meshes.into_iter().map(described).collect()
-    }
-
-    /// The part of the wall that each triangle of `mesh` is of; empty for other organs.
-    fn parts(&self, mesh: &TriMesh, monitor: &Monitor<'_>) -> Result<Vec<Part>, Cancelled> {
-        let parts = match &self.segmentation.fit.model.cup {
-            Some(cup) => wall_parts(mesh, cup, monitor)?,
-            None => None,
-        };
-        Ok(parts.unwrap_or_default())
-    }
-
-    /// The uptake of the wall at every vertex of `mesh`; ventricles only.
-    fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
-        let surfaces = self.segmentation.fit.model.surfaces.as_ref()?;
-        let map = self.segmentation.polar.as_ref()?;
-        let of = |p| map.uptake_at(&surfaces.apparent.wall, p);
-        let values: Vec<f64> = mesh.vertices.iter().map(of).collect();
-        Some(VertexField {
-            name: "Uptake",
-            colours: values.iter().map(|x| polar::colour_of(*x)).collect(),
-            values,
-        })
     }
 
     /// Warnings about the input and about the grid of its masks.
@@ -270,8 +249,7 @@ impl SegmentedVolume {
     /// The scan that the results belong to, with the given identity.
     pub fn scan(&self, identity: Provenance, made: Moment) -> SourceScan {
         let Reading { volume, facts, .. } = &self.reading;
-        let assumed = [AffineSource::Pixdim, AffineSource::UnknownOrigin];
-        let placed = !assumed.contains(&facts.affine_source);
+        let placed = facts.affine_source.is_placed();
         SourceScan::new(identity, volume.frame.clone(), volume.shape, placed, made)
     }
 
@@ -388,6 +366,34 @@ impl SegmentedVolume {
     }
 }
 
+impl Segmentation {
+    /// The part of the wall that each triangle of `mesh` is of; empty for other organs.
+    pub(crate) fn parts(
+        &self,
+        mesh: &TriMesh,
+        monitor: &Monitor<'_>,
+    ) -> Result<Vec<Part>, Cancelled> {
+        let parts = match &self.fit.model.cup {
+            Some(cup) => wall_parts(mesh, cup, monitor)?,
+            None => None,
+        };
+        Ok(parts.unwrap_or_default())
+    }
+
+    /// The uptake of the wall at every vertex of `mesh`; ventricles only.
+    pub(crate) fn uptake(&self, mesh: &TriMesh) -> Option<VertexField> {
+        let surfaces = self.fit.model.surfaces.as_ref()?;
+        let map = self.polar.as_ref()?;
+        let of = |p| map.uptake_at(&surfaces.apparent.wall, p);
+        let values: Vec<f64> = mesh.vertices.iter().map(of).collect();
+        Some(VertexField {
+            name: "Uptake",
+            colours: values.iter().map(|x| polar::colour_of(*x)).collect(),
+            values,
+        })
+    }
+}
+
 impl SegmentationFilesError {
     /// A file of labels, or why it cannot be written.
     pub(crate) fn nifti(
@@ -423,7 +429,7 @@ pub(crate) fn json_file(name: &str, document: &impl Serialize) -> NamedFile {
 }
 
 /// A document as JSON in one line.
-fn json_line(document: &impl Serialize) -> String {
+pub(crate) fn json_line(document: &impl Serialize) -> String {
     serde_json::to_string(document).expect("every key of a document is a text")
 }
 

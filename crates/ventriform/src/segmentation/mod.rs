@@ -44,8 +44,8 @@ mod error;
 
 pub use cavity::cavity;
 pub use error::SegmentationError;
-pub(crate) use files::json_file;
 pub use files::{NamedFile, SegmentationFilesError};
+pub(crate) use files::{json_file, json_line};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};

@@ -92,6 +92,11 @@ pub enum AffineSource {
 }
 
 impl AffineSource {
+    /// Whether orientation and origin in the patient are stated, not assumed.
+    pub fn is_placed(self) -> bool {
+        !matches!(self, Self::Pixdim | Self::UnknownOrigin)
+    }
+
     /// The name in JSON: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`, `mesh`,
     /// `caller`.
     pub fn as_str(self) -> &'static str {

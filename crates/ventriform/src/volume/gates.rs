@@ -20,19 +20,25 @@ pub struct GatedReading {
     pub timing: GateTiming,
     /// Facts about the file, or that of the first gate, with warnings of all.
     pub facts: VolumeFacts,
-    /// Whose scan it is; `None` unless the files are DICOM.
-    pub provenance: Option<Provenance>,
+    /// For every gate whose scan it is and which images or frames it was read from; empty unless the files are DICOM.
+    pub scans: Vec<Provenance>,
     /// The place of the grid as the file states it; `None` unless it is NIfTI.
     pub stated_grid: Option<StatedGrid>,
 }
 
 impl GatedReading {
+    /// Whose scan it is; `None` unless the files are DICOM.
+    pub fn provenance(&self) -> Option<&Provenance> {
+        self.scans.first()
+    }
+
     /// The gates that were read one by one.
     pub(super) fn of(readings: Vec<Reading>, mut timing: GateTiming) -> Result<Self, VolumeError> {
         let mut readings = readings.into_iter();
         let first = readings.next().ok_or(VolumeError::NoFile)?.usable()?;
         let mut facts = first.facts;
         let mut gates = vec![first.volume];
+        let mut scans = vec![first.provenance];
         for reading in readings {
             for warning in reading.facts.warnings {
                 if !facts.warnings.contains(&warning) {
@@ -40,6 +46,7 @@ impl GatedReading {
                 }
             }
             gates.push(reading.volume);
+            scans.push(reading.provenance);
         }
         let each = timing.gates_per_interval.unwrap_or(gates.len());
         if each > 0 && each < gates.len() && gates.len().is_multiple_of(each) {
@@ -54,6 +61,8 @@ impl GatedReading {
             ));
             gates = gates.split_off(main * each);
             gates.truncate(each);
+            scans = scans.split_off(main * each);
+            scans.truncate(each);
             if main > 0 {
                 // The sequence's first item, which was read, is that of the first interval.
                 timing = GateTiming::default();
@@ -63,7 +72,7 @@ impl GatedReading {
             gates,
             timing,
             facts,
-            provenance: first.provenance,
+            scans: scans.into_iter().collect::<Option<_>>().unwrap_or_default(),
             stated_grid: first.stated_grid,
         })
     }

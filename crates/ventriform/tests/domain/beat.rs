@@ -1,10 +1,17 @@
 //! The beat of a heart whose volumes are known: half an ellipsoid that shrinks and thickens, its muscle kept.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
+use dicom_core::value::DataSetSequence;
+use dicom_core::{DataElement, PrimitiveValue, VR};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::{DefaultDicomObject, FileMetaTableBuilder, InMemDicomObject, from_reader};
 use rayon::ThreadPoolBuilder;
+use ventriform::beat::BeatFlag;
 use ventriform::export::Format;
+use ventriform::export::dicom::Moment;
 use ventriform::gated::{BeatChoice, GatedError, GatedHeart, GatedOrder, from_files};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
@@ -212,6 +219,20 @@ fn an_even_contraction_is_even_and_in_phase() {
     assert_eq!(report.segments.len(), 17);
 }
 
+/// Blur lets a part of the thickening through; both opinions find it.
+#[test]
+fn counts_give_a_second_opinion_on_thickening() {
+    let report = whole().report();
+    let [thin, thick] = [0.0, 1.0].map(thickness_mm);
+    let truth = 100.0 * (thick / thin - 1.0);
+    let counts = report.segments.iter().map(|segment| {
+        let counts = segment.thickening_counts_percent;
+        counts.expect("a wall with counts")
+    });
+    let mean = counts.sum::<f64>() / report.segments.len() as f64;
+    assert!((0.3..1.0).contains(&(mean / truth)), "{mean} of {truth}");
+}
+
 #[test]
 fn gates_that_begin_elsewhere_in_the_cycle_give_the_same_ejection_fraction() {
     let mut rotated = gates().to_vec();
@@ -298,6 +319,9 @@ fn one_thread_and_four_give_the_same_bytes() {
         "mesh_ed.stl",
         "mesh_es.stl",
         "mesh_gate08.stl",
+        "mesh.glb",
+        "polar_es.json",
+        "polar_phase.svg",
         "labels_gate01.nii.gz",
     ] {
         assert!(names.contains(&name), "{names:?}");
@@ -383,15 +407,282 @@ fn a_file_that_denies_its_gates_needs_the_callers_word() {
 
 /// The gates as one NIfTI-1 file whose volumes are `seconds` apart.
 fn four_dimensional(seconds: f32) -> Vec<u8> {
-    let mut bytes = nifti::write(&gates()[0], StoredType::Float32, false).expect("floats fit");
+    four_dimensional_of(gates(), seconds)
+}
+
+fn four_dimensional_of(gates: &[Volume], seconds: f32) -> Vec<u8> {
+    let mut bytes = nifti::write(&gates[0], StoredType::Float32, false).expect("floats fit");
     bytes.truncate(352);
     bytes[40..42].copy_from_slice(&4i16.to_le_bytes());
     bytes[48..50].copy_from_slice(&8i16.to_le_bytes());
     bytes[92..96].copy_from_slice(&seconds.to_le_bytes());
     // Millimetres and seconds.
     bytes[123] = 2 | 8;
-    for gate in gates() {
+    for gate in gates {
         bytes.extend(gate.voxels.iter().flat_map(|v| v.to_le_bytes()));
     }
     bytes
+}
+
+/// Slope of the stored numbers, which no binary number is.
+const SLOPE: f32 = 0.0613;
+
+/// The gates as whole numbers times [`SLOPE`], and these numbers.
+fn quantised() -> (Vec<Volume>, Vec<u16>) {
+    let numbers = |gate: &Volume| -> Vec<u16> {
+        let stored = gate.voxels.iter().map(|v| (v / SLOPE).round() as u16);
+        stored.collect()
+    };
+    let stored: Vec<Vec<u16>> = gates().iter().map(numbers).collect();
+    let rescaled = |(gate, stored): (&Volume, &Vec<u16>)| Volume {
+        voxels: (stored.iter())
+            .map(|n| (f64::from(*n) * f64::from(SLOPE)) as f32)
+            .collect(),
+        ..gate.clone()
+    };
+    let volumes = gates().iter().zip(&stored).map(rescaled).collect();
+    (volumes, stored.concat())
+}
+
+/// The gates as one gated Nuclear Medicine image of which a fifth or more of the beats was rejected.
+fn nuclear(stored: &[u16], rejected: u16) -> Vec<u8> {
+    let gate = &gates()[0];
+    let slices = gate.shape[2];
+    let frames = GATES * slices;
+    let text = |tag, vr, text: &str| DataElement::new(tag, vr, PrimitiveValue::from(text));
+    let shorts =
+        |tag, numbers: Vec<u16>| DataElement::new(tag, VR::US, PrimitiveValue::U16(numbers.into()));
+    let items = |tag, item: InMemDicomObject| {
+        DataElement::new(tag, VR::SQ, DataSetSequence::from(vec![item]))
+    };
+    let origin = gate.frame.to_patient(&Vec3::zeros());
+    let detector = InMemDicomObject::from_element_iter([
+        text(
+            tags::IMAGE_POSITION_PATIENT,
+            VR::DS,
+            &format!("{}\\{}\\{}", origin.x, origin.y, origin.z),
+        ),
+        text(tags::IMAGE_ORIENTATION_PATIENT, VR::DS, "1\\0\\0\\0\\1\\0"),
+    ]);
+    let beats = InMemDicomObject::from_element_iter([
+        text(tags::NOMINAL_INTERVAL, VR::IS, "850"),
+        text(tags::INTERVALS_ACQUIRED, VR::IS, "100"),
+        text(tags::INTERVALS_REJECTED, VR::IS, &rejected.to_string()),
+    ]);
+    let gating =
+        InMemDicomObject::from_element_iter([items(tags::DATA_INFORMATION_SEQUENCE, beats)]);
+    let pointers = vec![
+        tags::RR_INTERVAL_VECTOR,
+        tags::TIME_SLOT_VECTOR,
+        tags::SLICE_VECTOR,
+    ];
+    let number = |n: usize| n as u16 + 1;
+    InMemDicomObject::from_element_iter([
+        text(
+            tags::SOP_CLASS_UID,
+            VR::UI,
+            uids::NUCLEAR_MEDICINE_IMAGE_STORAGE,
+        ),
+        text(tags::SOP_INSTANCE_UID, VR::UI, "1.2.3.4.5"),
+        text(tags::STUDY_INSTANCE_UID, VR::UI, "1.2.3"),
+        text(tags::SERIES_INSTANCE_UID, VR::UI, "1.2.3.4"),
+        text(tags::FRAME_OF_REFERENCE_UID, VR::UI, "1.2.3.9"),
+        text(tags::PATIENT_ID, VR::LO, "P1"),
+        text(tags::MODALITY, VR::CS, "NM"),
+        text(
+            tags::IMAGE_TYPE,
+            VR::CS,
+            "DERIVED\\PRIMARY\\RECON GATED TOMO\\EMISSION",
+        ),
+        shorts(tags::ROWS, vec![gate.shape[1] as u16]),
+        shorts(tags::COLUMNS, vec![gate.shape[0] as u16]),
+        text(tags::NUMBER_OF_FRAMES, VR::IS, &frames.to_string()),
+        shorts(tags::SAMPLES_PER_PIXEL, vec![1]),
+        text(tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "MONOCHROME2"),
+        shorts(tags::BITS_ALLOCATED, vec![16]),
+        shorts(tags::BITS_STORED, vec![16]),
+        shorts(tags::HIGH_BIT, vec![15]),
+        shorts(tags::PIXEL_REPRESENTATION, vec![0]),
+        text(
+            tags::PIXEL_SPACING,
+            VR::DS,
+            &format!("{SPACING_MM}\\{SPACING_MM}"),
+        ),
+        text(
+            tags::SPACING_BETWEEN_SLICES,
+            VR::DS,
+            &SPACING_MM.to_string(),
+        ),
+        text(tags::RESCALE_SLOPE, VR::DS, &SLOPE.to_string()),
+        text(tags::RESCALE_INTERCEPT, VR::DS, "0"),
+        DataElement::new(
+            tags::FRAME_INCREMENT_POINTER,
+            VR::AT,
+            PrimitiveValue::Tags(pointers.into()),
+        ),
+        shorts(tags::RR_INTERVAL_VECTOR, vec![1; frames]),
+        shorts(
+            tags::TIME_SLOT_VECTOR,
+            (0..frames).map(|n| number(n / slices)).collect(),
+        ),
+        shorts(
+            tags::SLICE_VECTOR,
+            (0..frames).map(|n| number(n % slices)).collect(),
+        ),
+        items(tags::DETECTOR_INFORMATION_SEQUENCE, detector),
+        items(tags::GATED_INFORMATION_SEQUENCE, gating),
+        DataElement::new(tags::PIXEL_DATA, VR::OW, PrimitiveValue::U16(stored.into())),
+    ])
+    .with_meta(FileMetaTableBuilder::new().transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN))
+    .map(|object| {
+        let mut bytes = Vec::new();
+        object.write_all(&mut bytes).expect("memory has room");
+        bytes
+    })
+    .expect("a class and an instance")
+}
+
+/// The beat of one file.
+fn beat_of_file(name: &str, bytes: Vec<u8>) -> GatedHeart {
+    let order = GatedOrder {
+        gates: &[VolumeFile::in_memory(name, bytes)],
+        auto: true,
+        models: Vec::new(),
+        parameters: &FitParameters::default(),
+        choice: BeatChoice {
+            rr_ms: Some(850.0),
+            ..BeatChoice::default()
+        },
+    };
+    from_files(&order, &ReadLimits::default(), &Monitor::silent()).expect("a beat")
+}
+
+fn from_nuclear() -> &'static GatedHeart {
+    static FROM_NUCLEAR: OnceLock<GatedHeart> = OnceLock::new();
+    FROM_NUCLEAR.get_or_init(|| beat_of_file("nm.dcm", nuclear(&quantised().1, 60)))
+}
+
+/// The same numbers as gated DICOM and as 4-D NIfTI: the same files, but for what the files say of themselves.
+#[test]
+fn dicom_and_nifti_give_the_same_beat() {
+    let nifti = beat_of_file("beat.nii", four_dimensional_of(&quantised().0, 0.1));
+    let hearts = [from_nuclear(), &nifti];
+    let [mut dicom, nifti] = hearts.map(GatedHeart::report);
+    // What the file says of itself and of the beats.
+    dicom.input = nifti.input.clone();
+    dicom.timing = nifti.timing.clone();
+    dicom.warnings.clone_from(&nifti.warnings);
+    dicom.flags.retain(|flag| flag.code != "beats_rejected");
+    assert_eq!(
+        serde_json::to_string(&dicom).unwrap(),
+        serde_json::to_string(&nifti).unwrap()
+    );
+    let [dicom, nifti] =
+        hearts.map(|heart| heart.files(&[Format::Obj], &Monitor::silent()).unwrap());
+    let alike = ["svg", "csv", "json"];
+    let mut compared = 0;
+    for (dicom, nifti) in dicom.iter().zip(&nifti) {
+        assert_eq!(dicom.name, nifti.name);
+        let kind = dicom.name.rsplit('.').next().unwrap();
+        if alike.contains(&kind) && dicom.name != "beat.json" {
+            assert!(dicom.bytes == nifti.bytes, "{}", dicom.name);
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 16);
+}
+
+#[test]
+fn many_rejected_beats_are_told() {
+    assert!(codes(from_nuclear()).contains(&"beats_rejected".to_owned()));
+    let timing = from_nuclear().report().timing;
+    assert_eq!(timing.beats_rejected, Some(60.0));
+    let few = nuclear(&quantised().1, 10);
+    let files = [VolumeFile::in_memory("nm.dcm", few)];
+    let read = read_gates(&files, false, &ReadLimits::default(), &Monitor::silent()).unwrap();
+    assert_eq!(
+        read.timing.rejected_share().and_then(BeatFlag::of_rejected),
+        None
+    );
+}
+
+/// Segmentations of both ends refer to the frames of their own gates, and the report has the figures of the beat.
+#[test]
+fn a_beat_is_written_as_dicom() {
+    let heart = from_nuclear();
+    let report = heart.report();
+    let made = Moment {
+        date: "20260101".into(),
+        time: "120000".into(),
+    };
+    let scans = heart.scans(heart.reading.provenance().unwrap(), &made);
+    let files = heart.dicom_files(&scans).unwrap();
+    let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+    assert_eq!(names, ["mask_ed.dcm", "mask_es.dcm", "measurements.dcm"]);
+    let again = heart.dicom_files(&scans).unwrap();
+    for (file, again) in files.iter().zip(&again) {
+        assert!(file.bytes == again.bytes, "{}", file.name);
+    }
+    let read: Vec<DefaultDicomObject> = (files.iter())
+        .map(|file| from_reader(&file.bytes[..]).unwrap())
+        .collect();
+    let slices = gates()[0].shape[2];
+    for (object, gate) in read
+        .iter()
+        .zip([report.end_diastole_gate, report.end_systole_gate])
+    {
+        let mut named = BTreeSet::new();
+        every_item(object, &mut |item| {
+            if let Ok(frame) = item.element(tags::REFERENCED_FRAME_NUMBER) {
+                named.insert(frame.to_int::<usize>().unwrap());
+            }
+        });
+        let own: BTreeSet<usize> = (slices * (gate - 1) + 1..=slices * gate).collect();
+        assert_eq!(named, own);
+    }
+    let uid = |object: &DefaultDicomObject| {
+        let uid = object.element(tags::SERIES_INSTANCE_UID).unwrap();
+        uid.to_str().unwrap().into_owned()
+    };
+    let series: BTreeSet<String> = read.iter().map(uid).collect();
+    assert_eq!(series.len(), 3);
+    let mut figures: Vec<(String, f64)> = Vec::new();
+    every_item(&read[2], &mut |item| {
+        let Ok(value) = item.element(tags::MEASURED_VALUE_SEQUENCE) else {
+            return;
+        };
+        let value = &value.items().unwrap()[0];
+        let number = value.element(tags::NUMERIC_VALUE).unwrap();
+        let name = item.element(tags::CONCEPT_NAME_CODE_SEQUENCE).unwrap();
+        let code = name.items().unwrap()[0].element(tags::CODE_VALUE).unwrap();
+        figures.push((
+            code.to_str().unwrap().into_owned(),
+            number.to_float64().unwrap(),
+        ));
+    });
+    let of = |code: &str| -> Vec<f64> {
+        let own = figures.iter().filter(|(found, _)| found == code);
+        own.map(|(_, number)| *number).collect()
+    };
+    assert_eq!(of("8821-1"), [report.edv_ml]);
+    assert_eq!(of("8823-7"), [report.esv_ml]);
+    assert_eq!(of("90096001"), [report.sv_ml]);
+    assert_eq!(of("70822001"), [report.ef_percent.unwrap()]);
+    assert_eq!(of("122447"), [report.mass_g]);
+    // Eight gates have no rates.
+    assert!(of("122616").is_empty() && of("122618").is_empty());
+    assert_eq!(of("PHASE-SD"), [report.phase.sd_degrees]);
+    let segments = &report.segments;
+    let thickening: Vec<f64> = segments.iter().map(|s| s.thickening_percent).collect();
+    assert_eq!(of("59092-7"), thickening);
+    let motion: Vec<f64> = segments.iter().map(|s| s.motion_mm).collect();
+    assert_eq!(of("60797005"), motion);
+}
+
+/// Calls `visit` with the data set and every item in it.
+fn every_item(set: &InMemDicomObject, visit: &mut dyn FnMut(&InMemDicomObject)) {
+    visit(set);
+    for item in set.iter().filter_map(|element| element.items()).flatten() {
+        every_item(item, visit);
+    }
 }

@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
+use ventriform::export::animated::{self, Cycle};
 use ventriform::export::open_part::open_part;
 use ventriform::export::{ExportError, Format, Metadata, Part, VertexField, encode, read_json};
 use ventriform::geometry::Vec3;
@@ -676,4 +677,95 @@ fn open_parts_are_the_triangles_and_figures_of_the_whole() {
     }
     assert!((area - mesh.area()).abs() < 1e-9 * area);
     assert!(open_part(&mesh, &metadata(), Part::Base).is_none());
+}
+
+/// The cup at a share of its contraction: shorter about its middle.
+fn contracted(share: f64) -> TriMesh {
+    let mesh = cup();
+    let middle = mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64;
+    let moved = |v: &Vec3| middle + (v - middle) * (1.0 - 0.2 * share);
+    TriMesh {
+        vertices: mesh.vertices.iter().map(moved).collect(),
+        ..mesh
+    }
+}
+
+/// At key n mesh n is shown, and the last key shows the first mesh again.
+#[test]
+fn a_beat_is_a_closed_animation_of_its_meshes() {
+    let meshes = [0.0, 0.6, 1.0, 0.3].map(contracted);
+    let cycle = Cycle {
+        meshes: &meshes,
+        rest: 0,
+        seconds: 0.9,
+    };
+    let bytes = animated::encode(&cycle, &painted_metadata(&meshes[0])).unwrap();
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("formats_animated");
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("beat.glb"), &bytes).unwrap();
+    let (document, buffer) = chunks(&bytes);
+    let numbers = |accessor: &Value| -> Vec<f32> {
+        let accessor = &document["accessors"][accessor.as_u64().unwrap() as usize];
+        let view = accessor["bufferView"].as_u64().unwrap() as usize;
+        let view = &document["bufferViews"][view];
+        let at = view["byteOffset"].as_u64().unwrap() as usize;
+        let count = accessor["count"].as_u64().unwrap() as usize;
+        let parts = if accessor["type"] == "VEC3" { 3 } else { 1 };
+        floats(&buffer[at..at + 4 * parts * count])
+    };
+    let animation = &document["animations"][0];
+    let sampler = &animation["samplers"][0];
+    assert_eq!(sampler["interpolation"], "LINEAR");
+    assert_eq!(animation["channels"][0]["target"]["path"], "weights");
+    let times = numbers(&sampler["input"]);
+    assert_eq!(times, [0.0, 0.225, 0.45, 0.675, 0.9]);
+    let weights = numbers(&sampler["output"]);
+    assert_eq!(weights[..4], weights[16..]);
+    let primitives = document["meshes"][0]["primitives"].as_array().unwrap();
+    assert_eq!(primitives.len(), 3);
+    for primitive in primitives {
+        let shown = |key: usize, attribute: &str| -> Vec<f32> {
+            let mut sum = numbers(&primitive["attributes"][attribute]);
+            let targets = primitive["targets"].as_array().unwrap();
+            assert_eq!(targets.len(), meshes.len());
+            for (target, weight) in targets.iter().zip(&weights[4 * key..]) {
+                let moved = numbers(&target[attribute]);
+                sum.iter_mut()
+                    .zip(moved)
+                    .for_each(|(s, m)| *s += weight * m);
+            }
+            sum
+        };
+        for key in 0..=meshes.len() {
+            let mesh = &meshes[key % meshes.len()];
+            for (attribute, wanted) in [
+                ("POSITION", rounded(&mesh.vertices)),
+                ("NORMAL", rounded(&mesh.vertex_normals())),
+            ] {
+                for (found, wanted) in shown(key, attribute).iter().zip(wanted) {
+                    assert!((found - wanted).abs() < 2e-4, "{attribute} at key {key}");
+                }
+            }
+        }
+    }
+    let mut other = meshes.clone();
+    other[2].vertices.pop();
+    other[2].triangles.clear();
+    other[2].triangles.push([0, 1, 2]);
+    let wrong = animated::encode(
+        &Cycle {
+            meshes: &other,
+            ..cycle
+        },
+        &metadata(),
+    );
+    assert_eq!(wrong, Err(ExportError::OtherMesh { index: 2 }));
+    let none = animated::encode(
+        &Cycle {
+            meshes: &[],
+            ..cycle
+        },
+        &metadata(),
+    );
+    assert_eq!(none, Err(ExportError::OtherMesh { index: 0 }));
 }

@@ -13,7 +13,7 @@ pub(super) fn put(
     set: &mut DataSet,
 ) -> Result<(), DicomError> {
     let picture = Picture::decode(png).map_err(|reason| DicomError::Picture { name, reason })?;
-    results.put_made(set);
+    results.scan.put_made(set);
     set.text(tags::IMAGE_TYPE, "DERIVED\\SECONDARY");
     set.text(tags::CONVERSION_TYPE, "SYN");
     set.text(tags::DERIVATION_DESCRIPTION, results.structure.label);

@@ -33,6 +33,7 @@ pub(super) const fn ucum(value: &'static str, meaning: &'static str) -> Code {
 
 /// A code of this software.
 pub(super) const fn own(value: &'static str, meaning: &'static str) -> Code {
+    assert!(value.len() <= 16, "a Code Value has at most 16 characters");
     code(value, OWN_SCHEME, meaning)
 }
 

@@ -8,6 +8,7 @@
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
 //!    `measurements`, `capture`).
+//! 4. [`DicomBeat::write`] does so for a beat: two Segmentations and a report.
 //!
 //! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
 //! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
@@ -21,6 +22,7 @@
 //! Not guaranteed: that the values which a source states about the patient are valid DICOM; they
 //! are copied, so that the archive finds the same patient.
 
+mod beat;
 mod capture;
 mod codes;
 mod data_set;
@@ -29,12 +31,14 @@ mod segmentation;
 mod source;
 mod stl;
 mod structure_set;
+mod structured_report;
 mod surface;
 mod uid;
 
 #[cfg(test)]
 mod tests;
 
+pub use beat::{BeatEnd, BeatObject, DicomBeat, EndResults};
 pub use codes::{LabelSegment, Structure};
 pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
@@ -235,6 +239,8 @@ pub struct DicomResults<'a> {
     cavity: Option<&'a Mask>,
     slices: Option<&'a [u8]>,
     polar: Option<&'a [u8]>,
+    /// The end of the beat that is shown; `None` for an image of all moments.
+    end: Option<BeatEnd>,
     uids: Uids,
 }
 
@@ -257,6 +263,7 @@ impl<'a> DicomResults<'a> {
             cavity: None,
             slices: None,
             polar: None,
+            end: None,
             uids: Uids::over_all(|add| {
                 add(env!("CARGO_PKG_VERSION").as_bytes());
                 scan.add_to(add);
@@ -296,11 +303,34 @@ impl<'a> DicomResults<'a> {
         }
     }
 
+    /// Says which end of a beat is shown.
+    #[must_use]
+    fn at(self, end: BeatEnd) -> Self {
+        Self {
+            end: Some(end),
+            ..self
+        }
+    }
+
     /// The bytes of `object`; `None` for a picture that is not there.
     ///
     /// # Errors
     /// See [`DicomError`].
     pub fn write(&self, object: DicomObject) -> Result<Option<Vec<u8>>, DicomError> {
+        let there = match object {
+            DicomObject::Polar => self.polar.is_some(),
+            DicomObject::Page => self.slices.is_some(),
+            _ => true,
+        };
+        if there {
+            self.write_always(object).map(Some)
+        } else {
+            self.scan.check().map(|()| None)
+        }
+    }
+
+    /// The bytes of `object`; a picture that is not there is empty.
+    fn write_always(&self, object: DicomObject) -> Result<Vec<u8>, DicomError> {
         self.scan.check()?;
         let mut set = DataSet::new();
         match object {
@@ -314,46 +344,30 @@ impl<'a> DicomResults<'a> {
                     DicomObject::Polar => self.polar,
                     _ => self.slices,
                 };
-                let Some(png) = picture else { return Ok(None) };
+                let png = picture.unwrap_or_default();
                 capture::put(self, object.file_name(), png, &mut set)?;
             }
         }
-        self.put_common(object, &mut set);
-        set.file().map(Some)
-    }
-
-    /// The modules that all objects have: patient, study, series, equipment, SOP Common, and the
-    /// references to the source.
-    fn put_common(&self, object: DicomObject, set: &mut DataSet) {
         let facts = object.facts();
-        self.scan.put_identity(set);
-        set.text(tags::SOP_CLASS_UID, facts.class);
-        set.text(tags::SOP_INSTANCE_UID, self.instance(object));
-        set.text(tags::MODALITY, facts.modality);
-        set.text(tags::SERIES_INSTANCE_UID, self.series(object));
-        set.text(tags::SERIES_NUMBER, facts.series.to_string());
-        set.text(tags::INSTANCE_NUMBER, "1");
-        let description = format!("{}: {}", self.structure.label, facts.description);
-        set.text(tags::SERIES_DESCRIPTION, description);
-        let made = self.scan.made();
-        set.text(tags::SERIES_DATE, made.date.as_str());
-        set.text(tags::SERIES_TIME, made.time.as_str());
-        set.text(tags::MANUFACTURER, "ventriform");
-        set.text(tags::MANUFACTURER_MODEL_NAME, "ventriform");
-        set.text(tags::DEVICE_SERIAL_NUMBER, "none");
-        set.text(tags::SOFTWARE_VERSIONS, env!("CARGO_PKG_VERSION"));
-    }
-
-    /// Date and time of the content.
-    fn put_made(&self, set: &mut DataSet) {
-        let made = self.scan.made();
-        set.text(tags::CONTENT_DATE, made.date.as_str());
-        set.text(tags::CONTENT_TIME, made.time.as_str());
+        let end = self.end.map(|end| format!(", {}", end.name()));
+        put_facts(
+            self.scan,
+            &facts,
+            [self.instance(object), self.series(object)],
+            format!(
+                "{}: {}{}",
+                self.structure.label,
+                facts.description,
+                end.unwrap_or_default()
+            ),
+            &mut set,
+        );
+        set.file()
     }
 
     /// Label, description and creator of a segmentation.
     fn put_content(&self, set: &mut DataSet) {
-        self.put_made(set);
+        self.scan.put_made(set);
         set.text(tags::CONTENT_LABEL, "VENTRIFORM");
         set.text(tags::CONTENT_DESCRIPTION, self.structure.label);
         set.empty(tags::CONTENT_CREATOR_NAME);
@@ -399,6 +413,32 @@ impl<'a> DicomResults<'a> {
     fn tracking(&self) -> String {
         self.uids.uid("tracking")
     }
+}
+
+/// The modules that all objects have: patient, study, series, equipment and SOP Common. `uids` are those of the instance
+/// and of its series.
+fn put_facts(
+    scan: &SourceScan,
+    facts: &ObjectFacts,
+    [instance, series]: [String; 2],
+    description: String,
+    set: &mut DataSet,
+) {
+    scan.put_identity(set);
+    set.text(tags::SOP_CLASS_UID, facts.class);
+    set.text(tags::SOP_INSTANCE_UID, instance);
+    set.text(tags::MODALITY, facts.modality);
+    set.text(tags::SERIES_INSTANCE_UID, series);
+    set.text(tags::SERIES_NUMBER, facts.series.to_string());
+    set.text(tags::INSTANCE_NUMBER, "1");
+    set.text(tags::SERIES_DESCRIPTION, description);
+    let made = scan.made();
+    set.text(tags::SERIES_DATE, made.date.as_str());
+    set.text(tags::SERIES_TIME, made.time.as_str());
+    set.text(tags::MANUFACTURER, "ventriform");
+    set.text(tags::MANUFACTURER_MODEL_NAME, "ventriform");
+    set.text(tags::DEVICE_SERIAL_NUMBER, "none");
+    set.text(tags::SOFTWARE_VERSIONS, env!("CARGO_PKG_VERSION"));
 }
 
 /// The description of segment `number` for its item in the Segment Sequence.

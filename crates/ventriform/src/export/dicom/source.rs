@@ -86,11 +86,16 @@ pub(super) struct SourceImages<'a> {
     instances: Vec<&'a str>,
 }
 
-impl SourceImages<'_> {
+impl<'a> SourceImages<'a> {
+    /// SOP Class and SOP Instance UID of every instance.
+    pub fn instances(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        self.instances.iter().map(|uid| (self.class, *uid))
+    }
+
     /// A reference to every instance.
     pub fn references(&self) -> Vec<DataSet> {
-        let all = self.instances.iter();
-        all.map(|uid| reference(self.class, uid)).collect()
+        let all = self.instances();
+        all.map(|(class, uid)| reference(class, uid)).collect()
     }
 
     /// The same, naming them as what the result was computed from.
@@ -385,6 +390,12 @@ impl SourceScan {
     /// When the results were made.
     pub(super) fn made(&self) -> &Moment {
         &self.made
+    }
+
+    /// Date and time of the content.
+    pub(super) fn put_made(&self, set: &mut DataSet) {
+        set.text(tags::CONTENT_DATE, self.made.date.as_str());
+        set.text(tags::CONTENT_TIME, self.made.time.as_str());
     }
 
     /// Patient, General Study, and the marks of de-identification.

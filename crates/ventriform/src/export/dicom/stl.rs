@@ -17,7 +17,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     };
     let bytes = encode(Format::Stl, results.mesh, &metadata)?;
     scan.put_frame_of_reference(set);
-    results.put_made(set);
+    results.scan.put_made(set);
     results.put_referenced_series(set);
     set.empty(tags::ACQUISITION_DATE_TIME);
     set.text(tags::BURNED_IN_ANNOTATION, "NO");

@@ -121,7 +121,13 @@ attributes! {
     GATE_HIGH_RR = GATED_DATA, 0x0018, 0x1082, "High R-R Value (0018,1082)";
     GATE_INTERVALS_ACQUIRED = GATED_DATA, 0x0018, 0x1083, "Intervals Acquired (0018,1083)";
     GATE_INTERVALS_REJECTED = GATED_DATA, 0x0018, 0x1084, "Intervals Rejected (0018,1084)";
+    NOMINAL_INTERVAL = &[], 0x0018, 0x1062, "Nominal Interval (0018,1062)";
+    FRAME_TIME = &[], 0x0018, 0x1063, "Frame Time (0018,1063)";
     LOW_RR_VALUE = &[], 0x0018, 0x1081, "Low R-R Value (0018,1081)";
+    HIGH_RR_VALUE = &[], 0x0018, 0x1082, "High R-R Value (0018,1082)";
+    INTERVALS_ACQUIRED = &[], 0x0018, 0x1083, "Intervals Acquired (0018,1083)";
+    INTERVALS_REJECTED = &[], 0x0018, 0x1084, "Intervals Rejected (0018,1084)";
+    HEART_RATE = &[], 0x0018, 0x1088, "Heart Rate (0018,1088)";
     B_VALUE = &[], 0x0018, 0x9087, "Diffusion b-value (0018,9087)";
     FLIP_ANGLE = &[], 0x0018, 0x1314, "Flip Angle (0018,1314)";
     CONVOLUTION_KERNEL = &[], 0x0018, 0x1210, "Convolution Kernel (0018,1210)";
@@ -215,6 +221,11 @@ attributes! {
         "Actual Cardiac Trigger Delay Time (0020,9252)";
     FRAME_CARDIAC_PHASE = FRAME_CARDIAC, 0x0020, 0x9241,
         "Nominal Percentage of Cardiac Phase (0020,9241)";
+    FRAME_RR_NOMINAL = FRAME_CARDIAC, 0x0020, 0x9251, "R-R Interval Time Nominal (0020,9251)";
+    FRAME_LOW_RR = FRAME_CARDIAC, 0x0018, 0x1081, "Low R-R Value (0018,1081)";
+    FRAME_HIGH_RR = FRAME_CARDIAC, 0x0018, 0x1082, "High R-R Value (0018,1082)";
+    FRAME_INTERVALS_ACQUIRED = FRAME_CARDIAC, 0x0018, 0x1083, "Intervals Acquired (0018,1083)";
+    FRAME_INTERVALS_REJECTED = FRAME_CARDIAC, 0x0018, 0x1084, "Intervals Rejected (0018,1084)";
     FRAME_RESPIRATORY_DELAY = FRAME_RESPIRATORY, 0x0020, 0x9255,
         "Nominal Respiratory Trigger Delay Time (0020,9255)";
     FRAME_RESPIRATORY_PHASE = FRAME_RESPIRATORY, 0x0020, 0x9245,

@@ -236,6 +236,13 @@ impl DicomFile {
             }
         };
         warnings.extend(attenuation_warning(a));
+        let enhanced_gates = scan.kind == Kind::Enhanced && timing::has_gates(a, pixels.frames);
+        let gated = volumes > 1 && (scan.kind == Kind::Nuclear { gated: true } || enhanced_gates);
+        let timing = if enhanced_gates {
+            timing::of_frames(a)?
+        } else {
+            timing::of(a)?
+        };
         let voxels = (columns * rows) as u64 * slices as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(a, voxels, limits.voxels));
@@ -250,8 +257,8 @@ impl DicomFile {
             },
             content,
             volumes,
-            gated: volumes > 1 && scan.kind == Kind::Nuclear { gated: true },
-            timing: timing::of(a)?,
+            gated,
+            timing,
             shape: [columns, rows, slices],
             placement,
             provenance: Provenance::of(a),
@@ -311,6 +318,12 @@ impl DicomFile {
                 NUMBER_OF_SLICES.name, series.slices, stack.slices
             ));
         }
+        let gated = volumes > 1 && series.gated;
+        let timing = if gated {
+            first.timing?
+        } else {
+            GateTiming::default()
+        };
         let mut warnings = first.warnings;
         warnings.extend(series.warnings(&stack, volumes));
         let voxels = (extent[0] * extent[1]) as u64 * stack.slices as u64;
@@ -334,8 +347,8 @@ impl DicomFile {
             format: FileFormat::DicomSeries,
             content: Content::Slices(stored.collect()),
             volumes,
-            gated: false,
-            timing: GateTiming::default(),
+            gated,
+            timing,
             shape: [extent[0], extent[1], stack.slices],
             placement: stack.placement,
             provenance: first.provenance,
@@ -494,6 +507,8 @@ struct First {
     warnings: Vec<String>,
     /// The distance of slices that it states, in millimetres.
     gap: Option<f64>,
+    /// What it says of the beats; an error counts only where the series is gated.
+    timing: Result<GateTiming, VolumeError>,
 }
 
 /// The files of a series found so far.
@@ -509,6 +524,8 @@ struct Series {
     names: BTreeMap<String, SeriesName>,
     /// The first instance.
     first: Option<First>,
+    /// Whether a file says that the volumes are gates.
+    gated: bool,
     /// Files that repeat an instance.
     repeated: usize,
     /// The most that any file states: slices of a volume, volumes, images.
@@ -577,7 +594,11 @@ impl Series {
                 provenance: Provenance::of(a),
                 warnings: Provenance::warnings(a),
                 gap: stated_gap(a)?,
+                timing: timing::of_slice(a),
             });
+        }
+        if timing::is_of_gates(a) {
+            self.gated = true;
         }
         let stated = |attribute| a.shorts(attribute).first().map_or(1, |n| usize::from(*n));
         self.slices = self.slices.max(stated(NUMBER_OF_SLICES));

@@ -512,6 +512,17 @@ fn padding(scan: &Scan, data_type: DataType, unused_bits: u32) -> Option<Padding
     })
 }
 
+/// A decimal text in single precision, as NIfTI files have it, so that the same image gives the same values in both;
+/// unchanged beyond the range of single precision.
+fn single(number: f64) -> f64 {
+    let rounded = f64::from(number as f32);
+    if rounded.is_finite() && (rounded != 0.0) == (number != 0.0) {
+        rounded
+    } else {
+        number
+    }
+}
+
 /// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the
 /// first item of the Real World Value Mapping; `None` if there is neither or they change nothing.
 fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError> {
@@ -527,7 +538,7 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
     for (slope, inter) in rescale {
         if let (None, Some([value])) = (&found, a.decimals_of(slope, frame)?) {
             let [inter] = a.decimals_of(inter, frame)?.unwrap_or([0.0]);
-            found = Some((slope.name, value, inter));
+            found = Some((slope.name, single(value), single(inter)));
         }
     }
     if found.is_none() && !a.shorts(MODALITY_TABLE).is_empty() {

@@ -1,38 +1,126 @@
-//! What a gated NM image says of the beats: PS3.3 C.8.4.9, Gated Information Sequence.
+//! What gated images say of the beats, and whether volumes are gates.
+//!
+//! In: the attributes of a file. Out: [`GateTiming`], of which the file may leave out any part. Nuclear Medicine images
+//! have it in the Gated Information Sequence (PS3.3 C.8.4.9), images of a PET series beside the slice (C.8.9.4), Enhanced
+//! images in the Cardiac Synchronization functional group (C.7.6.16.2.7).
 
 use super::super::VolumeError;
 use super::super::gate_timing::GateTiming;
 use super::attributes::{
-    Attribute, Attributes, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
-    GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, TIME_SLOT_VECTOR, TIME_SLOTS,
+    Attribute, Attributes, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE, FRAME_HIGH_RR,
+    FRAME_INTERVALS_ACQUIRED, FRAME_INTERVALS_REJECTED, FRAME_LOW_RR, FRAME_RR_NOMINAL, FRAME_TIME,
+    FRAME_TRIGGER_DELAY, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
+    GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, HEART_RATE, HIGH_RR_VALUE,
+    INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL,
+    OLD_TRIGGER_TIME, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
 };
 
-/// The timing of the first R-R interval; parts that the file leaves out are `None`.
+/// Milliseconds of a minute.
+const MINUTE_MS: f64 = 60_000.0;
+
+/// The timing of the first R-R interval of a Nuclear Medicine image.
 ///
 /// # Errors
 /// [`VolumeError::Field`] if a part is not a number, or is negative.
-pub(super) fn of(attributes: &Attributes) -> Result<GateTiming, VolumeError> {
-    let number = |attribute: Attribute| -> Result<Option<f64>, VolumeError> {
-        match attributes.decimals::<1>(attribute)? {
-            Some([number]) if number < 0.0 => {
-                let reason = "a duration or a count is 0 or more".to_owned();
-                Err(attributes.wrong(attribute.name, &number.to_string(), reason))
-            }
-            Some([number]) => Ok(Some(number)),
-            None => Ok(None),
-        }
-    };
-    // Some writers leave 0 where they know nothing.
-    let duration = |attribute| Ok::<_, VolumeError>(number(attribute)?.filter(|ms| *ms > 0.0));
-    let slots = attributes.shorts(TIME_SLOT_VECTOR).into_iter().max();
-    let stated = attributes.shorts(TIME_SLOTS).first().copied();
+pub(super) fn of(a: &Attributes) -> Result<GateTiming, VolumeError> {
+    let slots = a.shorts(TIME_SLOT_VECTOR).into_iter().max();
+    let stated = a.shorts(TIME_SLOTS).first().copied();
     Ok(GateTiming {
-        frame_time_ms: duration(GATE_FRAME_TIME)?,
-        rr_ms: duration(GATE_NOMINAL_INTERVAL)?,
-        low_rr_ms: duration(GATE_LOW_RR)?,
-        high_rr_ms: duration(GATE_HIGH_RR)?,
-        beats_accepted: number(GATE_INTERVALS_ACQUIRED)?,
-        beats_rejected: number(GATE_INTERVALS_REJECTED)?,
+        frame_time_ms: duration(a, GATE_FRAME_TIME, None)?,
+        rr_ms: duration(a, GATE_NOMINAL_INTERVAL, None)?,
+        low_rr_ms: duration(a, GATE_LOW_RR, None)?,
+        high_rr_ms: duration(a, GATE_HIGH_RR, None)?,
+        beats_accepted: number(a, GATE_INTERVALS_ACQUIRED, None)?,
+        beats_rejected: number(a, GATE_INTERVALS_REJECTED, None)?,
         gates_per_interval: slots.or(stated).map(usize::from),
     })
+}
+
+/// The timing that a slice of a gated PET series states.
+///
+/// # Errors
+/// As for [`of`].
+pub(super) fn of_slice(a: &Attributes) -> Result<GateTiming, VolumeError> {
+    let first = |attribute| a.shorts(attribute).first().copied().map(usize::from);
+    let slots = first(TIME_SLOTS);
+    let several = first(RR_INTERVALS).is_some_and(|intervals| intervals > 1);
+    let of_rate = duration(a, HEART_RATE, None)?.map(|rate| MINUTE_MS / rate);
+    Ok(GateTiming {
+        frame_time_ms: duration(a, FRAME_TIME, None)?,
+        rr_ms: duration(a, NOMINAL_INTERVAL, None)?.or(of_rate),
+        low_rr_ms: duration(a, LOW_RR_VALUE, None)?,
+        high_rr_ms: duration(a, HIGH_RR_VALUE, None)?,
+        beats_accepted: number(a, INTERVALS_ACQUIRED, None)?,
+        beats_rejected: number(a, INTERVALS_REJECTED, None)?,
+        gates_per_interval: several.then_some(slots).flatten(),
+    })
+}
+
+/// The timing that the first frame of a gated Enhanced image states.
+///
+/// # Errors
+/// As for [`of`].
+pub(super) fn of_frames(a: &Attributes) -> Result<GateTiming, VolumeError> {
+    let first = Some(0);
+    let nominal = a.double(FRAME_RR_NOMINAL, first);
+    Ok(GateTiming {
+        frame_time_ms: None,
+        rr_ms: nominal.filter(|ms| ms.is_finite() && *ms > 0.0),
+        low_rr_ms: duration(a, FRAME_LOW_RR, first)?,
+        high_rr_ms: duration(a, FRAME_HIGH_RR, first)?,
+        beats_accepted: number(a, FRAME_INTERVALS_ACQUIRED, first)?,
+        beats_rejected: number(a, FRAME_INTERVALS_REJECTED, first)?,
+        gates_per_interval: None,
+    })
+}
+
+/// Whether a slice says that it belongs to a gated series: PET by its Series Type, or by several time slots.
+pub(super) fn is_of_gates(a: &Attributes) -> bool {
+    match a.texts(SERIES_TYPE).first().map(String::as_str) {
+        Some("GATED") => true,
+        Some("DYNAMIC" | "STATIC" | "WHOLE BODY") => false,
+        _ => a.shorts(TIME_SLOTS).first().is_some_and(|slots| *slots > 1),
+    }
+}
+
+/// Whether the `frames` of an Enhanced image of uptake show several moments of the beat.
+pub(super) fn has_gates(a: &Attributes, frames: usize) -> bool {
+    let uptake = matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT"));
+    let differ = |value: &dyn Fn(usize) -> Option<f64>| {
+        let first = value(0);
+        first.is_some() && (1..frames).any(|frame| value(frame).is_some_and(|v| Some(v) != first))
+    };
+    let moments = [FRAME_TRIGGER_DELAY, FRAME_ACTUAL_DELAY, FRAME_CARDIAC_PHASE];
+    let of_groups =
+        || (moments.iter()).any(|moment| differ(&|frame| a.double(*moment, Some(frame))));
+    // Images that were made of single ones keep their Trigger Time.
+    let of_old = |frame| {
+        let time = a.decimals_of::<1>(OLD_TRIGGER_TIME, Some(frame));
+        time.ok().flatten().map(|[ms]| ms)
+    };
+    uptake && (of_groups() || differ(&of_old))
+}
+
+fn number(
+    a: &Attributes,
+    attribute: Attribute,
+    frame: Option<usize>,
+) -> Result<Option<f64>, VolumeError> {
+    match a.decimals_of::<1>(attribute, frame)? {
+        Some([number]) if number < 0.0 => {
+            let reason = "a duration or a count is 0 or more".to_owned();
+            Err(a.wrong(attribute.name, &number.to_string(), reason))
+        }
+        Some([number]) => Ok(Some(number)),
+        None => Ok(None),
+    }
+}
+
+/// Some writers leave 0 where they know nothing.
+fn duration(
+    a: &Attributes,
+    attribute: Attribute,
+    frame: Option<usize>,
+) -> Result<Option<f64>, VolumeError> {
+    Ok(number(a, attribute, frame)?.filter(|ms| *ms > 0.0))
 }

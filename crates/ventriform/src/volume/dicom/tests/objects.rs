@@ -586,3 +586,142 @@ fn archives_cost_no_more_than_they_hold() {
         }
     }
 }
+
+/// A series of gated PET: for each of `gates` two slices, told apart by `told`.
+fn gated_pet(gates: usize, told: fn(usize, usize) -> Elements) -> Vec<Elements> {
+    let slice = |gate: usize, slice: usize| {
+        let mut elements = ct("0", (100 * gate + 10 * slice) as u16);
+        elements.extend([
+            ((0x08, 0x16), ("UI", Text("1.2.840.10008.5.1.4.1.1.128"))),
+            ((0x08, 0x18), ("UI", written(format!("1.{gate}.{slice}")))),
+            ((0x08, 0x60), ("CS", Text("PT"))),
+            ((0x18, 0x1062), ("IS", Text("900"))),
+            ((0x18, 0x1063), ("DS", Text("112.5"))),
+            ((0x18, 0x1081), ("IS", Text("700"))),
+            ((0x18, 0x1082), ("IS", Text("1100"))),
+            ((0x18, 0x1083), ("IS", Text("390"))),
+            ((0x18, 0x1084), ("IS", Text("130"))),
+            (
+                (0x20, 0x32),
+                ("DS", written(format!("1\\2\\{}", 3 * slice))),
+            ),
+            ((0x28, 0x1052), ("DS", Text("0"))),
+            ((0x54, 0x71), ("US", Shorts(vec![8]))),
+            ((0x54, 0x1000), ("CS", Text("GATED\\IMAGE"))),
+        ]);
+        elements.extend(told(gate, slice));
+        elements
+    };
+    (0..gates)
+        .flat_map(|gate| [slice(gate, 1), slice(gate, 0)])
+        .collect()
+}
+
+/// Gates are told apart by the time after the R wave, or by the slots that Image Index counts; their order is that of the
+/// beat whatever the order of the files.
+#[test]
+fn a_series_of_gated_pet_is_read_gate_by_gate() {
+    type Said = fn(usize, usize) -> Elements;
+    let by_trigger: Said = |gate, _| {
+        let ms = 112.5 * gate as f64;
+        item((0x18, 0x1060), "DS", written(ms))
+    };
+    let by_index: Said = |gate, slice| {
+        let index = (2 * gate + slice + 1) as u16;
+        item((0x54, 0x1330), "US", Shorts(vec![index]))
+    };
+    for told in [by_trigger, by_index] {
+        let mut slices = gated_pet(8, told);
+        slices.reverse();
+        let limits = ReadLimits::default();
+        let read = |slices: &[Elements]| {
+            crate::volume::read_gates(&files(slices), false, &limits, &Monitor::silent())
+        };
+        let reading = read(&slices).unwrap();
+        assert_eq!(reading.gates.len(), 8);
+        for (index, gate) in reading.gates.iter().enumerate() {
+            let first = 100.0 * index as f32;
+            assert_eq!([gate.voxels[0], gate.voxels[6]], [first, first + 10.0]);
+            let uids = [0, 1].map(|slice| format!("1.{index}.{slice}"));
+            assert_eq!(reading.scans[index].instance_uids, uids);
+        }
+        let timing = &reading.timing;
+        assert_eq!(
+            (timing.rr_ms, timing.frame_time_ms),
+            (Some(900.0), Some(112.5))
+        );
+        assert_eq!(timing.rejected_share(), Some(0.25));
+        // A dynamic series is none, and its numbers do not matter.
+        for slice in &mut slices {
+            slice.insert((0x54, 0x1000), ("CS", Text("DYNAMIC\\IMAGE")));
+            slice.insert((0x18, 0x1062), ("IS", Text("-900")));
+        }
+        let refused = read(&slices).unwrap_err();
+        assert!(
+            matches!(refused, VolumeError::FrameNeeded { frames: 8, .. }),
+            "{refused}"
+        );
+    }
+}
+
+/// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was made
+/// of single ones, their Trigger Time.
+#[test]
+fn an_enhanced_image_of_several_moments_of_the_beat_is_gated() {
+    let of = |tag: (u16, u16), modality: &'static str| {
+        let said = |moment: usize| match tag {
+            (0x18, 0x1060) => {
+                let time = ["50", "0"][moment];
+                vec![group((0x20, 0x9171), item(tag, "DS", Text(time)))]
+            }
+            _ => {
+                let mut cardiac = item(tag, "FD", Double([50.0, 0.0][moment]));
+                cardiac.extend([
+                    ((0x18, 0x1081), ("IS", Text("700"))),
+                    ((0x18, 0x1083), ("IS", Text("90"))),
+                    ((0x18, 0x1084), ("IS", Text("10"))),
+                    ((0x20, 0x9251), ("FD", Double(880.0))),
+                ]);
+                vec![group((0x18, 0x9118), cardiac)]
+            }
+        };
+        let frame = |n: usize| {
+            let height = ["1\\2\\0", "1\\2\\3"][n % 2];
+            let mut frame = BTreeMap::from([
+                group((0x20, 0x9113), item((0x20, 0x32), "DS", Text(height))),
+                group((0x28, 0x9145), item((0x28, 0x1053), "DS", Text("1"))),
+            ]);
+            // The later gate is stored first.
+            frame.extend(said(n / 2));
+            frame
+        };
+        let mut elements = enhanced();
+        let frames = (0..4).map(frame).collect();
+        elements.insert((0x5200, 0x9230), ("SQ", Items(frames)));
+        elements.insert((0x08, 0x60), ("CS", Text(modality)));
+        let files = [VolumeFile::in_memory(
+            "test",
+            Encoding::Explicit.file(&elements),
+        )];
+        crate::volume::read_gates(&files, false, &ReadLimits::default(), &Monitor::silent())
+    };
+    for tag in [
+        (0x20, 0x9153),
+        (0x20, 0x9252),
+        (0x20, 0x9241),
+        (0x18, 0x1060),
+    ] {
+        let reading = of(tag, "PT").unwrap();
+        let first = |gate: usize| reading.gates[gate].voxels[0];
+        assert_eq!([first(0), first(1)], [12.0, 0.0]);
+        assert_eq!(reading.scans[1].slice_frames, [1, 2]);
+        if tag != (0x18, 0x1060) {
+            assert_eq!(reading.timing.rr_ms, Some(880.0));
+            assert_eq!(reading.timing.low_rr_ms, Some(700.0));
+            assert_eq!(reading.timing.rejected_share(), Some(0.1));
+        }
+        // A film of a heart is no image of uptake.
+        let film = of(tag, "MR").unwrap_err();
+        assert!(matches!(film, VolumeError::FrameNeeded { .. }), "{film}");
+    }
+}

@@ -1,0 +1,318 @@
+//! A beat as DICOM objects: Segmentations of end diastole and end systole, and its figures as a structured report.
+//!
+//! In: the report of a beat and, of both ends, the scan with that gate's images or frames, the masks and the mesh. Out:
+//! the bytes of [`BeatObject`]s. Each Segmentation refers to the frames of its own gate.
+//!
+//! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
+//! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
+//! segments. A figure that the report lacks is left out.
+
+use super::codes::{Code, MILLIMETRE, dcm, own, sct, ucum};
+use super::data_set::DataSet;
+use super::structured_report::{
+    self as sr, Figure, GRAM, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site,
+    group, measured, text, tracking,
+};
+use super::uid::Uids;
+use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
+use crate::grid::voxelise::Mask;
+use crate::mesh::TriMesh;
+use crate::report::{BeatReport, SegmentMotionReport};
+
+/// An end of the beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BeatEnd {
+    /// The cavity is largest.
+    Diastole,
+    /// The cavity is smallest.
+    Systole,
+}
+
+impl BeatEnd {
+    fn code(self) -> Code {
+        match self {
+            Self::Diastole => sct("416190007", "End diastole"),
+            Self::Systole => sct("416430001", "End Systole"),
+        }
+    }
+
+    /// Its name, for people.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Diastole => "end diastole",
+            Self::Systole => "end systole",
+        }
+    }
+}
+
+/// The wall at an end of the beat.
+#[derive(Clone)]
+pub struct EndResults<'a> {
+    /// The scan, with the images or frames of the gate.
+    pub scan: &'a SourceScan,
+    /// The wall on the scan's grid.
+    pub wall: &'a Mask,
+    /// The cavity there.
+    pub cavity: &'a Mask,
+    /// The wall, LPS mm.
+    pub mesh: &'a TriMesh,
+}
+
+/// An object of a beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BeatObject {
+    /// Wall and cavity at an end of the beat: Segmentation Storage.
+    Mask(BeatEnd),
+    /// The figures: Comprehensive 3D SR Storage.
+    Measurements,
+}
+
+impl BeatObject {
+    /// All of them.
+    pub const ALL: [Self; 3] = [
+        Self::Mask(BeatEnd::Diastole),
+        Self::Mask(BeatEnd::Systole),
+        Self::Measurements,
+    ];
+
+    /// The name of the file.
+    pub fn file_name(self) -> &'static str {
+        match self {
+            Self::Mask(BeatEnd::Diastole) => "mask_ed.dcm",
+            Self::Mask(BeatEnd::Systole) => "mask_es.dcm",
+            Self::Measurements => DicomObject::Measurements.file_name(),
+        }
+    }
+}
+
+/// The results of a beat.
+pub struct DicomBeat<'a> {
+    structure: Structure,
+    /// End diastole and end systole.
+    ends: [EndResults<'a>; 2],
+    report: &'a BeatReport,
+    /// The report as JSON in one line, from which UIDs are derived.
+    text: &'a str,
+}
+
+impl<'a> DicomBeat<'a> {
+    /// The results of a beat of `structure` at end diastole and end systole, with the text of its report, as JSON in one
+    /// line, from which UIDs are derived.
+    pub fn new(
+        structure: Structure,
+        ends: [EndResults<'a>; 2],
+        report: &'a BeatReport,
+        text: &'a str,
+    ) -> Self {
+        Self {
+            structure,
+            ends,
+            report,
+            text,
+        }
+    }
+
+    /// The bytes of `object`.
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn write(&self, object: BeatObject) -> Result<Vec<u8>, DicomError> {
+        match object {
+            BeatObject::Mask(end) => {
+                let of = match end {
+                    BeatEnd::Diastole => &self.ends[0],
+                    BeatEnd::Systole => &self.ends[1],
+                };
+                let results =
+                    DicomResults::new(of.scan, self.structure, of.wall, of.mesh, self.text);
+                results
+                    .with_cavity(Some(of.cavity))
+                    .at(end)
+                    .write_always(DicomObject::Mask)
+            }
+            BeatObject::Measurements => self.measurements(),
+        }
+    }
+
+    fn measurements(&self) -> Result<Vec<u8>, DicomError> {
+        let scans = [self.ends[0].scan, self.ends[1].scan];
+        for scan in scans {
+            scan.check()?;
+        }
+        let uids = Uids::over_all(|add| {
+            add(env!("CARGO_PKG_VERSION").as_bytes());
+            add(b"beat");
+            scans.iter().for_each(|scan| scan.add_to(add));
+            add(self.text.as_bytes());
+        });
+        let mut set = DataSet::new();
+        sr::put(&scans, self.structure, self.groups(&uids), &[], &mut set);
+        let name = BeatObject::Measurements.file_name();
+        put_facts(
+            scans[0],
+            &DicomObject::Measurements.facts(),
+            [uids.uid(name), uids.uid(&format!("series of {name}"))],
+            format!("{}: measurements of the beat", self.structure.label),
+            &mut set,
+        );
+        set.file()
+    }
+
+    fn groups(&self, uids: &Uids) -> Vec<DataSet> {
+        let label = self.structure.label;
+        let mut groups = Vec::new();
+        for (end, figures) in [
+            (BeatEnd::Diastole, DIASTOLIC_FIGURES),
+            (BeatEnd::Systole, SYSTOLIC_FIGURES),
+        ] {
+            let name = format!("{label}, {}", end.name());
+            let mut content = self.beginning(&name, uids);
+            content.push(concept(
+                "HAS CONCEPT MOD",
+                sct("246092007", "Cardiac cycle phase (attribute)"),
+                end.code(),
+            ));
+            content.push(finding_site(self.structure.site));
+            content.extend(measured(self.report, figures));
+            groups.push(group("1501", content));
+        }
+        let mut content = self.beginning(label, uids);
+        content.push(finding_site(self.structure.site));
+        content.extend(measured(self.report, BEAT_FIGURES));
+        if self.report.phase.reliable {
+            content.extend(measured(self.report, PHASE_FIGURES));
+        }
+        let flags = self.report.flags.iter();
+        content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
+        groups.push(group("1501", content));
+        for segment in &self.report.segments {
+            let number = segment.segment;
+            let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
+            let Some(site) = site else { continue };
+            let mut content = self.beginning(&format!("Segment {number}"), uids);
+            content.push(finding_site(*site));
+            content.extend(measured(segment, SEGMENT_FIGURES));
+            groups.push(group("1501", content));
+        }
+        groups
+    }
+
+    /// Tracking and finding of a group.
+    fn beginning(&self, name: &str, uids: &Uids) -> Vec<DataSet> {
+        let mut content = tracking(name, &uids.uid(name));
+        let finding = dcm("121071", "Finding");
+        content.push(concept("CONTAINS", finding, self.structure.kind));
+        content
+    }
+}
+
+const VOLUMES_PER_SECOND: Code = ucum("{EDV}/s", "end-diastolic volumes per second");
+const MILLISECOND: Code = ucum("ms", "millisecond");
+const DEGREE: Code = ucum("deg", "degree");
+
+const DIASTOLIC_FIGURES: &[Figure<BeatReport>] = &[figure(
+    |r| Some(r.edv_ml),
+    loinc("8821-1", "Left Ventricular ED Volume"),
+    MILLILITRE,
+)];
+
+const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[figure(
+    |r| Some(r.esv_ml),
+    loinc("8823-7", "Left Ventricular ES Volume"),
+    MILLILITRE,
+)];
+
+/// Measurements over the whole beat. Without a beat there is neither stroke nor ejection.
+const BEAT_FIGURES: &[Figure<BeatReport>] = &[
+    figure(
+        |r| r.ef_percent.map(|_| r.sv_ml),
+        sct("90096001", "Stroke Volume"),
+        MILLILITRE,
+    ),
+    figure(
+        |r| r.ef_percent,
+        sct("70822001", "Cardiac ejection fraction"),
+        PERCENT,
+    ),
+    figure(|r| Some(r.mass_g), dcm("122447", "Wall Mass"), GRAM),
+    figure(
+        |r| Some(r.rates.as_ref()?.peak_ejection_edv_per_s),
+        dcm("122616", "Peak Ejection Rate"),
+        VOLUMES_PER_SECOND,
+    ),
+    figure(
+        |r| Some(r.rates.as_ref()?.peak_filling_edv_per_s),
+        dcm("122618", "Peak Filling Rate"),
+        VOLUMES_PER_SECOND,
+    ),
+    figure(
+        |r| Some(r.rates.as_ref()?.time_to_peak_filling_ms),
+        own(
+            "PEAK-FILLING-MS",
+            "Time from end systole to the peak filling rate",
+        ),
+        MILLISECOND,
+    ),
+];
+
+const PHASE_FIGURES: &[Figure<BeatReport>] = &[
+    figure(
+        |r| Some(r.phase.mean_degrees),
+        own("PHASE-MEAN", "Mean phase of the wall's thickening"),
+        DEGREE,
+    ),
+    figure(
+        |r| Some(r.phase.sd_degrees),
+        own("PHASE-SD", "Standard deviation of the phases"),
+        DEGREE,
+    ),
+    figure(
+        |r| Some(r.phase.bandwidth_degrees),
+        own(
+            "PHASE-BANDWIDTH",
+            "Smallest arc with 95 per cent of the phases",
+        ),
+        DEGREE,
+    ),
+    figure(
+        |r| Some(r.phase.entropy_percent),
+        own("PHASE-ENTROPY", "Entropy of the phases"),
+        PERCENT,
+    ),
+];
+
+/// Measurements of a segment.
+const SEGMENT_FIGURES: &[Figure<SegmentMotionReport>] = &[
+    figure(
+        |s| Some(s.motion_mm),
+        sct(
+            "60797005",
+            "Cardiac wall motion, function (observable entity)",
+        ),
+        MILLIMETRE,
+    ),
+    figure(
+        |s| Some(s.thickening_percent),
+        loinc("59092-7", "% Thickening"),
+        PERCENT,
+    ),
+    figure(
+        |s| s.thickening_counts_percent,
+        own("THICKENING-COUNT", "Thickening by counts"),
+        PERCENT,
+    ),
+    figure(
+        |s| s.phase_degrees,
+        own("PHASE", "Phase of the greatest thickness"),
+        DEGREE,
+    ),
+];
+
+/// A code of LOINC.
+const fn loinc(value: &'static str, meaning: &'static str) -> Code {
+    Code {
+        value,
+        scheme: "LN",
+        meaning,
+    }
+}

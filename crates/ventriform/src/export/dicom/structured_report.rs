@@ -1,0 +1,319 @@
+//! What structured reports of measurements have in common: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID 1500
+//! of PS3.16.
+//!
+//! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
+//! source images, and the evidence. [`Figure`] is one figure of a report and how it is coded.
+
+use super::codes::{Code, OWN_SCHEME, dcm, sct, ucum};
+use super::data_set::{DataSet, reference};
+use super::{SourceScan, Structure};
+use dicom_core::Tag;
+use dicom_dictionary_std::tags;
+
+/// A figure of a report, or of an entry `T` of one, and how it is coded.
+pub(super) struct Figure<T> {
+    /// The figure; `None` or not finite where there is none.
+    pub value: fn(&T) -> Option<f64>,
+    pub concept: Code,
+    pub unit: Code,
+    /// Derivation from the single values.
+    pub derivation: Option<Code>,
+}
+
+pub(super) const MEAN: Code = sct("373098007", "Mean");
+pub(super) const MILLILITRE: Code = ucum("ml", "milliliter");
+pub(super) const GRAM: Code = ucum("g", "gram");
+pub(super) const PERCENT: Code = ucum("%", "Percent");
+
+pub(super) const fn figure<T>(
+    value: fn(&T) -> Option<f64>,
+    concept: Code,
+    unit: Code,
+) -> Figure<T> {
+    Figure {
+        value,
+        concept,
+        unit,
+        derivation: None,
+    }
+}
+
+pub(super) const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Figure<T> {
+    Figure {
+        value,
+        concept,
+        unit,
+        derivation: Some(MEAN),
+    }
+}
+
+/// The 17 segments of the left ventricle in their order (CID 3717).
+pub(super) const WALL_SEGMENTS: [Code; 17] = [
+    sct("264850008", "left ventricle basal anterior segment"),
+    sct("396482007", "left ventricle basal anteroseptal segment"),
+    sct("396646008", "left ventricle basal inferoseptal segment"),
+    sct("264846001", "left ventricle basal inferior segment"),
+    sct("396652009", "left ventricle basal inferolateral segment"),
+    sct("396654005", "left ventricle basal anterolateral segment"),
+    sct("264848000", "left ventricle mid anterior segment"),
+    sct("396647004", "left ventricle mid anteroseptal segment"),
+    sct("396649001", "left ventricle mid inferoseptal segment"),
+    sct("264847005", "left ventricle mid inferior segment"),
+    sct("396655006", "left ventricle mid inferolateral segment"),
+    sct("396656007", "left ventricle mid anterolateral segment"),
+    sct("264844003", "left ventricle apical anterior segment"),
+    sct("264845002", "left ventricle apical septal segment"),
+    sct("264849008", "left ventricle apical inferior segment"),
+    sct("264853005", "left ventricle apical lateral segment"),
+    sct("128564006", "Apex of left ventricle"),
+];
+
+/// What a report refers to beside the images of its scan.
+pub(super) struct SeriesReference {
+    /// Series Instance UID.
+    pub series: String,
+    /// SOP Class UID.
+    pub class: &'static str,
+    /// SOP Instance UID.
+    pub instance: String,
+}
+
+/// Puts everything that is particular to a report on `scans`, of one study, with these measurement groups.
+pub(super) fn put(
+    scans: &[&SourceScan],
+    structure: Structure,
+    groups: Vec<DataSet>,
+    others: &[SeriesReference],
+    set: &mut DataSet,
+) {
+    scans[0].put_made(set);
+    set.items(
+        tags::REFERENCED_PERFORMED_PROCEDURE_STEP_SEQUENCE,
+        Vec::new(),
+    );
+    set.items(tags::PERFORMED_PROCEDURE_CODE_SEQUENCE, Vec::new());
+    set.text(tags::PRELIMINARY_FLAG, "PRELIMINARY");
+    set.text(tags::COMPLETION_FLAG, "COMPLETE");
+    set.text(tags::VERIFICATION_FLAG, "UNVERIFIED");
+    set.item(
+        tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE,
+        evidence(scans, others),
+    );
+    let mut scheme = DataSet::new();
+    scheme.text(tags::CODING_SCHEME_DESIGNATOR, OWN_SCHEME);
+    scheme.text(tags::CODING_SCHEME_NAME, "Concepts of ventriform");
+    scheme.text(tags::CODING_SCHEME_RESPONSIBLE_ORGANIZATION, "ventriform");
+    set.item(tags::CODING_SCHEME_IDENTIFICATION_SEQUENCE, scheme);
+
+    set.text(tags::VALUE_TYPE, "CONTAINER");
+    set.code(
+        tags::CONCEPT_NAME_CODE_SEQUENCE,
+        dcm("126000", "Imaging Measurement Report"),
+    );
+    set.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
+    set.item(tags::CONTENT_TEMPLATE_SEQUENCE, template("1500"));
+    let mut content = context(structure);
+    content.extend(image_library(scans));
+    content.push(container(dcm("126010", "Imaging Measurements"), groups));
+    set.items(tags::CONTENT_SEQUENCE, content);
+}
+
+/// Language, observer and procedure.
+fn context(structure: Structure) -> Vec<DataSet> {
+    const OBSERVER_RELATION: &str = "HAS OBS CONTEXT";
+    let english = Code {
+        value: "en",
+        scheme: "RFC5646",
+        meaning: "English",
+    };
+    let language = dcm("121049", "Language of Content Item and Descendants");
+    let study = sct("252432008", "Radionuclide myocardial perfusion study");
+    let imaging = sct("363679005", "Imaging procedure");
+    let procedure = match structure.body_part {
+        "HEART" => study,
+        _ => imaging,
+    };
+    // The device is the software: one UID for each version.
+    let device = super::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
+    vec![
+        concept("HAS CONCEPT MOD", language, english),
+        concept(
+            OBSERVER_RELATION,
+            dcm("121005", "Observer Type"),
+            dcm("121007", "Device"),
+        ),
+        unique(
+            OBSERVER_RELATION,
+            dcm("121012", "Device Observer UID"),
+            &device,
+        ),
+        text(
+            OBSERVER_RELATION,
+            dcm("121013", "Device Observer Name"),
+            "ventriform",
+        ),
+        concept(
+            "HAS CONCEPT MOD",
+            dcm("121058", "Procedure reported"),
+            procedure,
+        ),
+    ]
+}
+
+/// The source images, as TID 1600 lists them; nothing without DICOM images.
+fn image_library(scans: &[&SourceScan]) -> Option<DataSet> {
+    let all: Vec<DataSet> = (series_of(scans).into_iter())
+        .flat_map(|(_, instances)| instances)
+        .map(|(class, uid)| image("CONTAINS", None, reference(class, uid)))
+        .collect();
+    if all.is_empty() {
+        return None;
+    }
+    let group = container(dcm("126200", "Image Library Group"), all);
+    Some(container(dcm("111028", "Image Library"), vec![group]))
+}
+
+/// The series of the scans' images, each once, with class and UID of its instances, each once.
+fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<(&'a str, Vec<(&'a str, &'a str)>)> {
+    let mut all: Vec<(&str, Vec<(&str, &str)>)> = Vec::new();
+    for images in scans.iter().filter_map(|scan| scan.images()) {
+        let at = all.iter().position(|(series, _)| *series == images.series);
+        let at = at.unwrap_or_else(|| {
+            all.push((images.series, Vec::new()));
+            all.len() - 1
+        });
+        let known = &mut all[at].1;
+        for instance in images.instances() {
+            if !known.contains(&instance) {
+                known.push(instance);
+            }
+        }
+    }
+    all
+}
+
+/// Those of `figures` that `source` has, as NUM items.
+pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
+    let item = |figure: &Figure<T>| {
+        let number = (figure.value)(source).filter(|number| number.is_finite())?;
+        let mut value = DataSet::new();
+        value.decimals(tags::NUMERIC_VALUE, &[number]);
+        value.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, figure.unit);
+        let mut item = item("CONTAINS", "NUM", Some(figure.concept));
+        item.item(tags::MEASURED_VALUE_SEQUENCE, value);
+        if let Some(code) = figure.derivation {
+            let derivation = dcm("121401", "Derivation");
+            item.item(
+                tags::CONTENT_SEQUENCE,
+                concept("HAS CONCEPT MOD", derivation, code),
+            );
+        }
+        Some(item)
+    };
+    figures.iter().filter_map(item).collect()
+}
+
+pub(super) fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
+    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
+    vec![
+        text(
+            OBSERVATION_RELATION,
+            dcm("112039", "Tracking Identifier"),
+            name,
+        ),
+        unique(
+            OBSERVATION_RELATION,
+            dcm("112040", "Tracking Unique Identifier"),
+            uid,
+        ),
+    ]
+}
+
+pub(super) fn finding_site(site: Code) -> DataSet {
+    concept("HAS CONCEPT MOD", sct("363698007", "Finding Site"), site)
+}
+
+pub(super) fn group(id: &str, content: Vec<DataSet>) -> DataSet {
+    let mut group = container(dcm("125007", "Measurement Group"), content);
+    group.item(tags::CONTENT_TEMPLATE_SEQUENCE, template(id));
+    group
+}
+
+fn template(id: &str) -> DataSet {
+    let mut item = DataSet::new();
+    item.text(tags::MAPPING_RESOURCE, "DCMR");
+    item.text(tags::TEMPLATE_IDENTIFIER, id);
+    item
+}
+
+fn item(relationship: &str, kind: &str, name: Option<Code>) -> DataSet {
+    let mut item = DataSet::new();
+    item.text(tags::RELATIONSHIP_TYPE, relationship);
+    item.text(tags::VALUE_TYPE, kind);
+    if let Some(name) = name {
+        item.code(tags::CONCEPT_NAME_CODE_SEQUENCE, name);
+    }
+    item
+}
+
+fn with_text(mut item: DataSet, tag: Tag, text: &str) -> DataSet {
+    item.text(tag, text);
+    item
+}
+
+fn container(name: Code, content: Vec<DataSet>) -> DataSet {
+    let mut item = item("CONTAINS", "CONTAINER", Some(name));
+    item.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
+    item.items(tags::CONTENT_SEQUENCE, content);
+    item
+}
+
+pub(super) fn concept(relationship: &str, name: Code, code: Code) -> DataSet {
+    let mut item = item(relationship, "CODE", Some(name));
+    item.code(tags::CONCEPT_CODE_SEQUENCE, code);
+    item
+}
+
+pub(super) fn text(relationship: &str, name: Code, text: &str) -> DataSet {
+    with_text(
+        item(relationship, "TEXT", Some(name)),
+        tags::TEXT_VALUE,
+        text,
+    )
+}
+
+fn unique(relationship: &str, name: Code, uid: &str) -> DataSet {
+    with_text(item(relationship, "UIDREF", Some(name)), tags::UID, uid)
+}
+
+pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet) -> DataSet {
+    let mut item = item(relationship, "IMAGE", name);
+    item.item(tags::REFERENCED_SOP_SEQUENCE, referenced);
+    item
+}
+
+/// The study with every instance that the content refers to.
+fn evidence(scans: &[&SourceScan], others: &[SeriesReference]) -> DataSet {
+    let mut all = Vec::new();
+    let mut add = |uid: &str, instances: Vec<DataSet>| {
+        let mut series = DataSet::new();
+        series.items(tags::REFERENCED_SOP_SEQUENCE, instances);
+        series.text(tags::SERIES_INSTANCE_UID, uid);
+        all.push(series);
+    };
+    for (series, instances) in series_of(scans) {
+        let all = instances.into_iter();
+        add(
+            series,
+            all.map(|(class, uid)| reference(class, uid)).collect(),
+        );
+    }
+    for other in others {
+        let instance = reference(other.class, &other.instance);
+        add(&other.series, vec![instance]);
+    }
+    let mut study = DataSet::new();
+    study.items(tags::REFERENCED_SERIES_SEQUENCE, all);
+    study.text(tags::STUDY_INSTANCE_UID, scans[0].study());
+    study
+}
