@@ -1,10 +1,10 @@
 //! A beat from files: read, segment the sum, fit all gates, keep what the output needs.
 
 use super::error::GatedError;
-use super::order::{BeatChoice, GatedOrder};
+use super::order::GatedOrder;
 use crate::beat::{self, Beat, BeatError, BeatParameters, GatedStudy};
 use crate::deform::WallSurface;
-use crate::parameters::{FitParameters, Parameters};
+use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::polar::SEGMENT_NAMES;
 use crate::progress::Monitor;
 use crate::report::{
@@ -119,8 +119,10 @@ impl GatedHeart {
             Some(map) => (1..=17).map(|segment| map.name_of(segment)).collect(),
             None => SEGMENT_NAMES.map(str::to_owned).to_vec(),
         };
-        let mut parameters = self.parameters.to_json();
-        parameters.extend(self.choice.to_json());
+        let parameters = GatedParameters {
+            fit: self.parameters.clone(),
+            choice: self.choice,
+        };
         let parts = BeatParts {
             segment_names: names,
             rr_ms: self.rr_ms,
@@ -134,7 +136,7 @@ impl GatedHeart {
             flags: (segmentation.fit.judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),
-            parameters,
+            parameters: parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),
             warnings: self.warnings(),
         };

@@ -14,4 +14,4 @@ mod pictures;
 
 pub use error::GatedError;
 pub use from_files::{GatedHeart, from_files};
-pub use order::{BeatChoice, GatedOrder, MASS_G, RR_MS};
+pub use order::GatedOrder;

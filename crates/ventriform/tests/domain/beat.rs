@@ -5,13 +5,13 @@ use std::sync::OnceLock;
 
 use rayon::ThreadPoolBuilder;
 use ventriform::export::Format;
-use ventriform::gated::{BeatChoice, GatedError, GatedHeart, GatedOrder, from_files};
+use ventriform::gated::{GatedError, GatedHeart, GatedOrder, from_files};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::Volume;
 use ventriform::grid::blur::{Kernel, blur};
 use ventriform::mesh::intersections::self_intersections;
-use ventriform::parameters::FitParameters;
+use ventriform::parameters::{BeatChoice, FitParameters};
 use ventriform::progress::Monitor;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{ReadLimits, VolumeError, VolumeFile, read_gates};
