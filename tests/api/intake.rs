@@ -1,7 +1,7 @@
 //! Objects that come by C-STORE and STOW-RS.
 
 use crate::dicom::{JANE, Patient, nm_of};
-use crate::helpers::{Service, TestApp, beating, fake_engine, key, problem, text};
+use crate::helpers::{Service, TestApp, fake_engine, key, problem, text};
 use crate::scu::{CT, NM, Object, Scu, command, nuclear, slice};
 use dicom_ul::pdu::{PDataValueType, Pdu};
 use reqwest::StatusCode;
@@ -11,6 +11,8 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::volume::{ReadLimits, Volume};
 use ventriform_http::ServeError;
 use ventriform_program::server::start;
@@ -244,14 +246,20 @@ async fn a_rule_makes_a_beat_of_a_gated_series_and_a_segmentation_of_another() {
                     { modality = "NM", kind = "segmentation" }]"#
             .replace('\n', " ");
     let (app, address) = service(|settings| settings.rules = rules.parse().unwrap()).await;
-    let gates: Vec<&Volume> = beating().iter().collect();
+    let shape = [4, 4, 3];
+    let volume = Volume {
+        shape,
+        voxels: (0..48u8).map(f32::from).collect(),
+        frame: VoxelToPatient::centred(shape, [4.0; 3], Vec3::zeros()).unwrap(),
+        integral: true,
+    };
     let other = Patient {
         study: "1.2.840.99999.8",
         ..JANE
     };
     let mut scu = Scu::open(address);
-    assert_eq!(scu.store(&Object::of_nm(&nm_of(&JANE, &gates))), 0);
-    assert_eq!(scu.store(&Object::of_nm(&nm_of(&other, &gates[..1]))), 0);
+    assert_eq!(scu.store(&Object::of_nm(&nm_of(&JANE, &[&volume; 8]))), 0);
+    assert_eq!(scu.store(&Object::of_nm(&nm_of(&other, &[&volume]))), 0);
     scu.release();
     let groups = settled(&app, 2).await;
     for (study, kind, parameter) in [

@@ -5,7 +5,7 @@
 //!    64 bits.
 //! 2. A path `.../{file}` becomes one path per file, so that each file has one media type and one
 //!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
-//!    names of a form, such as those of the gates of a beat: all of these are bytes.
+//!    names of a form: the meshes and labels of the gates of a beat.
 //! 3. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
 //! 4. Every operation gets examples: those of `examples.json`, recorded from a running service by
@@ -16,6 +16,7 @@ use super::answers::media_type_of;
 use crate::files::REPORT_PAGE;
 use crate::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
+use ventriform::export::Format;
 use ventriform::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
@@ -202,7 +203,18 @@ fn of_numbered_files(pattern: &Value, any: &Value) -> Value {
     if let Some(answers) = one["responses"].as_object_mut() {
         answers.shift_remove("406");
     }
-    one["responses"]["200"]["content"] = json!({"application/octet-stream": {"schema": binary()}});
+    // Labels come first: generators of clients take all as bytes, as they take those.
+    let mut content = Map::new();
+    content.insert("application/gzip".into(), json!({ "schema": binary() }));
+    for format in Format::ALL {
+        let schema = match format {
+            Format::Json => reference("MeshDocument"),
+            Format::Gltf => json!({"type": "object"}),
+            _ => binary(),
+        };
+        content.insert(format.media_type().into(), json!({ "schema": schema }));
+    }
+    one["responses"]["200"]["content"] = content.into();
     one
 }
 
