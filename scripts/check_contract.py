@@ -11,10 +11,11 @@
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
-import copy, io, json, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+import copy, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
 
 import pydicom
 from jsonschema import Draft202012Validator
+from nifti import nifti
 from openapi_spec_validator import validate
 from pydicom.uid import ExplicitVRLittleEndian, NuclearMedicineImageStorage, generate_uid
 from referencing import Registry, Resource
@@ -199,6 +200,31 @@ def workitems(walk):
     walk.call("get", "/dicom-web/workitems", expect=200)
 
 
+def beating():
+    """A heart in eight gates, as NIfTI: half an ellipsoid about an axis, which shrinks and thickens."""
+    side, axis, base_mm, blur_mm = 40, (-0.64, 0.6, -0.48), 14.0, 2.4
+    within = lambda distance: 1 / (1 + math.exp(min(distance / blur_mm, 50)))
+    # Distance along and across the axis of every voxel, mm; i runs fastest.
+    places = []
+    for k in range(side):
+        for j in range(side):
+            for i in range(side):
+                point = [4 * (n - side / 2) for n in (i, j, k)]
+                along = sum(x * a for x, a in zip(point, axis))
+                places.append((along, math.sqrt(max(sum(x * x for x in point) - along * along, 0))))
+    voxels = []
+    for contraction in (0, 0.4, 0.85, 1, 0.75, 0.45, 0.2, 0.05):
+        across, down, thickness = 24 - 7.5 * contraction, 50 - 4 * contraction, 9 + 4.5 * contraction
+        for along, off in places:
+            def inside(a, b):
+                share = math.hypot(off / a, along / b)
+                return within((share - 1) * math.hypot(off, along) / max(share, 0.01))
+            inner, outer = inside(across, down), inside(across + thickness, down + thickness)
+            apical = within(-base_mm - along)
+            voxels.append(round(1000 * apical * max(outer - inner, 0) + 120 * apical * inner + 100 * (1 - outer)))
+    return nifti(side, voxels, volumes=8)
+
+
 def everything(walk, folder):
     """Every operation once, and every problem that is easy to provoke."""
     scan = open(os.path.join(folder, "spect.nii.gz"), "rb").read()
@@ -246,6 +272,14 @@ def everything(walk, folder):
     anatomical = wait(walk, job)["segmentation"]
     call("get", "/v1/segmentations", expect=200)
     call("get", "/v1/segmentations/{id}", expect=200, id=segmentation)
+    gated = beating()
+    _, job = call("post", "/v1/beats", expect=202, query="?mass_g=130", body=gated, headers=octets)
+    beat = wait(walk, job)["beat"]
+    call("post", "/v1/beats", expect=200, query="?mass_g=130", body=gated,
+         headers={**octets, "prefer": "wait=60", "accept": "application/json"})
+    call("get", "/v1/beats", expect=200)
+    for file in ("mesh_gate01.json", "labels_gate01.nii.gz"):
+        call("get", "/v1/beats/{id}/{file}", expect=200, id=beat, file=file)
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
     walk.recorded["operations"]["create_template"].pop("request")
@@ -260,9 +294,9 @@ def everything(walk, folder):
     call("post", "/v1/readers", expect=200, query="?name=first", body=profile)
     call("get", "/v1/readers", expect=200)
 
-    of_kind = {"models": model, "segmentations": segmentation, "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
+    of_kind = {"models": model, "segmentations": segmentation, "beats": beat, "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
     for template, item in walk.contract.document["paths"].items():
-        found = re.match(r"/v1/(models|segmentations|templates|readers|volumes)/\{id\}(/.*)?$", template)
+        found = re.match(r"/v1/(models|segmentations|beats|templates|readers|volumes)/\{id\}(/.*)?$", template)
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
             cut = "mesh" not in template or "models" not in template

@@ -5,12 +5,12 @@ import struct
 INT16, FLOAT32 = (4, 16, "h"), (16, 32, "f")
 
 
-def nifti(side, voxels, kind=INT16):
-    """A volume of side^3 voxels of 4 mm; `voxels` are its values, in the order of the file."""
+def nifti(side, voxels, kind=INT16, volumes=1):
+    """Volumes of side^3 voxels of 4 mm; `voxels` are their values, in the order of the file."""
     code, bits, letter = kind
     head = bytearray(352)
     struct.pack_into("<i", head, 0, 348)
-    struct.pack_into("<8h", head, 40, 3, side, side, side, 1, 1, 1, 1)
+    struct.pack_into("<8h", head, 40, 3 if volumes == 1 else 4, side, side, side, volumes, 1, 1, 1)
     struct.pack_into("<2h", head, 70, code, bits)
     struct.pack_into("<8f", head, 76, 1, 4, 4, 4, 1, 1, 1, 1)
     struct.pack_into("<2f", head, 108, 352, 1)
@@ -20,4 +20,4 @@ def nifti(side, voxels, kind=INT16):
         axis[row] = 4.0
         struct.pack_into("<4f", head, 280 + 16 * row, *axis)
     head[344:348] = b"n+1\0"
-    return bytes(head) + struct.pack(f"<{side**3}{letter}", *voxels)
+    return bytes(head) + struct.pack(f"<{volumes * side**3}{letter}", *voxels)

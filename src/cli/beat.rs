@@ -3,6 +3,7 @@
 use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
 use super::output::note;
+use super::parameter_args::TableArgs;
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs, UnusableArgument};
@@ -10,8 +11,9 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
 use ventriform::export::Format;
-use ventriform::gated::{BeatChoice, GatedHeart, GatedOrder, from_files};
+use ventriform::gated::{GatedHeart, GatedOrder, from_files};
 use ventriform::mesh_files::MeshStatement;
+use ventriform::parameters::{BeatChoice, GatedParameters};
 use ventriform::progress::{CancelToken, Monitor, Plan};
 use ventriform_service::work::problems::Explain;
 
@@ -38,15 +40,6 @@ pub struct BeatArgs {
     /// greatest confidence is kept)
     #[arg(long, value_name = "MODEL", default_value = MODEL_AUTO)]
     model: Vec<PathBuf>,
-    /// The volumes of the file are gates of one heart beat, although its header says otherwise
-    #[arg(long)]
-    gated: bool,
-    /// Mass of the left ventricle's muscle, g, where it is known (20 to 600); the image does not tell how thick the wall is
-    #[arg(long, value_name = "G")]
-    mass_g: Option<f64>,
-    /// The R-R interval, ms (300 to 2500) [default: as the file states it]
-    #[arg(long, value_name = "MS")]
-    rr_ms: Option<f64>,
     /// Format of the meshes (repeatable)
     #[arg(
         long = "format",
@@ -56,6 +49,8 @@ pub struct BeatArgs {
     )]
     formats: Vec<Format>,
     #[command(flatten)]
+    choice: TableArgs<BeatChoice>,
+    #[command(flatten)]
     fit: FitArgs,
     #[command(flatten)]
     dicom: DicomArgs,
@@ -63,32 +58,15 @@ pub struct BeatArgs {
     limits: LimitArgs,
 }
 
-/// Parameters of a segmentation that a beat has no use for, and why.
-const WITHOUT_USE: &[(&str, &str)] = &[
-    ("frame", "all gates are fitted together"),
-    ("label", "a beat is compared with no expert's mask"),
-    ("resample", "a beat is compared with no expert's mask"),
-    ("mesh_unit", "a beat is compared with no expert's mask"),
-    ("mesh_frame", "a beat is compared with no expert's mask"),
-    ("edge", "a beat has the anatomical wall"),
-    ("organ", "only the left ventricle has a beat"),
-    ("mask_grid", "labels lie on the gates' grid"),
-];
-
 /// Runs the command.
 ///
 /// # Errors
 /// If a file cannot be read, the gates are no beat, or a file cannot be written. Nothing is written unless the fit is
 /// complete.
 pub fn run(args: &BeatArgs) -> Result<()> {
-    for (name, _) in args.fit.pairs() {
-        if let Some((_, why)) = WITHOUT_USE.iter().find(|(unused, _)| unused == name) {
-            let flag = name.replace('_', "-");
-            let message = format!("--{flag} has no use here: {why}. Leave it out.");
-            return Err(UnusableArgument::new(message).into());
-        }
-    }
-    let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
+    let pairs = args.choice.pairs().iter().chain(args.fit.pairs());
+    let pairs = pairs.map(|(name, text)| (*name, text.as_str()));
+    let parameters = GatedParameters::from_pairs(pairs).map_err(UnusableArgument::from)?;
     let limits = args.limits.limits()?;
     let gates = volume_files(&args.input, &limits)?;
     let dicom = args.dicom.order_of_gates(&gates, &limits)?;
@@ -98,18 +76,9 @@ pub fn run(args: &BeatArgs) -> Result<()> {
         gates: &gates,
         auto,
         models,
-        parameters: &parameters,
-        choice: BeatChoice {
-            gated: args.gated,
-            mass_g: args.mass_g,
-            rr_ms: args.rr_ms,
-        },
+        parameters: &parameters.fit,
+        choice: parameters.choice,
     };
-    if let Some((name, value, [least, greatest])) = order.choice.out_of_range() {
-        let flag = name.replace('_', "-");
-        let message = format!("--{flag} is {value}; give {least} to {greatest}");
-        return Err(UnusableArgument::new(message).into());
-    }
     let bar = Bar::over(Plan::BEAT);
     let monitor = Monitor::new(&bar, CancelToken::new());
     let made = from_files(&order, &limits, &monitor)

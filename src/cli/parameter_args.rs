@@ -18,13 +18,6 @@ pub type FitArgs = TableArgs<FitParameters>;
 #[error("{0}")]
 pub struct UnusableArgument(String);
 
-impl UnusableArgument {
-    /// The message says which argument, its value and what to give instead.
-    pub fn new(message: String) -> Self {
-        Self(message)
-    }
-}
-
 impl From<ParameterError> for UnusableArgument {
     fn from(error: ParameterError) -> Self {
         Self(error.with_advice())

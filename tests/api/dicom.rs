@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 use ventriform::progress::Monitor;
+use ventriform::volume::Volume;
 use ventriform::volume::phantom::{Phantom, PhantomParameters, phantom};
 
 /// An element of a data set in Explicit VR Little Endian.
@@ -63,6 +64,9 @@ pub const JANE: Patient = Patient {
     accession: "ACC-2026-17",
 };
 
+/// The greatest voxel of a made Nuclear Medicine Image.
+pub const NM_GREATEST: f32 = 30_000.0;
+
 /// The simulated heart that [`nm`] shows, and its true mask.
 pub fn simulated() -> &'static Phantom {
     static MADE: OnceLock<Phantom> = OnceLock::new();
@@ -75,9 +79,14 @@ pub fn simulated() -> &'static Phantom {
     })
 }
 
-/// A scan of `gates` gates (one is not gated) as a Nuclear Medicine Image.
+/// A scan of `gates` equal gates (one is not gated) as a Nuclear Medicine Image.
 pub fn nm(patient: &Patient, gates: usize) -> Vec<u8> {
-    let volume = &simulated().volume;
+    nm_of(patient, &vec![&simulated().volume; gates])
+}
+
+/// Gates on one grid (one is not gated) as a Nuclear Medicine Image.
+pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
+    let (volume, gates) = (volumes[0], volumes.len());
     let [columns, rows, slices] = volume.shape;
     let matrix = volume.frame.matrix();
     let text = |numbers: &[f64]| {
@@ -101,9 +110,11 @@ pub fn nm(patient: &Patient, gates: usize) -> Vec<u8> {
     let shorts =
         |numbers: &[u16]| -> Vec<u8> { numbers.iter().flat_map(|n| n.to_le_bytes()).collect() };
     let short = |number: usize| shorts(&[u16::try_from(number).unwrap()]);
-    let greatest = volume.voxels.iter().copied().fold(0.0, f32::max);
-    let voxels = volume.voxels.iter();
-    let voxels: Vec<u16> = voxels.map(|v| (v / greatest * 30_000.0) as u16).collect();
+    let voxels = || volumes.iter().flat_map(|volume| &volume.voxels);
+    let greatest = voxels().copied().fold(0.0, f32::max);
+    let voxels: Vec<u16> = voxels()
+        .map(|v| (v / greatest * NM_GREATEST).round() as u16)
+        .collect();
     let each = |gate: usize, slice: usize| (gate as u16 + 1, slice as u16 + 1);
     let frames: Vec<(u16, u16)> = (0..gates)
         .flat_map(|gate| (0..slices).map(move |slice| each(gate, slice)))
@@ -161,7 +172,7 @@ pub fn nm(patient: &Patient, gates: usize) -> Vec<u8> {
         elements.push(element(0x54, 0x70, "US", &shorts(&of_gates)));
     }
     elements.push(element(0x54, 0x80, "US", &shorts(&of_slices)));
-    elements.push(element(0x7fe0, 0x10, "OW", &shorts(&voxels.repeat(gates))));
+    elements.push(element(0x7fe0, 0x10, "OW", &shorts(&voxels)));
     file(&elements)
 }
 

@@ -1,5 +1,6 @@
 //! Objects that come by C-STORE and STOW-RS.
 
+use crate::dicom::{JANE, Patient, nm_of};
 use crate::helpers::{Service, TestApp, fake_engine, key, problem, text};
 use crate::scu::{CT, NM, Object, Scu, command, nuclear, slice};
 use dicom_ul::pdu::{PDataValueType, Pdu};
@@ -10,7 +11,9 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::volume::ReadLimits;
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::volume::{ReadLimits, Volume};
 use ventriform_http::ServeError;
 use ventriform_program::server::start;
 use ventriform_service::access::{Quota, Scope};
@@ -234,6 +237,50 @@ async fn a_rule_starts_its_job_once_whatever_is_sent_again() {
     assert_eq!(jobs.len(), 1);
     assert_eq!((&jobs[0]["id"], &jobs[0]["kind"]), (&job, &json!("model")));
     assert_eq!(jobs[0]["parameters"]["points"], 170);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_rule_makes_a_beat_of_a_gated_series_and_a_segmentation_of_another() {
+    let rules =
+        r#"[{ image_type = "RECON GATED TOMO", kind = "beat", parameters = { mass_g = 130 } },
+                    { modality = "NM", kind = "segmentation" }]"#
+            .replace('\n', " ");
+    let (app, address) = service(|settings| settings.rules = rules.parse().unwrap()).await;
+    let shape = [4, 4, 3];
+    let volume = Volume {
+        shape,
+        voxels: (0..48u8).map(f32::from).collect(),
+        frame: VoxelToPatient::centred(shape, [4.0; 3], Vec3::zeros()).unwrap(),
+        integral: true,
+    };
+    let other = Patient {
+        study: "1.2.840.99999.8",
+        ..JANE
+    };
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&Object::of_nm(&nm_of(&JANE, &[&volume; 8]))), 0);
+    assert_eq!(scu.store(&Object::of_nm(&nm_of(&other, &[&volume]))), 0);
+    scu.release();
+    let groups = settled(&app, 2).await;
+    for (study, kind, parameter) in [
+        (JANE.study, "beat", json!({"mass_g": 130.0, "gated": false})),
+        (
+            other.study,
+            "segmentation",
+            json!({"organ": "left_ventricle"}),
+        ),
+    ] {
+        let group = groups.iter().find(|group| group["study"] == study);
+        let group = group.unwrap_or_else(|| panic!("{study} in {groups:?}"));
+        let job = app.json(&text(&group["links"]["job"])).await;
+        assert_eq!(
+            (&job["kind"], &job["volume"]),
+            (&json!(kind), &group["volume"])
+        );
+        for (name, value) in parameter.as_object().unwrap() {
+            assert_eq!(&job["parameters"][name], value, "{job}");
+        }
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -11,6 +11,7 @@
 mod helpers;
 
 mod archives;
+mod beats;
 mod blobs;
 #[cfg(target_os = "linux")]
 mod bombs;

@@ -3,7 +3,7 @@
 use crate::helpers::{TestApp, text};
 use serde_json::{Value, json};
 use std::path::Path;
-use ventriform::parameters::{FIT_SPECS, SPECS};
+use ventriform::parameters::{BEAT_SPECS, FIT_SPECS, GatedParameters, SPECS};
 use ventriform_http::document_json;
 
 /// If set, the test writes the document instead of comparing it.
@@ -38,7 +38,12 @@ fn every_parameter_of_a_job_is_documented_twice() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
     let fit: Vec<_> = FIT_SPECS.iter().map(|spec| spec.name).collect();
     let model: Vec<_> = SPECS.iter().map(|spec| spec.name).collect();
+    let beat: Vec<_> = GatedParameters::fit_specs()
+        .map(|spec| spec.name)
+        .chain(BEAT_SPECS.iter().map(|spec| spec.name))
+        .collect();
     for (path, schema, names) in [
+        ("/v1/beats", "BeatParameters", beat),
         ("/v1/models", "ModelParameters", model),
         ("/v1/segmentations", "SegmentationParameters", fit),
     ] {
@@ -168,7 +173,8 @@ async fn every_operation_refuses_unknown_repeated_and_malformed_parameters() {
             let problem: Value = answer.json().await.unwrap_or_default();
             let what = format!("{method} {path}?{query}: {status} {problem}");
             // The parameters of a job are checked by its work, for JSON and forms alike.
-            let of_job = ["/v1/models", "/v1/segmentations"].contains(&path) && status == 422;
+            let of_job =
+                ["/v1/models", "/v1/segmentations", "/v1/beats"].contains(&path) && status == 422;
             assert!(
                 of_job || status == 400 && text(&problem["type"]).contains(code),
                 "{what}"
@@ -203,6 +209,8 @@ fn bytes_are_binary_and_reports_are_typed() {
         ("/v1/models/{id}/report.json", "ModelReport"),
         ("/v1/models/{id}/distance.json", "Closeness"),
         ("/v1/segmentations/{id}/report", "SegmentationReport"),
+        ("/v1/beats/{id}/report", "BeatReport"),
+        ("/v1/beats/{id}/beat.json", "BeatReport"),
         ("/v1/segmentations/{id}/polar.json", "PolarMap"),
     ] {
         let reference = text(&schema(path, "application/json")["$ref"]);

@@ -114,6 +114,7 @@ async fn no_way_in_goes_round_the_quota_of_bytes() {
         ("volume", upload("/v1/volumes")),
         ("model", upload("/v1/models")),
         ("segmentation", upload("/v1/segmentations")),
+        ("beat", upload("/v1/beats")),
         ("job", app.post("/v1/jobs").json(&json!({"volume": id}))),
         ("fetch", app.post("/v1/jobs").json(&order)),
         ("template", json_body("/v1/templates?organ=generic", mesh)),

@@ -131,6 +131,17 @@ impl Object {
         bytes
     }
 
+    /// The Nuclear Medicine Image in a file.
+    pub fn of_nm(file: &[u8]) -> Self {
+        let set = dicom_object::from_reader(file).unwrap().into_inner();
+        let instance = set.element_by_name("SOPInstanceUID").unwrap();
+        Self {
+            class: NM,
+            instance: instance.to_str().unwrap().into_owned(),
+            set,
+        }
+    }
+
     /// The object as a file.
     pub fn file(&self) -> Vec<u8> {
         let start = ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT);

@@ -156,7 +156,7 @@ fn path(id: &str) -> String {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct CascadeQuery {
-    /// Whether to erase also the models, segmentations and templates that were made of the volume, and the records of its jobs
+    /// Whether to erase also the models, segmentations, beats and templates that were made of the volume, and the records of its jobs
     #[param(default = false)]
     pub cascade: Option<bool>,
 }

@@ -176,10 +176,12 @@ The same in the background; the answer names the job:
   curl -fsS --data-binary @spect.nii.gz '{url}/v1/models?points=150'
 The wall of the ventricle as mask.nii.gz, found with the best model of the library:
   curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' '{url}/v1/segmentations?model=auto' -o mask.nii.gz
+Volumes, ejection fraction and motion of the wall of a gated study:
+  curl -fsS --data-binary @gated.nii.gz -H 'Prefer: wait=60' '{url}/v1/beats' -o beat.json
 The jobs and their progress:
   curl -fsS '{url}/v1/jobs'
-Stored models and segmentations:
-  curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'
+Stored models, segmentations and beats:
+  curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'; curl -fsS '{url}/v1/beats'
 The report on a model (or a segmentation) as an HTML_TYPE page:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 

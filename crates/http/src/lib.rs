@@ -7,7 +7,7 @@
 //! | content | where |
 //! |---|---|
 //! | the paths, the layers around them | [`router`] |
-//! | uploads, jobs, results | [`volumes`], [`volume_download`], [`jobs`], [`models`], [`segmentations`], [`templates`], [`readers`] |
+//! | uploads, jobs, results | [`volumes`], [`volume_download`], [`jobs`], [`models`], [`segmentations`], [`beats`], [`templates`], [`readers`] |
 //! | webhooks and their deliveries | [`webhooks`], [`webhook_request`] |
 //! | common parts of them | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`response_cache`] |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`quota`], [`keys`], [`audit`] |
@@ -32,6 +32,7 @@
 
 mod app;
 mod audit;
+mod beats;
 pub mod caller;
 mod client;
 mod collection;

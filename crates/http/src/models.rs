@@ -104,7 +104,7 @@ pub async fn create_model(
     let job = UploadJob {
         makes: Resource::Model,
         apart: &[],
-        offers: Offer::meshes(),
+        offers: Offer::meshes("mesh"),
     };
     filing::file_upload(&app, &caller, job, query, request).await
 }

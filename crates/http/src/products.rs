@@ -1,4 +1,4 @@
-//! The common routes of models, segmentations and templates beside being [`Collection`]s: a mesh
+//! The common routes of models, segmentations, beats and templates beside being [`Collection`]s: a mesh
 //! in several formats, files that can be downloaded, and perhaps a report.
 //!
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
@@ -12,7 +12,7 @@ use super::memory::charge;
 use super::negotiate;
 use super::openapi::{
     ConditionalHeaders, DicomProblems, Documented, DownloadAnswers, LookupProblems, MeshAnswer,
-    ReportAnswer,
+    ReportAnswer, ReportDocumentAnswer,
 };
 use super::problem::not_found::{missing, no_such_file};
 use super::problem::{Answer, Problem};
@@ -60,8 +60,17 @@ pub trait ProductCollection: 'static {
     /// The names, without extension, of the meshes it may have in every format.
     const MESHES: &'static [&'static str] = &["mesh"];
 
+    /// The mesh that stands for the product where only one is asked for.
+    const MESH: &'static str = "mesh";
+
     /// The names of the files it may have beside its meshes.
     const FILES: &'static [&'static str];
+
+    /// The form, as a regular expression, of further names, of which each product has as many as its scan has parts.
+    const NUMBERED_FILES: Option<&'static str> = None;
+
+    /// The file that holds the report; it has one if it is among its files.
+    const REPORT_FILE: &'static str = "report.json";
 
     /// The name of the schema that lists all names of files.
     const FILE_SCHEMA: &'static str;
@@ -138,7 +147,10 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         &format!("get_{noun}_mesh"),
         format!("Download a {noun}'s mesh"),
     )
-    .description("In the format that `Accept` asks for; GLB if it allows any.")
+    .description(match P::MESH {
+        "mesh" => "In the format that `Accept` asks for; GLB if it allows any.".to_owned(),
+        stem => format!("`{stem}.*` in the format that `Accept` asks for; GLB if it allows any."),
+    })
     .parameters::<PartQuery>()
     .parameters::<ConditionalHeaders>()
     .answers::<MeshAnswer>();
@@ -170,15 +182,22 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     if !P::MESHES.is_empty() {
         routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
     }
-    if P::FILES.contains(&REPORT_FILE) {
+    if P::FILES.contains(&P::REPORT_FILE) {
         let report = download(
             "report",
             &format!("get_{noun}_report"),
             format!("Read a {noun}'s report"),
         )
-        .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
-        .parameters::<ConditionalHeaders>()
-        .answers::<ReportAnswer>();
+        .parameters::<ConditionalHeaders>();
+        let report = if P::FILES.contains(&files::REPORT_PAGE) {
+            report
+                .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
+                .answers::<ReportAnswer>()
+        } else {
+            report
+                .description("JSON.")
+                .answers::<ReportDocumentAnswer>()
+        };
         routes.push(shared(report).served_by(get(get_report::<P>)));
     }
     routes
@@ -186,9 +205,6 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
 
 /// Memory for a byte of the files that a page is made of: the file, what is read of it, and the page.
 const PAGE_MEMORY_PER_BYTE: u64 = 8;
-
-/// The file that holds the report.
-const REPORT_FILE: &str = "report.json";
 
 /// The program that made a product.
 #[derive(Serialize, ToSchema)]
@@ -319,23 +335,24 @@ impl Offer {
         }
     }
 
-    /// The mesh in every format, GLB first.
-    pub fn meshes() -> Vec<Self> {
+    /// The mesh of that name in every format, GLB first.
+    pub fn meshes(stem: &str) -> Vec<Self> {
         Format::ALL
-            .map(|format| Self::new(format.media_type(), mesh_name(format)))
+            .map(|format| {
+                let name = format!("{stem}.{}", format.extension());
+                Self::new(format.media_type(), name)
+            })
             .to_vec()
     }
 
-    fn reports() -> [Self; 2] {
-        [
-            Self::new("application/json", REPORT_FILE),
-            Self::new("text/html", files::REPORT_PAGE),
-        ]
+    /// The report of products of that kind, and the page if they have one.
+    fn reports<P: ProductCollection>() -> Vec<Self> {
+        let page = P::FILES.contains(&files::REPORT_PAGE);
+        let page = page.then(|| Self::new("text/html", files::REPORT_PAGE));
+        std::iter::once(Self::new("application/json", P::REPORT_FILE))
+            .chain(page)
+            .collect()
     }
-}
-
-fn mesh_name(format: Format) -> String {
-    format!("mesh.{}", format.extension())
 }
 
 /// The offer that `Accept` rates highest, or the 406 that lists the offers.
@@ -412,10 +429,10 @@ async fn get_mesh<P: ProductCollection>(
     headers: HeaderMap,
 ) -> Answer {
     let Some(Word(part)) = query.part else {
-        return get_offered::<P>(&app, &caller, &id, &headers, &Offer::meshes()).await;
+        return get_offered::<P>(&app, &caller, &id, &headers, &Offer::meshes(P::MESH)).await;
     };
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    let offers = Offer::meshes();
+    let offers = Offer::meshes(P::MESH);
     let offer = choose(&headers, &offers)?;
     let mut response = send_part(&app, &product, &offer.file, part, &headers).await?;
     response
@@ -491,7 +508,7 @@ async fn get_report<P: ProductCollection>(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    get_offered::<P>(&app, &caller, &id, &headers, &Offer::reports()).await
+    get_offered::<P>(&app, &caller, &id, &headers, &Offer::reports::<P>()).await
 }
 
 /// The file among `offers` that `Accept` rates highest.
@@ -528,7 +545,7 @@ async fn get_file<P: ProductCollection>(
         query.all::<()>()?;
     }
     let names = file_names::<P>();
-    if !names.contains(&name) {
+    if P::NUMBERED_FILES.is_none() && !names.contains(&name) {
         return Err(no_such_file(P::RESOURCE, &name, &names));
     }
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
@@ -674,7 +691,10 @@ async fn send_named(
         return files::send(app, product, file, headers).await;
     }
     let work = app.service.engine.work(product.resource().noun());
-    match work.filter(|_| name == files::REPORT_PAGE).cloned() {
+    match work
+        .filter(|work| name == files::REPORT_PAGE && !work.page_files().is_empty())
+        .cloned()
+    {
         Some(work) => {
             let files = product.files.iter();
             let needed = files.filter(|file| work.page_files().contains(&&file.name[..]));
@@ -714,7 +734,7 @@ fn file_names<P: ProductCollection>() -> Vec<String> {
     meshes.chain(others).chain(objects).collect()
 }
 
-/// The schema of [`file_names`].
+/// The schema of [`file_names`]; its pattern is that of [`ProductCollection::NUMBERED_FILES`].
 struct FileNames<P>(PhantomData<P>);
 
 impl<P: ProductCollection> ToSchema for FileNames<P> {
@@ -727,7 +747,8 @@ impl<P: ProductCollection> PartialSchema for FileNames<P> {
     fn schema() -> RefOr<Schema> {
         let names = ObjectBuilder::new()
             .schema_type(Type::String)
-            .enum_values(Some(file_names::<P>()));
+            .enum_values(Some(file_names::<P>()))
+            .pattern(P::NUMBERED_FILES);
         Schema::from(names).into()
     }
 }

@@ -1,6 +1,7 @@
 //! The map of the API, and the layers around it.
 
 use super::app::App;
+use super::beats::Beats;
 use super::document::PublishedDocuments;
 use super::guard::{self, hosts, pages};
 use super::limits::BodyLimits;
@@ -14,9 +15,9 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, collection, erasures, front_page, health, idempotency, identities, intake_status, jobs,
-    keys, legal_hold, models, products, readers, segmentations, stow, templates, volume_download,
-    volumes, voxels, webhook_request, webhooks, workitems,
+    audit, beats, collection, erasures, front_page, health, idempotency, identities, intake_status,
+    jobs, keys, legal_hold, models, products, readers, segmentations, stow, templates,
+    volume_download, volumes, voxels, webhook_request, webhooks, workitems,
 };
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -42,15 +43,17 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         collection::routes::<Volumes>().to_vec(),
         collection::routes::<Models>().to_vec(),
         collection::routes::<Segmentations>().to_vec(),
+        collection::routes::<Beats>().to_vec(),
         collection::routes::<Templates>().to_vec(),
         collection::routes::<Readers>().to_vec(),
         // GET /v1/KINDS/{id}/mesh, .../report and .../{file}
         products::routes::<Models>(),
         products::routes::<Segmentations>(),
+        products::routes::<Beats>(),
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 38] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 39] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -65,6 +68,7 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(erasures::get_erasure),
         routes!(models::create_model).layer(upload()),
         routes!(segmentations::create_segmentation).layer(upload()),
+        routes!(beats::create_beat).layer(upload()),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(readers::create_reader).layer(json(PROFILE_SIZE)),
         routes!(templates::update_template).layer(json(settings.json_limit)),

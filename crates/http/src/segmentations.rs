@@ -112,7 +112,7 @@ fn offers() -> Vec<Offer> {
         "application/nifti",
         "application/x-nifti",
     ];
-    let meshes = Offer::meshes().into_iter();
+    let meshes = Offer::meshes("mesh").into_iter();
     masks
         .map(|media_type| Offer::new(media_type, MASK_FILE))
         .into_iter()

@@ -187,7 +187,10 @@ fn sendable(kind: &str) -> Vec<&'static str> {
 
 /// Advice that names the objects which can be sent.
 pub fn sendable_fix(kind: &str) -> String {
-    format!("Give some of {}.", sendable(kind).join(", "))
+    match sendable(kind).as_slice() {
+        [] => "Leave `send` and `to` out.".to_owned(),
+        names => format!("Give some of {}.", names.join(", ")),
+    }
 }
 
 fn invalid(field: &str, detail: impl Into<String>) -> Failure {

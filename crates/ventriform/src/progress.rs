@@ -101,15 +101,15 @@ impl Plan {
 }
 
 impl Plan {
-    /// A beat: the gates' sum segmented, and one wall fitted to all gates.
+    /// A beat: the gates' sum segmented and measured, and one wall fitted to all gates.
     pub const BEAT: Plan = Plan(&[
         (Stage::Read, 0.05),
         (Stage::Localise, 0.08),
         (Stage::Align, 0.02),
         (Stage::Deform, 0.08),
-        (Stage::Beat, 0.67),
         (Stage::Polar, 0.03),
         (Stage::Report, 0.04),
+        (Stage::Beat, 0.67),
         (Stage::Export, 0.03),
     ]);
 }

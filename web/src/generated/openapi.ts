@@ -95,6 +95,361 @@ export interface components {
             /** @description `cursor` of the next page; absent on the last. */
             next_cursor?: string | null;
         };
+        /** @description A beat: one wall in motion, fitted to the gates of a volume, with its main figures. */
+        Beat: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example bea_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["BeatLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["BeatParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description Volumes, ejection fraction, the spread of phases, the confidence of the fit to the gates' sum, and flags; the report has all figures. */
+            summary: components["schemas"]["BeatSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        /** @description A signing secret. */
+        WebhookSecret: {
+            /**
+             * Format: date-time
+             * @description Until when the secret before signs too (RFC 3339).
+             */
+            former_until: string;
+            /**
+             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret: string;
+        };
+        /** @description Paths of one beat. */
+        BeatLinks: {
+            /** @description The volume curve. */
+            curve: string;
+            /** @description The wall at end diastole, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description The histogram of the wall's phases. */
+            phase: string;
+            /** @description The report. */
+            report: string;
+            /** @description This beat. */
+            self: string;
+            /** @description The volume. */
+            volume: string;
+        };
+        /** @description A page of beats. */
+        BeatList: {
+            /** @description The beats, newest first. */
+            beats: components["schemas"]["Beat"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /** @description The parameters of a beat */
+        BeatParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
+            axis?: number[];
+            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
+            base?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /** @description Box of voxels that contains the centre of the organ: i0,j0,k0,i1,j1,k1, counted from 0, both corners included */
+            box?: number[];
+            /** @description A point in the cavity, x,y,z in LPS millimetres: the search stays within 25 mm of it and does not question it. Default: the organ is searched for in the whole volume */
+            center?: number[];
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Whether the volumes of the file are gates of one heart beat although its header says otherwise
+             * @default false
+             */
+            gated?: boolean;
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /** @description Mass of the left ventricle's muscle, g, where it is known: the image does not tell how thick the wall is. Default: the usual thickness is assumed */
+            mass_g?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Id of the model to fit (a template, a model or an earlier segmentation), or auto: fits the built-in hearts, the templates flagged `library` and the models named after it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative name: template
+             * @default auto
+             */
+            model?: string;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 4.5
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            resolution?: number;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /** @description The R-R interval, ms, from which rates of ejection and filling are computed. Default: as the file states it */
+            rr_ms?: number;
+            /** @description Voxel i,j,k (counted from 0) in the cavity; use this or center */
+            seed_point?: number[];
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+        };
+        /** @description The report of a beat. Volumes are millilitres, lengths millimetres, angles degrees of the cycle. */
+        BeatReport: {
+            /**
+             * Format: double
+             * @description Confidence of the fit to the gates' sum, 0..=1.
+             */
+            confidence: number;
+            /** @description The volume curve, gates' width taken off, at equal steps from the beginning of the first gate. */
+            curve: components["schemas"]["CurvePoint"][];
+            /**
+             * Format: double
+             * @description End-diastolic volume: the largest of the curve.
+             */
+            edv_ml: number;
+            /**
+             * Format: double
+             * @description Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
+             */
+            ef_of_gates_percent?: number | null;
+            /**
+             * Format: double
+             * @description Ejection fraction, per cent; `null` if the gates are no beat (flag `no_contraction`).
+             */
+            ef_percent?: number | null;
+            /**
+             * Format: double
+             * @description When the curve is largest, degrees.
+             */
+            end_diastole_degrees: number;
+            /**
+             * Format: int64
+             * @description The gate with the largest cavity.
+             */
+            end_diastole_gate: number;
+            /**
+             * Format: double
+             * @description When the curve is smallest, degrees.
+             */
+            end_systole_degrees: number;
+            /**
+             * Format: int64
+             * @description The gate with the smallest cavity.
+             */
+            end_systole_gate: number;
+            /**
+             * Format: double
+             * @description End-systolic volume: the smallest of the curve.
+             */
+            esv_ml: number;
+            /** @description Reasons to look closer: of the fit to the gates' sum, then of the beat. */
+            flags: components["schemas"]["Flag"][];
+            /** @description Each gate, in the mean over its width. */
+            gates: components["schemas"]["GateReport"][];
+            /** @description The file of the gates. */
+            input: components["schemas"]["FileFacts"];
+            long_axis?: components["schemas"]["LongAxis"] | null;
+            /** @description Why there are no rates. */
+            no_rates?: string | null;
+            /** @description Every parameter, defaults written out. */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** @description Phases of the wall. */
+            phase: components["schemas"]["PhaseReport"];
+            rates?: components["schemas"]["RatesReport"] | null;
+            resolution_mm?: components["schemas"]["Resolution"] | null;
+            /**
+             * Format: double
+             * @description The R-R interval, ms, as given or stated by the file.
+             */
+            rr_ms?: number | null;
+            /** @description The wall's segments (AHA). */
+            segments: components["schemas"]["SegmentMotionReport"][];
+            /**
+             * Format: int64
+             * @description Steps of the joint fit.
+             */
+            steps: number;
+            /**
+             * Format: double
+             * @description Stroke volume.
+             */
+            sv_ml: number;
+            /** @description The model that was fitted to the gates' sum. */
+            template: string;
+            /** @description What the file says of the beats. */
+            timing: components["schemas"]["TimingReport"];
+            /**
+             * Format: double
+             * @description Muscle of the wall in the mean of the beat.
+             */
+            wall_ml: number;
+            /**
+             * Format: double
+             * @description Its greatest change over the beat, per cent.
+             */
+            wall_swing_percent: number;
+            /** @description Warnings about the files. */
+            warnings: string[];
+        };
+        /** @description The main figures of a beat; the report has all. */
+        BeatSummary: {
+            /**
+             * Format: double
+             * @description Confidence of that fit, 0 to 1.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description End-diastolic volume.
+             */
+            edv_ml: number;
+            /**
+             * Format: double
+             * @description Ejection fraction; `null` if the gates are no beat.
+             */
+            ef_percent?: number | null;
+            /**
+             * Format: double
+             * @description End-systolic volume.
+             */
+            esv_ml: number;
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /**
+             * Format: int64
+             * @description Number of gates.
+             */
+            gates: number;
+            /**
+             * Format: double
+             * @description The smallest arc that holds 95 per cent of them, degrees.
+             */
+            phase_bandwidth_degrees: number;
+            /** @description Whether the phases can be relied on. */
+            phase_reliable: boolean;
+            /**
+             * Format: double
+             * @description Standard deviation of the wall's phases, degrees.
+             */
+            phase_sd_degrees: number;
+            /**
+             * Format: double
+             * @description Stroke volume.
+             */
+            sv_ml: number;
+            /** @description Name of the model that was fitted to the gates' sum. */
+            template: string;
+        };
         /** @description One model's fit. */
         Candidate: {
             /**
@@ -137,6 +492,19 @@ export interface components {
              * @description Parts that each side of a triangle is cut into.
              */
             parts: number;
+        };
+        /** @description A point of the volume curve. */
+        CurvePoint: {
+            /**
+             * Format: double
+             * @description Volume of the cavity.
+             */
+            cavity_ml: number;
+            /**
+             * Format: double
+             * @description When.
+             */
+            degrees: number;
         };
         /** @description A message about a job to one receiver. */
         Delivery: {
@@ -507,18 +875,20 @@ export interface components {
             /** @description Oddities of the file that do not prevent its use. */
             warnings: string[];
         };
-        /** @description A signing secret. */
-        WebhookSecret: {
+        WebhookRequest: {
+            /** @description What to tell; the three ends of a job unless given */
+            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
             /**
-             * Format: date-time
-             * @description Until when the secret before signs too (RFC 3339).
-             */
-            former_until: string;
-            /**
-             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
              * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
              */
-            secret: string;
+            secret?: string;
+            /**
+             * Format: uri
+             * @description Where to send deliveries: https, and a public host unless the operator allows it
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
         };
         /** @description Figures of a fit, and the fitted model's pose. */
         Fit: {
@@ -701,6 +1071,29 @@ export interface components {
             /** @description The finding. */
             reason: string;
         };
+        /** @description A gate. */
+        GateReport: {
+            /**
+             * Format: double
+             * @description Volume of the cavity.
+             */
+            cavity_ml: number;
+            /**
+             * Format: double
+             * @description The factor that brought the gate to the usual counts of a gate.
+             */
+            counts_factor: number;
+            /**
+             * Format: int64
+             * @description Its number, from 1.
+             */
+            gate: number;
+            /**
+             * Format: double
+             * @description Volume of the muscle.
+             */
+            wall_ml: number;
+        };
         /** @description The state of the service. */
         Health: {
             /**
@@ -818,6 +1211,8 @@ export interface components {
              * @description How often a worker has started it.
              */
             attempts: number;
+            /** @description The beat it made; only for kind `beat`. */
+            beat?: string | null;
             /** @description Whether a client has asked to cancel it. */
             cancel_requested: boolean;
             /**
@@ -897,6 +1292,8 @@ export interface components {
         };
         /** @description Paths of one job and of its results. */
         JobLinks: {
+            /** @description The beat it made. */
+            beat?: string | null;
             /** @description Its changes as server-sent events. */
             events: string;
             /** @description The segmentation's mask. */
@@ -921,7 +1318,7 @@ export interface components {
             /** @description `cursor` of the next page; absent on the last. */
             next_cursor?: string | null;
         };
-        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"];
+        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"];
         JobRequest: components["schemas"]["VolumeJobRequest"] | components["schemas"]["SourceJobRequest"];
         /** @description A series in an archive. */
         JobSource: {
@@ -1664,6 +2061,38 @@ export interface components {
              */
             sweeps: number;
         };
+        /** @description Phases of the wall: of the first harmonic of the thickness, weighted by area and amplitude. */
+        PhaseReport: {
+            /**
+             * Format: double
+             * @description The smallest arc that holds 95 per cent of the weight.
+             */
+            bandwidth_degrees: number;
+            /**
+             * Format: double
+             * @description Width of a bin.
+             */
+            bin_degrees: number;
+            /**
+             * Format: double
+             * @description Entropy of the histogram as a share of that of an even one, per cent.
+             */
+            entropy_percent: number;
+            /** @description Share of the weight in equal bins from 0 to 360 degrees. */
+            histogram: number[];
+            /**
+             * Format: double
+             * @description Circular mean.
+             */
+            mean_degrees: number;
+            /** @description Whether enough of the wall moves, and the gates are a beat. */
+            reliable: boolean;
+            /**
+             * Format: double
+             * @description Standard deviation.
+             */
+            sd_degrees: number;
+        };
         /** @description A polar map, as in `polar.json`. */
         PolarMap: {
             /**
@@ -1830,6 +2259,24 @@ export interface components {
              */
             type: string;
         };
+        /** @description How fast the ventricle empties and fills. */
+        RatesReport: {
+            /**
+             * Format: double
+             * @description Greatest rate of ejection, end-diastolic volumes per second.
+             */
+            peak_ejection_edv_per_s: number;
+            /**
+             * Format: double
+             * @description Greatest rate of filling, end-diastolic volumes per second.
+             */
+            peak_filling_edv_per_s: number;
+            /**
+             * Format: double
+             * @description From end systole to the greatest rate of filling.
+             */
+            time_to_peak_filling_ms: number;
+        };
         /** @description A reader: a profile by which segmentations are drawn. */
         Reader: {
             /**
@@ -1853,20 +2300,10 @@ export interface components {
             /** @description The content of the profile. */
             summary: components["schemas"]["ReaderSummary"];
         };
-        WebhookRequest: {
-            /** @description What to tell; the three ends of a job unless given */
-            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
-            /**
-             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
-             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
-             */
-            secret?: string;
-            /**
-             * Format: uri
-             * @description Where to send deliveries: https, and a public host unless the operator allows it
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
+        /** @description The registered receivers. */
+        WebhookList: {
+            /** @description The oldest first. */
+            webhooks: components["schemas"]["Webhook"][];
         };
         /** @description Paths of one reader. */
         ReaderLinks: {
@@ -2236,6 +2673,31 @@ export interface components {
          * @enum {string}
          */
         Scope: "read" | "submit" | "admin";
+        /** @description A segment through the beat. */
+        SegmentMotionReport: {
+            /**
+             * Format: double
+             * @description Motion of the inner surface inward, end diastole to end systole.
+             */
+            motion_mm: number;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: double
+             * @description Phase of the greatest thickness; `null` where the segment does not move.
+             */
+            phase_degrees?: number | null;
+            /**
+             * Format: int64
+             * @description Its number, 1 to 17.
+             */
+            segment: number;
+            /**
+             * Format: double
+             * @description Thickening, end diastole to end systole.
+             */
+            thickening_percent: number;
+        };
         /** @description A segmentation: a model fitted to a volume, with its main figures and its reliability. */
         Segmentation: {
             /**
@@ -2267,10 +2729,32 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        /** @description The registered receivers. */
-        WebhookList: {
-            /** @description The oldest first. */
-            webhooks: components["schemas"]["Webhook"][];
+        /** @description A registered receiver. */
+        Webhook: {
+            /**
+             * Format: date-time
+             * @description When it was registered (RFC 3339).
+             */
+            created_at: string;
+            /** @description The events that it is told. */
+            events: string[];
+            /**
+             * Format: date-time
+             * @description Since when it answers 410 and is told nothing (RFC 3339).
+             */
+            gone_at?: string | null;
+            /**
+             * @description Its id.
+             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description What signs its deliveries; shown only when it is registered. */
+            secret?: string | null;
+            /**
+             * @description Where it is.
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
         };
         SegmentationForm: {
             /**
@@ -2593,7 +3077,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation";
+            kind?: "model" | "segmentation" | "beat";
             /**
              * @description The caller's own names and values
              * @example {
@@ -2939,32 +3423,18 @@ export interface components {
             /** @description Counts and main figures. */
             summary: components["schemas"]["TemplateSummary"];
         };
-        /** @description A registered receiver. */
-        Webhook: {
+        /** @description Volumes of one wall, millilitres. */
+        WallVolumes: {
             /**
-             * Format: date-time
-             * @description When it was registered (RFC 3339).
+             * Format: double
+             * @description Of the cavity.
              */
-            created_at: string;
-            /** @description The events that it is told. */
-            events: string[];
+            cavity: number;
             /**
-             * Format: date-time
-             * @description Since when it answers 410 and is told nothing (RFC 3339).
+             * Format: double
+             * @description Of the wall.
              */
-            gone_at?: string | null;
-            /**
-             * @description Its id.
-             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
-             */
-            id: string;
-            /** @description What signs its deliveries; shown only when it is registered. */
-            secret?: string | null;
-            /**
-             * @description Where it is.
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
+            wall: number;
         };
         /** @description Paths of one template. */
         TemplateLinks: {
@@ -3048,6 +3518,39 @@ export interface components {
             anatomical: components["schemas"]["Thickness"];
             /** @description Of the wall as the blurred image shows it. */
             apparent: components["schemas"]["Thickness"];
+        };
+        /** @description What the file says of the beats. */
+        TimingReport: {
+            /**
+             * Format: double
+             * @description Beats accepted.
+             */
+            beats_accepted?: number | null;
+            /**
+             * Format: double
+             * @description Beats rejected.
+             */
+            beats_rejected?: number | null;
+            /**
+             * Format: double
+             * @description Length of a gate.
+             */
+            frame_time_ms?: number | null;
+            /**
+             * Format: double
+             * @description The longest R-R interval accepted.
+             */
+            high_rr_ms?: number | null;
+            /**
+             * Format: double
+             * @description The shortest R-R interval accepted.
+             */
+            low_rr_ms?: number | null;
+            /**
+             * Format: double
+             * @description The R-R interval.
+             */
+            nominal_interval_ms?: number | null;
         };
         /** @description Standard deviation of the nodes' distance from the walls, millimetres. */
         Uncertainties: {
@@ -3208,7 +3711,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation";
+            kind?: "model" | "segmentation" | "beat";
             /**
              * @description The caller's own names and values
              * @example {
@@ -3256,19 +3759,6 @@ export interface components {
             /** @description The volumes, newest first. */
             volumes: components["schemas"]["Volume"][];
         };
-        /** @description Volumes of one wall, millilitres. */
-        WallVolumes: {
-            /**
-             * Format: double
-             * @description Of the cavity.
-             */
-            cavity: number;
-            /**
-             * Format: double
-             * @description Of the wall.
-             */
-            wall: number;
-        };
     };
     responses: never;
     parameters: never;
@@ -3280,8 +3770,16 @@ export type Agreement = components['schemas']['Agreement'];
 export type AppliedReader = components['schemas']['AppliedReader'];
 export type AuditEventName = components['schemas']['AuditEventName'];
 export type AuditPage = components['schemas']['AuditPage'];
+export type Beat = components['schemas']['Beat'];
+export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type BeatLinks = components['schemas']['BeatLinks'];
+export type BeatList = components['schemas']['BeatList'];
+export type BeatParameters = components['schemas']['BeatParameters'];
+export type BeatReport = components['schemas']['BeatReport'];
+export type BeatSummary = components['schemas']['BeatSummary'];
 export type Candidate = components['schemas']['Candidate'];
 export type Closeness = components['schemas']['Closeness'];
+export type CurvePoint = components['schemas']['CurvePoint'];
 export type Delivery = components['schemas']['Delivery'];
 export type DeliveryList = components['schemas']['DeliveryList'];
 export type Dependency = components['schemas']['Dependency'];
@@ -3294,7 +3792,7 @@ export type ErasedItem = components['schemas']['ErasedItem'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
 export type FileFacts = components['schemas']['FileFacts'];
-export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type WebhookRequest = components['schemas']['WebhookRequest'];
 export type Fit = components['schemas']['Fit'];
 export type FitnessFormStages = components['schemas']['FitnessFormStages'];
 export type FitnessForms = components['schemas']['FitnessForms'];
@@ -3304,6 +3802,7 @@ export type FitnessTermStages = components['schemas']['FitnessTermStages'];
 export type FitnessTerms = components['schemas']['FitnessTerms'];
 export type FittedVolumes = components['schemas']['FittedVolumes'];
 export type Flag = components['schemas']['Flag'];
+export type GateReport = components['schemas']['GateReport'];
 export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
 export type Histograms = components['schemas']['Histograms'];
@@ -3339,14 +3838,16 @@ export type NewKey = components['schemas']['NewKey'];
 export type NotReady = components['schemas']['NotReady'];
 export type ObjectDelivery = components['schemas']['ObjectDelivery'];
 export type OptimiseReport = components['schemas']['OptimiseReport'];
+export type PhaseReport = components['schemas']['PhaseReport'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
 export type PolarSummary = components['schemas']['PolarSummary'];
 export type Posture = components['schemas']['Posture'];
 export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
+export type RatesReport = components['schemas']['RatesReport'];
 export type Reader = components['schemas']['Reader'];
-export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type WebhookList = components['schemas']['WebhookList'];
 export type ReaderLinks = components['schemas']['ReaderLinks'];
 export type ReaderList = components['schemas']['ReaderList'];
 export type ReaderOffsets = components['schemas']['ReaderOffsets'];
@@ -3368,8 +3869,9 @@ export type Scaling = components['schemas']['Scaling'];
 export type Scan = components['schemas']['Scan'];
 export type ScanUids = components['schemas']['ScanUids'];
 export type Scope = components['schemas']['Scope'];
+export type SegmentMotionReport = components['schemas']['SegmentMotionReport'];
 export type Segmentation = components['schemas']['Segmentation'];
-export type WebhookList = components['schemas']['WebhookList'];
+export type Webhook = components['schemas']['Webhook'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
 export type SegmentationLinks = components['schemas']['SegmentationLinks'];
 export type SegmentationList = components['schemas']['SegmentationList'];
@@ -3388,7 +3890,7 @@ export type SurfaceNoise = components['schemas']['SurfaceNoise'];
 export type SurfaceReport = components['schemas']['SurfaceReport'];
 export type TagsPatch = components['schemas']['TagsPatch'];
 export type Template = components['schemas']['Template'];
-export type Webhook = components['schemas']['Webhook'];
+export type WallVolumes = components['schemas']['WallVolumes'];
 export type TemplateLinks = components['schemas']['TemplateLinks'];
 export type TemplateList = components['schemas']['TemplateList'];
 export type TemplatePatch = components['schemas']['TemplatePatch'];
@@ -3396,6 +3898,7 @@ export type TemplateSummary = components['schemas']['TemplateSummary'];
 export type Territory = components['schemas']['Territory'];
 export type Thickness = components['schemas']['Thickness'];
 export type Thicknesses = components['schemas']['Thicknesses'];
+export type TimingReport = components['schemas']['TimingReport'];
 export type Uncertainties = components['schemas']['Uncertainties'];
 export type Uncertainty = components['schemas']['Uncertainty'];
 export type UploadForm = components['schemas']['UploadForm'];
@@ -3405,6 +3908,5 @@ export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
 export type VolumeList = components['schemas']['VolumeList'];
-export type WallVolumes = components['schemas']['WallVolumes'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

@@ -76,6 +76,8 @@ pub struct JobBody {
     model: Option<String>,
     /// The segmentation it made; only for kind `segmentation`.
     segmentation: Option<String>,
+    /// The beat it made; only for kind `beat`.
+    beat: Option<String>,
     /// Related paths.
     links: JobLinks,
 }
@@ -219,6 +221,9 @@ struct JobLinks {
     /// The segmentation it made.
     #[serde(skip_serializing_if = "Option::is_none")]
     segmentation: Option<String>,
+    /// The beat it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    beat: Option<String>,
     /// The segmentation's mask.
     #[serde(skip_serializing_if = "Option::is_none")]
     mask: Option<String>,
@@ -284,6 +289,7 @@ fn body(job: Job, context: &Context) -> JobBody {
         id.filter(|id| Resource::of(id) == Some(resource))
     };
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
+    let beat = made(Resource::Beat);
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = path_of(&job.id);
@@ -311,6 +317,7 @@ fn body(job: Job, context: &Context) -> JobBody {
             volume: job.volume.as_deref().map(path_of),
             model: model.as_deref().map(path_of),
             segmentation: segmentation.as_deref().map(path_of),
+            beat: beat.as_deref().map(path_of),
             mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
             mesh: below("mesh"),
             report: below("report"),
@@ -331,5 +338,6 @@ fn body(job: Job, context: &Context) -> JobBody {
         revision: job.revision,
         model,
         segmentation,
+        beat,
     }
 }

@@ -151,7 +151,7 @@ async fn read_job<'a>(
 pub struct JobQuery {
     /// Only jobs in this state
     state: Option<JobStateName>,
-    /// Only jobs of this kind: model, segmentation
+    /// Only jobs of this kind: model, segmentation, beat
     kind: Option<String>,
     /// Only jobs of this priority
     priority: Option<PriorityName>,

@@ -15,6 +15,9 @@ const JOB_SCHEMA: &str = "Job";
 /// The schema of a segmentation's report, which the document's frame registers.
 const SEGMENTATION_REPORT: &str = "SegmentationReport";
 
+/// The schema of a beat's report, which the document's frame registers.
+const BEAT_REPORT: &str = "BeatReport";
+
 /// The schema of a reader's profile, which the handlers register.
 const READER_PROFILE: &str = "ReaderProfile";
 
@@ -235,10 +238,16 @@ files! {
     ])];
     /// 200 with a report.
     ReportAnswer: "The report", [reports()];
+    /// 200 with a report that has no page.
+    ReportDocumentAnswer: "The report", [report_document()];
     /// 200 with the mask, mesh or report of a segmentation.
-    SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone()];
+    SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone(SEGMENTATION_REPORT)];
     /// 200 with any of a segmentation's files.
     SegmentationFileAnswer: "The file", [meshes(), masks(), labels(), pictures(), reports(), objects()];
+    /// 200 with the report of a beat, or a mesh of it.
+    BeatAnswer: "The report or the mesh", [meshes(), report_alone(BEAT_REPORT)];
+    /// 200 with any of a beat's files.
+    BeatFileAnswer: "The file", [meshes(), masks(), pictures(), tables(), report_document()];
     /// 200 with a reader's profile.
     ReaderFileAnswer: "The profile", [profiles()];
     /// 200 with any of a model's files.
@@ -347,8 +356,16 @@ fn reports() -> Contents {
     ]
 }
 
-fn report_alone() -> Contents {
-    let report = Ref::from_schema_name(SEGMENTATION_REPORT);
+fn report_document() -> Contents {
+    vec![("application/json", Content::new(Some(object())))]
+}
+
+fn tables() -> Contents {
+    files_of(["text/csv"])
+}
+
+fn report_alone(schema: &str) -> Contents {
+    let report = Ref::from_schema_name(schema);
     vec![("application/json", Content::new(Some(report)))]
 }
 
@@ -360,6 +377,7 @@ pub fn media_type_of(name: &str) -> &'static str {
         "gz" => "application/gzip",
         "nrrd" => seg_nrrd::MEDIA_TYPE,
         "html" => "text/html",
+        "csv" => "text/csv",
         "png" => "image/png",
         "svg" => "image/svg+xml",
         _ => Format::ALL

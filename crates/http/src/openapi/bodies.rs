@@ -11,7 +11,7 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
 use ventriform::export::dicom::DicomObject;
-use ventriform::parameters::{FitParameters, ModelParameters};
+use ventriform::parameters::{FitParameters, GatedParameters, ModelParameters};
 use ventriform_service::hooks::HookEvent;
 use ventriform_service::records::LegalHold;
 
@@ -27,6 +27,7 @@ impl ToSchema for JobRequest {
         schemas.push((ModelParameters::name().into(), ModelParameters::schema()));
         schemas.push((JobParameters::name().into(), JobParameters::schema()));
         schemas.push((FitParameters::name().into(), FitParameters::schema()));
+        schemas.push((GatedParameters::name().into(), GatedParameters::schema()));
         schemas.push((WebhookRequest::name().into(), WebhookRequest::schema()));
         let own = [
             (VolumeJobRequest::name(), VolumeJobRequest::schema()),
@@ -51,7 +52,7 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
     let text = || ObjectBuilder::new().schema_type(Type::String);
     let kind = text()
         .description(Some("The kind of work"))
-        .enum_values(Some(["model", "segmentation"]))
+        .enum_values(Some(["model", "segmentation", "beat"]))
         .default(Some(json!("model")));
     let (external_id, labels) = tag_fields(false);
     let names = text().enum_values(Some(DicomObject::ALL.map(DicomObject::file_name)));
@@ -278,7 +279,8 @@ impl PartialSchema for JobParameters {
     fn schema() -> RefOr<Schema> {
         let parameters = AnyOfBuilder::new()
             .item(Ref::from_schema_name(ModelParameters::name()))
-            .item(Ref::from_schema_name(FitParameters::name()));
+            .item(Ref::from_schema_name(FitParameters::name()))
+            .item(Ref::from_schema_name(GatedParameters::name()));
         Schema::AnyOf(parameters.build()).into()
     }
 }

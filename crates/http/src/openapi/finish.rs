@@ -4,7 +4,8 @@
 //! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
 //!    64 bits.
 //! 2. A path `.../{file}` becomes one path per file, so that each file has one media type and one
-//!    schema. Generators of clients choose how to read an answer by its first media type.
+//!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
+//!    names of a form: the meshes and labels of the gates of a beat.
 //! 3. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
 //! 4. Every operation gets examples: those of `examples.json`, recorded from a running service by
@@ -15,6 +16,7 @@ use super::answers::media_type_of;
 use crate::files::REPORT_PAGE;
 use crate::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
+use ventriform::export::Format;
 use ventriform::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
@@ -156,7 +158,14 @@ fn one_path_per_file(document: &mut Value) {
             separate.insert(path, item);
             continue;
         };
-        for name in take_file_names(&mut document["components"]["schemas"], &item) {
+        let names = take_file_names(&mut document["components"]["schemas"], &item);
+        if let Some(pattern) = names.get("pattern") {
+            let operation = of_numbered_files(pattern, &item["get"]);
+            separate.insert(path.clone(), json!({ "get": operation }));
+        }
+        let listed = names["enum"].as_array().into_iter().flatten();
+        for name in listed.filter_map(Value::as_str) {
+            let name = name.to_owned();
             let operation = of_one_file(folder, &name, &item["get"]);
             separate.insert(format!("{folder}/{name}"), json!({ "get": operation }));
         }
@@ -165,8 +174,8 @@ fn one_path_per_file(document: &mut Value) {
     document["paths"] = separate.into();
 }
 
-/// The values of the parameter `file`. Its schema is dropped.
-fn take_file_names(schemas: &mut Value, item: &Value) -> Vec<String> {
+/// The schema of the parameter `file`, which is taken out.
+fn take_file_names(schemas: &mut Value, item: &Value) -> Value {
     let parameters = item["get"]["parameters"].as_array();
     let file = parameters
         .into_iter()
@@ -177,9 +186,36 @@ fn take_file_names(schemas: &mut Value, item: &Value) -> Vec<String> {
         let name = reference.rsplit('/').next()?;
         schemas.as_object_mut()?.remove(name)
     });
-    let names = schema.as_ref().and_then(|schema| schema["enum"].as_array());
-    let names = names.into_iter().flatten().filter_map(Value::as_str);
-    names.map(str::to_owned).collect()
+    schema.unwrap_or_default()
+}
+
+/// The operation that downloads a file whose name has that form, from the one that downloads any.
+fn of_numbered_files(pattern: &Value, any: &Value) -> Value {
+    let mut one = any.clone();
+    let parameters = one["parameters"].as_array_mut();
+    if let Some(parameters) = parameters {
+        parameters.retain(|parameter| parameter["name"] != "part");
+        let file = parameters.iter_mut().find(|one| one["name"] == "file");
+        if let Some(file) = file {
+            file["schema"] = json!({"type": "string", "pattern": pattern});
+        }
+    }
+    if let Some(answers) = one["responses"].as_object_mut() {
+        answers.shift_remove("406");
+    }
+    // Labels come first: generators of clients take all as bytes, as they take those.
+    let mut content = Map::new();
+    content.insert("application/gzip".into(), json!({ "schema": binary() }));
+    for format in Format::ALL {
+        let schema = match format {
+            Format::Json => reference("MeshDocument"),
+            Format::Gltf => json!({"type": "object"}),
+            _ => binary(),
+        };
+        content.insert(format.media_type().into(), json!({ "schema": schema }));
+    }
+    one["responses"]["200"]["content"] = content.into();
+    one
 }
 
 /// The operation that downloads the file `name`, from the one that downloads any.
@@ -209,13 +245,11 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
         }
     }
     let schema = match (name, media_type) {
-        ("mesh.json" | "mesh_apparent.json" | "mesh_anatomical.json", _) => {
-            reference("MeshDocument")
-        }
-        ("report.json", _) => report_of(folder),
+        ("report.json" | "beat.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
         ("polar.json", _) => reference("PolarMap"),
         ("profile.json", _) => reference("ReaderProfile"),
+        (mesh, "application/json") if mesh.starts_with("mesh") => reference("MeshDocument"),
         (_, "model/gltf+json") => json!({"type": "object"}),
         (_, "text/html" | "image/svg+xml") => json!({"type": "string"}),
         _ => binary(),
@@ -234,6 +268,8 @@ fn reference(schema: &str) -> Value {
 fn report_of(path: &str) -> Value {
     if path.starts_with("/v1/segmentations") {
         reference("SegmentationReport")
+    } else if path.starts_with("/v1/beats") {
+        reference("BeatReport")
     } else {
         reference("ModelReport")
     }

@@ -6,7 +6,8 @@ use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{RefOr, Required};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 use ventriform::parameters::{
-    FIT_SPECS, FitParameters, Kind, ModelParameters, ParameterSpec, Parameters, schema_of,
+    BeatChoice, FIT_SPECS, FitParameters, GatedParameters, Kind, ModelParameters, ParameterSpec,
+    Parameters, schema_of,
 };
 use ventriform_service::records::Priority;
 
@@ -25,6 +26,17 @@ pub struct SegmentationQuery;
 impl IntoParams for SegmentationQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         FitParameters::SPECS.iter().map(parameter_of).collect()
+    }
+}
+
+/// Parameters of a beat as query parameters.
+pub struct BeatQuery;
+
+impl IntoParams for BeatQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let of_fit = GatedParameters::fit_specs().map(parameter_of);
+        let own = BeatChoice::SPECS.iter().map(parameter_of);
+        own.chain(of_fit).collect()
     }
 }
 

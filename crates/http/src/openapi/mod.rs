@@ -22,19 +22,19 @@ mod inputs;
 mod operation;
 
 pub use answers::{
-    DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems,
-    IdentityProblems, ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, OriginalAnswer,
-    PatchProblems, ReaderFileAnswer, ReportAnswer, ScopeProblems, SegmentationAnswer,
-    SegmentationFileAnswer, StowAnswers, UnchangedAnswer, UploadProblems, WaitAnswers,
-    WorkitemConflict, WorkitemProblems,
+    BeatAnswer, BeatFileAnswer, DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer,
+    FileProblems, HoldProblems, IdentityProblems, ListProblems, LookupProblems, MeshAnswer,
+    ModelFileAnswer, OriginalAnswer, PatchProblems, ReaderFileAnswer, ReportAnswer,
+    ReportDocumentAnswer, ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, StowAnswers,
+    UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
     HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
     TagsPatch, TemplatePatch, UploadForm, WebhookRequest, WorkitemBody,
 };
 pub use inputs::{
-    CachedHeaders, ConditionalHeaders, ErasureHeader, EventHeader, IdempotencyHeader, ModelQuery,
-    OrganField, PreferHeader, PriorityField, SegmentationQuery, TransactionHeader,
+    BeatQuery, CachedHeaders, ConditionalHeaders, ErasureHeader, EventHeader, IdempotencyHeader,
+    ModelQuery, OrganField, PreferHeader, PriorityField, SegmentationQuery, TransactionHeader,
     WebhookSecretHeader, fit_parameters,
 };
 pub use operation::Documented;
@@ -59,6 +59,7 @@ use utoipa::openapi::{RefOr, Required};
         (name = "jobs", description = "Work on volumes: filed, followed, cancelled"),
         (name = "models", description = "Surface models, and one request from volume to model"),
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
+        (name = "beats", description = "Gated studies as one model in motion, and one request from study to beat"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
         (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
@@ -74,6 +75,7 @@ use utoipa::openapi::{RefOr, Required};
         ventriform::report::ModelReport,
         ventriform::report::Closeness,
         ventriform::report::SegmentationReport,
+        ventriform::report::BeatReport,
         ventriform::polar::PolarDocument,
     ))
 )]

@@ -35,7 +35,7 @@ fn unknown_id(resource: Resource, id: &str) -> Problem {
 fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
     let fix = match resource {
         Resource::Volume => "Upload the same file again; it gets the same id.",
-        Resource::Model | Resource::Segmentation => {
+        Resource::Model | Resource::Segmentation | Resource::Beat => {
             "Send the same volume with the same parameters again; the result gets the same id."
         }
         Resource::Template => "Add the same mesh again; it gets the same id.",

@@ -314,7 +314,7 @@ settings! {
     decoding_time: Span = "10s";
     /// Bytes of an upload for which decoding_time grows by one second
     decoding_rate: Size = "1MiB";
-    /// Memory for answers about volumes, models, segmentations, templates and ended jobs, which are
+    /// Memory for answers about volumes, models, segmentations, beats, templates and ended jobs, which are
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
     /// Memory that bodies of requests and answers take together, shared out between clients: one alone has
@@ -390,7 +390,7 @@ settings! {
     /// Age at which volumes are erased, counted from their last upload or use; `off` keeps them,
     /// `retention` is the value of that setting
     volume_retention: OwnRetention = "retention";
-    /// Age at which models and segmentations are erased, counted from their last computation;
+    /// Age at which models, segmentations and beats are erased, counted from their last computation;
     /// `off` keeps them, `retention` is the value of that setting. Templates are kept
     result_retention: OwnRetention = "retention";
     /// Age at which the records of finished jobs are erased (not their results); `off` keeps them,

@@ -21,7 +21,7 @@ pub struct Rule {
     /// A part of the Study Description; capital and small letters are alike.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study_description: Option<String>,
-    /// The kind of job: `model` or `segmentation`.
+    /// The kind of job: `model`, `segmentation` or `beat`.
     pub kind: String,
     /// The job's parameters.
     #[serde(default, skip_serializing_if = "Map::is_empty")]

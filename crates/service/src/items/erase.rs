@@ -34,7 +34,7 @@ const COPIES_BATCH: usize = 500;
 pub struct RetentionAges {
     /// Of volumes, counted from their last upload or use.
     pub volumes: Option<Duration>,
-    /// Of models and segmentations, counted from when they were last computed.
+    /// Of models, segmentations and beats, counted from when they were last computed.
     pub results: Option<Duration>,
     /// Of the records of finished jobs, counted from their end.
     pub jobs: Option<Duration>,
@@ -52,7 +52,7 @@ impl RetentionAges {
     pub(crate) fn of(&self, kind: Resource) -> Option<Duration> {
         match kind {
             Resource::Volume => self.volumes,
-            Resource::Model | Resource::Segmentation => self.results,
+            Resource::Model | Resource::Segmentation | Resource::Beat => self.results,
             Resource::Job => self.jobs,
             Resource::Template | Resource::Reader => None,
         }
@@ -198,7 +198,7 @@ impl Items {
     /// # Errors
     /// If the database fails.
     pub async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
-        for kind in [Resource::Volume, Resource::Model, Resource::Segmentation] {
+        for kind in Resource::WITH_FILES {
             let Some(age) = ages.of(kind) else {
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use super::isolation::Isolation;
 use crate::items::{StoredItem, WorkOutput};
-use crate::records::{Failure, LocalFile, Resource};
+use crate::records::{Failure, Fault, LocalFile, Resource};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -55,15 +55,20 @@ pub trait Work: Send + Sync + 'static {
     /// [`WorkError::Cancelled`] if the token was raised, else the reason.
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError>;
 
-    /// Names of the product's files from which [`Work::page`] is made.
-    fn page_files(&self) -> &'static [&'static str];
+    /// Names of the product's files from which [`Work::page`] is made; empty if it has no page.
+    fn page_files(&self) -> &'static [&'static str] {
+        &[]
+    }
 
     /// The report on a product as an HTML page, made from the product's files. It names whose scan
     /// it is as far as the fields of `scan` do.
     ///
     /// # Errors
-    /// If a file is missing, cannot be read or cannot be parsed.
-    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure>;
+    /// If a file is missing, cannot be read or cannot be parsed, or if there is no page.
+    fn page(&self, _product: &StoredItem, _scan: &Map<String, Value>) -> Result<String, Failure> {
+        let detail = format!("A {} has no page.", self.makes().noun());
+        Err(Failure::new(Fault::Request, "not-found", detail).fix("Read its report instead."))
+    }
 }
 
 /// Parameters as they were given.

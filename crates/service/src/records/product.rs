@@ -1,4 +1,4 @@
-//! The record of a product: a model, a segmentation or a template.
+//! The record of a product: a model, a segmentation, a beat, a template or a reader.
 
 use super::FileRecord;
 use super::{Resource, Timestamp};

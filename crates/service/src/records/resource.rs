@@ -9,6 +9,8 @@ pub enum Resource {
     Model,
     /// A model fitted to a volume.
     Segmentation,
+    /// One wall in motion, fitted to the gates of a volume.
+    Beat,
     /// A model of the library, tried by `model=auto`.
     Template,
     /// A reader's profile.
@@ -19,20 +21,22 @@ pub enum Resource {
 
 impl Resource {
     /// Every kind.
-    pub const ALL: [Resource; 6] = [
+    pub const ALL: [Resource; 7] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
+        Resource::Beat,
         Resource::Template,
         Resource::Reader,
         Resource::Job,
     ];
 
     /// The kinds that have files.
-    pub const WITH_FILES: [Resource; 5] = [
+    pub const WITH_FILES: [Resource; 6] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
+        Resource::Beat,
         Resource::Template,
         Resource::Reader,
     ];
@@ -43,6 +47,7 @@ impl Resource {
             Resource::Volume => "vol_",
             Resource::Model => "mdl_",
             Resource::Segmentation => "seg_",
+            Resource::Beat => "bea_",
             Resource::Template => "tpl_",
             Resource::Reader => "rdr_",
             Resource::Job => "job_",
@@ -55,6 +60,7 @@ impl Resource {
             Resource::Volume => "volume",
             Resource::Model => "model",
             Resource::Segmentation => "segmentation",
+            Resource::Beat => "beat",
             Resource::Template => "template",
             Resource::Reader => "reader",
             Resource::Job => "job",
@@ -67,6 +73,7 @@ impl Resource {
             Resource::Volume => "volumes",
             Resource::Model => "models",
             Resource::Segmentation => "segmentations",
+            Resource::Beat => "beats",
             Resource::Template => "templates",
             Resource::Reader => "readers",
             Resource::Job => "jobs",

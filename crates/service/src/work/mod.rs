@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `model` | jobs of kind `model`: a volume's files to a surface model |
 //! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
+//! | `beat` | jobs of kind `beat`: one wall in motion fitted to the gates of a volume |
+//! | `models` | the models that both fit |
 //! | `template` | a mesh to a template of the library |
 //! | `profile` | a reader's profile, checked |
 //! | `upload` | validating and previewing an uploaded volume |
@@ -14,9 +16,11 @@
 //! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
 //! reads local files and returns bytes; it neither stores anything nor sees the queue.
 
+mod beat;
 pub mod dicom;
 mod files;
 mod model;
+mod models;
 mod page;
 mod parameters;
 pub mod part;
@@ -26,6 +30,7 @@ mod segmentation;
 mod template;
 mod upload;
 
+pub use beat::BeatWork;
 pub use model::ModelWork;
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
@@ -53,9 +58,10 @@ pub struct Engine {
 impl Engine {
     /// The engine of the product; `limits` bound the volumes it reads.
     pub fn new(limits: ReadLimits) -> Self {
-        let works: [Arc<dyn Work>; 2] = [
+        let works: [Arc<dyn Work>; 3] = [
             Arc::new(ModelWork { limits }),
             Arc::new(SegmentationWork { limits }),
+            Arc::new(BeatWork { limits }),
         ];
         Self {
             reader: Arc::new(DomainReader { limits }),

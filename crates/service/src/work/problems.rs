@@ -236,6 +236,15 @@ impl Explain for SegmentationError {
 impl Explain for GatedError {
     fn explain(&self) -> Failure {
         match self {
+            GatedError::Volume(VolumeError::FrameNeeded { frames, why }) => {
+                let why = why.as_deref().unwrap_or("its header does not say so");
+                let detail = format!(
+                    "The {frames} volumes are taken for no gates of one heart beat: {why}."
+                );
+                Failure::new(Fault::Content, "not-gated", detail).at("gated").fix(
+                    "Set `gated` to true if they are gates; one volume of a dynamic study is for a segmentation.",
+                )
+            }
             GatedError::Volume(error) => error.explain(),
             GatedError::Segmentation(error) => error.explain(),
             GatedError::Beat(error) => {
@@ -261,6 +270,10 @@ impl Explain for GatedError {
             }
             GatedError::Cancelled(_) => failure(CANCELLED_FAILURE, self, None, START_AGAIN.into()),
         }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, GatedError::Cancelled(_))
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Procedure {
     pub scheme: String,
     /// The archive that has the series.
     pub archive: String,
-    /// The kind of job: `model` or `segmentation`.
+    /// The kind of job: `model`, `segmentation` or `beat`.
     pub kind: String,
     /// The job's parameters.
     #[serde(default, skip_serializing_if = "Map::is_empty")]

@@ -1,10 +1,10 @@
 //! A beat from files: read, segment the sum, fit all gates, keep what the output needs.
 
 use super::error::GatedError;
-use super::order::{BeatChoice, GatedOrder};
+use super::order::GatedOrder;
 use crate::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::deform::WallSurface;
-use crate::parameters::{FitParameters, Parameters};
+use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::polar::SEGMENT_NAMES;
 use crate::progress::Monitor;
 use crate::report::{
@@ -102,8 +102,10 @@ impl GatedHeart {
             Some(map) => (1..=17).map(|segment| map.name_of(segment)).collect(),
             None => SEGMENT_NAMES.map(str::to_owned).to_vec(),
         };
-        let mut parameters = self.parameters.to_json();
-        parameters.extend(self.choice.to_json());
+        let parameters = GatedParameters {
+            fit: self.parameters.clone(),
+            choice: self.choice,
+        };
         let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let parts = BeatParts {
             segment_names: names,
@@ -119,7 +121,7 @@ impl GatedHeart {
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .chain(rejected.map(|flag| RaisedFlag::new(flag.code(), &flag)))
                 .collect(),
-            parameters,
+            parameters: parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),
             warnings: self.reading.facts.warnings.clone(),
         };

@@ -9,9 +9,11 @@
 mod error;
 mod files;
 mod from_files;
+mod names;
 mod order;
 mod pictures;
 
 pub use error::GatedError;
 pub use from_files::{GatedHeart, from_files};
-pub use order::{BeatChoice, GatedOrder, MASS_G, RR_MS};
+pub use names::{FILE_NAMES, GATE_FILE_PATTERN};
+pub use order::GatedOrder;

@@ -1,10 +1,11 @@
-//! The parameters of a model and of a fit, by the names that users give them.
+//! The parameters of a model, of a fit and of a beat, by the names that users give them.
 //!
-//! Two tables, [`SPECS`] and [`FIT_SPECS`], define names, types, ranges, defaults and help texts for
+//! Three tables, [`SPECS`], [`FIT_SPECS`] and [`BEAT_SPECS`], define names, types, ranges, defaults and help texts for
 //! the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
-//! in; [`ModelParameters`] or [`FitParameters`] come out, with every value of the right type and in
+//! in; [`ModelParameters`], [`FitParameters`] or [`GatedParameters`] come out, with every value of the right type and in
 //! its range, or a [`ParameterError`] with the name of the first invalid parameter.
 
+mod beat;
 #[cfg(test)]
 mod checks;
 mod fit;
@@ -17,6 +18,7 @@ mod schema;
 mod specs;
 mod table;
 
+pub use beat::{BEAT_SPECS, BeatChoice, GatedParameters, MASS_G, RR_MS};
 pub use fit::{FitParameters, KnownPosition, MaskGrid};
 pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;

@@ -1,6 +1,8 @@
 //! The tables of parameters as schemas of OpenAPI.
 
-use super::{FitParameters, Kind, ModelParameters, ParameterSpec, Parameters};
+use super::{
+    BeatChoice, FitParameters, GatedParameters, Kind, ModelParameters, ParameterSpec, Parameters,
+};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;
@@ -33,11 +35,34 @@ impl PartialSchema for FitParameters {
     }
 }
 
+impl ToSchema for GatedParameters {
+    fn name() -> Cow<'static, str> {
+        "BeatParameters".into()
+    }
+}
+
+impl PartialSchema for GatedParameters {
+    fn schema() -> RefOr<Schema> {
+        let of_fit = Self::fit_specs().map(|spec| (spec.name, schema_of(spec)));
+        let own = BeatChoice::SPECS
+            .iter()
+            .map(|spec| (spec.name, schema_of(spec)));
+        object_with("The parameters of a beat", of_fit.chain(own))
+    }
+}
+
 fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {
-    let object = P::SPECS
-        .iter()
-        .fold(ObjectBuilder::new(), |object, spec| {
-            object.property(spec.name, schema_of(spec))
+    let rows = P::SPECS.iter();
+    object_with(description, rows.map(|spec| (spec.name, schema_of(spec))))
+}
+
+fn object_with(
+    description: &str,
+    fields: impl Iterator<Item = (&'static str, Schema)>,
+) -> RefOr<Schema> {
+    let object = fields
+        .fold(ObjectBuilder::new(), |object, (name, schema)| {
+            object.property(name, schema)
         })
         .description(Some(description))
         .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));

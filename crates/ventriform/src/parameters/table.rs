@@ -195,7 +195,7 @@ pub trait Parameters: Sized + 'static {
     }
 }
 
-fn from_inputs<'a, P: Parameters>(
+pub(super) fn from_inputs<'a, P: Parameters>(
     inputs: impl Iterator<Item = (&'a str, RawValue<'a>)>,
 ) -> Result<P, ParameterError> {
     let mut draft = P::Draft::default();
@@ -267,16 +267,22 @@ fn find<P: Parameters>(name: &str) -> Result<&'static ParameterSpec<P>, Paramete
     let names = || P::SPECS.iter().map(|spec| spec.name);
     P::SPECS.iter().find(|s| s.name == own).ok_or_else(|| {
         let aliases = P::ALIASES.iter().map(|(other, _)| *other);
-        ParameterError {
-            field: name.into(),
-            message: "there is no such parameter".into(),
-            fix: match nearest(name, names().chain(aliases)) {
-                Some(near) => format!("Did you mean `{near}`?"),
-                None => {
-                    let names: Vec<_> = names().collect();
-                    format!("Known parameters: {}.", names.join(", "))
-                }
-            },
-        }
+        unknown(name, &names().collect::<Vec<_>>(), aliases)
     })
+}
+
+/// The error about a name that is none of `names` and `aliases`, with the nearest of them.
+pub(super) fn unknown<'a>(
+    name: &str,
+    names: &[&'a str],
+    aliases: impl Iterator<Item = &'a str>,
+) -> ParameterError {
+    ParameterError {
+        field: name.into(),
+        message: "there is no such parameter".into(),
+        fix: match nearest(name, names.iter().copied().chain(aliases)) {
+            Some(near) => format!("Did you mean `{near}`?"),
+            None => format!("Known parameters: {}.", names.join(", ")),
+        },
+    }
 }

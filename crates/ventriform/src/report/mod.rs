@@ -57,4 +57,6 @@ pub use segmentation_report::{
     AgreementReport, AppliedReaderReport, CandidateReport, RaisedFlag, RefusedTemplateReport,
     Resolution, SegmentationParts, SegmentationReport,
 };
-pub use summaries::{ModelSummary, ReaderSummary, SegmentationSummary, TemplateSummary, object};
+pub use summaries::{
+    BeatSummary, ModelSummary, ReaderSummary, SegmentationSummary, TemplateSummary, object,
+};

@@ -1,5 +1,6 @@
 //! The main figures of what jobs make, for lists: the reports have all.
 
+use super::beat_report::BeatReport;
 use super::fit_report::FittedVolumes;
 use super::segmentation_report::{
     AgreementReport, CandidateReport, RaisedFlag, SegmentationReport,
@@ -60,6 +61,34 @@ pub struct SegmentationSummary {
     pub vertices: usize,
 }
 
+/// The main figures of a beat; the report has all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct BeatSummary {
+    /// Name of the model that was fitted to the gates' sum.
+    pub template: String,
+    /// Confidence of that fit, 0 to 1.
+    pub confidence: f64,
+    /// Number of gates.
+    pub gates: usize,
+    /// End-diastolic volume.
+    pub edv_ml: f64,
+    /// End-systolic volume.
+    pub esv_ml: f64,
+    /// Stroke volume.
+    pub sv_ml: f64,
+    /// Ejection fraction; `null` if the gates are no beat.
+    pub ef_percent: Option<f64>,
+    /// Standard deviation of the wall's phases, degrees.
+    pub phase_sd_degrees: f64,
+    /// The smallest arc that holds 95 per cent of them, degrees.
+    pub phase_bandwidth_degrees: f64,
+    /// Whether the phases can be relied on.
+    pub phase_reliable: bool,
+    /// Reasons to look closer.
+    pub flags: Vec<RaisedFlag>,
+}
+
 /// The main figures of a template.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
@@ -101,6 +130,25 @@ impl SegmentationSummary {
             measures: report.measures,
             flags: report.flags,
             vertices,
+        }
+    }
+}
+
+impl BeatSummary {
+    /// The main figures of `report`.
+    pub fn of(report: BeatReport) -> Self {
+        Self {
+            template: report.template,
+            confidence: report.confidence,
+            gates: report.gates.len(),
+            edv_ml: report.edv_ml,
+            esv_ml: report.esv_ml,
+            sv_ml: report.sv_ml,
+            ef_percent: report.ef_percent,
+            phase_sd_degrees: report.phase.sd_degrees,
+            phase_bandwidth_degrees: report.phase.bandwidth_degrees,
+            phase_reliable: report.phase.reliable,
+            flags: report.flags,
         }
     }
 }

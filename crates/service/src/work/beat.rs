@@ -1,0 +1,77 @@
+//! Jobs of kind `beat`: [`ventriform::gated::from_files`] over a stored volume with gates and stored models.
+
+use super::files::volume_files;
+use super::models::{MESH_FILE, named_models, stored_models};
+use super::problems::{Explain, not_exportable, work_error};
+use crate::items::{OutputFile, WorkOutput};
+use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use crate::records::{Failure, Resource};
+use serde_json::{Map, Value};
+use ventriform::export::Format;
+use ventriform::gated::{GatedOrder, from_files};
+use ventriform::parameters::GatedParameters;
+use ventriform::progress::{Monitor, Plan};
+use ventriform::report::{BeatSummary, object};
+use ventriform::segmentation::SegmentationFilesError;
+use ventriform::volume::ReadLimits;
+
+/// Fits one wall in motion to the gates of volumes.
+#[derive(Debug, Clone, Copy)]
+pub struct BeatWork {
+    /// Limits on the volume; those on voxels hold for all gates together.
+    pub limits: ReadLimits,
+}
+
+impl Work for BeatWork {
+    fn makes(&self) -> Resource {
+        Resource::Beat
+    }
+
+    fn needs(&self, parameters: &Map<String, Value>) -> Needs {
+        let (items, library) = named_models(parameters);
+        Needs {
+            items,
+            library,
+            files: &[MESH_FILE],
+        }
+    }
+
+    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
+        let parameters = match given {
+            GivenParameters::Text(pairs) => {
+                let pairs = pairs.iter();
+                GatedParameters::from_pairs(
+                    pairs.map(|(name, text)| (name.as_str(), text.as_str())),
+                )
+            }
+            GivenParameters::Json(object) => GatedParameters::from_json(object),
+        };
+        Ok(parameters.map_err(|error| error.explain())?.to_json())
+    }
+
+    fn plan(&self) -> Plan {
+        Plan::BEAT
+    }
+
+    fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
+        let parameters =
+            GatedParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
+        let order = GatedOrder {
+            gates: &volume_files(&input.files),
+            auto: parameters.fit.is_auto(),
+            models: stored_models(input, &parameters.fit)?,
+            parameters: &parameters.fit,
+            choice: parameters.choice,
+        };
+        let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
+        let files = made.files(&Format::ALL, monitor);
+        let files = files.map_err(|error| match error {
+            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
+            error => WorkError::Failed(not_exportable(&error)),
+        })?;
+        Ok(WorkOutput {
+            summary: object(&BeatSummary::of(made.report())),
+            files: files.into_iter().map(OutputFile::from).collect(),
+        })
+    }
+}

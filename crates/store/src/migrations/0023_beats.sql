@@ -1,0 +1,10 @@
+-- Beats are products like segmentations. Only the list of kinds changes; see migration 15.
+
+PRAGMA writable_schema = ON;
+UPDATE sqlite_schema SET sql = replace(sql, '''reader'')', '''reader'', ''beat'')')
+WHERE type = 'table' AND name IN ('products', 'holdings');
+PRAGMA writable_schema = RESET;
+
+-- Any change of the schema tells other connections to read it again.
+CREATE TABLE beats_begin (id INTEGER) STRICT;
+DROP TABLE beats_begin;

@@ -1,0 +1,262 @@
+//! The parameters of a beat: its own, and those of the fit to the gates' sum.
+
+use super::input::RawValue;
+use super::table::{from_inputs, unknown};
+use super::{FIT_SPECS, FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
+use serde_json::{Map, Value, json};
+use std::ops::RangeInclusive;
+
+/// Masses that a left ventricle's muscle can have, g.
+pub const MASS_G: RangeInclusive<f64> = 20.0..=600.0;
+/// R-R intervals that a heart can have, ms: 200 to 24 beats per minute.
+pub const RR_MS: RangeInclusive<f64> = 300.0..=2500.0;
+
+/// The parameters of a beat beside those of the fit to the gates' sum.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BeatChoice {
+    /// Whether the volumes are gates although the file does not say so. Default `false`.
+    pub gated: bool,
+    /// Mass of the left ventricle's muscle, g, where it is known; within [`MASS_G`]. Default: the wall's usual
+    /// thickness is assumed.
+    pub mass_g: Option<f64>,
+    /// The R-R interval, ms, within [`RR_MS`]. Default: as the file states it.
+    pub rr_ms: Option<f64>,
+}
+
+impl BeatChoice {
+    /// The first parameter that lies outside of its range: name, value, least and greatest.
+    pub fn out_of_range(&self) -> Option<(&'static str, f64, [f64; 2])> {
+        [
+            ("mass_g", self.mass_g, MASS_G),
+            ("rr_ms", self.rr_ms, RR_MS),
+        ]
+        .into_iter()
+        .find_map(|(name, value, range)| {
+            let value = value?;
+            (!range.contains(&value)).then_some((name, value, [*range.start(), *range.end()]))
+        })
+    }
+}
+
+impl Parameters for BeatChoice {
+    type Draft = Self;
+
+    const SPECS: &'static [ParameterSpec<Self>] = BEAT_SPECS;
+
+    fn finish(choice: Self) -> Result<Self, ParameterError> {
+        Ok(choice)
+    }
+}
+
+/// Every parameter that only a beat has.
+pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
+    ParameterSpec {
+        name: "gated",
+        kind: Kind::Switch,
+        default: "false",
+        summary: "Whether the volumes of the file are gates of one heart beat although its header says otherwise",
+        read: |d, v| {
+            d.gated = v.switch();
+            Ok(())
+        },
+        write: |p| json!(p.gated),
+    },
+    ParameterSpec {
+        name: "mass_g",
+        kind: Kind::Number {
+            min: *MASS_G.start(),
+            max: *MASS_G.end(),
+        },
+        default: "",
+        summary: "Mass of the left ventricle's muscle, g, where it is known: the image does not tell how thick the \
+                  wall is. Default: the usual thickness is assumed",
+        read: |d, v| {
+            d.mass_g = Some(v.f64());
+            Ok(())
+        },
+        write: |p| json!(p.mass_g),
+    },
+    ParameterSpec {
+        name: "rr_ms",
+        kind: Kind::Number {
+            min: *RR_MS.start(),
+            max: *RR_MS.end(),
+        },
+        default: "",
+        summary: "The R-R interval, ms, from which rates of ejection and filling are computed. Default: as the file \
+                  states it",
+        read: |d, v| {
+            d.rr_ms = Some(v.f64());
+            Ok(())
+        },
+        write: |p| json!(p.rr_ms),
+    },
+];
+
+/// Parameters of a fit that a beat has no use for, and why.
+const WITHOUT_USE: &[(&str, &str)] = &[
+    ("frame", "all gates are fitted together"),
+    ("expert", NO_EXPERT),
+    ("label", NO_EXPERT),
+    ("resample", NO_EXPERT),
+    ("mesh_unit", NO_EXPERT),
+    ("mesh_frame", NO_EXPERT),
+    ("reader", "readers draw one wall, not a beat"),
+    ("edge", "a beat has the anatomical wall"),
+    ("organ", "only the left ventricle has a beat"),
+    ("mask_grid", "labels lie on the gates' grid"),
+];
+
+const NO_EXPERT: &str = "a beat is compared with no expert's mask";
+
+/// Everything that determines a beat, apart from the files.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GatedParameters {
+    /// The parameters of the fit to the gates' sum.
+    pub fit: FitParameters,
+    /// The beat's own.
+    pub choice: BeatChoice,
+}
+
+impl GatedParameters {
+    /// The rows of the parameters of a fit that a beat takes.
+    pub fn fit_specs() -> impl Iterator<Item = &'static ParameterSpec<FitParameters>> {
+        FIT_SPECS
+            .iter()
+            .filter(|spec| why_unused(spec.name).is_none())
+    }
+
+    /// Reads parameters given as text, from a query string or a command line.
+    ///
+    /// # Errors
+    /// As [`Parameters::from_pairs`]; also for parameters of a fit that a beat has no use for.
+    pub fn from_pairs<'a>(
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Self, ParameterError> {
+        let pairs = pairs.into_iter();
+        Self::from_each(pairs.map(|(name, text)| (name, RawValue::Text(text))))
+    }
+
+    /// Reads parameters given as a JSON object. Types are strict: `"130"` is not a number.
+    ///
+    /// # Errors
+    /// As [`GatedParameters::from_pairs`].
+    pub fn from_json(object: &Map<String, Value>) -> Result<Self, ParameterError> {
+        let fields = object.iter();
+        Self::from_each(fields.map(|(name, value)| (name.as_str(), RawValue::Json(value))))
+    }
+
+    /// Every parameter that is set, by name, including defaults. [`GatedParameters::from_json`] reads it back.
+    pub fn to_json(&self) -> Map<String, Value> {
+        let mut all = self.fit.to_json();
+        all.retain(|name, _| why_unused(name).is_none());
+        all.extend(self.choice.to_json());
+        all
+    }
+
+    fn from_each<'a>(
+        given: impl Iterator<Item = (&'a str, RawValue<'a>)>,
+    ) -> Result<Self, ParameterError> {
+        let (mut own, mut of_fit) = (Vec::new(), Vec::new());
+        for (name, value) in given {
+            if BEAT_SPECS.iter().any(|spec| spec.name == name) {
+                own.push((name, value));
+                continue;
+            }
+            if let Some(why) = why_unused(name) {
+                return Err(ParameterError {
+                    field: name.into(),
+                    message: format!("a beat has no use for it: {why}"),
+                    fix: "Leave it out.".into(),
+                });
+            }
+            let mut aliases = FitParameters::ALIASES.iter().map(|(other, _)| *other);
+            let mut known = Self::fit_specs().map(|spec| spec.name);
+            if !known.any(|known| known == name) && !aliases.any(|alias| alias == name) {
+                let names = Self::fit_specs().map(|spec| spec.name);
+                let names = names.chain(BEAT_SPECS.iter().map(|spec| spec.name));
+                let aliases = FitParameters::ALIASES.iter().map(|(other, _)| *other);
+                return Err(unknown(name, &names.collect::<Vec<_>>(), aliases));
+            }
+            of_fit.push((name, value));
+        }
+        Ok(Self {
+            fit: from_inputs(of_fit.into_iter())?,
+            choice: from_inputs(own.into_iter())?,
+        })
+    }
+}
+
+fn why_unused(name: &str) -> Option<&'static str> {
+    let unused = WITHOUT_USE.iter().find(|(unused, _)| *unused == name);
+    unused.map(|(_, why)| *why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::checks;
+    use super::*;
+
+    fn pairs(list: &[(&str, &str)]) -> Result<GatedParameters, ParameterError> {
+        GatedParameters::from_pairs(list.iter().copied())
+    }
+
+    #[test]
+    fn written_parameters_read_back_unchanged() {
+        checks::read_back_unchanged::<BeatChoice>(&[
+            &[],
+            &[("gated", "true"), ("mass_g", "130.5"), ("rr_ms", "850")],
+        ]);
+        let both = pairs(&[("mass_g", "130"), ("axis", "0,0,-1"), ("template", "auto")]).unwrap();
+        assert_eq!(GatedParameters::from_json(&both.to_json()).unwrap(), both);
+    }
+
+    #[test]
+    fn the_table_states_the_defaults_of_the_code() {
+        checks::table_states_defaults::<BeatChoice>();
+    }
+
+    #[test]
+    fn what_a_beat_has_no_use_for_is_refused_and_not_written() {
+        let written = GatedParameters::default().to_json();
+        for (name, why) in WITHOUT_USE {
+            assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
+            assert!(!written.contains_key(*name), "{name}");
+            let refused = pairs(&[(name, "1")]).unwrap_err();
+            assert_eq!(refused.field, *name);
+            assert!(refused.message.contains(why), "{refused}");
+        }
+    }
+
+    #[test]
+    fn wrong_names_and_values_are_refused_by_name() {
+        for (name, text, fix) in [
+            ("mas_g", "130", "`mass_g`"),
+            ("rr", "850", "`rr_ms`"),
+            ("mass_g", "19.9", "20 to 600"),
+            ("rr_ms", "nan", "300 to 2500"),
+            ("gated", "yes", "true or false"),
+            ("centre", "1,2", "3 finite numbers"),
+        ] {
+            let refused = pairs(&[(name, text)]).unwrap_err();
+            assert_eq!(refused.field, name);
+            assert!(refused.fix.contains(fix), "{refused:?}");
+        }
+        let twice = pairs(&[("gated", "true"), ("gated", "true")]).unwrap_err();
+        assert_eq!(twice.field, "gated");
+    }
+
+    #[test]
+    fn the_table_allows_what_the_beat_allows() {
+        for spec in BEAT_SPECS {
+            let Kind::Number { min, max } = spec.kind else {
+                continue;
+            };
+            for (value, fits) in [(min, true), (max, true), (max + 1e-6, false)] {
+                let choice = pairs(&[(spec.name, &value.to_string())]).map(|given| given.choice);
+                assert_eq!(choice.is_ok(), fits, "{} = {value}", spec.name);
+                assert!(choice.map_or(true, |choice| choice.out_of_range().is_none()));
+            }
+        }
+    }
+}

@@ -1,0 +1,336 @@
+//! `/v1/beats`: with the fake computation, and with the real one in the real program.
+
+use crate::dicom::{JANE, nm, nm_of};
+use crate::helpers::{Service, TestApp, beating, heart, nifti_of, problem, text, volume};
+use reqwest::header::{ACCEPT, LOCATION};
+use reqwest::{Response, StatusCode};
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use ventriform::export::Format;
+use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN};
+use ventriform::volume::Volume;
+
+impl TestApp {
+    /// Makes a beat; returns it.
+    async fn beat(&self, words: &str) -> Value {
+        let answer = self.post("/v1/beats").body(volume(words)).send().await;
+        let answer = answer.unwrap();
+        assert_eq!(answer.status(), StatusCode::ACCEPTED);
+        let job = answer.json().await.unwrap();
+        let job = self.until(&job, &["succeeded"]).await;
+        assert_eq!(job["kind"], "beat");
+        assert!(job["model"].is_null() && job["segmentation"].is_null());
+        let beat = self.json(&text(&job["links"]["beat"])).await;
+        assert_eq!(beat["id"], job["beat"]);
+        assert_eq!(beat["links"]["report"], job["links"]["report"]);
+        assert_eq!(beat["links"]["mesh"], job["links"]["mesh"]);
+        beat
+    }
+}
+
+#[tokio::test]
+async fn beats_are_listed_downloaded_and_deleted_like_segmentations() {
+    let app = TestApp::start().await;
+    let made = app.beat("sphere").await;
+    let path = text(&made["links"]["self"]);
+    let list = app.json("/v1/beats?limit=1").await;
+    assert_eq!(list["beats"][0], made);
+    let others = app.json("/v1/segmentations").await;
+    assert_eq!(others["segmentations"], json!([]));
+
+    let report = app.json(&format!("{path}/report")).await;
+    assert_eq!(report, app.json(&format!("{path}/beat.json")).await);
+    let get = async |name: &str, accept: &str| {
+        let request = app.get(&format!("{path}/{name}")).header(ACCEPT, accept);
+        request.send().await.unwrap()
+    };
+    let stl = get("mesh", "model/stl").await;
+    assert_eq!(stl.headers()["content-type"], "model/stl");
+    let place = stl.headers()["content-location"].to_str().unwrap();
+    assert_eq!(place, format!("{path}/mesh_ed.stl"));
+    let labels = get("labels_gate01.nii.gz", "*/*").await;
+    assert_eq!(labels.headers()["content-type"], "application/gzip");
+    for name in [
+        "labels_gate09.nii.gz",
+        "mesh.glb",
+        "report.html",
+        "mask.dcm",
+    ] {
+        let refused = problem(get(name, "*/*").await, 404, "not-found").await;
+        assert!(text(&refused["fix"]).contains("beat.json"), "{refused}");
+    }
+    problem(get("report", "text/html").await, 406, "not-acceptable").await;
+    let as_model = format!("/v1/models/{}", text(&made["id"]));
+    problem(app.get(&as_model).send().await.unwrap(), 404, "not-found").await;
+
+    let erased = app.delete(&path).send().await.unwrap();
+    assert_eq!(erased.status(), StatusCode::NO_CONTENT);
+    problem(app.get(&path).send().await.unwrap(), 410, "gone").await;
+    problem(get("beat.json", "*/*").await, 410, "gone").await;
+    assert_eq!(app.stored(), [text(&made["volume"])]);
+    assert_eq!(app.beat("sphere").await["id"], made["id"]);
+
+    // The beat goes with its volume.
+    let scan = format!("/v1/volumes/{}?cascade=true", text(&made["volume"]));
+    let erased = app.delete(&scan).header("prefer", "return=representation");
+    let receipt: Value = erased.send().await.unwrap().json().await.unwrap();
+    assert!(
+        receipt.to_string().contains(&text(&made["id"])),
+        "{receipt}"
+    );
+    problem(app.get(&path).send().await.unwrap(), 410, "gone").await;
+    assert!(app.stored().is_empty());
+}
+
+#[tokio::test]
+async fn invalid_parameters_of_a_beat_are_rejected_with_the_field() {
+    let app = TestApp::start().await;
+    for (query, field, hint) in [
+        ("mas_g=130", "mas_g", "`mass_g`"),
+        ("mass_g=5", "mass_g", "20 to 600"),
+        ("rr_ms=inf", "rr_ms", "300 to 2500"),
+        ("gated=1", "gated", "true or false"),
+        ("gated=true&gated=true", "gated", "true or false"),
+        ("frame=1", "frame", "Leave it out"),
+        ("organ=left_ventricle", "organ", "Leave it out"),
+        ("expert=vol_00", "expert", "Leave it out"),
+        ("center=1,2", "center", "3 finite numbers"),
+        ("model=lv.json", "model", "mdl_"),
+    ] {
+        let answer = app
+            .post(&format!("/v1/beats?{query}"))
+            .body(volume("sphere"));
+        let body = problem(answer.send().await.unwrap(), 422, "invalid-parameter").await;
+        assert_eq!(body["field"], field, "{query}");
+        assert!(text(&body["fix"]).contains(hint), "{body}");
+    }
+    let volume = app.volume("sphere").await;
+    let file = |parameters: Value| {
+        let order = json!({"kind": "beat", "volume": volume, "parameters": parameters});
+        app.post("/v1/jobs").json(&order).send()
+    };
+    for parameters in [json!({"mass_g": "130"}), json!({"frame": 0})] {
+        problem(file(parameters).await.unwrap(), 422, "invalid-parameter").await;
+    }
+    let missing = file(json!({"model": "tpl_00"})).await.unwrap();
+    let missing = problem(missing, 422, "invalid-field").await;
+    assert_eq!(missing["field"], "model");
+    let filed = file(json!({"mass_g": 130, "axis": [0, 0, -1]}))
+        .await
+        .unwrap();
+    let job: Value = filed.json().await.unwrap();
+    assert_eq!(job["parameters"]["mass_g"], 130.0);
+    assert_eq!(
+        job["parameters"]["gated"], false,
+        "defaults are written out"
+    );
+    assert!(job["parameters"]["organ"].is_null());
+    let order = json!({"kind": "beat", "volume": volume, "send": ["mask.dcm"], "to": "pacs"});
+    let unsent = app.post("/v1/jobs").json(&order).send().await.unwrap();
+    let unsent = problem(unsent, 422, "invalid-field").await;
+    assert!(text(&unsent["fix"]).contains("Leave `send`"), "{unsent}");
+}
+
+#[tokio::test]
+async fn idempotency_keys_cancelling_and_webhooks_work_as_for_segmentations() {
+    let app = TestApp::start().await;
+    let post = |query: &str| {
+        app.post(&format!("/v1/beats?{query}"))
+            .header("idempotency-key", "k")
+            .body(volume("slow"))
+            .send()
+    };
+    let first: Value = post("mass_g=130").await.unwrap().json().await.unwrap();
+    let again: Value = post("mass_g=130").await.unwrap().json().await.unwrap();
+    assert_eq!(first["id"], again["id"]);
+    let other = post("mass_g=131").await.unwrap();
+    problem(other, 422, "idempotency-key-reused").await;
+    app.until(&first, &["running"]).await;
+    let cancelled = app.delete(&text(&first["links"]["self"])).send().await;
+    assert_eq!(cancelled.unwrap().status(), StatusCode::ACCEPTED);
+    app.until(&first, &["cancelled"]).await;
+    app.beat("sphere").await;
+    let jobs = app.json("/v1/jobs?kind=beat&state=succeeded").await;
+    assert_eq!(jobs["jobs"].as_array().unwrap().len(), 1);
+    let metrics = app.metrics().await;
+    assert!(metrics.contains("ventriform_jobs_filed_total{kind=\"beat\"} 2"));
+    let audit = app.json("/v1/audit").await.to_string();
+    assert!(audit.contains("bea_"), "reading and making it is recorded");
+}
+
+/// The figures that other programs read of `beat.json`.
+fn assert_figures(report: &Value) {
+    for name in ["edv_ml", "esv_ml", "sv_ml", "ef_percent"] {
+        assert!(
+            report[name].as_f64().is_some_and(|x| x > 0.0),
+            "{name}: {report}"
+        );
+    }
+    for name in ["end_diastole_gate", "end_systole_gate"] {
+        assert!((1..=8).contains(&report[name].as_u64().unwrap()), "{name}");
+    }
+    let gates = report["gates"].as_array().unwrap();
+    assert_eq!(gates.len(), 8);
+    for name in ["cavity_ml", "wall_ml", "counts_factor"] {
+        assert!(gates.iter().all(|gate| gate[name].is_f64()), "{name}");
+    }
+    let segments = report["segments"].as_array().unwrap();
+    assert_eq!(segments.len(), 17);
+    for name in ["motion_mm", "thickening_percent", "phase_degrees"] {
+        assert!(
+            segments.iter().any(|segment| segment[name].is_f64()),
+            "{name}"
+        );
+    }
+    let phase = &report["phase"];
+    assert!(phase["sd_degrees"].is_f64() && phase["bandwidth_degrees"].is_f64());
+    assert!(phase["reliable"].is_boolean() && report["flags"].is_array());
+}
+
+/// Whether `name` is of the form of [`GATE_FILE_PATTERN`], read by hand.
+fn is_of_gate(name: &str) -> bool {
+    let numbered = |rest: &str| {
+        let (number, extension) = rest.split_once('.')?;
+        let digits = number.len() == 2 && number.bytes().all(|byte| byte.is_ascii_digit());
+        digits.then(|| extension.to_owned())
+    };
+    let mesh = name.strip_prefix("mesh_gate").and_then(numbered);
+    let labels = name.strip_prefix("labels_gate").and_then(numbered);
+    let known = |extension: String| {
+        let form = GATE_FILE_PATTERN.split(['(', '|', ')']);
+        form.into_iter().any(|word| word == extension)
+            && Format::from_extension(&extension).is_some()
+    };
+    mesh.is_some_and(known) || labels.is_some_and(|extension| extension == "nii.gz")
+}
+
+#[tokio::test]
+async fn a_gated_study_becomes_a_beat_whatever_its_format() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let post = async |query: &str, accept: &str, body: Vec<u8>| -> Response {
+        let request = service.post(&format!("/v1/beats{query}"));
+        let request = request.header("prefer", "wait=60").header(ACCEPT, accept);
+        request.body(body).send().await.unwrap()
+    };
+    let json = async |path: &str| -> Value {
+        let answer = service.get(path).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        answer.json().await.unwrap()
+    };
+    let answer = post("", "*/*", nifti_of(beating(), None)).await;
+    assert_eq!(answer.status(), 200, "{}", answer.text().await.unwrap());
+    assert_eq!(answer.headers()["content-type"], "application/json");
+    let path = answer.headers()[LOCATION].to_str().unwrap().to_owned();
+    let report: Value = answer.json().await.unwrap();
+    assert_figures(&report);
+    assert_eq!(report["end_systole_gate"], 4, "{report}");
+    let beat = json(&path).await;
+    assert_eq!(beat["summary"]["ef_percent"], report["ef_percent"]);
+    assert_eq!(beat["summary"]["gates"], 8);
+    assert_eq!(beat["parameters"], report["parameters"]);
+
+    // Every file is documented by its name or its form, and is what it says.
+    let mut names = BTreeSet::new();
+    for file in beat["files"].as_array().unwrap() {
+        let name = text(&file["name"]);
+        let mesh = ["mesh_ed.", "mesh_es."]
+            .iter()
+            .any(|stem| name.starts_with(stem));
+        assert!(
+            mesh || FILE_NAMES.contains(&&name[..]) || is_of_gate(&name),
+            "{name}"
+        );
+        let answer = service.get(&text(&file["href"])).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{name}");
+        assert_eq!(answer.headers()["content-type"], text(&file["media_type"]));
+        let length = answer.bytes().await.unwrap().len() as u64;
+        assert_eq!(file["bytes"], length, "{name}");
+        names.insert(name);
+    }
+    assert!(names.contains("mesh_gate08.vtp") && names.contains("labels_gate08.nii.gz"));
+    let [ed, first] = ["mesh_ed.json", "mesh_gate01.json"].map(|name| format!("{path}/{name}"));
+    let (ed, first) = (json(&ed).await, json(&first).await);
+    assert_eq!(ed["triangles"], first["triangles"]);
+
+    // The same study as DICOM has the same figures, up to the rounding of its place.
+    let gates: Vec<&Volume> = beating().iter().collect();
+    let answer = post("?rr_ms=800", "model/gltf-binary", nm_of(&JANE, &gates)).await;
+    assert_eq!(answer.status(), 200);
+    assert_eq!(answer.headers()["content-type"], "model/gltf-binary");
+    let of_dicom = answer.headers()[LOCATION].to_str().unwrap().to_owned();
+    assert!(answer.bytes().await.unwrap().starts_with(b"glTF"));
+    let of_dicom = json(&format!("{of_dicom}/report")).await;
+    for name in ["edv_ml", "esv_ml", "ef_percent"] {
+        let [one, other] = [&report, &of_dicom].map(|report| report[name].as_f64().unwrap());
+        assert!((one - other).abs() < 0.1, "{name}: {one} and {other}");
+    }
+    assert_eq!(of_dicom["rr_ms"], 800.0);
+
+    // A correction of the axis refits all gates of a stored volume, which may be said to be gated.
+    let ends = ["base", "apex"].map(|end| report["long_axis"][end].clone());
+    let [base, apex] = ends.map(|end| serde_json::from_value::<[f64; 3]>(end).unwrap());
+    let axis = json!([0, 1, 2].map(|axis| apex[axis] - base[axis]));
+    let dynamic = nifti_of(beating(), Some(60.0));
+    let stored = service
+        .post("/v1/volumes")
+        .body(dynamic)
+        .send()
+        .await
+        .unwrap();
+    let stored: Value = stored.json().await.unwrap();
+    let order = json!({"kind": "beat", "volume": stored["id"],
+        "parameters": {"gated": true, "axis": axis, "mass_g": 130}});
+    let filed = service.post("/v1/jobs").json(&order).send().await.unwrap();
+    let job: Value = filed.json().await.unwrap();
+    let job = service.ended(&text(&job["id"])).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let refitted = json(&format!("{}/report", text(&job["links"]["beat"]))).await;
+    assert_eq!(refitted["parameters"]["axis"], axis);
+    // 130 g of muscle of 1.05 g/ml.
+    let wall = refitted["wall_ml"].as_f64().unwrap();
+    assert!((wall - 130.0 / 1.05).abs() < 6.0, "{wall} ml");
+}
+
+#[tokio::test]
+async fn what_is_no_gated_study_is_refused_with_advice() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let post = async |query: &str, body: Vec<u8>| -> Response {
+        let request = service.post(&format!("/v1/beats{query}"));
+        request
+            .header("prefer", "wait=60")
+            .body(body)
+            .send()
+            .await
+            .unwrap()
+    };
+    let gates = beating();
+    for ungated in [heart().0, nm(&JANE, 1)] {
+        let refused = problem(post("", ungated).await, 422, "not-gated").await;
+        assert!(text(&refused["fix"]).contains("gated series"), "{refused}");
+    }
+    // Eight volumes that last a minute each are no heart beat.
+    let dynamic = nifti_of(gates, Some(60.0));
+    let refused = problem(post("", dynamic).await, 422, "not-gated").await;
+    assert_eq!(refused["field"], "gated");
+    assert!(text(&refused["detail"]).contains("480 s"), "{refused}");
+    let few = problem(
+        post("", nifti_of(&gates[..5], None)).await,
+        422,
+        "gate-count",
+    )
+    .await;
+    assert!(text(&few["detail"]).contains("5 gates"), "{few}");
+    let mut empty = gates.to_vec();
+    empty[2].voxels.fill(0.0);
+    let empty = problem(post("", nifti_of(&empty, None)).await, 422, "empty-gate").await;
+    assert!(text(&empty["detail"]).contains("gate 3") || text(&empty["detail"]).contains("Gate 3"));
+    // A heart that stands still has no ejection fraction, which is a result.
+    let still = vec![&gates[0]; 8];
+    let answer = post("", nm_of(&JANE, &still)).await;
+    assert_eq!(answer.status(), 200);
+    let report: Value = answer.json().await.unwrap();
+    assert!(report["ef_percent"].is_null(), "{report}");
+    assert!(report["flags"].to_string().contains("no_contraction"));
+}
