@@ -21,7 +21,7 @@ use ventriform::mesh::intersections::self_intersections;
 use ventriform::parameters::{BeatChoice, FitParameters};
 use ventriform::progress::Monitor;
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{ReadLimits, VolumeError, VolumeFile, read_gates};
+use ventriform::volume::{Provenance, ReadLimits, VolumeError, VolumeFile, read_gates};
 
 /// Length of wall basal of the ellipsoid's centre, mm.
 const BASE_MM: f64 = 14.0;
@@ -646,6 +646,17 @@ fn a_beat_is_written_as_dicom() {
     };
     let series: BTreeSet<String> = read.iter().map(uid).collect();
     assert_eq!(series.len(), 3);
+    // The report names its images; where they are not DICOM, there is no list of them, not an empty one.
+    let evidence = tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE;
+    assert!(read[2].element(evidence).is_ok());
+    let stated = Provenance {
+        patient_id: Some("P1".into()),
+        study_uid: Some("1.2.3".into()),
+        ..Provenance::default()
+    };
+    let unnamed = whole().dicom_files(&whole().scans(&stated, &made)).unwrap();
+    let unnamed = from_reader(&unnamed[2].bytes[..]).unwrap();
+    assert!(unnamed.element(evidence).is_err());
     let mut figures: Vec<(String, f64)> = Vec::new();
     every_item(&read[2], &mut |item| {
         let Ok(value) = item.element(tags::MEASURED_VALUE_SEQUENCE) else {

@@ -95,10 +95,12 @@ pub(super) fn put(
     set.text(tags::PRELIMINARY_FLAG, "PRELIMINARY");
     set.text(tags::COMPLETION_FLAG, "COMPLETE");
     set.text(tags::VERIFICATION_FLAG, "UNVERIFIED");
-    set.item(
-        tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE,
-        evidence(scans, others),
-    );
+    if let Some(evidence) = evidence(scans, others) {
+        set.item(
+            tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE,
+            evidence,
+        );
+    }
     let mut scheme = DataSet::new();
     scheme.text(tags::CODING_SCHEME_DESIGNATOR, OWN_SCHEME);
     scheme.text(tags::CODING_SCHEME_NAME, "Concepts of ventriform");
@@ -292,8 +294,8 @@ pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet)
     item
 }
 
-/// The study with every instance that the content refers to.
-fn evidence(scans: &[&SourceScan], others: &[SeriesReference]) -> DataSet {
+/// The study with every instance that the content refers to; `None` if it refers to none.
+fn evidence(scans: &[&SourceScan], others: &[SeriesReference]) -> Option<DataSet> {
     let mut all = Vec::new();
     let mut add = |uid: &str, instances: Vec<DataSet>| {
         let mut series = DataSet::new();
@@ -312,8 +314,11 @@ fn evidence(scans: &[&SourceScan], others: &[SeriesReference]) -> DataSet {
         let instance = reference(other.class, &other.instance);
         add(&other.series, vec![instance]);
     }
+    if all.is_empty() {
+        return None;
+    }
     let mut study = DataSet::new();
     study.items(tags::REFERENCED_SERIES_SEQUENCE, all);
     study.text(tags::STUDY_INSTANCE_UID, scans[0].study());
-    study
+    Some(study)
 }
