@@ -50,12 +50,7 @@ async fn beats_are_listed_downloaded_and_deleted_like_segmentations() {
     assert_eq!(place, format!("{path}/mesh_ed.stl"));
     let labels = get("labels_gate01.nii.gz", "*/*").await;
     assert_eq!(labels.headers()["content-type"], "application/gzip");
-    for name in [
-        "labels_gate09.nii.gz",
-        "mesh.glb",
-        "report.html",
-        "mask.dcm",
-    ] {
+    for name in ["labels_gate09.nii.gz", "report.html", "mask.dcm"] {
         let refused = problem(get(name, "*/*").await, 404, "not-found").await;
         assert!(text(&refused["fix"]).contains("beat.json"), "{refused}");
     }

@@ -247,7 +247,10 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
     let schema = match (name, media_type) {
         ("report.json" | "beat.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
-        ("polar.json", _) => reference("PolarMap"),
+        ("polar.json" | "polar_ed.json" | "polar_es.json", _) => reference("PolarMap"),
+        ("polar_motion.json" | "polar_thickening.json" | "polar_phase.json", _) => {
+            reference("PolarFigure")
+        }
         ("profile.json", _) => reference("ReaderProfile"),
         (mesh, "application/json") if mesh.starts_with("mesh") => reference("MeshDocument"),
         (_, "model/gltf+json") => json!({"type": "object"}),

@@ -77,6 +77,7 @@ use utoipa::openapi::{RefOr, Required};
         ventriform::report::SegmentationReport,
         ventriform::report::BeatReport,
         ventriform::polar::PolarDocument,
+        ventriform::polar::FigureDocument,
     ))
 )]
 pub struct DocumentFrame;

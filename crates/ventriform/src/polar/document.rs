@@ -90,7 +90,7 @@ pub struct PolarSegment {
 
 /// A figure of the wall on a polar map, as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = PolarFigure))]
 pub struct FigureDocument {
     /// The figure.
     pub figure: WallFigure,
