@@ -310,11 +310,15 @@ export interface components {
             confidence: number;
             /** @description The volume curve, gates' width taken off, at equal steps from the beginning of the first gate. */
             curve: components["schemas"]["CurvePoint"][];
+            /** @description Interval about EDV that holds the true volume of nine of ten hearts. */
+            edv_interval_ml: number[];
             /**
              * Format: double
              * @description End-diastolic volume: the largest of the curve.
              */
             edv_ml: number;
+            /** @description The same about EF; `null` if there is none. */
+            ef_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
@@ -345,18 +349,25 @@ export interface components {
              * @description The gate with the smallest cavity.
              */
             end_systole_gate: number;
+            /** @description The same about ESV. */
+            esv_interval_ml: number[];
             /**
              * Format: double
              * @description End-systolic volume: the smallest of the curve.
              */
             esv_ml: number;
-            /** @description Reasons to look closer: of the fit to the gates' sum, then of the beat. */
+            /** @description Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat. */
             flags: components["schemas"]["Flag"][];
             /** @description Each gate, in the mean over its width. */
             gates: components["schemas"]["GateReport"][];
             /** @description The file of the gates. */
             input: components["schemas"]["FileFacts"];
             long_axis?: components["schemas"]["LongAxis"] | null;
+            /**
+             * Format: double
+             * @description Its mass, grams, at the density of muscle, 1.05 g/ml.
+             */
+            mass_g: number;
             /** @description Why there are no rates. */
             no_rates?: string | null;
             /** @description Every parameter, defaults written out. */
@@ -834,6 +845,21 @@ export interface components {
              * @description Standard deviation of the distance from the axis to the middle of the wall, as a share of its mean.
              */
             unroundness: number;
+        };
+        /** @description The mean of a figure over a segment. */
+        FigureSegment: {
+            /**
+             * Format: double
+             * @description The mean; null where there is none.
+             */
+            mean?: number | null;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int64
+             * @description 1 to 17.
+             */
+            number: number;
         };
         /** @description The statements of a volume's file. */
         FileFacts: {
@@ -2093,6 +2119,40 @@ export interface components {
              */
             sd_degrees: number;
         };
+        /** @description A figure of the wall on a polar map, as it is written. */
+        PolarFigure: {
+            /**
+             * Format: int64
+             * @description Columns of pixels, around the axis.
+             */
+            columns: number;
+            /** @description The figure. */
+            figure: components["schemas"]["WallFigure"];
+            /**
+             * @description For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+             *     end; row n reaches from n to n + 1.
+             */
+            level_ends: number[][];
+            /** @description Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            orientation: string;
+            /** @description The values of the first and the last colour of the drawn map. */
+            range: number[];
+            /** @description The radii at which these levels end on the drawn map, as shares of its own. */
+            rings: number[];
+            /**
+             * Format: int64
+             * @description Rows of pixels, from apex to base.
+             */
+            rows: number;
+            /** @description The number of the segment to which each pixel belongs. */
+            segment_of: number[][];
+            /** @description The 17 segments. */
+            segments: components["schemas"]["FigureSegment"][];
+            /** @description Its unit: `mm`, `%` or `degrees` of the cycle. */
+            unit: string;
+            /** @description The pixels; null where there is no wall, or none that moves. */
+            values: (number | null)[][];
+        };
         /** @description A polar map, as in `polar.json`. */
         PolarMap: {
             /**
@@ -2692,6 +2752,12 @@ export interface components {
              * @description Its number, 1 to 17.
              */
             segment: number;
+            /**
+             * Format: double
+             * @description The same by the counts of the wall, a second opinion: lower by what the image's filter takes; `null` where the
+             *     wall has no counts.
+             */
+            thickening_counts_percent?: number | null;
             /**
              * Format: double
              * @description Thickening, end diastole to end systole.
@@ -3759,6 +3825,11 @@ export interface components {
             /** @description The volumes, newest first. */
             volumes: components["schemas"]["Volume"][];
         };
+        /**
+         * @description A figure of the wall.
+         * @enum {string}
+         */
+        WallFigure: "motion" | "thickening" | "phase";
     };
     responses: never;
     parameters: never;
@@ -3791,6 +3862,7 @@ export type ErasedFile = components['schemas']['ErasedFile'];
 export type ErasedItem = components['schemas']['ErasedItem'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
+export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
 export type WebhookRequest = components['schemas']['WebhookRequest'];
 export type Fit = components['schemas']['Fit'];
@@ -3839,6 +3911,7 @@ export type NotReady = components['schemas']['NotReady'];
 export type ObjectDelivery = components['schemas']['ObjectDelivery'];
 export type OptimiseReport = components['schemas']['OptimiseReport'];
 export type PhaseReport = components['schemas']['PhaseReport'];
+export type PolarFigure = components['schemas']['PolarFigure'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
 export type PolarSummary = components['schemas']['PolarSummary'];
@@ -3908,5 +3981,6 @@ export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
 export type VolumeList = components['schemas']['VolumeList'];
+export type WallFigure = components['schemas']['WallFigure'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;
