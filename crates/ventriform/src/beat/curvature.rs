@@ -21,8 +21,8 @@ use crate::progress::{Cancelled, Monitor};
 
 /// Share of the curvature at a typical step that is added: no unknown is left without.
 const DAMPING: f64 = 1e-3;
-/// Reach of the blur that is followed, voxels: three standard deviations of a width of 12 mm.
-const BLUR_REACH_VOXELS: usize = 4;
+/// Reach of the blur that is followed, voxels: 2.4 standard deviations of a width of 12 mm.
+const BLUR_REACH_VOXELS: usize = 3;
 
 /// The Gauss-Newton matrix in blocks, ready to be solved.
 #[derive(Debug)]

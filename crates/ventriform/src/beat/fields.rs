@@ -249,6 +249,7 @@ pub(super) struct Nodes {
 
 impl Nodes {
     /// About the point with this arc, mm, and column with a fraction; beyond the last row the value there continues.
+    #[inline]
     pub fn at(rows: usize, arc: f64, column: f64) -> Self {
         let row = (arc / ROW_SPACING_MM).max(0.0);
         let low = (row as usize).min(rows - 2);
@@ -262,6 +263,7 @@ impl Nodes {
         }
     }
 
+    #[inline]
     fn indices(&self) -> [usize; 4] {
         let [left, right] = self.columns;
         let (low, high) = (self.row * COLUMNS, (self.row + 1) * COLUMNS);
@@ -269,23 +271,49 @@ impl Nodes {
     }
 
     /// The value of a field.
+    #[inline]
     pub fn value(&self, field: &[f64]) -> f64 {
-        let [a, b, c, d] = self.indices().map(|n| field[n]);
-        let low = a + self.right * (b - a);
-        let high = c + self.right * (d - c);
-        low + self.up * (high - low)
+        let shares = self.shares().into_iter();
+        shares.map(|(node, share)| share * field[node]).sum()
     }
 
-    /// The change of a field by a millimetre of arc.
-    pub fn slope(&self, field: &[f64]) -> f64 {
-        if !self.inside {
-            return 0.0;
+    /// The values of four fields that stand side by side at every node.
+    #[inline]
+    pub fn values(&self, fields: &[[f64; 4]]) -> [f64; 4] {
+        let mut values = [0.0; 4];
+        for (node, share) in self.shares() {
+            for (value, field) in values.iter_mut().zip(fields[node]) {
+                *value += share * field;
+            }
         }
-        let [a, b, c, d] = self.indices().map(|n| field[n]);
-        ((1.0 - self.right) * (c - a) + self.right * (d - b)) / ROW_SPACING_MM
+        values
+    }
+
+    /// The changes of four fields by a millimetre of arc.
+    #[inline]
+    pub fn slopes(&self, fields: &[[f64; 4]]) -> [f64; 4] {
+        if !self.inside {
+            return [0.0; 4];
+        }
+        let [a, b, c, d] = self.indices().map(|node| fields[node]);
+        [0, 1, 2, 3].map(|n| {
+            let (left, right) = (c[n] - a[n], d[n] - b[n]);
+            ((1.0 - self.right) * left + self.right * right) / ROW_SPACING_MM
+        })
+    }
+
+    /// Adds what a change of the values of four fields here adds to the nodes.
+    #[inline]
+    pub fn add(&self, fields: &mut [[f64; 4]], what: [f64; 4]) {
+        for (node, share) in self.shares() {
+            for (field, what) in fields[node].iter_mut().zip(what) {
+                *field += share * what;
+            }
+        }
     }
 
     /// The nodes, and their shares in the value of a field.
+    #[inline]
     pub fn shares(&self) -> [(usize, f64); 4] {
         let [a, b, c, d] = self.indices();
         [
@@ -296,14 +324,8 @@ impl Nodes {
         ]
     }
 
-    /// Adds what a change of the field's value here adds to the nodes.
-    pub fn add(&self, field: &mut [f64], what: f64) {
-        for (node, share) in self.shares() {
-            field[node] += share * what;
-        }
-    }
-
     /// The columns on both sides, and their shares in the arc of the rim.
+    #[inline]
     pub fn rim_shares(&self) -> [(usize, f64); 2] {
         let [left, right] = self.columns;
         [(left, 1.0 - self.right), (right, self.right)]

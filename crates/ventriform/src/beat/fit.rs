@@ -267,11 +267,14 @@ fn minimise(
 ) -> Result<Minimised, BeatError> {
     let (typical, bounds) = steps_and_bounds(&objective.layout, &start);
     let (mut unknowns, mut steps) = (start, 0);
+    let ef_at = |objective: &Objective, point: &[f64]| {
+        ejection_fraction(&curve(objective, point, CURVE_MOMENTS))
+    };
     let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
     for stage_steps in stages {
         objective.take_motion_off(resolution_mm, &unknowns);
         let curvature = Curvature::of(&objective, &unknowns, &typical, monitor)?;
-        let (mut last_ef, mut looks_at_rest) = (f64::NAN, 0);
+        let (mut last_ef, mut looks_at_rest) = (ef_at(&objective, &unknowns), 0);
         let found = lbfgs::minimise(
             unknowns,
             &bounds,
@@ -280,7 +283,7 @@ fn minimise(
             |point, stage| {
                 monitor.report(Stage::Beat, (steps + stage) as f64 / max_steps as f64)?;
                 if stage_steps.is_none() && stage % STEPS_BETWEEN_LOOKS == 0 {
-                    let ef = ejection_fraction(&curve(&objective, point, CURVE_MOMENTS));
+                    let ef = ef_at(&objective, point);
                     let at_rest = (ef - last_ef).abs() < EF_AT_REST;
                     looks_at_rest = if at_rest { looks_at_rest + 1 } else { 0 };
                     last_ef = ef;

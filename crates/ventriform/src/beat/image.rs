@@ -37,6 +37,7 @@ pub(super) struct Voxel {
 
 impl Voxel {
     /// Arc of the voxel with the long axis stretched by `stretch`, mm.
+    #[inline]
     pub fn arc(&self, cap_arc: f64, stretch: f64) -> f64 {
         if self.cap {
             self.along
@@ -119,42 +120,28 @@ impl HeartGrid {
 
     /// The wall at every voxel.
     pub fn samples(&self, layout: &Layout, state: &WallState, activity: &Activity) -> Vec<Sample> {
-        let sample = |voxel: &Voxel| self.sample(layout, voxel, state, activity);
+        let fields = side_by_side(state, activity);
+        let sample = |voxel: &Voxel| {
+            let arc = voxel.arc(self.cap_arc, state.stretch);
+            let nodes = Nodes::at(layout.rows, arc, voxel.column);
+            let [mid, thick, uptake, outside] = nodes.values(&fields);
+            let beyond = voxel.distance - mid;
+            Sample {
+                nodes,
+                uptake,
+                outside,
+                blood: activity.blood,
+                inner: Ramp::new(beyond + thick / 2.0),
+                outer: Ramp::new(thick / 2.0 - beyond),
+                apical: Ramp::new(nodes.rim(&activity.rim) - arc),
+            }
+        };
         self.voxels.iter().map(sample).collect()
     }
 
     /// The activity of every voxel.
     pub fn paint(samples: &[Sample]) -> Vec<f32> {
         samples.iter().map(|sample| sample.value() as f32).collect()
-    }
-
-    fn sample(
-        &self,
-        layout: &Layout,
-        voxel: &Voxel,
-        state: &WallState,
-        activity: &Activity,
-    ) -> Sample {
-        let arc = voxel.arc(self.cap_arc, state.stretch);
-        let nodes = Nodes::at(layout.rows, arc, voxel.column);
-        let [mid, thick, uptake, outside] = [
-            &state.mid_wall,
-            &state.thickness,
-            &activity.uptake,
-            &activity.outside,
-        ]
-        .map(|field| nodes.value(field));
-        let rim = nodes.rim(&activity.rim);
-        let beyond = voxel.distance - mid;
-        Sample {
-            nodes,
-            uptake,
-            outside,
-            blood: activity.blood,
-            inner: Ramp::new(beyond + thick / 2.0),
-            outer: Ramp::new(thick / 2.0 - beyond),
-            apical: Ramp::new(rim - arc),
-        }
     }
 
     /// Adds the gradients by the wall and by the activity of something whose gradient by the painted voxels is
@@ -168,6 +155,8 @@ impl HeartGrid {
         by_state: &mut StateGradient,
         by_activity: &mut ActivityGradient,
     ) {
+        let fields = side_by_side(state, activity);
+        let mut by_fields = vec![[0.0; 4]; fields.len()];
         for ((voxel, sample), by) in self.voxels.iter().zip(samples).zip(by_voxel) {
             let by = f64::from(*by);
             if by == 0.0 {
@@ -175,13 +164,16 @@ impl HeartGrid {
             }
             let nodes = &sample.nodes;
             let change = sample.change();
-            by_activity.blood += by * change.blood;
-            nodes.add(&mut by_state.mid_wall, by * change.mid_wall);
-            nodes.add(&mut by_state.thickness, by * change.thickness);
-            nodes.add(&mut by_activity.uptake, by * change.uptake);
-            nodes.add(&mut by_activity.outside, by * change.outside);
+            nodes.add(&mut by_fields, change.fields().map(|change| by * change));
             nodes.add_to_rim(&mut by_activity.rim, by * change.rim);
-            by_state.stretch += by * stretch_change(voxel, sample, &change, state, activity);
+            by_activity.blood += by * change.blood;
+            by_state.stretch += by * stretch_change(voxel, sample, &change, state, &fields);
+        }
+        for (node, by) in by_fields.into_iter().enumerate() {
+            by_state.mid_wall[node] += by[0];
+            by_state.thickness[node] += by[1];
+            by_activity.uptake[node] += by[2];
+            by_activity.outside[node] += by[3];
         }
     }
 
@@ -194,33 +186,44 @@ impl HeartGrid {
         activity: &Activity,
         mut add: impl FnMut(usize, &Nodes, &Change, f64),
     ) {
+        let fields = side_by_side(state, activity);
         for (index, (voxel, sample)) in self.voxels.iter().zip(samples).enumerate() {
             let change = sample.change();
-            let by_stretch = stretch_change(voxel, sample, &change, state, activity);
+            let by_stretch = stretch_change(voxel, sample, &change, state, &fields);
             add(index, &sample.nodes, &change, by_stretch);
         }
     }
 }
 
+/// Distance, thickness, uptake and activity outside of the wall, side by side at every node.
+fn side_by_side(state: &WallState, activity: &Activity) -> Vec<[f64; 4]> {
+    let of_node = |node: usize| {
+        [
+            state.mid_wall[node],
+            state.thickness[node],
+            activity.uptake[node],
+            activity.outside[node],
+        ]
+    };
+    (0..state.mid_wall.len()).map(of_node).collect()
+}
+
 /// The change of a voxel's activity by the stretch of the long axis: the arc at the voxel shrinks.
+#[inline]
 fn stretch_change(
     voxel: &Voxel,
     sample: &Sample,
     change: &Change,
     state: &WallState,
-    activity: &Activity,
+    fields: &[[f64; 4]],
 ) -> f64 {
     if voxel.cap {
         return 0.0;
     }
     let arc_by_stretch = voxel.along / (state.stretch * state.stretch);
-    let nodes = &sample.nodes;
-    let by_arc = nodes.slope(&state.mid_wall) * change.mid_wall
-        + nodes.slope(&state.thickness) * change.thickness
-        + nodes.slope(&activity.uptake) * change.uptake
-        + nodes.slope(&activity.outside) * change.outside
-        - change.rim;
-    by_arc * arc_by_stretch
+    let slopes = sample.nodes.slopes(fields).into_iter();
+    let by_fields: f64 = slopes.zip(change.fields()).map(|(s, c)| s * c).sum();
+    (by_fields - change.rim) * arc_by_stretch
 }
 
 /// The change of a voxel's activity by a unit of each value of the wall at the voxel.
@@ -232,6 +235,14 @@ pub(super) struct Change {
     pub outside: f64,
     pub rim: f64,
     pub blood: f64,
+}
+
+impl Change {
+    /// Those by the fields, in the order of [`side_by_side`].
+    #[inline]
+    fn fields(&self) -> [f64; 4] {
+        [self.mid_wall, self.thickness, self.uptake, self.outside]
+    }
 }
 
 fn voxel(coordinates: &RayCoordinates, [s, x, y]: [f64; 3]) -> Voxel {
@@ -259,6 +270,7 @@ struct Ramp {
 
 impl Ramp {
     /// Of a voxel whose centre lies `depth` mm inside.
+    #[inline]
     fn new(depth: f64) -> Self {
         let share = depth / GRID_STEP_MM + 0.5;
         Self {
@@ -285,6 +297,7 @@ pub(super) struct Sample {
 }
 
 impl Sample {
+    #[inline]
     fn value(&self) -> f64 {
         let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.share);
         self.uptake * oi * oo * ob
@@ -292,6 +305,7 @@ impl Sample {
             + self.outside * ((1.0 - oo) + oi * oo * (1.0 - ob))
     }
 
+    #[inline]
     fn change(&self) -> Change {
         let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.share);
         let (u, b) = (self.uptake, self.outside);
