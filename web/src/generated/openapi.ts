@@ -310,11 +310,15 @@ export interface components {
             confidence: number;
             /** @description The volume curve, gates' width taken off, at equal steps from the beginning of the first gate. */
             curve: components["schemas"]["CurvePoint"][];
+            /** @description Interval about EDV that holds the true volume of nine of ten hearts. */
+            edv_interval_ml: number[];
             /**
              * Format: double
              * @description End-diastolic volume: the largest of the curve.
              */
             edv_ml: number;
+            /** @description The same about EF; `null` if there is none. */
+            ef_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
@@ -345,18 +349,25 @@ export interface components {
              * @description The gate with the smallest cavity.
              */
             end_systole_gate: number;
+            /** @description The same about ESV. */
+            esv_interval_ml: number[];
             /**
              * Format: double
              * @description End-systolic volume: the smallest of the curve.
              */
             esv_ml: number;
-            /** @description Reasons to look closer: of the fit to the gates' sum, then of the beat. */
+            /** @description Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat. */
             flags: components["schemas"]["Flag"][];
             /** @description Each gate, in the mean over its width. */
             gates: components["schemas"]["GateReport"][];
             /** @description The file of the gates. */
             input: components["schemas"]["FileFacts"];
             long_axis?: components["schemas"]["LongAxis"] | null;
+            /**
+             * Format: double
+             * @description Its mass, grams, at the density of muscle, 1.05 g/ml.
+             */
+            mass_g: number;
             /** @description Why there are no rates. */
             no_rates?: string | null;
             /** @description Every parameter, defaults written out. */
@@ -365,6 +376,7 @@ export interface components {
             };
             /** @description Phases of the wall. */
             phase: components["schemas"]["PhaseReport"];
+            posture?: components["schemas"]["Posture"] | null;
             rates?: components["schemas"]["RatesReport"] | null;
             resolution_mm?: components["schemas"]["Resolution"] | null;
             /**
@@ -2692,6 +2704,12 @@ export interface components {
              * @description Its number, 1 to 17.
              */
             segment: number;
+            /**
+             * Format: double
+             * @description The same by the counts of the wall, a second opinion: lower by what the image's filter takes; `null` where the
+             *     wall has no counts.
+             */
+            thickening_counts_percent?: number | null;
             /**
              * Format: double
              * @description Thickening, end diastole to end systole.
