@@ -41,23 +41,27 @@ export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & 
           </figure>
         )))}
       </div>
-      <div class="three maps">
-        {maps.map(({ name, map, lut }) => (
-          <figure key={name}>
-            <Drawn width={MAP} height={MAP} name={name} draw={element => {
-              const context = element.getContext("2d");
-              if (context) drawPolar(context, map, MAP, RATIO, { lut: lut ?? scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
-            }} />
-            <figcaption><span>{name}</span><ColourBar lut={lut ?? scene.wallLut.value} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} /></figcaption>
-          </figure>
-        ))}
+      <div class="beside maps-and-words">
+        <div class="three">
+          {maps.map(({ name, map, lut }) => (
+            <figure key={name}>
+              <Drawn width={MAP} height={MAP} name={name} draw={element => {
+                const context = element.getContext("2d");
+                if (context) drawPolar(context, map, MAP, RATIO, { lut: lut ?? scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
+              }} />
+              <figcaption><span>{name}</span><ColourBar lut={lut ?? scene.wallLut.value} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} /></figcaption>
+            </figure>
+          ))}
+        </div>
+        <div class="words">
+          <Verdict shown={shown} />
+          <p class="quiet">
+            {volume.format}, {shape(volume)}, <code>{volume.id}</code>; beat <code>{shown.result.id}</code>.{" "}
+            {report.rr_ms ? `R-R interval ${number(report.rr_ms, 0, "ms")}. ` : ""}
+            {parameters.length === 0 ? "All parameters had their defaults." : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
+          </p>
+        </div>
       </div>
-      <Verdict shown={shown} />
-      <p class="quiet">
-        {volume.format}, {shape(volume)}, <code>{volume.id}</code>; beat <code>{shown.result.id}</code>.{" "}
-        {report.rr_ms ? `R-R interval ${number(report.rr_ms, 0, "ms")}. ` : ""}
-        {parameters.length === 0 ? "All parameters had their defaults." : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
-      </p>
       <Foot page={1} of={1} />
     </section>
   );

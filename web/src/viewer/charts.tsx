@@ -7,7 +7,7 @@ import { number } from "../words";
 import type { Scene } from "./scene";
 
 const [WIDTH, HEIGHT] = [320, 190];
-const AREA = { left: 34, right: 312, top: 14, bottom: 158 };
+const AREA = { left: 32, right: 308, top: 20, bottom: 158 };
 
 /** A step of 1, 2 or 5 times a power of ten that is not below `least`. */
 function roundStep(least: number): number {
@@ -46,7 +46,7 @@ function Frame({ name, highest, unit, below, onPick, children }: FrameProps) {
           <text x={AREA.left - 5} y={up(value) + 4} text-anchor="end">{value}</text>
         </g>
       ))}
-      <text x={2} y={AREA.top - 4}>{unit}</text>
+      <text x={4} y={10}>{unit}</text>
       <text x={(AREA.left + AREA.right) / 2} y={HEIGHT - 4} text-anchor="middle">{below}</text>
       {children(up)}
     </svg>

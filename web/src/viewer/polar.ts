@@ -335,14 +335,15 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   context.textBaseline = "middle";
   const write = (text: string, x: number, y: number, font: string) => {
     context.font = font;
-    context.lineWidth = 3;
+    context.lineWidth = size < 180 ? 2 : 3;
     context.lineJoin = "round";
     context.strokeStyle = "rgba(0,0,0,.85)";
     context.strokeText(text, x, y);
     context.fillStyle = "#fff";
     context.fillText(text, x, y);
   };
-  const text = Math.max(10, Math.min(14, size / 26));
+  // Small maps have the room for small figures only.
+  const text = size < 180 ? 8 : Math.max(10, Math.min(14, size / 26));
   for (const { number, mean } of map.segments) {
     const [ring, turns] = labelPlace(map, number);
     const [x, y] = at(ring, turns);

@@ -283,6 +283,7 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
       {shown.beat && <BeatCharts scene={scene} report={shown.beat.report} />}
       {shown.polar && shown.heart && (
         <div class="polars">
+          {shown.beat && <h2>Uptake, all gates</h2>}
           <PolarView scene={scene} map={shown.polar} mesh={shown.mesh} heart={shown.heart} title={other?.polar ? "Shown fit" : "Polar map"} />
           {other?.polar && other.heart && (
             <details open>
