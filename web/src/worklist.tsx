@@ -299,7 +299,7 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
 
 function figures(result: Result) {
   const { summary } = result;
-  if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, {number(summary.edv_ml, 0, "ml")} to {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
+  if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
   if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
   const given = summary.volumes_ml;
   const volumesMl = given?.anatomical ?? given;

@@ -1,6 +1,6 @@
 // A result with all that the views draw of it.
 
-import { type FileOfResult, type Result, type Volume, call, get } from "../api";
+import { type FileOfResult, type Result, type Volume, call, fieldOf, get } from "../api";
 import type { BeatReport, Closeness, PolarMap, SegmentationReport } from "../generated/openapi";
 import { isBeat, isFit } from "../words";
 import { type Mesh, meanOf } from "./mesh";
@@ -49,9 +49,14 @@ function expertOf(id: string, parameters: Result["parameters"]): Promise<Voxels>
   return kept(`/v1/volumes/${id}/voxels.nii.gz?${query}`);
 }
 
-/** The voxels of a stored volume, whatever its files are. */
-export function voxelsOf(volume: Pick<Volume, "id">, frame: number | null): Promise<Voxels> {
-  return kept(`/v1/volumes/${volume.id}/voxels.nii.gz${frame === null ? "" : `?frame=${frame}`}`);
+/** The voxels of a stored volume, whatever its files are; of frames that are no gates, and of which none is chosen, the first. */
+export function voxelsOf(volume: Pick<Volume, "id" | "frames">, frame: number | null): Promise<Voxels> {
+  const path = `/v1/volumes/${volume.id}/voxels.nii.gz`;
+  if (frame !== null) return kept(`${path}?frame=${frame}`);
+  return kept(path).catch(error => {
+    if (volume.frames > 1 && fieldOf(error) === "frame") return kept(`${path}?frame=0`);
+    throw error;
+  });
 }
 
 /** The voxels of every gate of a volume, one after the other; `told` has those that were read. */

@@ -39,8 +39,11 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
       scene.gate.value = null;
     };
   }, [scene, report]);
-  // Whoever shows another moment, as a press on the curve does, stops the beat there.
-  useEffect(() => scene.held.watch(() => setPlaying(false)), [scene]);
+  // Whoever shows another moment, as a press on the curve does, stops the beat there; so does whoever moves the heart.
+  useEffect(() => {
+    const ends = [scene.held.watch(() => setPlaying(false)), scene.edit.watch(() => scene.edit.value && setPlaying(false))];
+    return () => ends.forEach(end => end());
+  }, [scene]);
 
   useEffect(() => {
     if (!playing) return;
