@@ -87,7 +87,7 @@ export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Scen
           {marks.map(([name, degrees, ml]) => (
             <g key={name}>
               <circle cx={across(degrees)} cy={up(ml)} r={3.5} />
-              <text class="mark" x={Math.max(AREA.left + 10, Math.min(AREA.right - 10, across(degrees)))} y={name === "ED" ? up(ml) + 16 : up(ml) - 8} text-anchor="middle">{name}</text>
+              <text class="mark" x={Math.max(AREA.left + 10, Math.min(AREA.right - 10, across(degrees)))} y={name === "ED" ? up(ml) - 8 : Math.min(AREA.bottom - 3, up(ml) + 15)} text-anchor="middle">{name}</text>
             </g>
           ))}
           {scene && <Now scene={scene} report={report} up={up} />}

@@ -26,12 +26,15 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
   // Who asks for less motion starts the beat by hand.
   const [playing, setPlaying] = useState(() => !matchMedia("(prefers-reduced-motion: reduce)").matches);
   const [speed, setSpeed] = useState(1);
-  const gate = shown === null ? report.end_diastole_gate : Math.floor(shown * gates) + 1;
+  const gateOf = (turns: number | null) => (turns === null ? report.end_diastole_gate : Math.floor(turns * gates) + 1);
+  const gate = gateOf(shown);
 
   const goTo = (wanted: number) => {
     setPlaying(false);
     scene.goTo((((wanted - 1 + gates) % gates) + 0.5) / gates, gates);
   };
+  // Keys may follow each other faster than the view is drawn.
+  const step = (by: number) => goTo(gateOf(scene.gate.value) + by);
   useLayoutEffect(() => {
     scene.goTo(scene.moment.value ?? (report.end_diastole_gate - 0.5) / gates, gates);
     return () => {
@@ -49,11 +52,11 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
     if (!playing) return;
     const [start, from] = [performance.now(), scene.moment.value ?? 0];
     let asked = 0;
-    const step = (now: number) => {
+    const draw = (now: number) => {
       scene.goTo((from + (Math.max(0, now - start) * speed) / (report.rr_ms ?? UNKNOWN_CYCLE_MS)) % 1, gates);
-      asked = requestAnimationFrame(step);
+      asked = requestAnimationFrame(draw);
     };
-    asked = requestAnimationFrame(step);
+    asked = requestAnimationFrame(draw);
     return () => cancelAnimationFrame(asked);
   }, [scene, report, playing, speed]);
 
@@ -62,8 +65,8 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
       const at = event.target as Element;
       if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || at.closest(WRITTEN)) return;
       if (event.key === " " && !at.closest(PRESSED)) setPlaying(now => !now);
-      else if (event.key === "ArrowLeft" && !at.closest("input")) goTo(gate - 1);
-      else if (event.key === "ArrowRight" && !at.closest("input")) goTo(gate + 1);
+      else if (event.key === "ArrowLeft" && !at.closest("input")) step(-1);
+      else if (event.key === "ArrowRight" && !at.closest("input")) step(1);
       else return;
       event.preventDefault();
     };
@@ -76,8 +79,8 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
     <div class="toolbar player" role="group" aria-label="Beat">
       <button type="button" class="main" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
       <span class="choice">
-        <button type="button" aria-label="Gate before" onClick={() => goTo(gate - 1)}>◀</button>
-        <button type="button" aria-label="Next gate" onClick={() => goTo(gate + 1)}>▶</button>
+        <button type="button" aria-label="Gate before" onClick={() => step(-1)}>◀</button>
+        <button type="button" aria-label="Next gate" onClick={() => step(1)}>▶</button>
       </span>
       <input type="range" aria-label="Gate" min={1} max={gates} value={gate} aria-valuetext={`${gate} of ${gates}${name && `, ${name}`}`} onInput={event => goTo(Number(event.currentTarget.value))} />
       <span class="gate">gate {gate} of {gates} <b>{name}</b></span>

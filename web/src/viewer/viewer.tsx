@@ -108,7 +108,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
 
   const gates = shown?.beat?.report.gates.length ?? 0;
   useEffect(() => {
-    if (!scene || gates === 0) return;
+    if (!scene || gates === 0 || (scene.gates.value.length === gates && scene.gates.value.every(Boolean))) return;
     let gone = false;
     readGates(volume, gates, read => {
       if (!gone) scene.gates.value = read;
