@@ -19,7 +19,7 @@ assets=crates/ventriform/assets
 built=$tools/../$assets
 rm -rf "$tools/src" "$tools/tests" "$built"
 mkdir -p "$built"
-cp "$assets/uptake.json" "$built/"
+cp "$assets/uptake.json" "$assets/figures.json" "$built/"
 mkdir -p "$tools/../openapi"
 cp openapi/ventriform.json "$tools/../openapi/"
 cp -r web/package.json web/package-lock.json web/types.mjs web/tsconfig.json web/vite.config.ts web/index.html web/src web/tests "$tools/"

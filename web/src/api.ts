@@ -1,22 +1,23 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
 import { at } from "./base";
-import type { Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
+import type { Beat, BeatSummary, Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
 
 export type { JobState, Problem, Volume } from "./generated/openapi";
 export type FileOfResult = Download;
-/** The page files and shows two kinds of work. */
-export type Job = AnyJob & { kind: "model" | "segmentation" };
+/** Kinds of work. */
+export type Kind = "model" | "segmentation" | "beat";
+export type Job = AnyJob & { kind: Kind };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;
 
-/** A model, a segmentation or a template; which of them, its id says. */
-export type Result = Pick<Model | Segmentation, "id" | "created_at" | "volume" | "files"> & {
+/** A model, a segmentation, a beat or a template; which of them, its id says. */
+export type Result = Pick<Model | Segmentation | Beat, "id" | "created_at" | "volume" | "files"> & {
   parameters: Parameters;
-  summary: Partial<ModelSummary & SegmentationSummary>;
+  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary>;
   links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"]>;
 };
 

@@ -3,7 +3,7 @@
 import { ProblemError, type Result, type Volume, call } from "./api";
 import { loadScan, resultsOf } from "./library";
 import { saveBlob } from "./save";
-import { isFit, nameOf } from "./words";
+import { isBeat, isFit, nameOf } from "./words";
 import { zip } from "./zip";
 
 /** The name of a scan as files may have it, without the endings of its own files. */
@@ -64,6 +64,6 @@ export async function saveScan(volume: Volume, told: (text: string) => void): Pr
   await loadScan(volume.id);
   const results = resultsOf(volume.id);
   const scan = volume.originals.map(file => ({ name: `scan/${file.name}`, path: file.href }));
-  const made = results.flatMap(result => filesOf(volume, result, `${isFit(result.id) ? "fit" : "model"}_${result.id.slice(0, 12)}`));
+  const made = results.flatMap(result => filesOf(volume, result, `${isFit(result.id) ? "fit" : isBeat(result.id) ? "beat" : "model"}_${result.id.slice(0, 12)}`));
   await saved(fileNameOf(volume), [...scan, ...made], told);
 }

@@ -1,10 +1,12 @@
 // One job: its state while it lasts, and why it failed.
 
 import { useState } from "preact/hooks";
-import { type Job, type Problem, sentences, words } from "./api";
+import { type Job, type Kind, type Problem, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
 import { open } from "./route";
 import { ordinal, stage } from "./words";
+
+const KINDS: Record<Kind, string> = { model: "Model", segmentation: "Fit", beat: "Beat" };
 
 /** What is wrong, and what to do. */
 export function Trouble({ problem }: { problem: Problem | null | undefined }) {
@@ -15,7 +17,7 @@ export function Trouble({ problem }: { problem: Problem | null | undefined }) {
 
 export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) => void) | undefined }) {
   const [problem, setProblem] = useState("");
-  const what = job.kind === "model" ? "Model" : "Fit";
+  const what = KINDS[job.kind];
   const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
   const change = () => {
     if (onChange) onChange(job);

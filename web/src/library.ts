@@ -3,11 +3,12 @@
 import { at } from "./base";
 import { type Job, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
 import { Watched } from "./state";
-import { newest } from "./words";
+import { isBeat, isFit, newest } from "./words";
 
 export const volumes = new Watched<Volume[]>([]);
 export const models = new Watched<Result[]>([]);
 export const fits = new Watched<Result[]>([]);
+export const beats = new Watched<Result[]>([]);
 export const templates = new Watched<Result[]>([]);
 export const jobs = new Watched<Job[]>([]);
 /** Where the list of volumes goes on; null at its end. */
@@ -21,14 +22,15 @@ const PAGE = 30;
 
 /** Reads the newest of everything. */
 export async function refresh(): Promise<void> {
-  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value };
+  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value, beats: beats.value };
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
-    const [v, m, s, t] = await Promise.all([
+    const [v, m, s, b, t] = await Promise.all([
       page<Volume>("volumes", { limit: Math.max(PAGE, Math.min(100, volumes.value.length)) }),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
+      page<Result>("beats", { limit: 100 }),
       page<Result>("templates", { limit: 100 }),
     ]);
     volumes.value = renewed(known.volumes, volumes.value, v.items);
@@ -36,8 +38,9 @@ export async function refresh(): Promise<void> {
     jobs.value = renewed(known.jobs, jobs.value, j.items).map(latest(jobs.value));
     models.value = renewed(known.models, models.value, m.items);
     fits.value = renewed(known.fits, fits.value, s.items);
+    beats.value = renewed(known.beats, beats.value, b.items);
     templates.value = t.items;
-    partial.value = Boolean(m.next || s.next);
+    partial.value = Boolean(m.next || s.next || b.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -77,7 +80,7 @@ export async function loadScan(id: string): Promise<Volume> {
   if (!volumes.value.some(other => other.id === id)) volumes.value = [...volumes.value, volume];
   const own = await page<Job>("jobs", { volume: id, limit: 100 });
   for (const job of own.items.reverse()) put(job);
-  const missing = own.items.flatMap(job => (job.state === "succeeded" ? [job.segmentation, job.model] : []));
+  const missing = own.items.flatMap(job => (job.state === "succeeded" ? [madeBy(job)] : []));
   await Promise.all([...new Set(missing)].map(result => (result && !find(result) ? loadResult(result) : null)));
   return volume;
 }
@@ -95,7 +98,7 @@ export function loadResultsOf(id: string): void {
 export async function loadAllResults(): Promise<void> {
   if (!partial.value) return;
   partial.value = false;
-  for (const [kind, list] of [["segmentations", fits], ["models", models]] as const) {
+  for (const [kind, list] of KINDS) {
     let cursor: string | null = null;
     do {
       const next: { items: Result[]; next: string | null } = await page<Result>(kind, { limit: 100, ...(cursor ? { cursor } : {}) });
@@ -108,12 +111,24 @@ export async function loadAllResults(): Promise<void> {
 
 const MOST = 2000;
 
+/** The results of scans: their collection, and what of it was read. */
+const KINDS = [["segmentations", fits], ["models", models], ["beats", beats]] as const;
+
+function kindOf(id: string): (typeof KINDS)[number] {
+  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : 1];
+}
+
+/** What a job made, once it has succeeded. */
+export function madeBy(job: Job): string | null {
+  return job.segmentation ?? job.model ?? job.beat ?? null;
+}
+
 export function find(id: string): Result | undefined {
-  return fits.value.find(fit => fit.id === id) ?? models.value.find(model => model.id === id);
+  return kindOf(id)[1].value.find(result => result.id === id);
 }
 
 export async function loadResult(id: string): Promise<Result | undefined> {
-  const [kind, list] = id.startsWith("seg_") ? (["segmentations", fits] as const) : (["models", models] as const);
+  const [kind, list] = kindOf(id);
   try {
     const result = await get<Result>(`/v1/${kind}/${id}`);
     list.value = [result, ...list.value.filter(other => other.id !== id)];
@@ -124,7 +139,7 @@ export async function loadResult(id: string): Promise<Result | undefined> {
 }
 
 export function resultsOf(volume: string): Result[] {
-  const own = [...fits.value, ...models.value].filter(result => result.volume === volume);
+  const own = [...beats.value, ...fits.value, ...models.value].filter(result => result.volume === volume);
   return own.sort(newest);
 }
 
@@ -139,7 +154,7 @@ export function put(job: Job): void {
   if (known && known.revision > job.revision) return;
   jobs.value = known ? jobs.value.with(at, job) : [job, ...jobs.value];
   if (known?.state !== job.state && job.state === "succeeded") {
-    const made = job.segmentation ?? job.model;
+    const made = madeBy(job);
     if (made && !find(made)) void loadResult(made);
   }
 }
@@ -219,9 +234,9 @@ export async function forget(job: Job): Promise<void> {
 }
 
 export async function eraseResult(id: string): Promise<void> {
-  await call(`/v1/${id.startsWith("seg_") ? "segmentations" : "models"}/${id}`, { method: "DELETE" });
-  fits.value = fits.value.filter(fit => fit.id !== id);
-  models.value = models.value.filter(model => model.id !== id);
+  const [kind, list] = kindOf(id);
+  await call(`/v1/${kind}/${id}`, { method: "DELETE" });
+  list.value = list.value.filter(result => result.id !== id);
 }
 
 export async function eraseVolume(id: string): Promise<void> {

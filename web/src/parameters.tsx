@@ -1,12 +1,10 @@
 // Every parameter of a model or fit: names, ranges, defaults and help come from the service's own document.
 
 import { useEffect, useState } from "preact/hooks";
-import { type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
+import { type Kind, type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
 import { fits, models, templates, volumes } from "./library";
 import { useWatched } from "./state";
 import { isLabelMap, moment, nameOf } from "./words";
-
-export type Kind = "model" | "segmentation";
 
 interface Schema {
   type?: string | string[];
@@ -36,12 +34,13 @@ const NOT_OF_THE_WORK = new Set(["external_id", "labels", "webhook", "webhook_ev
 
 let specs: Promise<Record<Kind, Spec[]>> | undefined;
 
-/** The parameters of both kinds of work. */
+/** The parameters of every kind of work. */
 export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
   specs ??= get<{ paths: Record<string, { post?: Operation }> }>("/openapi.json").then(
     document => ({
       model: read(document.paths["/v1/models"]?.post),
       segmentation: read(document.paths["/v1/segmentations"]?.post),
+      beat: read(document.paths["/v1/beats"]?.post),
     }),
     error => {
       specs = undefined;
@@ -55,6 +54,8 @@ const UNITS: [RegExp, string][] = [
   [/square millimetres/, "mm²"],
   [/millimetres|LPS mm/, "mm"],
   [/degrees/, "°"],
+  [/, g,/, "g"],
+  [/, ms\b/, "ms"],
   [/, in voxels/, "voxels"],
 ];
 
@@ -72,7 +73,12 @@ function read(operation?: Operation): Spec[] {
 const FEW: Record<Kind, string[]> = {
   model: ["points", "method", "iso"],
   segmentation: ["model", "edge", "reader", "expert", "frame"],
+  beat: ["model", "mass_g", "rr_ms", "gated"],
 };
+
+const PLACE = ["center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior"];
+const EDGE = ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"];
+const SPRINGS = ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"];
 
 const GROUPS: Record<Kind, [string, string[]][]> = {
   model: [
@@ -84,9 +90,15 @@ const GROUPS: Record<Kind, [string, string[]][]> = {
   ],
   segmentation: [
     ["The expert's mask", ["label", "resample"]],
-    ["Where the heart is", ["organ", "center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior"]],
-    ["Edge of the wall", ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"]],
-    ["Springs", ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"]],
+    ["Where the heart is", ["organ", ...PLACE]],
+    ["Edge of the wall", EDGE],
+    ["Springs", SPRINGS],
+    ["Polar map", ["polar_*"]],
+  ],
+  beat: [
+    ["Where the heart is", PLACE],
+    ["Edge of the wall", EDGE],
+    ["Springs", SPRINGS],
     ["Polar map", ["polar_*"]],
   ],
 };
@@ -234,6 +246,9 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
 const NAMES: Record<string, string> = {
   iso: "Iso-value",
   model: "Model to fit",
+  mass_g: "Mass of the muscle",
+  rr_ms: "R-R interval",
+  gated: "Taken for gates",
   expert: "Expert's mask",
   reader: "Drawn as by",
   edge: "Wall shown",

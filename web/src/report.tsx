@@ -59,6 +59,8 @@ function shownOf({ mesh: own, other, fit, polar, distance }: Embedded): Shown {
     expert: null,
     displacement: null,
     surface: distance ? byVertex(mesh, distance) : null,
+    gates: null,
+    figures: [],
   };
 }
 
@@ -114,7 +116,7 @@ async function draw(embedded: Embedded): Promise<void> {
     put("viewer", (
       <div class="pictures alone">
         <div class="grid one">
-          <Wall scene={scene} mesh={mesh} inner={shown.otherEdge} other={null} polar={polar} displacement={null} surface={shown.surface} />
+          <Wall scene={scene} mesh={mesh} inner={shown.otherEdge} other={null} polar={polar} displacement={null} surface={shown.surface} gates={null} figures={[]} />
         </div>
       </div>
     ));

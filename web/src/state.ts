@@ -26,6 +26,12 @@ export class Watched<T> {
 export function useWatched<T>(watched: Watched<T>): T {
   const [, draw] = useState(0);
   // Not `useEffect`: it runs after the view was painted, and what changes until then would not be seen.
-  useLayoutEffect(() => watched.watch(() => draw(n => n + 1)), [watched]);
+  const drawn = watched.value;
+  useLayoutEffect(() => {
+    const again = () => draw(n => n + 1);
+    // What another view has changed since this one was drawn.
+    if (!Object.is(watched.value, drawn)) again();
+    return watched.watch(again);
+  }, [watched]);
   return watched.value;
 }

@@ -1,6 +1,6 @@
 // How things are called and numbers are written.
 
-import type { Job, Result, Volume } from "./api";
+import type { Job, Kind, Result, Volume } from "./api";
 
 export function nameOf(volume: Volume): string {
   return volume.external_id || volume.labels["name"] || `Scan ${volume.id.slice(4, 12)}`;
@@ -45,6 +45,14 @@ export function shape(volume: Volume): string {
   return `${volume.shape.join(" × ")} voxels of ${edge} mm${frames}`;
 }
 
+/** Fewest and most gates of one heart beat that the service fits. */
+const GATES = [6, 32] as const;
+
+/** Whether the frames of a scan count as gates of a heart beat; if they are none, the job says so. */
+export function isGated(volume: Volume): boolean {
+  return volume.frames >= GATES[0] && volume.frames <= GATES[1] && !isLabelMap(volume);
+}
+
 export function isLabelMap(volume: Volume): boolean {
   return volume.label_values != null;
 }
@@ -57,6 +65,7 @@ const STAGES: Record<string, string> = {
   retile: "placing the points",
   optimise: "improving the triangles",
   deform: "fitting the wall",
+  beat: "fitting all gates",
   polar: "measuring the uptake",
   report: "measuring",
   export: "writing files",
@@ -70,13 +79,23 @@ export function isFit(id: string): boolean {
   return id.startsWith("seg_");
 }
 
+export function isBeat(id: string): boolean {
+  return id.startsWith("bea_");
+}
+
+/** The kind of work that makes such a result. */
+export function kindOf(id: string): Kind {
+  return isFit(id) ? "segmentation" : isBeat(id) ? "beat" : "model";
+}
+
 /** What distinguishes a result from others of the same scan. */
 export function resultName(result: Result): string {
-  if (isFit(result.id)) {
+  if (isFit(result.id) || isBeat(result.id)) {
     const changed = ["center", "axis", "base", "roll"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
     const model = result.parameters["model"];
     const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
-    return changed.length ? `Corrected fit${by}` : `Fit${by}`;
+    const what = isBeat(result.id) ? `beat of ${result.summary.gates} gates` : "fit";
+    return `${changed.length ? "Corrected " : ""}${what}${by}`.replace(/^./, letter => letter.toUpperCase());
   }
   return `Model, ${String(result.summary["vertices"])} points`;
 }

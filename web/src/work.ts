@@ -1,8 +1,7 @@
 // Filing work: what a person asks for becomes a job, whose state the library follows.
 
-import { type Job, type ParameterValue, type Volume, post } from "./api";
+import { type Job, type Kind, type ParameterValue, type Volume, post } from "./api";
 import { put, watchActive } from "./library";
-import type { Kind } from "./parameters";
 import { nameOf } from "./words";
 
 export async function file(kind: Kind, volume: Volume, parameters: Record<string, ParameterValue>, labels: Record<string, string> = {}): Promise<Job> {

@@ -1,21 +1,24 @@
 // The list of scans: what is being sent, what is stored, what was made of it.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Result, type Volume, words } from "./api";
+import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
-import { eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import { beats, eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
 import { Picture } from "./picture";
 import { open, route } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
-import { bytes, isFit, isLabelMap, moment, nameOf, newest, number, resultName, shape, study } from "./words";
+import { bytes, isBeat, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study } from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
-type Show = "all" | "fits" | "models" | "nothing" | "failed";
+type Show = "all" | "fits" | "beats" | "models" | "nothing" | "failed";
 type Order = "newest" | "name" | "largest";
+
+/** The kind of fit for a scan: its gates are fitted together. */
+const fitOf = (volume: Volume) => (isGated(volume) ? "beat" : "segmentation");
 
 const THEN = "ventriform.then";
 const SHOWN = 30;
@@ -29,7 +32,7 @@ export function WorkList() {
       volumes.value = [volume, ...volumes.value.filter(other => other.id !== volume.id)];
       if (then === "nothing" || isLabelMap(volume)) return;
       const alone = uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
-      file(then === "fit" ? "segmentation" : "model", volume, {}).then(
+      file(then === "model" ? "model" : fitOf(volume), volume, {}).then(
         () => alone && route.value.view === "list" && open(volume.id),
         error => setMessage(words(error)),
       );
@@ -133,6 +136,7 @@ function Scans() {
   const all = useWatched(volumes);
   const allFits = useWatched(fits);
   const allModels = useWatched(models);
+  const allBeats = useWatched(beats);
   const allJobs = useWatched(jobs);
   const next = useWatched(more);
   const isLoaded = useWatched(loaded);
@@ -142,13 +146,13 @@ function Scans() {
   const [order, setOrder] = useState<Order>("newest");
   const [at, setAt] = useState(0);
   const rows = useMemo((): Row[] => {
-    const results = [...allFits, ...allModels].sort(newest);
+    const results = [...allBeats, ...allFits, ...allModels].sort(newest);
     return all.map(volume => ({
       volume,
       results: results.filter(result => result.volume === volume.id),
       open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded"),
     }));
-  }, [all, allFits, allModels, allJobs]);
+  }, [all, allFits, allModels, allBeats, allJobs]);
   // A search looks at everything stored, so the rest of the list is read first.
   useEffect(() => {
     if (!search && order === "newest" && show === "all") return;
@@ -166,6 +170,7 @@ function Scans() {
         <ol>
           <li><b>Drop a scan.</b> It is stored on this service and nowhere else.</li>
           <li><b>The left ventricle is found and fitted</b>, usually within two seconds.</li>
+          <li><b>Of a gated scan, all gates are fitted together</b>: the wall beats, with its volumes and ejection fraction.</li>
           <li><b>Look at slices, wall and polar map together</b>; correct axis and centre by hand, compare, download.</li>
         </ol>
         <p class="quiet">No scan at hand? <code>ventriform phantom</code> simulates one.</p>
@@ -181,6 +186,7 @@ function Scans() {
           <select value={show} onChange={event => setShow(event.currentTarget.value as Show)}>
             <option value="all">all scans</option>
             <option value="fits">with a fit</option>
+            <option value="beats">with a beat</option>
             <option value="models">with a model</option>
             <option value="nothing">without a result</option>
             <option value="failed">with a failed job</option>
@@ -225,7 +231,8 @@ function matches({ volume, results }: Row, search: string): boolean {
 function passes(row: Row, show: Show): boolean {
   switch (show) {
     case "fits": return row.results.some(result => isFit(result.id));
-    case "models": return row.results.some(result => !isFit(result.id));
+    case "beats": return row.results.some(result => isBeat(result.id));
+    case "models": return row.results.some(result => !isFit(result.id) && !isBeat(result.id));
     case "nothing": return row.results.length === 0;
     case "failed": return row.open.some(job => job.state === "failed");
     case "all": return true;
@@ -244,7 +251,7 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
   const name = nameOf(volume);
   const labels = Object.entries(volume.labels).filter(([label]) => label !== "name");
   useEffect(() => loadResultsOf(volume.id), [volume.id]);
-  const start = (kind: "model" | "segmentation") => () => {
+  const start = (kind: Kind) => () => {
     setProblem("");
     file(kind, volume, {}).then(put, error => setProblem(words(error)));
   };
@@ -275,7 +282,7 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
         {state && <span class="quiet" role="status">{state}</span>}
       </div>
       <div class="actions">
-        <button type="button" onClick={start("segmentation")} aria-label={`Fit the ventricle of ${name}`}>Fit</button>
+        <button type="button" onClick={start(fitOf(volume))} aria-label={`Fit ${isGated(volume) ? "the beat" : "the ventricle"} of ${name}`}>Fit</button>
         <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>Model</button>
         <button type="button" class="plain" aria-label={`Download all of ${name} as zip`} onClick={() => {
           setProblem("");
@@ -292,15 +299,18 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
 
 function figures(result: Result) {
   const { summary } = result;
+  if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
   if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
   const given = summary.volumes_ml;
   const volumesMl = given?.anatomical ?? given;
-  const flags = summary.flags?.length ?? 0;
   return (
     <>
       <span>cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}</span>
-      {flags > 0 && <span>{" · "}</span>}
-      {flags > 0 && <span class="warning">{flags} {flags === 1 ? "doubt" : "doubts"}</span>}
+      <Doubts count={summary.flags?.length ?? 0} />
     </>
   );
+}
+
+function Doubts({ count }: { count: number }) {
+  return count > 0 ? <><span>{" · "}</span><span class="warning">{count} {count === 1 ? "doubt" : "doubts"}</span></> : null;
 }

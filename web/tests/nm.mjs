@@ -1,7 +1,8 @@
 // DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO), or a
-// PET series of one file for each slice. The same scan as header and image, and small volumes for a long list.
+// PET series of one file for each slice. The same scan as header and image, as gates of a beat, and small volumes for a long
+// list.
 
-import { gunzipSync } from "node:zlib";
+import { gunzipSync, gzipSync } from "node:zlib";
 
 const LONG = new Set(["OB", "OW", "SQ", "UN", "UT"]);
 
@@ -10,7 +11,7 @@ function element(tag, vr, value) {
   let body;
   if (Buffer.isBuffer(value)) body = value;
   else if (vr === "US") body = Buffer.concat([value].flat().map(n => Buffer.from(Uint16Array.of(n).buffer)));
-  else if (vr === "AT") body = Buffer.from(Uint16Array.of(value >>> 16, value & 0xffff).buffer);
+  else if (vr === "AT") body = Buffer.concat([value].flat().map(tag => Buffer.from(Uint16Array.of(tag >>> 16, tag & 0xffff).buffer)));
   else body = Buffer.from([value].flat().join("\\"), "utf8");
   if (body.length % 2) body = Buffer.concat([body, Buffer.from(vr === "UI" ? "\0" : " ")]);
   const head = Buffer.alloc(LONG.has(vr) ? 12 : 8);
@@ -71,13 +72,21 @@ function image([nx, ny], steps) {
 }
 
 export function nm(nifti, patient) {
-  const { shape, pixels, steps, origin } = scanOf(nifti);
+  const scan = scanOf(nifti);
+  return nmFile(scan, patient, "RECON TOMO", [
+    element(0x00280008, "IS", scan.shape[2]),
+    element(0x00280009, "AT", 0x00540080),
+  ], [element(0x00540080, "US", Array.from({ length: scan.shape[2] }, (_, n) => n + 1))]);
+}
+
+/** An NM file with the elements that say how its frames are counted, and those of each frame. */
+function nmFile({ shape, pixels, steps, origin }, patient, type, counted, vectors) {
   const kind = "1.2.840.10008.5.1.4.1.1.20";
   const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
   return Buffer.concat([
     ...head(kind, `${ROOT}.7.3`),
     element(0x00080005, "CS", "ISO_IR 192"),
-    element(0x00080008, "CS", ["DERIVED", "PRIMARY", "RECON TOMO", "EMISSION"]),
+    element(0x00080008, "CS", ["DERIVED", "PRIMARY", type, "EMISSION"]),
     element(0x00080016, "UI", kind),
     element(0x00080018, "UI", `${ROOT}.7.3`),
     element(0x00080020, "DA", "20250115"),
@@ -92,11 +101,10 @@ export function nm(nifti, patient) {
     element(0x00200052, "UI", `${ROOT}.7.4`),
     element(0x00280002, "US", 1),
     element(0x00280004, "CS", "MONOCHROME2"),
-    element(0x00280008, "IS", shape[2]),
-    element(0x00280009, "AT", 0x00540080),
+    ...counted,
     ...image(shape, steps),
     element(0x00540022, "SQ", item(element(0x00200032, "DS", origin.map(number)), element(0x00200037, "DS", sides.map(number)))),
-    element(0x00540080, "US", Array.from({ length: shape[2] }, (_, n) => n + 1)),
+    ...vectors,
     element(0x7fe00010, "OW", pixels),
   ]);
 }
@@ -141,6 +149,88 @@ export function pair(nifti) {
   const start = header.readFloatLE(108);
   header.writeFloatLE(0, 108);
   return { header, image: file.subarray(start) };
+}
+
+/** How much shorter every length about the heart is at end systole, and when that is, in turns of the cycle. */
+const [SHRINKAGE, SYSTOLE] = [0.1, 0.375];
+
+/** The gates of a beat as `scripts/gated_phantom.py` makes them: the scan drawn together about the heart and let go again. */
+function beat(nifti, truth, gates) {
+  const file = gunzipSync(nifti);
+  const [nx, ny, nz] = [42, 44, 46].map(at => file.readInt16LE(at));
+  const count = nx * ny * nz;
+  const start = file.readFloatLE(108);
+  const [slope, intercept] = [112, 116].map(at => file.readFloatLE(at));
+  const voxels = Float32Array.from({ length: count }, (_, n) => Math.max(0, slope * file.readInt16LE(start + 2 * n) + intercept));
+  const mask = gunzipSync(truth);
+  const first = mask.readFloatLE(108);
+  const size = mask.readInt16LE(72) / 8;
+  const [sum, middle] = [[0, 0, 0], []];
+  let inside = 0;
+  for (let n = 0; n < count; n++) {
+    if (mask[first + size * n] === 0) continue;
+    inside++;
+    [n % nx, Math.floor(n / nx) % ny, Math.floor(n / (nx * ny))].forEach((at, axis) => (sum[axis] += at));
+  }
+  sum.forEach((total, axis) => (middle[axis] = total / inside));
+  return Array.from({ length: gates }, (_, gate) => {
+    const turns = (gate + 0.5) / gates;
+    const way = turns < SYSTOLE ? turns / SYSTOLE : (1 - turns) / (1 - SYSTOLE);
+    const scale = 1 - (SHRINKAGE * (1 - Math.cos(Math.PI * way))) / 2;
+    // For each axis, the voxel before a place and the share of the next.
+    const places = [nx, ny, nz].map((length, axis) => Array.from({ length }, (_, at) => {
+      const place = Math.max(0, Math.min(length - 1, middle[axis] + (at - middle[axis]) / scale));
+      const before = Math.min(length - 2, Math.floor(place));
+      return [before, place - before];
+    }));
+    const out = new Int16Array(count);
+    for (let k = 0, n = 0; k < nz; k++) {
+      const [c, w] = places[2][k];
+      for (let j = 0; j < ny; j++) {
+        const [b, v] = places[1][j];
+        const row = (c * ny + b) * nx;
+        for (let i = 0; i < nx; i++, n++) {
+          const [a, u] = places[0][i];
+          const along = at => voxels[at] + u * (voxels[at + 1] - voxels[at]);
+          const across = at => along(at) + v * (along(at + nx) - along(at));
+          const low = across(row + a);
+          out[n] = Math.round((low + w * (across(row + nx * ny + a) - low)) / scale ** 3);
+        }
+      }
+    }
+    return out;
+  });
+}
+
+/** A 4-D NIfTI-1 file of the gates of a beat, which lasts `rr` ms; the header says nothing of gates. */
+export function gated(nifti, truth, gates, rr = 900) {
+  const header = Buffer.from(gunzipSync(nifti).subarray(0, 352));
+  header.writeInt16LE(4, 40);
+  header.writeInt16LE(gates, 48);
+  header.writeFloatLE(rr / 1000 / gates, 92);
+  [352, 1, 0].forEach((value, n) => header.writeFloatLE(value, 108 + 4 * n)); // start, slope and intercept
+  header[123] = 2 | 8; // mm and s
+  return gzipSync(Buffer.concat([header, ...beat(nifti, truth, gates).map(voxels => Buffer.from(voxels.buffer))]));
+}
+
+/** The same beat as a gated NM file. */
+export function gatedNm(nifti, truth, gates, patient, rr = 900) {
+  const scan = scanOf(nifti);
+  const frames = Array.from({ length: gates * scan.shape[2] }, (_, n) => [Math.floor(n / scan.shape[2]) + 1, (n % scan.shape[2]) + 1]);
+  const pixels = Buffer.concat(beat(nifti, truth, gates).map(voxels => Buffer.from(Uint16Array.from(voxels).buffer)));
+  const timing = item(element(0x00181062, "IS", rr), element(0x00181063, "DS", number(rr / gates)), element(0x00181083, "IS", 400), element(0x00181084, "IS", 12));
+  return nmFile({ ...scan, pixels }, patient, "RECON GATED TOMO", [
+    element(0x00280008, "IS", frames.length),
+    element(0x00280009, "AT", [0x00540060, 0x00540070, 0x00540080]),
+  ], [
+    element(0x00540060, "US", frames.map(() => 1)),
+    element(0x00540061, "US", 1),
+    element(0x00540062, "SQ", item(element(0x00540063, "SQ", timing))),
+    element(0x00540070, "US", frames.map(([gate]) => gate)),
+    element(0x00540071, "US", gates),
+    element(0x00540080, "US", frames.map(([, slice]) => slice)),
+    element(0x00540081, "US", scan.shape[2]),
+  ]);
 }
 
 /** A NIfTI-1 volume of 8 x 8 x (7 + n) voxels of 1 mm, which count up from n. */

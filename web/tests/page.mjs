@@ -11,7 +11,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
-import { nm, pair, series, small } from "./nm.mjs";
+import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 
 const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
@@ -53,7 +53,7 @@ async function service(...flags) {
 }
 
 /** A tab that fails the check if anything is wrong behind the view. */
-async function tab(browser, address, { width = 1280, dark = false, expected = [], script, scripts = true, ratio = 1 } = {}) {
+async function tab(browser, address, { width = 1280, dark = false, expected = [], script, scripts = true, ratio = 1, motion = true } = {}) {
   const context = await browser.newContext({
     viewport: { width, height: width > 600 ? 800 : 850 },
     colorScheme: dark ? "dark" : "light",
@@ -61,6 +61,7 @@ async function tab(browser, address, { width = 1280, dark = false, expected = []
     acceptDownloads: true,
     javaScriptEnabled: scripts,
     deviceScaleFactor: ratio,
+    reducedMotion: motion ? "no-preference" : "reduce",
   });
   const page = await context.newPage();
   page.setDefaultTimeout(PATIENCE);
@@ -450,6 +451,119 @@ async function main() {
     await page.goto(`${address}/#/`);
     await page.waitForFunction(() => /Phantom Fritz/.test(document.querySelector(".scans")?.textContent ?? ""));
     assert.deepEqual(faults, []);
+    await close();
+  });
+
+  await check("a gated scan becomes a beat: played, stepped, corrected, printed", async () => {
+    const folder = join(SCREENSHOTS, "gated");
+    assert.equal(spawnSync(PROGRAM, ["phantom", "-o", folder, "--size", "64", "--spacing", "6.4"]).status, 0);
+    const [scan, truth] = ["spect", "lv_truth"].map(name => readFileSync(join(folder, `${name}.nii.gz`)));
+    const [nifti, dicom, dynamic] = ["gated.nii.gz", "gated.dcm", "dynamic.nii.gz"].map(name => join(folder, name));
+    writeFileSync(nifti, gated(scan, truth, 8));
+    writeFileSync(dicom, gatedNm(scan, truth, 16, "Beat^Berta"));
+    writeFileSync(dynamic, gated(scan, truth, 8, 480_000));
+    const played = page => page.waitForFunction(() => document.querySelector(".player") && !document.querySelector(".player [role=status]"));
+    const gate = page => page.getByLabel("Gate", { exact: true }).inputValue().then(Number);
+    const moment = page => page.locator(".beat-chart .now line").getAttribute("x1");
+    const moves = (page, from) => page.waitForFunction(old => document.querySelector(".beat-chart .now line").getAttribute("x1") !== old, from);
+    for (const [width, dark, file, gates] of [[1280, false, nifti, 8], [1280, true, dicom, 16], [400, false, dicom, 16], [400, true, nifti, 8]]) {
+      const name = `${width}-${dark ? "dark" : "light"}`;
+      const motion = width === 1280;
+      const own = await service();
+      const { page, faults, close } = await tab(browser, own.address, { width, dark, motion });
+      await page.waitForSelector(".welcome");
+      await choose(page, file);
+      await played(page);
+      const button = page.locator(".player button.main");
+      // It plays unless less motion is asked for.
+      assert.equal(await button.textContent(), motion ? "Pause" : "Play");
+      if (motion) {
+        await moves(page, await moment(page));
+        await page.keyboard.press(" ");
+      }
+      assert.equal(await button.textContent(), "Play");
+      await page.waitForTimeout(200);
+      const [still, first] = [await moment(page), await gate(page)];
+      await page.waitForTimeout(400);
+      assert.equal(await moment(page), still, "it stands still");
+      await page.keyboard.press("ArrowRight");
+      await moves(page, still);
+      assert.equal(await gate(page), (first % gates) + 1);
+      await page.keyboard.press("ArrowLeft");
+      await page.keyboard.press("ArrowLeft");
+      assert.equal(await gate(page), ((first + gates - 2) % gates) + 1);
+      await page.keyboard.press(" ");
+      await page.waitForFunction(() => document.querySelector(".player button.main").textContent === "Pause");
+      await moves(page, await moment(page));
+      await page.getByLabel("Speed").selectOption("0.25");
+      await button.click();
+      // At end systole the slices show another gate than at end diastole.
+      const picture = () => page.locator(".slice canvas").first().evaluate(canvas => canvas.toDataURL());
+      const at = wanted => page.getByLabel("Gate", { exact: true }).fill(String(wanted));
+      const report = await page.evaluate(async () => {
+        const { beats } = await (await fetch("/v1/beats")).json();
+        return (await fetch(beats[0].links.report)).json();
+      });
+      await at(report.end_diastole_gate);
+      await page.waitForTimeout(300);
+      assert.match(await page.textContent(".player .gate"), /end diastole/);
+      const wide = await picture();
+      await at(report.end_systole_gate);
+      await page.waitForTimeout(300);
+      assert.match(await page.textContent(".player .gate"), /end systole/);
+      assert.notEqual(await picture(), wide);
+
+      const figures = await page.textContent(".figures");
+      assert.match(figures, new RegExp(`Ejection fraction90 %: ${report.ef_interval_percent.map(end => end.toFixed(0)).join(" to ")}${report.ef_percent.toFixed(0)}`));
+      assert.match(figures, /End-diastolic volume90 %[^]*End-systolic volume90 %[^]*Stroke volume[^]*Bandwidth/);
+      if (gates === 16) assert.match(figures, /Peak filling rate[\d.]+/);
+      assert.equal(await page.locator(".maps canvas[role=img]").count(), 5);
+      const colours = page.getByLabel("Colour of the wall");
+      for (const figure of await colours.locator("option").allTextContents()) await colours.selectOption(figure);
+      assert.ok((await colours.locator("option").allTextContents()).includes("Motion inward"));
+      await colours.selectOption("Uptake");
+      const map = page.locator(".maps canvas[role=img]").last();
+      await map.scrollIntoViewIfNeeded();
+      const box = await map.boundingBox();
+      await map.click({ position: { x: box.width * 0.5, y: box.height * 0.2 } });
+      await page.waitForFunction(() => /anterior/.test(document.querySelector(".maps figure:last-child figcaption").textContent));
+      await page.locator(".beat-maps details summary").click();
+      assert.equal(await page.locator(".beat-maps tbody tr").count(), 17);
+      await look(page, `beat-${name}`);
+      if (width === 1280) assert.equal(await printed(page, `beat-${name}`), 1, "pages on paper");
+
+      // Another rim: all gates are fitted again.
+      await page.getByRole("button", { name: "Correct by hand" }).click();
+      const base = page.locator(".correction label", { hasText: "Base" }).locator("input");
+      await base.fill(String(Number(await base.inputValue()) + 6));
+      await look(page, `beat-correct-${name}`);
+      await page.getByRole("button", { name: "Fit from here" }).click();
+      await page.waitForSelector(".choices .other");
+      assert.match(await page.textContent(".choices .current"), /Corrected beat of \d+ gates[^]*by hand: base; from the fit of/);
+      await page.waitForFunction(() => document.querySelectorAll(".figures thead th").length >= 2);
+      await played(page);
+      await look(page, `beat-compare-${name}`);
+      if (width === 1280) {
+        assert.equal(await printed(page, `beat-compare-${name}`), 1, "pages on paper");
+        const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+        assert.match(namesIn(await zip.path()), /beat\.json[^]*mesh\.glb/);
+      }
+      await page.goto(`${own.address}/#/`);
+      await page.waitForFunction(() => document.querySelectorAll(".scan .result").length === 2);
+      assert.match(await page.textContent(".scan .result"), /EF \d+.%/);
+      await look(page, `beat-list-${name}`);
+      assert.deepEqual(faults, []);
+      await close();
+      await own.stop();
+    }
+    // Frames that last minutes are no gates: said in words, and the first of them is shown.
+    const { page, close } = await tab(browser, address, { expected: [/status of 4\d\d/] });
+    await page.waitForSelector(".drop");
+    await choose(page, dynamic);
+    await page.waitForFunction(() => /no gates of one heart beat/.test(document.querySelector(".job.failed")?.textContent ?? ""));
+    await page.waitForSelector(".slice canvas");
+    assert.equal(await page.locator(".stage [role=alert]").count(), 0);
+    await look(page, "dynamic-1280");
     await close();
   });
 

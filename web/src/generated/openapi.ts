@@ -376,6 +376,7 @@ export interface components {
             };
             /** @description Phases of the wall. */
             phase: components["schemas"]["PhaseReport"];
+            posture?: components["schemas"]["Posture"] | null;
             rates?: components["schemas"]["RatesReport"] | null;
             resolution_mm?: components["schemas"]["Resolution"] | null;
             /**

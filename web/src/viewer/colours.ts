@@ -1,5 +1,6 @@
 // Colour maps: 256 colours each, from a few anchors.
 
+import figures from "../../../crates/ventriform/assets/figures.json";
 import uptake from "../../../crates/ventriform/assets/uptake.json";
 
 export type Lut = Uint8Array;
@@ -47,6 +48,12 @@ export const LUTS: Record<string, Lut> = {
 
 /** For what has a middle: distances and differences. */
 export const DIVERGING = ramp([[0, "#2166ac"], [0.25, "#92c5de"], [0.5, "#f7f7f7"], [0.75, "#f4a582"], [1, "#b2182b"]]);
+
+/** Round the cycle of a beat. */
+export const CYCLE = ramp([...figures.cycle, figures.cycle[0]!].map((rgb, n): [number, string] => [n / figures.cycle.length, hex(rgb)]));
+
+/** A wall that moves outward, or gets thinner. */
+export const OUTWARD = figures.outward as [number, number, number];
 
 export function colour(lut: Lut, share: number): [number, number, number] {
   const n = Math.max(0, Math.min(255, Math.round(share * 255))) * 3;

@@ -4,7 +4,7 @@ import { useLayoutEffect, useState } from "preact/hooks";
 import { type ParameterValue, type Volume, fieldOf, words } from "../api";
 import { ReaderChoice, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { useWatched } from "../state";
-import { isFit } from "../words";
+import { isGated, kindOf } from "../words";
 import { file } from "../work";
 import type { Loaded } from "./loaded";
 import { frameOf } from "./plane";
@@ -51,6 +51,8 @@ export function Correction({ scene, volume, shown }: Props) {
   }, [scene, shown]);
   if (!edit) return null;
 
+  const kind = shown?.beat || (!shown && isGated(volume)) ? "beat" : "segmentation";
+  const corrected = shown && kindOf(shown.result.id) === kind ? shown : null;
   const axis = unit(sub(edit.apex, edit.base));
   const centreTo = (center: Vec) => {
     const way = sub(center, edit.center);
@@ -72,9 +74,9 @@ export function Correction({ scene, volume, shown }: Props) {
     setProblem(null);
     setSending(true);
     try {
-      const specs = (await parameterSpecs()).segmentation;
-      const before = shown && isFit(shown.result.id) ? valuesOf(draftOf(shown.result.parameters, specs), specs) : {};
-      const next: Record<string, ParameterValue> = { ...before, edge };
+      const specs = (await parameterSpecs())[kind];
+      const before = corrected ? valuesOf(draftOf(corrected.result.parameters, specs), specs) : {};
+      const next: Record<string, ParameterValue> = { ...before, ...(kind === "beat" ? {} : { edge }) };
       if (edit.changed.has("center")) {
         next["center"] = edit.center.map(value => Math.round(value * 100) / 100);
         delete next["seed_point"];
@@ -92,8 +94,8 @@ export function Correction({ scene, volume, shown }: Props) {
       }
       const changed = [...edit.changed, ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []), ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
       const labels: Record<string, string> = { changed: changed.join(" ") || "nothing" };
-      if (shown && isFit(shown.result.id)) labels["parent"] = shown.result.id;
-      await file("segmentation", volume, next, labels);
+      if (corrected) labels["parent"] = corrected.result.id;
+      await file(kind, volume, next, labels);
     } catch (error) {
       setProblem({ field: fieldOf(error), text: words(error) });
     }
@@ -101,7 +103,7 @@ export function Correction({ scene, volume, shown }: Props) {
   };
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
-      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. The new fit is kept beside this one and names it.</p>
+      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.</p>
       <Triple name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
       <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
       <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
@@ -113,17 +115,17 @@ export function Correction({ scene, volume, shown }: Props) {
         Turn about the axis, °
         <input type="number" step={5} value={edit.roll} onInput={event => (scene.edit.value = { ...edit, roll: Number(event.currentTarget.value) || 0, changed: new Set(edit.changed).add("roll") })} />
       </label>
-      <label class="field">
+      {kind === "segmentation" && <label class="field">
         Wall shown
         <select value={edge} onChange={event => setEdge(event.currentTarget.value)}>
           <option value="apparent">apparent: as the image shows it</option>
           <option value="anatomical">anatomical: without blur</option>
         </select>
-      </label>
-      <label class="field">
+      </label>}
+      {kind === "segmentation" && <label class="field">
         Drawn as by
         <ReaderChoice common={{ id: "correction-reader" }} text={reader} onText={setReader} />
-      </label>
+      </label>}
       {problem && <p class="error" role="alert">{problem.text}</p>}
       <div class="buttons">
         <button type="button" class="main" disabled={sending} onClick={() => void send()}>Fit from here</button>

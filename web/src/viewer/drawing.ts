@@ -42,7 +42,7 @@ export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Pl
   const step = Math.max(finest, 1 / factor);
   const [nx, ny] = [Math.max(1, Math.ceil(box.width / factor / step)), Math.max(1, Math.ceil(box.height / factor / step))];
   const values = sample(scene.voxels, plane, origin, nx, ny, step);
-  const { low, high } = scene.window.value;
+  const { low, high } = scene.windowNow;
   const lut: Lut = scene.lut.value;
   const image = new ImageData(nx, ny);
   const gain = 255 / (high - low || 1);
@@ -144,7 +144,7 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
   paint(context, scene, plane, origin, { x: 0, y: 0, width, height }, factor);
   context.save();
   context.translate(width / 2, height / 2);
-  contours(context, scene.layers.value, plane, origin, factor, Math.hypot(width, height) / 2 / factor);
+  contours(context, scene.layersNow, plane, origin, factor, Math.hypot(width, height) / 2 / factor);
   const flat = (place: Vec): [number, number] => {
     const r = sub(place, origin);
     return [dot(r, plane.right) * factor, dot(r, plane.down) * factor];

@@ -4,15 +4,18 @@ import { at } from "../base";
 import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, saveResult } from "../bundle";
-import { bytes, isFit, moment, number, resultName } from "../words";
-import type { Agreement, ModelSummary, SegmentationReport } from "../generated/openapi";
+import { bytes, kindOf, moment, number, resultName } from "../words";
+import type { Agreement, BeatReport, ModelSummary, SegmentationReport } from "../generated/openapi";
 import type { Loaded } from "./loaded";
 
-type Row = [string, (loaded: Loaded) => number | null | undefined, number, string];
+/** Name, figure, digits, unit; for some, the interval that holds the truth in nine of ten hearts. */
+type Row = [string, (loaded: Loaded) => number | null | undefined, number, string, ((loaded: Loaded) => number[] | null | undefined)?];
 
 const of = (read: (report: SegmentationReport) => number | null | undefined) => (loaded: Loaded) => loaded.report && read(loaded.report);
 const summary = (name: keyof ModelSummary) => (loaded: Loaded) => loaded.result.summary[name];
 const measure = (name: keyof Agreement) => of(report => report.measures?.[name]);
+
+const beat = <T,>(read: (report: BeatReport) => T) => (loaded: Loaded) => loaded.beat && read(loaded.beat.report);
 
 const FIT: [string, Row[]][] = [
   ["", [
@@ -47,35 +50,65 @@ const MODEL: [string, Row[]][] = [
   ]],
 ];
 
+const BEAT: [string, Row[]][] = [
+  ["", [
+    ["Ejection fraction", beat(r => r.ef_percent), 0, "%", beat(r => r.ef_interval_percent)],
+    ["End-diastolic volume", beat(r => r.edv_ml), 0, "ml", beat(r => r.edv_interval_ml)],
+    ["End-systolic volume", beat(r => r.esv_ml), 0, "ml", beat(r => r.esv_interval_ml)],
+    ["Stroke volume", beat(r => r.sv_ml), 0, "ml"],
+    ["Mass", beat(r => r.mass_g), 0, "g"],
+    ["Peak ejection rate", beat(r => r.rates?.peak_ejection_edv_per_s), 1, "EDV/s"],
+    ["Peak filling rate", beat(r => r.rates?.peak_filling_edv_per_s), 1, "EDV/s"],
+    ["Time to peak filling", beat(r => r.rates?.time_to_peak_filling_ms), 0, "ms"],
+    ["R-R interval", beat(r => r.rr_ms), 0, "ms"],
+  ]],
+  ["Phases of the wall", [
+    ["Mean", beat(r => r.phase.mean_degrees), 0, "°"],
+    ["Standard deviation", beat(r => r.phase.sd_degrees), 0, "°"],
+    ["Bandwidth, 95 %", beat(r => r.phase.bandwidth_degrees), 0, "°"],
+    ["Entropy", beat(r => r.phase.entropy_percent), 0, "%"],
+  ]],
+];
+
+const ROWS = { segmentation: FIT, model: MODEL, beat: BEAT };
+
 /** The figures that are read first. */
-export function headlines(shown: Loaded): [string, string][] {
-  const rows = (isFit(shown.result.id) ? FIT : MODEL)[0]![1];
-  return rows.slice(0, 5).flatMap(([name, read, digits, unit]): [string, string][] => (typeof read(shown) === "number" ? [[name, number(read(shown), digits, unit)]] : []));
+export function headlines(shown: Loaded): [string, string, string][] {
+  const rows = ROWS[kindOf(shown.result.id)][0]![1];
+  return rows.slice(0, 5).flatMap(([name, read, digits, unit, interval]): [string, string, string][] => (typeof read(shown) === "number" ? [[name, number(read(shown), digits, unit), between(interval?.(shown), digits)]] : []));
+}
+
+function between(interval: number[] | null | undefined, digits: number): string {
+  return interval ? `${number(interval[0], digits)} to ${number(interval[1], digits)}` : "";
 }
 
 /** How likely the fit is good, and every reason to doubt it. */
-export function Verdict({ report }: { report: SegmentationReport }) {
-  const { confidence } = report.fit;
+export function Verdict({ shown }: { shown: Loaded }) {
+  const flags = shown.report?.flags ?? shown.beat?.report.flags ?? [];
+  const confidence = shown.report?.fit.confidence ?? shown.beat?.report.confidence;
   return (
-    <div class={report.flags.length ? "verdict doubt" : "verdict"}>
+    <div class={flags.length ? "verdict doubt" : "verdict"}>
       {typeof confidence === "number" && (
         <p>
-          <b>{confidence > 0.99 ? "> 99" : (100 * confidence).toFixed(0)} %</b> likely a good fit
+          <b>{confidence > 0.99 ? "> 99" : (100 * confidence).toFixed(0)} %</b> likely a good fit{shown.beat && " of the gates’ sum"}
           <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
         </p>
       )}
-      {report.flags.length > 0 ? <ul>{report.flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
+      {flags.length > 0 ? <ul>{flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
     </div>
   );
 }
 
 export function Figures({ shown, other, verdict = true }: { shown: Loaded; other: Loaded | null; verdict?: boolean }) {
-  const sections = isFit(shown.result.id) ? FIT : MODEL;
+  const sections = ROWS[kindOf(shown.result.id)];
   const { report } = shown;
+  const warnings = report?.warnings ?? shown.beat?.report.warnings ?? [];
+  const choice = report?.choice ?? (shown.beat && `started from ${shown.beat.report.template}`);
+  const reason = shown.beat?.report.no_rates;
   return (
     <section class="figures" aria-label="Figures">
-      {report && verdict && <Verdict report={report} />}
-      {verdict && report?.warnings.map(text => <p key={text} class="warning">{text}</p>)}
+      {(report || shown.beat) && verdict && <Verdict shown={shown} />}
+      {verdict && warnings.map(text => <p key={text} class="warning">{text}</p>)}
       <table>
         <caption class="hidden">Figures of the shown result{other && " and of the compared one"}</caption>
         <thead class={other ? "" : "hidden"}>
@@ -87,9 +120,9 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
           return (
             <tbody key={title}>
               {title && <tr><th scope="colgroup" colSpan={3} class="part">{title}</th></tr>}
-              {filled.map(([name, read, digits, unit]) => (
+              {filled.map(([name, read, digits, unit, interval]) => (
                 <tr key={name}>
-                  <th scope="row">{name}</th>
+                  <th scope="row">{name}{interval?.(shown) && <span class="interval">90 %: {between(interval(shown), digits)}</span>}</th>
                   <td>{number(read(shown), digits, unit)}</td>
                   {other && <td>{number(read(other), digits, unit)}</td>}
                 </tr>
@@ -98,7 +131,8 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
           );
         })}
       </table>
-      <p class="quiet">{resultName(shown.result)} of {moment(shown.result.created_at)}{report && `; ${report.choice}`}</p>
+      {reason && <p class="quiet">No rates: {reason}.</p>}
+      <p class="quiet">{resultName(shown.result)} of {moment(shown.result.created_at)}{choice && `; ${choice}`}</p>
     </section>
   );
 }

@@ -1,15 +1,24 @@
 // A result with all that the views draw of it.
 
-import { type FileOfResult, type Result, type Volume, call, get } from "../api";
-import type { Closeness, PolarMap, SegmentationReport } from "../generated/openapi";
-import { isFit } from "../words";
-import type { Mesh } from "./mesh";
+import { type FileOfResult, type Result, type Volume, call, fieldOf, get } from "../api";
+import type { BeatReport, Closeness, PolarMap, SegmentationReport } from "../generated/openapi";
+import { isBeat, isFit } from "../words";
+import { type Mesh, meanOf } from "./mesh";
+import type { FigureMap } from "./polar";
 import { type Shown, byVertex, heartOf, middleOf, wallNames } from "./shown";
 import { type Voxels, unpackNifti } from "./volume";
 
 export interface Loaded extends Shown {
   result: Result;
   report: SegmentationReport | null;
+  beat: LoadedBeat | null;
+}
+
+/** What belongs to a beat beside its wall. */
+export interface LoadedBeat {
+  report: BeatReport;
+  /** Uptake of end diastole and of end systole. */
+  ends: [PolarMap, PolarMap] | null;
 }
 
 const keptVoxels = new Map<string, Promise<Voxels>>();
@@ -40,17 +49,71 @@ function expertOf(id: string, parameters: Result["parameters"]): Promise<Voxels>
   return kept(`/v1/volumes/${id}/voxels.nii.gz?${query}`);
 }
 
-/** The voxels of a stored volume, whatever its files are. */
-export function voxelsOf(volume: Pick<Volume, "id">, frame: number | null): Promise<Voxels> {
-  return kept(`/v1/volumes/${volume.id}/voxels.nii.gz${frame === null ? "" : `?frame=${frame}`}`);
+/** The voxels of a stored volume, whatever its files are; of frames that are no gates, and of which none is chosen, the first. */
+export function voxelsOf(volume: Pick<Volume, "id" | "frames">, frame: number | null): Promise<Voxels> {
+  const path = `/v1/volumes/${volume.id}/voxels.nii.gz`;
+  if (frame !== null) return kept(`${path}?frame=${frame}`);
+  return kept(path).catch(error => {
+    if (volume.frames > 1 && fieldOf(error) === "frame") return kept(`${path}?frame=0`);
+    throw error;
+  });
 }
 
-export async function loadLoaded(result: Result): Promise<Loaded> {
+/** The voxels of every gate of a volume, one after the other; `told` has those that were read. */
+export async function readGates({ id }: Pick<Volume, "id">, gates: number, told: (read: (Voxels | null)[]) => boolean): Promise<void> {
+  const read: (Voxels | null)[] = new Array<null>(gates).fill(null);
+  for (let gate = 0; gate < gates; gate++) {
+    read[gate] = await loadVoxels(`/v1/volumes/${id}/voxels.nii.gz?frame=${gate}`);
+    if (!told([...read])) return;
+  }
+}
+
+async function loadBeat(result: Result): Promise<Loaded> {
+  const { file, json } = filesOf(result);
+  const report = await json<BeatReport>("beat.json");
+  if (!report) throw new Error("This beat has no report.");
+  const [meshes, polar, ed, es, ...figures] = await Promise.all([
+    Promise.all(report.gates.map(({ gate }) => get<Mesh>(file(`mesh_gate${String(gate).padStart(2, "0")}.json`)?.href ?? ""))),
+    json<PolarMap>("polar.json"),
+    json<PolarMap>("polar_ed.json"),
+    json<PolarMap>("polar_es.json"),
+    json<FigureMap>("polar_motion.json"),
+    json<FigureMap>("polar_thickening.json"),
+    json<FigureMap>("polar_phase.json"),
+  ]);
+  const heart = heartOf({ fit: report, posture: report.posture ?? null, polar });
+  const mesh = meanOf(meshes);
+  return {
+    result,
+    report: null,
+    beat: { report, ends: ed && es && [ed, es] },
+    mesh,
+    gates: meshes,
+    figures: figures.filter(map => map !== null),
+    otherEdge: null,
+    polar,
+    heart,
+    middle: middleOf(mesh, heart),
+    names: ["wall", ""],
+    mask: null,
+    expert: null,
+    displacement: null,
+    surface: null,
+  };
+}
+
+function filesOf(result: Result) {
   const file = (name: string): FileOfResult | undefined => result.files.find(one => one.name === name);
   const json = async <T>(name: string): Promise<T | null> => {
     const found = file(name);
     return found ? get<T>(found.href) : null;
   };
+  return { file, json };
+}
+
+export async function loadLoaded(result: Result): Promise<Loaded> {
+  if (isBeat(result.id)) return loadBeat(result);
+  const { file, json } = filesOf(result);
   const meshFile = file("mesh.json");
   if (!meshFile) throw new Error("This result has no mesh.");
   const fit = isFit(result.id);
@@ -71,6 +134,9 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
   return {
     result,
     report,
+    beat: null,
+    gates: null,
+    figures: [],
     mesh,
     otherEdge: inner,
     polar,

@@ -1,7 +1,7 @@
 // Triangle meshes: their outline in a plane, and figures for every vertex to colour them by.
 
 import type { Plane } from "./plane";
-import { type Vec, add, cross, dot, norm, sub, unit } from "./vector";
+import { type Vec, add, cross, dot, mix, norm, scale, sub, unit } from "./vector";
 
 export interface Mesh {
   vertices: Vec[];
@@ -19,6 +19,21 @@ export function withNormals(vertices: Vec[], triangles: Mesh["triangles"]): Mesh
     for (const at of [a, b, c]) normals[at] = add(normals[at]!, normal);
   }
   return { vertices, triangles, normals: normals.map(unit) };
+}
+
+/** The mean of meshes with the same triangles. */
+export function meanOf(meshes: Mesh[]): Mesh {
+  const vertices = meshes[0]!.vertices.map((_, at) => scale(meshes.reduce<Vec>((sum, mesh) => add(sum, mesh.vertices[at]!), [0, 0, 0]), 1 / meshes.length));
+  return withNormals(vertices, meshes[0]!.triangles);
+}
+
+/** The mesh at a moment of the cycle, between those in the middle of its gates. */
+export function between(gates: Mesh[], turns: number): Mesh {
+  const place = turns * gates.length - 0.5 + gates.length;
+  const [from, to] = [Math.floor(place), Math.floor(place) + 1].map(n => gates[n % gates.length]!) as [Mesh, Mesh];
+  const share = place - Math.floor(place);
+  const mixed = (a: Vec[], b: Vec[]) => a.map((one, at) => mix(one, b[at]!, share));
+  return { vertices: mixed(from.vertices, to.vertices), triangles: from.triangles, normals: mixed(from.normals, to.normals).map(unit) };
 }
 
 /** Where the mesh cuts the plane through `origin`: pairs of points in the plane's own millimetres. */

@@ -50,8 +50,8 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
       scene.cursor.value = shown.middle;
       scene.view.value = { width: HEART_WIDTH, middle: scene.heart.value ? null : shown.middle };
       // The window reaches to the wall's own maximum: liver and gut may be hotter.
-      const hottest = Math.max(...uptake(scene.voxels, shown.mesh));
-      if (hottest > scene.voxels.lowest) scene.window.value = { low: scene.window.value.low, high: hottest };
+      const hottest = Math.max(...uptake(scene.still, shown.mesh));
+      if (hottest > scene.still.lowest) scene.window.value = { low: scene.window.value.low, high: hottest };
     }
     if (!shown && scene.view.value.width === 0) scene.view.value = { width: 260, middle: null };
   }, [scene, shown, other]);
@@ -83,7 +83,7 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
     return () => removeEventListener("keydown", press);
   }, [scene]);
 
-  const range = scene.voxels.highest - Math.min(0, scene.voxels.lowest);
+  const range = scene.still.highest - Math.min(0, scene.still.lowest);
   const tools: [Tool, string][] = [["cursor", "Point"], ["window", "Window"], ["move", "Move"]];
   return (
     <div class="pictures" ref={stage}>
@@ -150,8 +150,8 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
   );
 }
 
-function wallOf({ mesh, otherEdge, polar, displacement, surface }: Shown) {
-  return { mesh, inner: otherEdge, polar, displacement, surface };
+function wallOf({ mesh, gates, figures, otherEdge, polar, displacement, surface }: Shown) {
+  return { mesh, gates, figures, inner: otherEdge, polar, displacement, surface };
 }
 
 function Swatch({ layer }: { layer: Layer }) {
@@ -175,6 +175,7 @@ function Keys() {
     ["W, M", "drag sets the window, moves the picture"],
     ["Home, 0", "back to the heart"],
     ["F", "full screen"],
+    ["Space, arrows outside of the views", "a beat: play and pause, gate by gate"],
   ];
   return <dl class="keys">{rows.map(([key, what]) => <div key={key}><dt>{key}</dt><dd>{what}</dd></div>)}</dl>;
 }

@@ -1,15 +1,79 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
-import type { PolarMap, PolarSegment } from "../generated/openapi";
-import { type Lut, NO_WALL, colour, thresholdOn } from "./colours";
+import type { PolarMap } from "../generated/openapi";
+import { CYCLE, LUTS, type Lut, NO_WALL, OUTWARD, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
+/** The place of every pixel of a map. */
+type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings">;
+
+/** A map of one figure of the wall. */
+export interface DrawnMap extends Laid {
+  orientation: string;
+  values: (number | null)[][];
+  segments: { number: number; name: string; mean: number | null; territory?: string }[];
+  /** Below it, the wall is enclosed by a line; null: nowhere. */
+  threshold: number | null;
+  /** The values of the first and the last colour. */
+  range: [number, number];
+  unit: string;
+  /** The colour of values below the range; null: the first colour. */
+  below: [number, number, number] | null;
+  /** Whether the range closes to a ring, so that nothing lies between two values. */
+  cyclic: boolean;
+}
+
+/** A figure of a beat's wall, as in `polar_motion.json`. */
+export interface FigureMap extends Laid {
+  figure: "motion" | "thickening" | "phase";
+  unit: string;
+  range: [number, number];
+  orientation: string;
+  segments: { number: number; name: string; mean: number | null }[];
+  values: (number | null)[][];
+}
+
+/** What the figures are called, and how their units are written. */
+export const FIGURES: Record<FigureMap["figure"], { name: string; unit: string }> = {
+  motion: { name: "Motion inward", unit: "mm" },
+  thickening: { name: "Thickening", unit: "%" },
+  phase: { name: "Phase", unit: "°" },
+};
+
+export function figureLut(figure: FigureMap["figure"]): Lut {
+  return figure === "phase" ? CYCLE : LUTS["Inferno"]!;
+}
+
+export function figureMap(map: FigureMap): DrawnMap {
+  const cyclic = map.figure === "phase";
+  return { ...map, unit: FIGURES[map.figure].unit, threshold: null, below: cyclic ? null : OUTWARD, cyclic };
+}
+
+export function uptakeMap(map: PolarMap): DrawnMap {
+  return {
+    ...map,
+    values: map.values_percent.map(row => row.map(value => value ?? null)),
+    segments: map.segments.map(({ number, name, mean_percent, territory }) => ({ number, name, mean: mean_percent ?? null, territory: territory ?? "" })),
+    threshold: map.threshold_percent,
+    range: [0, 100],
+    unit: "%",
+    below: null,
+    cyclic: false,
+  };
+}
+
+/** The colour of a value; grey where there is no wall. */
+export function colourOn({ range: [low, high], below }: Pick<DrawnMap, "range" | "below">, lut: Lut, value: number): [number, number, number] {
+  if (Number.isNaN(value)) return NO_WALL;
+  return below && value < low ? below : colour(lut, (value - low) / (high - low));
+}
+
 /** Apex, apical, mid and basal, in maps that do not say how wide they are. */
 const RINGS = [1 / 4, 2 / 4, 3 / 4, 1];
 
-function ringsOf(map: PolarMap): number[] {
+function ringsOf(map: Laid): number[] {
   return map.rings ?? RINGS;
 }
 
@@ -18,7 +82,7 @@ function level(segment: number): number {
 }
 
 /** The rows at which the levels of a column end; as well as the segments tell it in maps of older versions. */
-function ends(map: PolarMap, column: number): number[] {
+function ends(map: Laid, column: number): number[] {
   const known = map.level_ends?.[column];
   if (known) return known;
   const out = [0, 0, 0, map.rows];
@@ -30,7 +94,7 @@ function ends(map: PolarMap, column: number): number[] {
 }
 
 /** Share of the radius of a place `rows` from the apex. */
-export function radiusOf(map: PolarMap, rows: number, column: number): number {
+export function radiusOf(map: Laid, rows: number, column: number): number {
   let [from, inner] = [0, 0];
   const all = ends(map, column);
   for (const [n, outer] of ringsOf(map).entries()) {
@@ -41,7 +105,7 @@ export function radiusOf(map: PolarMap, rows: number, column: number): number {
   return 1;
 }
 
-function rowsAt(map: PolarMap, radius: number, column: number): number {
+function rowsAt(map: Laid, radius: number, column: number): number {
   const all = ends(map, column);
   const rings = ringsOf(map);
   const found = rings.findIndex(outer => radius < outer);
@@ -51,12 +115,13 @@ function rowsAt(map: PolarMap, radius: number, column: number): number {
 }
 
 /** The column of a place so many columns from lateral; the ray of column n lies at n + 0.5, as that of row n does. */
-function columnAt(map: PolarMap, columns: number): number {
+function columnAt(map: Laid, columns: number): number {
   return ((Math.floor(columns) % map.columns) + map.columns) % map.columns;
 }
 
-/** The value between the rays, in per cent; NaN where there is no wall. */
-export function valueAt(map: PolarMap, rows: number, columns: number): number {
+/** The value between the rays; NaN where there is no wall. */
+export function valueAt(map: DrawnMap, rows: number, columns: number): number {
+  if (map.cyclic) return map.values[Math.max(0, Math.min(map.rows - 1, Math.floor(rows)))]![columnAt(map, columns)] ?? NaN;
   const row = Math.max(0, Math.min(map.rows - 1, rows - 0.5));
   const column = (((columns - 0.5) % map.columns) + map.columns) % map.columns;
   const [r, c] = [Math.floor(row), Math.floor(column)];
@@ -64,7 +129,7 @@ export function valueAt(map: PolarMap, rows: number, columns: number): number {
   let [sum, weight] = [0, 0];
   for (const [dr, wr] of [[0, 1 - fr], [1, fr]] as const) {
     for (const [dc, wc] of [[0, 1 - fc], [1, fc]] as const) {
-      const value = map.values_percent[Math.min(map.rows - 1, r + dr)]![(c + dc) % map.columns];
+      const value = map.values[Math.min(map.rows - 1, r + dr)]![(c + dc) % map.columns];
       if (value == null) continue;
       sum += value * wr * wc;
       weight += wr * wc;
@@ -153,14 +218,14 @@ function polarOf(x: number, y: number, size: number): [number, number] {
 
 const MARGIN = 0.07;
 
-export function placeOnMap(map: PolarMap, x: number, y: number, size: number): [number, number] | null {
+export function placeOnMap(map: Laid, x: number, y: number, size: number): [number, number] | null {
   const [radius, turns] = polarOf(x, y, size);
   if (radius > 1) return null;
   const columns = turns * map.columns;
   return [rowsAt(map, radius, columnAt(map, columns)), columns];
 }
 
-export function segmentAt(map: PolarMap, rows: number, columns: number): PolarSegment | undefined {
+export function segmentAt<T extends { number: number }>(map: Laid & { segments: T[] }, rows: number, columns: number): T | undefined {
   const row = Math.max(0, Math.min(map.rows - 1, Math.floor(rows)));
   const number = map.segment_of[row]![columnAt(map, columns)];
   return map.segments.find(segment => segment.number === number);
@@ -178,10 +243,10 @@ export interface PolarStyle {
 const TERRITORY: Record<string, string> = { LAD: "#7ee0ff", LCX: "#b6ff8a", RCA: "#ffb3f0" };
 
 /** Draws the map into a square of `size` CSS pixels. */
-export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size: number, ratio: number, style: PolarStyle): void {
+export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size: number, ratio: number, style: PolarStyle): void {
   const pixels = Math.round(size * ratio);
   const image = context.createImageData(pixels, pixels);
-  const means = new Map(map.segments.map(segment => [segment.number, segment.mean_percent]));
+  const means = new Map(map.segments.map(segment => [segment.number, segment.mean]));
   for (let y = 0; y < pixels; y++) {
     for (let x = 0; x < pixels; x++) {
       const [radius, turns] = polarOf(x + 0.5, y + 0.5, pixels);
@@ -192,8 +257,7 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
       const row = Math.min(map.rows - 1, Math.floor(rows));
       const value = style.segments ? (means.get(map.segment_of[row]![nearest]!) ?? NaN) : valueAt(map, rows, columns);
       const at = 4 * (y * pixels + x);
-      const rgb = Number.isNaN(value) ? NO_WALL : colour(style.lut, value / 100);
-      image.data.set([...rgb, 255], at);
+      image.data.set([...colourOn(map, style.lut, value), 255], at);
     }
   }
   context.setTransform(1, 0, 0, 1, 0, 0);
@@ -224,13 +288,14 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
       context.stroke();
     }
   }
-  if (style.threshold) {
+  const { threshold } = map;
+  if (style.threshold && threshold !== null) {
     // The border between wall below and above the threshold.
     context.strokeStyle = thresholdOn(style.lut);
     context.lineWidth = 2;
     const below = (row: number, column: number) => {
-      const value = map.values_percent[row]?.[column % map.columns];
-      return value == null ? null : value < map.threshold_percent;
+      const value = map.values[row]?.[column % map.columns];
+      return value == null ? null : value < threshold;
     };
     const parts = (one: boolean | null, other: boolean | null) => one !== null && other !== null && one !== other;
     context.beginPath();
@@ -270,18 +335,19 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
   context.textBaseline = "middle";
   const write = (text: string, x: number, y: number, font: string) => {
     context.font = font;
-    context.lineWidth = 3;
+    context.lineWidth = size < 180 ? 2 : 3;
     context.lineJoin = "round";
     context.strokeStyle = "rgba(0,0,0,.85)";
     context.strokeText(text, x, y);
     context.fillStyle = "#fff";
     context.fillText(text, x, y);
   };
-  const text = Math.max(10, Math.min(14, size / 26));
-  for (const { number, mean_percent } of map.segments) {
+  // Small maps have the room for small figures only.
+  const text = size < 180 ? 8 : Math.max(10, Math.min(14, size / 26));
+  for (const { number, mean } of map.segments) {
     const [ring, turns] = labelPlace(map, number);
     const [x, y] = at(ring, turns);
-    write(mean_percent == null ? "–" : mean_percent.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
+    write(mean === null ? "–" : mean.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
   }
   if (oriented) {
     for (const [name, turns] of [["A", 0.25], ["S", 0.5], ["I", 0.75], ["L", 0]] as const) {
@@ -302,13 +368,13 @@ export function drawPolar(context: CanvasRenderingContext2D, map: PolarMap, size
 }
 
 /** The middle of a segment: rows from the apex, columns from lateral. */
-export function middleOfSegment(map: PolarMap, number: number): [number, number] {
+export function middleOfSegment(map: Laid, number: number): [number, number] {
   const [radius, turns] = labelPlace(map, number);
   const columns = turns * map.columns;
   return [rowsAt(map, radius, columnAt(map, columns)), columns];
 }
 
-function labelPlace(map: PolarMap, number: number): [number, number] {
+function labelPlace(map: Laid, number: number): [number, number] {
   if (number === 17) return [0, 0];
   const rings = ringsOf(map);
   const between = (n: number) => (rings[n - 1]! + rings[n]!) / 2;

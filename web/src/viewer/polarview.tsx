@@ -7,7 +7,7 @@ import { useCanvas } from "./canvas";
 import { LUTS, WALL_LUT, keep } from "./colours";
 import type { Mesh } from "./mesh";
 import type { PolarMap } from "../generated/openapi";
-import { WallFrame, drawPolar, placeOnMap, segmentAt, valueAt } from "./polar";
+import { WallFrame, drawPolar, placeOnMap, segmentAt, uptakeMap, valueAt } from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
 import { ColourBar } from "./wall";
@@ -27,11 +27,12 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
   const [threshold, setThreshold] = useState(true);
   const [territories, setTerritories] = useState(false);
   const frame = useMemo(() => new WallFrame(mesh, heart, map.rows, map.columns), [mesh, heart, map]);
+  const drawnMap = useMemo(() => uptakeMap(map), [map]);
   const [rows, columns] = frame.place(cursor);
   const onWall = rows >= 0 && rows <= map.rows + 1;
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
-    if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
+    if (context) drawPolar(context, drawnMap, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
   };
   const { canvas } = useCanvas(draw, () => () => undefined, map);
   const segment = onWall ? segmentAt(map, rows, columns) : undefined;
@@ -61,7 +62,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
       />
       <figcaption>
         <p class="at">
-          {segment ? <><b>{segment.name}</b> {number(segment.mean_percent, 0, "%")}, here {number(valueAt(map, rows, columns), 0, "%")}</> : "Cursor off the wall"}
+          {segment ? <><b>{segment.name}</b> {number(segment.mean_percent, 0, "%")}, here {number(valueAt(drawnMap, rows, columns), 0, "%")}</> : "Cursor off the wall"}
         </p>
         <span class="inline">
           <ColourBar lut={lut} low="0" high="100 %" />

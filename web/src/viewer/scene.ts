@@ -15,6 +15,8 @@ export interface Layer {
   dashed?: boolean;
   shown: boolean;
   mesh?: Mesh;
+  /** The mesh in every gate of a beat, at equal steps of the cycle. */
+  gates?: Mesh[];
   mask?: Voxels;
 }
 
@@ -63,8 +65,18 @@ export class Scene {
   /** From where the walls are seen, the same for all; `turned` counts its changes. */
   camera: Camera | null = null;
   readonly turned = new Watched<number>(0);
+  /** The moment of the beat, in turns of its cycle; null where nothing beats. */
+  readonly moment = new Watched<number | null>(null);
+  /** The moment in the middle of the gate that is shown: it changes with the gate. */
+  readonly gate = new Watched<number | null>(null);
+  /** Counts how often the beat was stopped at a moment. */
+  readonly held = new Watched<number>(0);
+  /** The voxels of the gates, as far as they were read. */
+  readonly gates = new Watched<(Voxels | null)[]>([]);
 
-  constructor(readonly voxels: Voxels, lut: Lut, wallLut: Lut) {
+  /** `still` are the voxels that are shown where no gate is. */
+  constructor(readonly still: Voxels, lut: Lut, wallLut: Lut) {
+    const { voxels } = this;
     this.cursor = new Watched<Vec>(voxels.middle);
     this.window = new Watched<Window>({ low: Math.min(0, voxels.lowest), high: voxels.percentile(0.9995) || voxels.highest });
     this.lut = new Watched(lut);
@@ -73,9 +85,46 @@ export class Scene {
 
   /** Everything that changes a slice. */
   watch(act: () => void): () => void {
-    const all: { watch(act: () => void): () => void }[] = [this.cursor, this.window, this.lut, this.layers, this.heart, this.edit, this.tool, this.view, this.difference, this.smooth];
+    const all: { watch(act: () => void): () => void }[] = [this.cursor, this.window, this.lut, this.layers, this.gate, this.gates, this.heart, this.edit, this.tool, this.view, this.difference, this.smooth];
     const ends = all.map(watched => watched.watch(act));
     return () => ends.forEach(end => end());
+  }
+
+  get voxels(): Voxels {
+    return gateAt(this.gates.value, this.gate.value) ?? this.still;
+  }
+
+  /** The window for what is shown: a gate holds its share of the counts of the whole beat. */
+  get windowNow(): Window {
+    const { low, high } = this.window.value;
+    const share = this.voxels === this.still ? 1 : 1 / this.gates.value.length;
+    return { low: low * share, high: high * share };
+  }
+
+  /** The layers at the gate that is shown. */
+  get layersNow(): Layer[] {
+    return this.layers.value.map(layer => {
+      const mesh = gateAt(layer.gates ?? [], this.gate.value);
+      return mesh ? { ...layer, mesh } : layer;
+    });
+  }
+
+  /** Shows a moment of a beat of so many gates, and stops there. */
+  hold(turns: number, gates: number): void {
+    this.held.value += 1;
+    this.goTo(turns, gates);
+  }
+
+  /** Shows a moment of a beat of so many gates. */
+  goTo(turns: number, gates: number): void {
+    this.gate.value = (Math.floor(turns * gates) + 0.5) / gates;
+    this.moment.value = turns;
+  }
+
+  /** The same views at another moment of the beat, whatever happens to this one. */
+  at(turns: number): Scene {
+    const scene = Object.create(this) as Scene;
+    return Object.defineProperties(scene, { gate: { value: new Watched<number | null>(turns) }, moment: { value: new Watched<number | null>(turns) } });
   }
 
   /** The middle of what slices show. */
@@ -85,4 +134,9 @@ export class Scene {
     const heart = this.heart.value;
     return heart ? [0, 1, 2].map(n => (heart.base[n]! + heart.apex[n]!) / 2) as unknown as Vec : this.voxels.middle;
   }
+}
+
+/** What belongs to the gate at a moment of the cycle. */
+function gateAt<T>(gates: T[], turns: number | null): T | undefined {
+  return turns === null ? undefined : gates[Math.min(gates.length - 1, Math.floor(turns * gates.length))];
 }

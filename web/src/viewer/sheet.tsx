@@ -1,8 +1,9 @@
-// What the viewer prints: two pages of paper, the figures that matter first.
+// What the viewer prints: two pages of paper, of a beat one, the figures that matter first.
 
 import { type ComponentChildren, render } from "preact";
 import type { Volume } from "../api";
 import { isFit, moment, nameOf, number, resultName, shape, study } from "../words";
+import { BeatSheet } from "./beatsheet";
 import { type Camera } from "./camera";
 import { DIVERGING, LUTS } from "./colours";
 import { drawSlice } from "./drawing";
@@ -10,7 +11,7 @@ import { Figures, Verdict, headlines } from "./figures";
 import { FlatView } from "./flatview";
 import type { Loaded } from "./loaded";
 import { PATIENT, frameOf, heartPlanes } from "./plane";
-import { drawPolar } from "./polar";
+import { drawPolar, uptakeMap } from "./polar";
 import type { Scene } from "./scene";
 import { drawStack } from "./stack";
 import { add, scale, unit } from "./vector";
@@ -37,7 +38,7 @@ export function printsAs(printed: () => Printed | null): () => void {
     host = document.createElement("div");
     host.className = "sheet";
     document.body.append(host);
-    render(<Sheet {...now} />, host);
+    render(now.shown.beat ? <BeatSheet {...now} beat={now.shown.beat} /> : <Sheet {...now} />, host);
   };
   const after = () => {
     if (!host) return;
@@ -54,7 +55,7 @@ export function printsAs(printed: () => Printed | null): () => void {
   };
 }
 
-function Drawn({ width, height, name, draw }: { width: number; height: number; name: string; draw: (element: HTMLCanvasElement) => void }) {
+export function Drawn({ width, height, name, draw }: { width: number; height: number; name: string; draw: (element: HTMLCanvasElement) => void }) {
   return (
     <canvas role="img" aria-label={name} ref={element => {
       if (!element) return;
@@ -80,7 +81,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
             <figure>
               <Drawn width={360} height={360} name="Polar map" draw={element => {
                 const context = element.getContext("2d");
-                if (context) drawPolar(context, polar, 360, RATIO, { lut: scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
+                if (context) drawPolar(context, uptakeMap(polar), 360, RATIO, { lut: scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
               }} />
               <figcaption>
                 <span>Uptake; the white line encloses what is below {number(polar.threshold_percent, 0, "%")}</span>
@@ -90,9 +91,9 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
           )}
           <div>
             <dl class="headlines">
-              {headlines(shown).map(([name, value]) => <div key={name}><dt>{name}</dt><dd>{value}</dd></div>)}
+              {headlines(shown).map(([name, value, interval]) => <div key={name}><dt>{name}</dt><dd>{value}{interval && <span class="interval">90 %: {interval}</span>}</dd></div>)}
             </dl>
-            {shown.report && <Verdict report={shown.report} />}
+            {shown.report && <Verdict shown={shown} />}
           </div>
         </div>
         <div class="three">
@@ -139,7 +140,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
   );
 }
 
-function Head({ volume, title, children }: { volume: Volume; title: string; children?: ComponentChildren }) {
+export function Head({ volume, title, children }: { volume: Volume; title: string; children?: ComponentChildren }) {
   return (
     <header>
       <h1>{title}</h1>
@@ -193,6 +194,6 @@ function Legend({ scene }: { scene: Scene }) {
   );
 }
 
-function Foot({ page }: { page: number }) {
-  return <footer>ventriform: research software, not a medical device. Measurements are no diagnosis. Printed {moment(new Date().toISOString())}. Page {page} of 2</footer>;
+export function Foot({ page, of = 2 }: { page: number; of?: number }) {
+  return <footer>ventriform: research software, not a medical device. Measurements are no diagnosis. Printed {moment(new Date().toISOString())}. Page {page} of {of}</footer>;
 }

@@ -2,6 +2,7 @@
 
 import type { Closeness, Fit, PolarMap, PolarSummary, Posture } from "../generated/openapi";
 import type { Mesh } from "./mesh";
+import type { FigureMap } from "./polar";
 import type { Axis } from "./plane";
 import type { Layer } from "./scene";
 import type { Vec } from "./vector";
@@ -34,6 +35,10 @@ export interface Shown {
   displacement: number[] | null;
   /** Distance of a model to the surface it was made of, at every vertex, mm. */
   surface: Float32Array | null;
+  /** The wall in every gate of a beat, with the same triangles as `mesh`, their mean. */
+  gates: Mesh[] | null;
+  /** Figures of a beat's wall, laid flat. */
+  figures: FigureMap[];
 }
 
 /** The heart's axis; it has no superior direction where nothing tells which side is anterior. */
@@ -77,11 +82,15 @@ export function layersOf(shown: Shown | null, other: Shown | null): Layer[] {
   const layers: Layer[] = [];
   if (shown) {
     const [own, second] = shown.names;
-    layers.push({ name: own, colour: "#3dffa8", shown: true, mesh: shown.mesh });
+    layers.push({ name: own, colour: "#3dffa8", shown: true, mesh: shown.mesh, ...gatesOf(shown) });
     if (shown.otherEdge) layers.push({ name: second, colour: "#ffffff", shown: false, mesh: shown.otherEdge });
     if (shown.mask) layers.push({ name: "mask", colour: "#ffd24d", shown: false, mask: shown.mask });
     if (shown.expert) layers.push({ name: "expert", colour: "#4db8ff", shown: true, mask: shown.expert });
   }
-  if (other) layers.push({ name: "compared", colour: "#d6a6ff", dashed: true, shown: true, mesh: other.mesh });
+  if (other) layers.push({ name: "compared", colour: "#d6a6ff", dashed: true, shown: true, mesh: other.mesh, ...gatesOf(other) });
   return layers;
+}
+
+function gatesOf({ gates }: Shown): { gates?: Mesh[] } {
+  return gates ? { gates } : {};
 }

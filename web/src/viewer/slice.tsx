@@ -81,7 +81,7 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
   };
   const window_ = (dx: number, dy: number) => {
     const { low, high } = scene.window.value;
-    const range = scene.voxels.highest - scene.voxels.lowest || 1;
+    const range = scene.still.highest - scene.still.lowest || 1;
     const width = Math.max(range / 500, high - low + (dx / 300) * range);
     const middle = (low + high) / 2 + (dy / 300) * range;
     scene.window.value = { low: middle - width / 2, high: middle + width / 2 };

@@ -94,7 +94,7 @@ export function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane
     context.clip();
     paint(context, scene, plane, origin, box, factor);
     context.translate(box.x + box.width / 2, height / 2);
-    contours(context, scene.layers.value, plane, origin, factor, 70);
+    contours(context, scene.layersNow, plane, origin, factor, 70);
     context.restore();
     if (n === now) {
       context.strokeStyle = "#4de3ff";

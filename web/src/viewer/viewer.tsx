@@ -1,20 +1,22 @@
 // One scan: its slices, the wall, the polar map, what was measured, and what can be done about it.
 
 import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
+import { type Job, type Kind, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
-import { eraseResult, find, fits, isActive, jobs, loadResult, loadScan, models, resultsOf } from "../library";
-import { type Draft, type Kind, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
+import { beats, eraseResult, find, fits, isActive, jobs, loadResult, loadScan, madeBy, models, resultsOf } from "../library";
+import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { home, isAt, open, route } from "../route";
 import { useWatched } from "../state";
 import { file } from "../work";
-import { isFit, moment, nameOf, resultName, shape, study } from "../words";
+import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study } from "../words";
+import { BeatCharts, BeatMaps } from "./beatview";
 import { LUT, WALL_LUT, kept } from "./colours";
 import { Correction } from "./correction";
 import { Downloads, Figures } from "./figures";
-import { type Loaded, loadLoaded, voxelsOf } from "./loaded";
+import { type Loaded, loadLoaded, readGates, voxelsOf } from "./loaded";
 import { Pictures } from "./pictures";
+import { Player } from "./player";
 import { PolarView } from "./polarview";
 import { Scene } from "./scene";
 import { type Printed, printsAs } from "./sheet";
@@ -23,7 +25,7 @@ export function Viewer({ volume: id }: { volume: string }) {
   const [volume, setVolume] = useState<Volume | null>(null);
   const [problem, setProblem] = useState("");
   const { result: chosen, other } = useWatched(route);
-  const known = useWatched(fits).length + useWatched(models).length;
+  const known = useWatched(beats).length + useWatched(fits).length + useWatched(models).length;
   const load = useCallback(() => {
     setProblem("");
     loadScan(id).then(setVolume, error => setProblem(words(error)));
@@ -31,7 +33,7 @@ export function Viewer({ volume: id }: { volume: string }) {
   useEffect(load, [load]);
   const results = useMemo(() => resultsOf(id), [id, known, volume]);
   const jobOfRoute = chosen?.startsWith("job_") ? chosen : null;
-  const current = jobOfRoute ? null : (chosen ?? (results.find(result => isFit(result.id)) ?? results[0])?.id ?? null);
+  const current = jobOfRoute ? null : (chosen ?? (results.find(result => isBeat(result.id)) ?? results.find(result => isFit(result.id)) ?? results[0])?.id ?? null);
   if (problem) {
     return <div class="pad"><p class="error" role="alert">{problem}</p><button type="button" onClick={load}>Try again</button> <button type="button" onClick={home}>Back to the list</button></div>;
   }
@@ -63,12 +65,14 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
         continue;
       }
       if (!running.current.delete(job.id) || job.state !== "succeeded") continue;
-      const made = job.segmentation ?? job.model;
+      const made = madeBy(job);
       if (made && isAt(volume.id)) open(volume.id, made, job.labels["parent"] ?? null);
     }
   }, [own]);
 
-  const frame = (current && find(current)?.parameters["frame"]) ?? null;
+  const parameters = current ? find(current)?.parameters : undefined;
+  // Volumes that count as gates only by order are not summed by the service.
+  const frame = parameters?.["frame"] ?? (parameters?.["gated"] ? 0 : null);
   useEffect(() => {
     let gone = false;
     setProblem("");
@@ -102,6 +106,17 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
     if (fit) void loadLoaded(fit).then(loaded => (scene.heart.value ??= loaded.heart), () => undefined);
   }, [scene, shown]);
 
+  const gates = shown?.beat?.report.gates.length ?? 0;
+  useEffect(() => {
+    if (!scene || gates === 0 || (scene.gates.value.length === gates && scene.gates.value.every(Boolean))) return;
+    let gone = false;
+    readGates(volume, gates, read => {
+      if (!gone) scene.gates.value = read;
+      return !gone;
+    }).catch(error => !gone && setProblem(words(error)));
+    return () => void (gone = true);
+  }, [scene, volume, gates]);
+
   const busy = own.some(isActive);
 
   // What would be printed, whenever somebody prints.
@@ -111,7 +126,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   useEffect(() => printsAs(() => printed.current), []);
   useEffect(() => {
     const result = shown?.result;
-    if (result) void parameterSpecs().then(specs => setChanged(Object.entries(draftOf(result.parameters, specs[isFit(result.id) ? "segmentation" : "model"]))), () => undefined);
+    if (result) void parameterSpecs().then(specs => setChanged(Object.entries(draftOf(result.parameters, specs[kindOf(result.id)]))), () => undefined);
   }, [shown]);
 
   // A job tells of its progress many times a second: the pictures are not drawn again for that, which would take the
@@ -119,6 +134,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   const pictures = useMemo(() => scene && (
     <Pictures scene={scene} name={nameOf(volume)} shown={shown} other={other} empty={busy ? "The wall appears here when the work is done." : "Fit the ventricle, or make a model, to see the wall here."}>
       <Busy volume={volume.id} />
+      {shown?.beat && <Player scene={scene} report={shown.beat.report} />}
     </Pictures>
   ), [scene, volume, shown, other, busy]);
   const facts = useMemo(() => shown && scene && <Facts scene={scene} volume={volume} shown={shown} other={other} />, [scene, volume, shown, other]);
@@ -153,9 +169,15 @@ interface SideProps {
   shown: Loaded | null;
 }
 
+const WORK: { kind: Kind; name: string }[] = [
+  { kind: "beat", name: "Fit the beat" },
+  { kind: "segmentation", name: "Fit the ventricle" },
+  { kind: "model", name: "Surface model" },
+];
+
 function Side({ volume, results, jobs: own, current, otherId, retry, scene, shown }: SideProps) {
   const [tab, setTab] = useState<"work" | "correct" | null>(retry ? "work" : null);
-  const [kind, setKind] = useState<Kind>("segmentation");
+  const [kind, setKind] = useState<Kind>(isGated(volume) ? "beat" : "segmentation");
   const [draft, setDraft] = useState<Draft>({});
   const [problem, setProblem] = useState<{ field: string | null; text: string } | null>(null);
   const [sending, setSending] = useState(false);
@@ -225,20 +247,17 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
       {tab === "work" && (
         <form class="panel" onSubmit={event => void send(event)} aria-label="New fit or model">
           <span class="choice" role="group" aria-label="Kind of work">
-            <button type="button" aria-pressed={kind === "segmentation"} onClick={() => {
-              setKind("segmentation");
-              setDraft({});
-              setProblem(null);
-            }}>Fit the ventricle</button>
-            <button type="button" aria-pressed={kind === "model"} onClick={() => {
-              setKind("model");
-              setDraft({});
-              setProblem(null);
-            }}>Surface model</button>
+            {WORK.filter(one => one.kind !== "beat" || volume.frames > 1).map(one => (
+              <button key={one.kind} type="button" aria-pressed={kind === one.kind} onClick={() => {
+                setKind(one.kind);
+                setDraft({});
+                setProblem(null);
+              }}>{one.name}</button>
+            ))}
           </span>
           <ParameterForm kind={kind} volume={volume} draft={draft} onChange={setDraft} problem={problem} />
-          <button class="main" disabled={sending}>{kind === "segmentation" ? "Fit" : "Make the model"}</button>
-          {shown && <button type="button" class="plain" onClick={() => repeat({ kind: isFit(shown.result.id) ? "segmentation" : "model", parameters: shown.result.parameters })}>Take the parameters of the shown result</button>}
+          <button class="main" disabled={sending}>{kind === "model" ? "Make the model" : "Fit"}</button>
+          {shown && <button type="button" class="plain" onClick={() => repeat({ kind: kindOf(shown.result.id), parameters: shown.result.parameters })}>Take the parameters of the shown result</button>}
         </form>
       )}
       {tab === "correct" && scene && <Correction scene={scene} volume={volume} shown={shown} />}
@@ -249,7 +268,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
 
 /** Which result a corrected fit came from, and what was changed. */
 function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; results: Result[] }) {
-  const labels = own.find(job => job.segmentation === result.id && job.labels["changed"])?.labels;
+  const labels = own.find(job => madeBy(job) === result.id && job.labels["changed"])?.labels;
   if (!labels) return null;
   const parent = results.find(other => other.id === labels["parent"]);
   const names: Record<string, string> = { center: "centre", edge: "wall shown" };
@@ -260,8 +279,11 @@ function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; r
 function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; shown: Loaded; other: Loaded | null }) {
   return (
     <>
+      {shown.beat && <Figures shown={shown} other={other} />}
+      {shown.beat && <BeatCharts scene={scene} report={shown.beat.report} />}
       {shown.polar && shown.heart && (
         <div class="polars">
+          {shown.beat && <h2>Uptake, all gates</h2>}
           <PolarView scene={scene} map={shown.polar} mesh={shown.mesh} heart={shown.heart} title={other?.polar ? "Shown fit" : "Polar map"} />
           {other?.polar && other.heart && (
             <details open>
@@ -271,7 +293,8 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
           )}
         </div>
       )}
-      <Figures shown={shown} other={other} />
+      {shown.beat && <BeatMaps scene={scene} shown={shown} beat={shown.beat} />}
+      {!shown.beat && <Figures shown={shown} other={other} />}
       <Downloads result={shown.result} volume={volume} />
     </>
   );

@@ -4,14 +4,14 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/ho
 import { useWatched } from "../state";
 import { type Camera, type MeshPainter, boundsOf, project, turn, usualCamera } from "./camera";
 import { useCanvas } from "./canvas";
-import { DIVERGING, LUTS, type Lut, colour, css } from "./colours";
+import { DIVERGING, LUTS, type Lut, css } from "./colours";
 import { handleEvents } from "./events";
 import { FlatView } from "./flatview";
 import { MeshView } from "./glview";
-import { type Mesh, apart, thickness, triangleShape } from "./mesh";
+import { type Mesh, apart, between, thickness, triangleShape } from "./mesh";
 import { type Axis, frameOf, letters } from "./plane";
 import type { PolarMap } from "../generated/openapi";
-import { WallFrame, valueAt } from "./polar";
+import { type DrawnMap, FIGURES, type FigureMap, WallFrame, colourOn, figureLut, figureMap, uptakeMap, valueAt } from "./polar";
 import type { Scene } from "./scene";
 import { type Vec, add, dot, scale, sub, unit } from "./vector";
 import type { Voxels } from "./volume";
@@ -21,6 +21,8 @@ interface Paint {
   unit: string;
   lut: Lut;
   range: [number, number];
+  /** The colour of values below the range; without it, the first colour. */
+  below?: [number, number, number] | null;
   values: () => Float32Array;
 }
 
@@ -34,6 +36,9 @@ interface Props {
   displacement: number[] | null;
   /** Distance of a model to the surface it was made of, at every vertex, mm. */
   surface: Float32Array | null;
+  /** The wall in every gate of a beat, and figures of it. */
+  gates: Mesh[] | null;
+  figures: FigureMap[];
   /** What is written over it, where there are two. */
   title?: string;
   /** Whether another wall says from where both are seen. */
@@ -58,24 +63,25 @@ function percent(values: Float32Array): Float32Array {
   return values.map(value => (100 * value) / hottest);
 }
 
-function polarUptake(mesh: Mesh, polar: PolarMap, heart: Axis): Float32Array {
-  const frame = new WallFrame(mesh, heart, polar.rows, polar.columns);
-  return Float32Array.from(mesh.vertices, vertex => {
-    const [rows, columns] = frame.place(vertex);
-    return valueAt(polar, rows, columns);
-  });
+/** The value of a map at every vertex. */
+function byMap(mesh: Mesh, map: DrawnMap, heart: Axis): Float32Array {
+  const frame = new WallFrame(mesh, heart, map.rows, map.columns);
+  return Float32Array.from(mesh.vertices, vertex => valueAt(map, ...frame.place(vertex)));
 }
 
 /** The uptake at every vertex, per cent: of the polar map, or else of the voxels under it. */
 export function uptakeOf(scene: Scene, { mesh, polar, heart }: { mesh: Mesh; polar: PolarMap | null; heart: Axis | null }): Float32Array {
-  return polar && heart ? polarUptake(mesh, polar, heart) : percent(uptake(scene.voxels, mesh));
+  return polar && heart ? byMap(mesh, uptakeMap(polar), heart) : percent(uptake(scene.voxels, mesh));
 }
 
-function paints({ scene, mesh, inner, other, polar, displacement, surface }: Props, lut: Lut, heart: Axis | null): Paint[] {
+function paints({ scene, mesh, inner, other, polar, displacement, surface, figures }: Props, lut: Lut, heart: Axis | null): Paint[] {
   const list: Paint[] = [];
   const viridis = LUTS["Viridis"]!;
   const seen = polar && heart ? true : scene.voxels.highest > scene.voxels.lowest;
   if (seen) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
+  if (heart) {
+    for (const map of figures) list.push({ name: FIGURES[map.figure].name, unit: FIGURES[map.figure].unit, lut: figureLut(map.figure), range: map.range, below: figureMap(map).below, values: () => byMap(mesh, figureMap(map), heart) });
+  }
   if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
   list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });
   if (inner) list.push({ name: "Distance between the two walls", unit: "mm", lut: DIVERGING, range: [-6, 6], values: () => apart(mesh, inner) });
@@ -88,10 +94,10 @@ function paints({ scene, mesh, inner, other, polar, displacement, surface }: Pro
 }
 
 /** The colours of vertices with these values; grey where there is none. */
-export function coloursOf(values: Float32Array, { lut, range: [low, high] }: Pick<Paint, "lut" | "range">): Float32Array {
+export function coloursOf(values: Float32Array, { lut, range, below = null }: Pick<Paint, "lut" | "range" | "below">): Float32Array {
   const colours = new Float32Array(3 * values.length);
   values.forEach((value, at) => {
-    const rgb = Number.isNaN(value) ? [90, 96, 100] : colour(lut, (value - low) / (high - low));
+    const rgb = Number.isNaN(value) ? [90, 96, 100] : colourOn({ range, below }, lut, value);
     colours.set(rgb.map(part => part / 255), 3 * at);
   });
   return colours;
@@ -111,7 +117,7 @@ export function wallCamera(mesh: Mesh, heart: Axis | null): Camera {
 }
 
 export function Wall(props: Props) {
-  const { scene, mesh, other, title, follows } = props;
+  const { scene, mesh, other, title, follows, gates } = props;
   const view = useRef<MeshPainter | null>(null);
   // Whether the browser has no WebGL, or lost it.
   const [plain, setPlain] = useState(false);
@@ -123,16 +129,26 @@ export function Wall(props: Props) {
   const paint = list.find(one => one.name === chosen) ?? list[0]!;
   const values = useMemo(() => paint.values(), [mesh, paint.name, props.polar, props.other, props.inner, heart]);
 
+  const colours = useMemo(() => coloursOf(values, paint), [values, paint.lut]);
+  const put = (made: MeshPainter) => {
+    const now = (plain ? scene.gate : scene.moment).value;
+    const moved = gates && now !== null ? between(gates, now) : mesh;
+    made.setSurface("wall", moved, colours);
+    if (edges) made.setWire("edges", moved, [0.05, 0.07, 0.09]);
+    else made.remove("edges");
+  };
+
   const draw = (element: HTMLCanvasElement) => {
     const made = view.current;
     if (!made) return;
+    if (gates) put(made);
     if (scene.camera) made.camera = scene.camera;
     made.setPoint("cursor", scene.cursor.value, [0.3, 0.89, 1]);
     made.draw();
     element.setAttribute("aria-valuetext", `seen from ${letters(made.camera.toward)}`);
   };
   const watch = (act: () => void) => {
-    const ends = [scene.cursor.watch(act), scene.turned.watch(act)];
+    const ends = [scene.cursor.watch(act), scene.turned.watch(act), (plain ? scene.gate : scene.moment).watch(act)];
     return () => ends.forEach(end => end());
   };
   const { canvas, ask } = useCanvas(draw, watch, plain);
@@ -164,13 +180,11 @@ export function Wall(props: Props) {
   useEffect(() => {
     const made = view.current;
     if (!made) return;
-    made.setSurface("wall", mesh, coloursOf(values, paint));
-    if (edges) made.setWire("edges", mesh, [0.05, 0.07, 0.09]);
-    else made.remove("edges");
+    put(made);
     if (other) made.setWire("other", other, [0.78, 0.55, 1]);
     else made.remove("other");
     ask();
-  }, [scene, mesh, values, paint.lut, other, edges, plain]);
+  }, [scene, mesh, gates, colours, other, edges, plain]);
 
   const [low, high] = paint.range;
   return (
@@ -246,7 +260,7 @@ function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void,
     const box = element.getBoundingClientRect();
     const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
     let [best, depth]: [Vec | null, number] = [null, -Infinity];
-    for (const layer of scene.layers.value) {
+    for (const layer of scene.layersNow) {
       for (const vertex of layer.mesh?.vertices ?? []) {
         const [u, v] = project(view.camera, vertex, box.width / box.height);
         if (Math.hypot((u - x) * box.width, (v - y) * box.height) > 16) continue;

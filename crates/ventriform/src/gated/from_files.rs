@@ -8,7 +8,7 @@ use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::polar::SEGMENT_NAMES;
 use crate::progress::Monitor;
 use crate::report::{
-    BeatParts, BeatReport, FileFacts, LongAxis, RaisedFlag, Resolution, SegmentationReport,
+    BeatParts, BeatReport, FileFacts, LongAxis, Posture, RaisedFlag, Resolution, SegmentationReport,
 };
 use crate::segmentation::{Segmentation, SegmentationParameters, prepare, segment};
 use crate::volume::{GatedReading, ReadLimits, read_gates};
@@ -112,6 +112,9 @@ impl GatedHeart {
             rr_ms: self.rr_ms,
             timing: self.reading.timing.clone(),
             long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),
+            posture: (segmentation.fit.model.patient_orientation)
+                .as_ref()
+                .map(Posture::of),
             resolution: segmentation
                 .resolution
                 .map(|r| Resolution::new(r.value, r.given)),

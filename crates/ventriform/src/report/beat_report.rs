@@ -2,7 +2,7 @@
 //!
 //! Gates and segments are counted from 1. Phase 0 is the beginning of the first gate.
 
-use super::fit_report::LongAxis;
+use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
 use super::json_number::round;
 use super::segmentation_report::{RaisedFlag, Resolution, SegmentationReport};
@@ -64,6 +64,8 @@ pub struct BeatReport {
     pub timing: TimingReport,
     /// The long axis of the summed image's wall.
     pub long_axis: Option<LongAxis>,
+    /// Which way is up in the patient, by which the sides of the wall are named.
+    pub posture: Option<Posture>,
     /// Full width at half maximum of a point in the gates.
     pub resolution_mm: Option<Resolution>,
     /// The model that was fitted to the gates' sum.
@@ -186,6 +188,8 @@ pub struct BeatParts {
     pub timing: GateTiming,
     /// The long axis of the summed image's wall.
     pub long_axis: Option<LongAxis>,
+    /// Which way is up in the patient.
+    pub posture: Option<Posture>,
     /// The gates' resolution.
     pub resolution: Option<Resolution>,
     /// The model that was fitted to the gates' sum.
@@ -281,6 +285,7 @@ impl BeatReport {
                 beats_rejected: parts.timing.beats_rejected,
             },
             long_axis: parts.long_axis,
+            posture: parts.posture,
             resolution_mm: parts.resolution,
             template: parts.template,
             confidence: round(parts.confidence),

@@ -220,7 +220,7 @@ impl LocalisationReport {
 }
 
 impl Posture {
-    pub(super) fn of(orientation: &PatientOrientation) -> Self {
+    pub(crate) fn of(orientation: &PatientOrientation) -> Self {
         Self {
             superior: point(&orientation.superior),
             source: orientation.source.as_str().to_owned(),

@@ -1,0 +1,100 @@
+// What was measured of a beat beside its figures: curve, phases, and maps of the wall.
+
+import { useMemo } from "preact/hooks";
+import type { BeatReport } from "../generated/openapi";
+import { useWatched } from "../state";
+import { number } from "../words";
+import { useCanvas } from "./canvas";
+import { PhaseHistogram, VolumeCurve } from "./charts";
+import type { Lut } from "./colours";
+import type { Loaded, LoadedBeat } from "./loaded";
+import { type DrawnMap, FIGURES, WallFrame, drawPolar, figureLut, figureMap, placeOnMap, segmentAt, uptakeMap } from "./polar";
+import type { Scene } from "./scene";
+import { ColourBar } from "./wall";
+
+export interface NamedMap {
+  name: string;
+  map: DrawnMap;
+  /** Its colours; null: those chosen for the uptake. */
+  lut: Lut | null;
+}
+
+/** Uptake of end diastole and end systole, motion, thickening and phase. */
+export function mapsOf({ figures }: Loaded, { ends }: LoadedBeat): NamedMap[] {
+  const uptake = ends ? ["Uptake, end diastole", "Uptake, end systole"].map((name, n): NamedMap => ({ name, map: uptakeMap(ends[n]!), lut: null })) : [];
+  return [...uptake, ...figures.map((map): NamedMap => ({ name: FIGURES[map.figure].name, map: figureMap(map), lut: figureLut(map.figure) }))];
+}
+
+export function BeatCharts({ scene, report }: { scene: Scene; report: BeatReport }) {
+  return (
+    <section class="charts" aria-label="Curves">
+      <h2>Volume</h2>
+      <VolumeCurve report={report} scene={scene} />
+      <h2>Phases of the wall</h2>
+      <PhaseHistogram report={report} />
+      {!report.phase.reliable && <p class="warning">The phases are not reliable: too little of the wall moves.</p>}
+    </section>
+  );
+}
+
+export function BeatMaps({ scene, shown, beat }: { scene: Scene; shown: Loaded; beat: LoadedBeat }) {
+  const maps = useMemo(() => mapsOf(shown, beat), [shown, beat]);
+  const { heart, mesh } = shown;
+  return (
+    <section class="beat-maps" aria-label="Maps of the beat">
+      {heart && <div class="maps">{maps.map(one => <SmallMap key={one.name} scene={scene} named={one} frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)} />)}</div>}
+      <details>
+        <summary>Segments</summary>
+        <SegmentTable report={beat.report} />
+      </details>
+    </section>
+  );
+}
+
+export function SegmentTable({ report }: { report: BeatReport }) {
+  return (
+    <table class="segments">
+      <caption class="hidden">Motion, thickening and phase of the segments</caption>
+      <thead><tr><th scope="col">Segment</th><th scope="col">mm</th><th scope="col">thickens</th><th scope="col">by counts</th><th scope="col">phase</th></tr></thead>
+      <tbody>
+        {report.segments.map(one => (
+          <tr key={one.segment}>
+            <th scope="row">{one.segment} {one.name}</th>
+            <td>{number(one.motion_mm, 1)}</td>
+            <td>{number(one.thickening_percent, 0, "%")}</td>
+            <td>{number(one.thickening_counts_percent, 0, "%")}</td>
+            <td>{number(one.phase_degrees, 0, "°")}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+/** A map that a press takes the cursor to; the place of the cursor is marked on it. */
+function SmallMap({ scene, named: { name, map, lut }, frame }: { scene: Scene; named: NamedMap; frame: WallFrame }) {
+  const chosen = useWatched(scene.wallLut);
+  const cursor = useWatched(scene.cursor);
+  const colours = lut ?? chosen;
+  const [rows, columns] = frame.place(cursor);
+  const onWall = rows >= 0 && rows <= map.rows + 1;
+  const draw = (element: HTMLCanvasElement) => {
+    const context = element.getContext("2d");
+    if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut: colours, segments: false, threshold: true, territories: false, cursor: onWall ? [rows, columns] : null });
+  };
+  const { canvas } = useCanvas(draw, () => () => undefined, map);
+  const segment = onWall ? segmentAt(map, rows, columns) : undefined;
+  return (
+    <figure class="polar">
+      <canvas ref={canvas} role="img" aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, 0, map.unit)}`).join(", ")}`} onPointerDown={event => {
+        const place = placeOnMap(map, event.offsetX, event.offsetY, event.currentTarget.clientWidth);
+        if (place) scene.cursor.value = frame.at(...place);
+      }} />
+      <figcaption>
+        <b>{name}</b>
+        <ColourBar lut={colours} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />
+        <span class="quiet">{segment ? `${segment.name} ${number(segment.mean, 0, map.unit)}` : "\u00a0"}</span>
+      </figcaption>
+    </figure>
+  );
+}
