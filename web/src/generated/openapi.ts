@@ -143,6 +143,8 @@ export interface components {
         BeatLinks: {
             /** @description The volume curve. */
             curve: string;
+            /** @description DICOM objects of the scan's patient and study, for the archive. */
+            dicom: string[];
             /** @description The wall at end diastole, in the format that `Accept` asks for. */
             mesh: string;
             /** @description The histogram of the wall's phases. */
@@ -310,11 +312,15 @@ export interface components {
             confidence: number;
             /** @description The volume curve, gates' width taken off, at equal steps from the beginning of the first gate. */
             curve: components["schemas"]["CurvePoint"][];
+            /** @description Interval about EDV that holds the true volume of nine of ten hearts. */
+            edv_interval_ml: number[];
             /**
              * Format: double
              * @description End-diastolic volume: the largest of the curve.
              */
             edv_ml: number;
+            /** @description The same about EF; `null` if there is none. */
+            ef_interval_percent?: number[] | null;
             /**
              * Format: double
              * @description Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
@@ -345,18 +351,25 @@ export interface components {
              * @description The gate with the smallest cavity.
              */
             end_systole_gate: number;
+            /** @description The same about ESV. */
+            esv_interval_ml: number[];
             /**
              * Format: double
              * @description End-systolic volume: the smallest of the curve.
              */
             esv_ml: number;
-            /** @description Reasons to look closer: of the fit to the gates' sum, then of the beat. */
+            /** @description Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat. */
             flags: components["schemas"]["Flag"][];
             /** @description Each gate, in the mean over its width. */
             gates: components["schemas"]["GateReport"][];
             /** @description The file of the gates. */
             input: components["schemas"]["FileFacts"];
             long_axis?: components["schemas"]["LongAxis"] | null;
+            /**
+             * Format: double
+             * @description Its mass, grams, at the density of muscle, 1.05 g/ml.
+             */
+            mass_g: number;
             /** @description Why there are no rates. */
             no_rates?: string | null;
             /** @description Every parameter, defaults written out. */
@@ -418,6 +431,16 @@ export interface components {
              * @description Ejection fraction; `null` if the gates are no beat.
              */
             ef_percent?: number | null;
+            /**
+             * Format: int64
+             * @description The gate with the largest cavity, counted from 1.
+             */
+            end_diastole_gate: number;
+            /**
+             * Format: int64
+             * @description The gate with the smallest cavity.
+             */
+            end_systole_gate: number;
             /**
              * Format: double
              * @description End-systolic volume.
@@ -835,6 +858,21 @@ export interface components {
              */
             unroundness: number;
         };
+        /** @description The mean of a figure over a segment. */
+        FigureSegment: {
+            /**
+             * Format: double
+             * @description The mean; null where there is none.
+             */
+            mean?: number | null;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int64
+             * @description 1 to 17.
+             */
+            number: number;
+        };
         /** @description The statements of a volume's file. */
         FileFacts: {
             /** @description Maps a voxel index to LPS millimetres; row by row. */
@@ -1083,6 +1121,11 @@ export interface components {
              * @description The factor that brought the gate to the usual counts of a gate.
              */
             counts_factor: number;
+            /**
+             * Format: int64
+             * @description The volume of the input that it is, counted from 0 as the parameter `frame` is.
+             */
+            frame: number;
             /**
              * Format: int64
              * @description Its number, from 1.
@@ -2093,6 +2136,40 @@ export interface components {
              */
             sd_degrees: number;
         };
+        /** @description A figure of the wall on a polar map, as it is written. */
+        PolarFigure: {
+            /**
+             * Format: int64
+             * @description Columns of pixels, around the axis.
+             */
+            columns: number;
+            /** @description The figure. */
+            figure: components["schemas"]["WallFigure"];
+            /**
+             * @description For every column, the distances from the apex in rows at which apex, apical, mid and basal level
+             *     end; row n reaches from n to n + 1.
+             */
+            level_ends: number[][];
+            /** @description Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`. */
+            orientation: string;
+            /** @description The values of the first and the last colour of the drawn map. */
+            range: number[];
+            /** @description The radii at which these levels end on the drawn map, as shares of its own. */
+            rings: number[];
+            /**
+             * Format: int64
+             * @description Rows of pixels, from apex to base.
+             */
+            rows: number;
+            /** @description The number of the segment to which each pixel belongs. */
+            segment_of: number[][];
+            /** @description The 17 segments. */
+            segments: components["schemas"]["FigureSegment"][];
+            /** @description Its unit: `mm`, `%` or `degrees` of the cycle. */
+            unit: string;
+            /** @description The pixels; null where there is no wall, or none that moves. */
+            values: (number | null)[][];
+        };
         /** @description A polar map, as in `polar.json`. */
         PolarMap: {
             /**
@@ -2694,6 +2771,12 @@ export interface components {
             segment: number;
             /**
              * Format: double
+             * @description The same by the counts of the wall, a second opinion: lower by what the image's filter takes; `null` where the
+             *     wall has no counts.
+             */
+            thickening_counts_percent?: number | null;
+            /**
+             * Format: double
              * @description Thickening, end diastole to end systole.
              */
             thickening_percent: number;
@@ -3095,7 +3178,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
             source: components["schemas"]["SourceRequest"];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
@@ -3729,7 +3812,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
             /**
@@ -3759,6 +3842,11 @@ export interface components {
             /** @description The volumes, newest first. */
             volumes: components["schemas"]["Volume"][];
         };
+        /**
+         * @description A figure of the wall.
+         * @enum {string}
+         */
+        WallFigure: "motion" | "thickening" | "phase";
     };
     responses: never;
     parameters: never;
@@ -3791,6 +3879,7 @@ export type ErasedFile = components['schemas']['ErasedFile'];
 export type ErasedItem = components['schemas']['ErasedItem'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
+export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
 export type WebhookRequest = components['schemas']['WebhookRequest'];
 export type Fit = components['schemas']['Fit'];
@@ -3839,6 +3928,7 @@ export type NotReady = components['schemas']['NotReady'];
 export type ObjectDelivery = components['schemas']['ObjectDelivery'];
 export type OptimiseReport = components['schemas']['OptimiseReport'];
 export type PhaseReport = components['schemas']['PhaseReport'];
+export type PolarFigure = components['schemas']['PolarFigure'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
 export type PolarSummary = components['schemas']['PolarSummary'];
@@ -3908,5 +3998,6 @@ export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
 export type VolumeList = components['schemas']['VolumeList'];
+export type WallFigure = components['schemas']['WallFigure'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;
