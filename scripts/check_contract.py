@@ -275,6 +275,8 @@ def everything(walk, folder):
     gated = beating()
     _, job = call("post", "/v1/beats", expect=202, query="?mass_g=130", body=gated, headers=octets)
     beat = wait(walk, job)["beat"]
+    # The beat's DICOM objects belong to a patient and a study.
+    call("put", "/v1/volumes/{id}/identity", expect=200, id=job["volume"], body=stated)
     call("post", "/v1/beats", expect=200, query="?mass_g=130", body=gated,
          headers={**octets, "prefer": "wait=60", "accept": "application/json"})
     call("get", "/v1/beats", expect=200)

@@ -1,14 +1,15 @@
 //! Archives: what jobs say of them, fetching scans, sending results.
 
-use crate::dicom::{JANE, nm};
+use crate::dicom::{JANE, nm, nm_of};
 use crate::fake_archive::{FakeArchive, FakeScp, Fault, implicit};
-use crate::helpers::{TestApp, engine_with, fake_engine, problem, sphere, text};
-use crate::scu::Scu;
+use crate::helpers::{TestApp, beating, engine_with, fake_engine, problem, sphere, text};
+use crate::scu::{Object, Scu};
 use crate::tls::{Authority, file as pem};
 use rcgen::ExtendedKeyUsagePurpose;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform::volume::{ReadLimits, Volume};
 use ventriform_service::archive::{Archive, Archives, Credentials};
 use ventriform_service::config::Settings;
 use ventriform_service::work::Engine;
@@ -448,6 +449,50 @@ async fn sending(app: &TestApp, objects: &[&str], to: &str) -> Value {
     let answer = file(app, &order).await;
     assert_eq!(answer.status(), 202);
     answer.json().await.unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_rule_makes_a_beat_and_delivers_its_objects() {
+    let names = ["mask_ed.dcm", "mask_es.dcm", "measurements.dcm"];
+    let rule = format!(
+        r#"[{{ image_type = "RECON GATED TOMO", kind = "beat", send = {names:?}, to = "pacs" }}]"#
+    );
+    let fake = FakeArchive::start(&[]).await;
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let app = TestApp::on(data, Engine::new(ReadLimits::default()), |settings| {
+        set(settings, &fake);
+        settings.dicom_listen = "127.0.0.1:0".parse().unwrap();
+        settings.series_quiet = "100ms".parse().unwrap();
+        settings.rules = rule.parse().unwrap();
+    })
+    .await;
+    let gates: Vec<&Volume> = beating().iter().collect();
+    let mut scu = Scu::open(app.running.as_ref().unwrap().dicom_address().unwrap());
+    assert_eq!(scu.store(&Object::of_nm(&nm_of(&JANE, &gates))), 0);
+    scu.release();
+    let deadline = Instant::now() + Duration::from_secs(20);
+    let job = loop {
+        let jobs = app.json("/v1/jobs").await;
+        match &jobs["jobs"][0] {
+            Value::Null => assert!(Instant::now() < deadline, "no job"),
+            job => break job.clone(),
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    };
+    let job = sent(&app, &job, "delivered").await;
+    assert_eq!(job["kind"], "beat");
+    let deliveries = job["deliveries"].as_array().unwrap().iter();
+    assert_eq!(
+        deliveries.map(|d| text(&d["name"])).collect::<Vec<_>>(),
+        names
+    );
+    let (stored, storings) = fake.stored();
+    assert_eq!((stored.len(), storings), (3, 3));
+    for name in names {
+        let path = format!("{}/{name}", text(&job["links"]["beat"]));
+        let offered = app.get(&path).send().await.unwrap().bytes().await.unwrap();
+        assert!(stored.values().any(|object| *object == offered), "{name}");
+    }
 }
 
 /// Waits until all deliveries of a job are in that state; returns the job.

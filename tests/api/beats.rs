@@ -123,7 +123,8 @@ async fn invalid_parameters_of_a_beat_are_rejected_with_the_field() {
     let order = json!({"kind": "beat", "volume": volume, "send": ["mask.dcm"], "to": "pacs"});
     let unsent = app.post("/v1/jobs").json(&order).send().await.unwrap();
     let unsent = problem(unsent, 422, "invalid-field").await;
-    assert!(text(&unsent["fix"]).contains("Leave `send`"), "{unsent}");
+    let there = "mask_ed.dcm, mask_es.dcm, measurements.dcm";
+    assert!(text(&unsent["fix"]).contains(there), "{unsent}");
 }
 
 #[tokio::test]
@@ -303,7 +304,13 @@ async fn what_is_no_gated_study_is_refused_with_advice() {
     let gates = beating();
     for ungated in [heart().0, nm(&JANE, 1)] {
         let refused = problem(post("", ungated).await, 422, "not-gated").await;
-        assert!(text(&refused["fix"]).contains("gated series"), "{refused}");
+        let fix = text(&refused["fix"]);
+        assert!(fix.contains("gated series"), "{refused}");
+        // Gates in files of their own are no upload.
+        assert!(
+            fix.contains("4-D NIfTI") && !fix.contains("each gate"),
+            "{refused}"
+        );
     }
     // Eight volumes that last a minute each are no heart beat.
     let dynamic = nifti_of(gates, Some(60.0));

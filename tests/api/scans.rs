@@ -1,14 +1,17 @@
 //! Whose scan a volume is: shown, searched, stated, erased; and DICOM objects of results.
 
-use crate::dicom::{JANE, Patient, contains, element, file, nm, simulated};
-use crate::helpers::{Api, TestApp, closed, key, problem, scan, text};
+use crate::dicom::{JANE, Patient, contains, element, file, nm, nm_of, simulated};
+use crate::helpers::{Api, TestApp, beating, closed, key, problem, scan, text};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform::progress::Monitor;
 use ventriform::volume::Provenance;
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use ventriform_service::access::{Quota, Scope};
 use ventriform_service::records::Tenant;
 use ventriform_service::work::Engine;
@@ -364,6 +367,106 @@ async fn a_segmentation_is_had_as_dicom_objects_of_the_scans_study() {
     problem(refused, 400, "unknown-parameter").await;
     let refused = get(&app, &format!("{fit}/mask.dcm?deidentify=yes")).await;
     problem(refused, 400, "invalid-parameter").await;
+}
+
+/// Calls `visit` with the data set and every item in it.
+fn every_item(set: &InMemDicomObject, visit: &mut dyn FnMut(&InMemDicomObject)) {
+    visit(set);
+    for item in set.iter().filter_map(|element| element.items()).flatten() {
+        every_item(item, visit);
+    }
+}
+
+/// The numbers of all frames that an object refers to, and the UIDs of all instances.
+fn references(object: &InMemDicomObject) -> (BTreeSet<usize>, BTreeSet<String>) {
+    let (mut frames, mut instances) = (BTreeSet::new(), BTreeSet::new());
+    every_item(object, &mut |item| {
+        if let Ok(frame) = item.element(tags::REFERENCED_FRAME_NUMBER) {
+            frames.extend(frame.to_multi_int::<usize>().unwrap());
+        }
+        if let Ok(instance) = item.element(tags::REFERENCED_SOP_INSTANCE_UID) {
+            instances.insert(instance.to_str().unwrap().into_owned());
+        }
+    });
+    (frames, instances)
+}
+
+#[tokio::test]
+async fn a_beat_is_had_as_dicom_objects_that_refer_to_the_gates_of_its_ends() {
+    let app = real().await;
+    let gates: Vec<&Volume> = beating().iter().collect();
+    let volume = upload(&app, nm_of(&JANE, &gates)).await;
+    let beat = result(&app, "beat", &volume, json!({})).await;
+    let made = app.json(&beat).await;
+    let links = ["mask_ed", "mask_es", "measurements"].map(|name| format!("{beat}/{name}.dcm"));
+    assert_eq!(made["links"]["dicom"], json!(links));
+    let report = app.json(&format!("{beat}/report")).await;
+    let ends = ["end_diastole_gate", "end_systole_gate"];
+    let ends = ends.map(|end| usize::try_from(report[end].as_u64().unwrap()).unwrap());
+    for (end, gate) in ["end_diastole_gate", "end_systole_gate"]
+        .into_iter()
+        .zip(ends)
+    {
+        assert_eq!(made["summary"][end], gate);
+        assert_eq!(report["gates"][gate - 1]["frame"], gate - 1);
+    }
+    let mut read: Vec<DefaultDicomObject> = Vec::new();
+    for path in &links {
+        let object = bytes(&app, path).await;
+        assert_eq!(object, bytes(&app, path).await, "{path} differs");
+        for of_scan in [JANE.name, JANE.id, JANE.study, JANE.accession] {
+            assert!(contains(&object, of_scan), "{path} lacks {of_scan}");
+        }
+        let anonymous = bytes(&app, &format!("{path}?deidentify=true")).await;
+        for hidden in ["Doe", JANE.id, JANE.study, JANE.accession, "19500102"] {
+            assert!(!contains(&anonymous, hidden), "{path} shows {hidden}");
+        }
+        read.push(from_reader(&object[..]).unwrap());
+    }
+    let source = BTreeSet::from([format!("{}.3", JANE.study)]);
+    let slices = gates[0].shape[2];
+    for ((object, path), gate) in read.iter().zip(&links).zip(ends) {
+        assert_eq!(
+            object.meta().media_storage_sop_class_uid(),
+            uids::SEGMENTATION_STORAGE
+        );
+        let (frames, instances) = references(object);
+        let own: BTreeSet<usize> = (slices * (gate - 1) + 1..=slices * gate).collect();
+        assert_eq!((&frames, &instances), (&own, &source), "{path}");
+        // Segment 1 is the wall and segment 2 the cavity, as the labels of that gate are.
+        let (of, voxels, _) = read_back(&bytes(&app, path).await);
+        assert_eq!(of.study_uid.as_deref(), Some(JANE.study));
+        let labels = format!("{beat}/labels_gate{gate:02}.nii.gz");
+        let labels = get(&app, &labels).await.bytes().await.unwrap();
+        let file = [VolumeFile::in_memory("labels.nii.gz", labels.to_vec())];
+        let limits = ReadLimits::default();
+        let stored = volume::read(&file, &ReadOptions::default(), &limits, &Monitor::silent());
+        assert!(voxels == stored.unwrap().volume.voxels, "{path}");
+        assert!(voxels.contains(&1.0) && voxels.contains(&2.0), "{path}");
+    }
+    let measurements = &read[2];
+    assert_eq!(
+        measurements.meta().media_storage_sop_class_uid(),
+        uids::COMPREHENSIVE3_DSR_STORAGE
+    );
+    assert!(references(measurements).1.is_superset(&source));
+    let mut numbers = BTreeSet::new();
+    every_item(measurements, &mut |item| {
+        if let Ok(number) = item.element(tags::NUMERIC_VALUE) {
+            numbers.insert(number.to_str().unwrap().trim().to_owned());
+        }
+    });
+    for figure in ["edv_ml", "esv_ml", "sv_ml", "ef_percent", "mass_g"] {
+        let figure = report[figure].to_string();
+        assert!(numbers.contains(&figure), "{figure} in {numbers:?}");
+    }
+
+    // They name the patient, which a key that may only read does not see.
+    let reader = with_scope(&app, Scope::Read, "default").await;
+    for path in &links {
+        problem(get(&reader, path).await, 403, "insufficient-scope").await;
+        bytes(&reader, &format!("{path}?deidentify=true")).await;
+    }
 }
 
 #[tokio::test]

@@ -149,6 +149,9 @@ impl Object {
     }
 }
 
+/// Bytes of a data set that are sent at once, below the usual limit on a PDU of 16 KiB.
+const PDU_BYTES: usize = 16_000;
+
 /// An open association.
 pub struct Scu(ClientAssociation<TcpStream>);
 
@@ -219,9 +222,12 @@ impl Scu {
         let set = command(0x0001, object.class, Some(&object.instance));
         self.send(PDataValueType::Command, context, set, true);
         let data = object.data_set(syntax);
-        let (first, second) = data.split_at(data.len() / 2);
-        self.send(PDataValueType::Data, context, first.to_vec(), false);
-        self.send(PDataValueType::Data, context, second.to_vec(), true);
+        // At least two, and each within a PDU.
+        let length = PDU_BYTES.min(data.len().div_ceil(2));
+        let last = data.len().div_ceil(length) - 1;
+        for (number, part) in data.chunks(length).enumerate() {
+            self.send(PDataValueType::Data, context, part.to_vec(), number == last);
+        }
         self.status()
     }
 

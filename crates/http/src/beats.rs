@@ -7,27 +7,28 @@ use super::jobs::filing::{self, UploadJob};
 use super::links::path_of;
 use super::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
 use super::problem::Answer;
-use super::products::{Offer, ProductCollection, body_of_product};
+use super::products::{Offer, ProductCollection, body_of_product, object_paths};
 use super::query::QueryReader;
 use super::tags::TagQuery;
 use super::webhook_request::WebhookQuery;
 use axum::extract::{Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
-use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN};
+use ventriform::export::dicom::BeatEnd;
+use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh};
 use ventriform_service::records::{Product, Resource};
 
 /// The collection of beats.
 pub struct Beats;
 
 /// The mesh that stands for a beat where one is asked for: the wall at end diastole.
-const MESH: &str = "mesh_ed";
+const MESH: &str = end_mesh(BeatEnd::Diastole);
 const REPORT_FILE: &str = "beat.json";
 
 impl ProductCollection for Beats {
     const RESOURCE: Resource = Resource::Beat;
     type Body = BeatBody;
-    const MESHES: &'static [&'static str] = &[MESH, "mesh_es"];
+    const MESHES: &'static [&'static str] = &[MESH, end_mesh(BeatEnd::Systole)];
     const MESH: &'static str = MESH;
     const FILES: &'static [&'static str] = FILE_NAMES;
     const NUMBERED_FILES: Option<&'static str> = Some(GATE_FILE_PATTERN);
@@ -37,7 +38,8 @@ impl ProductCollection for Beats {
         histogram of the wall's phases), `gates.csv` and `segments.csv`, the mesh at end diastole (`mesh_ed.*`) and at \
         end systole (`mesh_es.*`) in each format, and of every gate, counted from 01, its mesh in each format \
         (`mesh_gate01.*`) and its labels on the gates' grid (`labels_gate01.nii.gz`: wall 1, cavity 2). All meshes of a \
-        beat have the same nodes and triangles.";
+        beat have the same nodes and triangles. DICOM objects are wall and cavity at end diastole and at end systole \
+        (`mask_ed.dcm`, `mask_es.dcm`) and the figures (`measurements.dcm`).";
     type FileAnswer = openapi::BeatFileAnswer;
 }
 
@@ -67,6 +69,8 @@ struct BeatLinks {
     curve: String,
     /// The histogram of the wall's phases.
     phase: String,
+    /// DICOM objects of the scan's patient and study, for the archive.
+    dicom: Vec<String>,
     /// The volume.
     volume: String,
 }
@@ -79,6 +83,7 @@ impl BeatLinks {
             report: format!("{itself}/report"),
             curve: format!("{itself}/curve.svg"),
             phase: format!("{itself}/phase.svg"),
+            dicom: object_paths(beat),
             volume: path_of(beat.volume.as_deref().unwrap_or_default()),
             itself,
         }

@@ -36,7 +36,6 @@ use utoipa::openapi::path::HttpMethod;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::{IntoParams, IntoResponses, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
-use ventriform::export::dicom::DicomObject;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
@@ -44,7 +43,8 @@ use ventriform_service::decoding::LITTLE_MEMORY;
 use ventriform_service::records::{
     Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError, Tenant,
 };
-use ventriform_service::work::{UploadFacts, dicom, part};
+use ventriform_service::work::dicom::{self, ResultObject};
+use ventriform_service::work::{UploadFacts, part};
 
 /// One kind of product.
 pub trait ProductCollection: 'static {
@@ -570,17 +570,18 @@ async fn send_object(
     app: &App,
     tenant: &Tenant,
     product: &Product,
-    object: DicomObject,
+    object: ResultObject,
     deidentify: bool,
     headers: &HeaderMap,
 ) -> Answer {
     let id = &product.id;
-    let size: u64 = product.files.iter().map(|file| file.bytes).sum();
-    charge(size).await?;
+    let sources = object.source_files(product);
+    let sources = sources.iter().filter_map(|name| product.file(name));
+    charge(sources.map(|file| file.bytes).sum()).await?;
     let result = app
         .service
         .items()
-        .result(tenant, id, dicom::SOURCE_FILES)
+        .result(tenant, id, |product| object.source_files(product))
         .await?;
     let result = result.ok_or_else(|| volume_erased(id))?;
     let secret = if deidentify {
@@ -621,7 +622,7 @@ pub fn object_paths(product: &Product) -> Vec<String> {
     let itself = path_of(&product.id);
     let objects = dicom::objects(product.resource()).iter();
     objects
-        .filter(|object| product.file("polar.png").is_some() || **object != DicomObject::Polar)
+        .filter(|object| object.is_of(product))
         .map(|object| format!("{itself}/{}", object.file_name()))
         .collect()
 }

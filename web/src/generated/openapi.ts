@@ -143,6 +143,8 @@ export interface components {
         BeatLinks: {
             /** @description The volume curve. */
             curve: string;
+            /** @description DICOM objects of the scan's patient and study, for the archive. */
+            dicom: string[];
             /** @description The wall at end diastole, in the format that `Accept` asks for. */
             mesh: string;
             /** @description The histogram of the wall's phases. */
@@ -430,6 +432,16 @@ export interface components {
              * @description Ejection fraction; `null` if the gates are no beat.
              */
             ef_percent?: number | null;
+            /**
+             * Format: int64
+             * @description The gate with the largest cavity, counted from 1.
+             */
+            end_diastole_gate: number;
+            /**
+             * Format: int64
+             * @description The gate with the smallest cavity.
+             */
+            end_systole_gate: number;
             /**
              * Format: double
              * @description End-systolic volume.
@@ -1110,6 +1122,11 @@ export interface components {
              * @description The factor that brought the gate to the usual counts of a gate.
              */
             counts_factor: number;
+            /**
+             * Format: int64
+             * @description The volume of the input that it is, counted from 0 as the parameter `frame` is.
+             */
+            frame: number;
             /**
              * Format: int64
              * @description Its number, from 1.
@@ -3162,7 +3179,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
             source: components["schemas"]["SourceRequest"];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
@@ -3796,7 +3813,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
             /**

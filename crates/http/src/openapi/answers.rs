@@ -247,7 +247,7 @@ files! {
     /// 200 with the report of a beat, or a mesh of it.
     BeatAnswer: "The report or the mesh", [meshes(), report_alone(BEAT_REPORT)];
     /// 200 with any of a beat's files.
-    BeatFileAnswer: "The file", [meshes(), masks(), pictures(), tables(), report_document()];
+    BeatFileAnswer: "The file", [meshes(), masks(), pictures(), tables(), report_document(), objects()];
     /// 200 with a reader's profile.
     ReaderFileAnswer: "The profile", [profiles()];
     /// 200 with any of a model's files.

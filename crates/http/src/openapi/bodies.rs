@@ -10,10 +10,10 @@ use utoipa::openapi::schema::{
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
-use ventriform::export::dicom::DicomObject;
 use ventriform::parameters::{FitParameters, GatedParameters, ModelParameters};
 use ventriform_service::hooks::HookEvent;
-use ventriform_service::records::LegalHold;
+use ventriform_service::records::{LegalHold, Resource};
+use ventriform_service::work::dicom;
 
 /// A job to be filed; `create_job` reads it field by field.
 pub struct JobRequest;
@@ -55,14 +55,16 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
         .enum_values(Some(["model", "segmentation", "beat"]))
         .default(Some(json!("model")));
     let (external_id, labels) = tag_fields(false);
-    let names = text().enum_values(Some(DicomObject::ALL.map(DicomObject::file_name)));
+    let names = dicom::object_names();
+    let most = Resource::ALL.map(|kind| dicom::objects(kind).len());
+    let names = text().enum_values(Some(names));
     let send = ArrayBuilder::new()
         .description(Some(
             "DICOM objects of the result that are sent to an archive",
         ))
         .items(RefOr::T(Schema::from(names)))
         .min_items(Some(1))
-        .max_items(Some(DicomObject::ALL.len()));
+        .max_items(most.into_iter().max());
     let to = text()
         .description(Some(
             "The archive that they are sent to; that of `source` unless given",

@@ -138,7 +138,7 @@ impl ExchangeHost for Service {
         let result = self
             .queue
             .items()
-            .result(tenant, result, dicom::SOURCE_FILES)
+            .result(tenant, result, |product| object.source_files(product))
             .await?;
         let result = result.ok_or_else(|| gone("The result or its volume was erased."))?;
         let shape = UploadFacts::of(&result.volume)?.shape;

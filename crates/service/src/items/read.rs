@@ -116,7 +116,7 @@ impl Items {
         })
     }
 
-    /// A tenant's product with those of its files that are `wanted`, and the volume that it was made
+    /// A tenant's product with those of its files that `wanted` names, and the volume that it was made
     /// of with its files. `None` if the tenant has one of the two no more, or the product was made of
     /// no volume.
     ///
@@ -126,7 +126,7 @@ impl Items {
         &self,
         tenant: &Tenant,
         id: &str,
-        wanted: &[&str],
+        wanted: impl FnOnce(&Product) -> Vec<String> + Send,
     ) -> Result<Option<StoredResult>, StoreError> {
         let Some(product) = self.catalogue.product(tenant, id).await? else {
             return Ok(None);
@@ -140,9 +140,11 @@ impl Items {
         let Some(volume_files) = self.volume_files(&source, &volume.files).await? else {
             return Ok(None);
         };
+        let wanted = wanted(&product.item);
+        let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
         Ok(Some(StoredResult {
             made_at: product.ownership.created_at,
-            files: self.with_files(product.item, wanted).await?,
+            files: self.with_files(product.item, &wanted).await?,
             scan: volume.ownership.scan,
             volume: volume.item,
             volume_files,

@@ -2,11 +2,11 @@
 
 use super::error::GatedError;
 use super::from_files::GatedHeart;
-use super::pictures;
+use super::{names, pictures};
 use crate::beat::SegmentMotion;
 use crate::export::animated::{self, Cycle};
 use crate::export::dicom::{
-    BeatObject, DicomBeat, DicomError, DicomObject, EndResults, Moment, SourceScan, Structure,
+    BeatEnd, BeatObject, DicomBeat, DicomError, DicomObject, EndWall, Moment, SourceScan, Structure,
 };
 use crate::export::{self, Format, Metadata};
 use crate::grid::voxelise::{Mask, voxelise};
@@ -52,11 +52,8 @@ impl GatedHeart {
         ];
         files.extend(self.maps(monitor)?);
         let meshes = self.meshes();
-        let ends = [
-            ("mesh_ed".to_owned(), self.beat.end_diastole.gate),
-            ("mesh_es".to_owned(), self.beat.end_systole.gate),
-        ];
-        let gates = (0..meshes.len()).map(|gate| (format!("mesh_gate{:02}", gate + 1), gate));
+        let ends = BeatEnd::ALL.map(|end| (names::end_mesh(end).to_owned(), self.gate_at(end)));
+        let gates = (0..meshes.len()).map(|gate| (names::gate_mesh(gate + 1), gate));
         let known = self.metadata(&report, monitor)?;
         for (name, gate) in ends.into_iter().chain(gates) {
             for format in formats {
@@ -174,9 +171,10 @@ impl GatedHeart {
     /// End diastole and end systole as scans with the given identity, each with the images or frames of its gate.
     pub fn scans(&self, identity: &Provenance, made: &Moment) -> [SourceScan; 2] {
         let placed = self.reading.facts.affine_source.is_placed();
-        [&self.beat.end_diastole, &self.beat.end_systole].map(|end| {
-            let volume = &self.reading.gates[end.gate];
-            let known = match self.reading.scans.get(end.gate) {
+        BeatEnd::ALL.map(|end| {
+            let gate = self.gate_at(end);
+            let volume = &self.reading.gates[gate];
+            let known = match self.reading.scans.get(gate) {
                 Some(own) => Provenance {
                     series_uid: own.series_uid.clone(),
                     sop_class_uid: own.sop_class_uid.clone(),
@@ -198,33 +196,43 @@ impl GatedHeart {
     /// # Errors
     /// See [`DicomError`].
     pub fn dicom_files(&self, scans: &[SourceScan; 2]) -> Result<Vec<NamedFile>, DicomError> {
-        let ends = [self.beat.end_diastole.gate, self.beat.end_systole.gate];
         let meshes = self.meshes();
-        // A silent monitor is never cancelled.
-        let masks = ends.map(|gate| self.masks(gate, &meshes[gate], &Monitor::silent()));
-        let masks = masks.map(|masks| {
-            let empty = || Mask::empty(self.reading.gates[0].shape);
-            masks.unwrap_or_else(|Cancelled| [empty(), empty()])
-        });
         let report = self.report();
         let text = json_line(&report);
-        let end = |end: usize| EndResults {
-            scan: &scans[end],
-            wall: &masks[end][0],
-            cavity: &masks[end][1],
-            mesh: &meshes[ends[end]],
+        let results = DicomBeat::new(self.structure(), scans, &report, &text);
+        let wall = |end: BeatEnd| {
+            let gate = self.gate_at(end);
+            let mesh = meshes[gate].clone();
+            // A silent monitor is never cancelled.
+            let masks = self.masks(gate, &mesh, &Monitor::silent());
+            let [wall, cavity] = masks.unwrap_or_else(|Cancelled| {
+                let empty = || Mask::empty(self.reading.gates[gate].shape);
+                [empty(), empty()]
+            });
+            EndWall { wall, cavity, mesh }
         };
-        let results = DicomBeat::new(self.structure(), [end(0), end(1)], &report, &text);
         BeatObject::ALL
             .into_iter()
             .map(|object| {
+                let bytes = match object {
+                    BeatObject::Mask(end) => results.mask(end, &wall(end)),
+                    BeatObject::Measurements => results.measurements(),
+                };
                 Ok(NamedFile {
                     name: object.file_name().into(),
                     media_type: DicomObject::MEDIA_TYPE,
-                    bytes: results.write(object)?,
+                    bytes: bytes?,
                 })
             })
             .collect()
+    }
+
+    /// The gate at that end, from 0.
+    fn gate_at(&self, end: BeatEnd) -> usize {
+        match end {
+            BeatEnd::Diastole => self.beat.end_diastole.gate,
+            BeatEnd::Systole => self.beat.end_systole.gate,
+        }
     }
 
     /// The wall as 1 and the cavity as 2 in a gate.
@@ -243,7 +251,7 @@ impl GatedHeart {
         let entries: Vec<LabelEntry> = segments.iter().map(|segment| segment.entry).collect();
         let stated = self.reading.stated_grid.as_ref();
         let grid = (volume.shape, &volume.frame);
-        let name = format!("labels_gate{:02}.nii.gz", gate + 1);
+        let name = names::gate_labels(gate + 1);
         let bytes = nifti::write_labels(&labels, &entries, grid, stated, monitor);
         SegmentationFilesError::nifti(name, bytes)
     }

@@ -109,6 +109,7 @@ impl GatedHeart {
         let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let parts = BeatParts {
             segment_names: names,
+            first_frame: self.reading.first_frame,
             rr_ms: self.rr_ms,
             timing: self.reading.timing.clone(),
             long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),

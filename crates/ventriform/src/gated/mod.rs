@@ -15,5 +15,5 @@ mod pictures;
 
 pub use error::GatedError;
 pub use from_files::{GatedHeart, from_files};
-pub use names::{FILE_NAMES, GATE_FILE_PATTERN};
+pub use names::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, gate_labels};
 pub use order::GatedOrder;

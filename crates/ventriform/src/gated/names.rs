@@ -1,5 +1,7 @@
 //! The names of the files of a beat.
 
+use crate::export::dicom::BeatEnd;
+
 /// The files that every beat has beside the meshes of its gates: report, pictures, tables, polar maps, and the beat as an
 /// animation.
 pub const FILE_NAMES: &[&str] = &[
@@ -26,3 +28,21 @@ pub const FILE_NAMES: &[&str] = &[
 /// The names of the files of one gate, counted from 01, as a regular expression: its mesh in each format, and its labels.
 pub const GATE_FILE_PATTERN: &str =
     r"^(mesh_gate[0-9]{2}\.(glb|gltf|stl|ply|obj|vtk|vtp|json)|labels_gate[0-9]{2}\.nii\.gz)$";
+
+/// The name, without extension, of the mesh of the gate at that end.
+pub const fn end_mesh(end: BeatEnd) -> &'static str {
+    match end {
+        BeatEnd::Diastole => "mesh_ed",
+        BeatEnd::Systole => "mesh_es",
+    }
+}
+
+/// The name, without extension, of the mesh of the gate with that number, counted from 1.
+pub(super) fn gate_mesh(number: usize) -> String {
+    format!("mesh_gate{number:02}")
+}
+
+/// The name of the labels of the gate with that number, counted from 1.
+pub fn gate_labels(number: usize) -> String {
+    format!("labels_gate{number:02}.nii.gz")
+}

@@ -90,6 +90,8 @@ pub struct BeatReport {
 pub struct GateReport {
     /// Its number, from 1.
     pub gate: usize,
+    /// The volume of the input that it is, counted from 0 as the parameter `frame` is.
+    pub frame: usize,
     /// Volume of the cavity.
     pub cavity_ml: f64,
     /// Volume of the muscle.
@@ -182,6 +184,8 @@ pub struct TimingReport {
 pub struct BeatParts {
     /// Names of the segments, 1 to 17.
     pub segment_names: Vec<String>,
+    /// The volume of the input that is the first gate, counted from 0.
+    pub first_frame: usize,
     /// The R-R interval, ms.
     pub rr_ms: Option<f64>,
     /// What the file says of the beats.
@@ -243,6 +247,7 @@ impl BeatReport {
             gates: (beat.gates.iter().zip(&beat.factors).enumerate())
                 .map(|(gate, (volumes, factor))| GateReport {
                     gate: gate + 1,
+                    frame: parts.first_frame + gate,
                     cavity_ml: round(volumes.cavity_ml),
                     wall_ml: round(volumes.wall_ml),
                     counts_factor: round(*factor),

@@ -71,6 +71,10 @@ pub struct BeatSummary {
     pub confidence: f64,
     /// Number of gates.
     pub gates: usize,
+    /// The gate with the largest cavity, counted from 1.
+    pub end_diastole_gate: usize,
+    /// The gate with the smallest cavity.
+    pub end_systole_gate: usize,
     /// End-diastolic volume.
     pub edv_ml: f64,
     /// End-systolic volume.
@@ -141,6 +145,8 @@ impl BeatSummary {
             template: report.template,
             confidence: report.confidence,
             gates: report.gates.len(),
+            end_diastole_gate: report.end_diastole_gate,
+            end_systole_gate: report.end_systole_gate,
             edv_ml: report.edv_ml,
             esv_ml: report.esv_ml,
             sv_ml: report.sv_ml,

@@ -16,6 +16,8 @@ use super::{Volume, VolumeError};
 pub struct GatedReading {
     /// The gates, in their order.
     pub gates: Vec<Volume>,
+    /// The volume of the file that is the first gate, or the file, counted from 0: the others follow it.
+    pub first_frame: usize,
     /// What the file says of the beats.
     pub timing: GateTiming,
     /// Facts about the file, or that of the first gate, with warnings of all.
@@ -48,6 +50,7 @@ impl GatedReading {
             gates.push(reading.volume);
             scans.push(reading.provenance);
         }
+        let mut first_frame = 0;
         let each = timing.gates_per_interval.unwrap_or(gates.len());
         if each > 0 && each < gates.len() && gates.len().is_multiple_of(each) {
             let counts: Vec<f64> = (gates.chunks(each))
@@ -59,9 +62,10 @@ impl GatedReading {
                 counts.len(),
                 main + 1
             ));
-            gates = gates.split_off(main * each);
+            first_frame = main * each;
+            gates = gates.split_off(first_frame);
             gates.truncate(each);
-            scans = scans.split_off(main * each);
+            scans = scans.split_off(first_frame);
             scans.truncate(each);
             if main > 0 {
                 // The sequence's first item, which was read, is that of the first interval.
@@ -70,6 +74,7 @@ impl GatedReading {
         }
         Ok(Self {
             gates,
+            first_frame,
             timing,
             facts,
             scans: scans.into_iter().collect::<Option<_>>().unwrap_or_default(),

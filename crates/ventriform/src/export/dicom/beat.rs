@@ -1,7 +1,8 @@
 //! A beat as DICOM objects: Segmentations of end diastole and end systole, and its figures as a structured report.
 //!
-//! In: the report of a beat and, of both ends, the scan with that gate's images or frames, the masks and the mesh. Out:
-//! the bytes of [`BeatObject`]s. Each Segmentation refers to the frames of its own gate.
+//! In: the report of a beat, of both ends the scan with that gate's images or frames and, for a Segmentation, the wall
+//! at its end. All may come from a fit or from its stored files. Out: the bytes of [`BeatObject`]s. Each Segmentation
+//! refers to the frames of its own gate.
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
@@ -29,6 +30,17 @@ pub enum BeatEnd {
 }
 
 impl BeatEnd {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Diastole, Self::Systole];
+
+    /// The number of the gate at this end of the beat of `report`, counted from 1.
+    pub fn gate(self, report: &BeatReport) -> usize {
+        match self {
+            Self::Diastole => report.end_diastole_gate,
+            Self::Systole => report.end_systole_gate,
+        }
+    }
+
     fn code(self) -> Code {
         match self {
             Self::Diastole => sct("416190007", "End diastole"),
@@ -46,16 +58,14 @@ impl BeatEnd {
 }
 
 /// The wall at an end of the beat.
-#[derive(Clone)]
-pub struct EndResults<'a> {
-    /// The scan, with the images or frames of the gate.
-    pub scan: &'a SourceScan,
+#[derive(Debug, Clone)]
+pub struct EndWall {
     /// The wall on the scan's grid.
-    pub wall: &'a Mask,
+    pub wall: Mask,
     /// The cavity there.
-    pub cavity: &'a Mask,
+    pub cavity: Mask,
     /// The wall, LPS mm.
-    pub mesh: &'a TriMesh,
+    pub mesh: TriMesh,
 }
 
 /// An object of a beat.
@@ -88,54 +98,51 @@ impl BeatObject {
 /// The results of a beat.
 pub struct DicomBeat<'a> {
     structure: Structure,
-    /// End diastole and end systole.
-    ends: [EndResults<'a>; 2],
+    /// The scan at end diastole and at end systole.
+    scans: &'a [SourceScan; 2],
     report: &'a BeatReport,
     /// The report as JSON in one line, from which UIDs are derived.
     text: &'a str,
 }
 
 impl<'a> DicomBeat<'a> {
-    /// The results of a beat of `structure` at end diastole and end systole, with the text of its report, as JSON in one
-    /// line, from which UIDs are derived.
+    /// The results of a beat of `structure`. `scans` are the scan with the images or frames of the gate at end diastole
+    /// and with those at end systole; `text` is the report as JSON in one line, from which UIDs are derived.
     pub fn new(
         structure: Structure,
-        ends: [EndResults<'a>; 2],
+        scans: &'a [SourceScan; 2],
         report: &'a BeatReport,
         text: &'a str,
     ) -> Self {
         Self {
             structure,
-            ends,
+            scans,
             report,
             text,
         }
     }
 
-    /// The bytes of `object`.
+    /// The bytes of [`BeatObject::Mask`].
     ///
     /// # Errors
     /// See [`DicomError`].
-    pub fn write(&self, object: BeatObject) -> Result<Vec<u8>, DicomError> {
-        match object {
-            BeatObject::Mask(end) => {
-                let of = match end {
-                    BeatEnd::Diastole => &self.ends[0],
-                    BeatEnd::Systole => &self.ends[1],
-                };
-                let results =
-                    DicomResults::new(of.scan, self.structure, of.wall, of.mesh, self.text);
-                results
-                    .with_cavity(Some(of.cavity))
-                    .at(end)
-                    .write_always(DicomObject::Mask)
-            }
-            BeatObject::Measurements => self.measurements(),
-        }
+    pub fn mask(&self, end: BeatEnd, of: &EndWall) -> Result<Vec<u8>, DicomError> {
+        let scan = match end {
+            BeatEnd::Diastole => &self.scans[0],
+            BeatEnd::Systole => &self.scans[1],
+        };
+        DicomResults::new(scan, self.structure, &of.wall, &of.mesh, self.text)
+            .with_cavity(Some(&of.cavity))
+            .at(end)
+            .write_always(DicomObject::Mask)
     }
 
-    fn measurements(&self) -> Result<Vec<u8>, DicomError> {
-        let scans = [self.ends[0].scan, self.ends[1].scan];
+    /// The bytes of [`BeatObject::Measurements`].
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn measurements(&self) -> Result<Vec<u8>, DicomError> {
+        let scans = self.scans.each_ref();
         for scan in scans {
             scan.check()?;
         }

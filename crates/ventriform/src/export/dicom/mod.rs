@@ -8,7 +8,7 @@
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
 //!    `measurements`, `capture`).
-//! 4. [`DicomBeat::write`] does so for a beat: two Segmentations and a report.
+//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report.
 //!
 //! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
 //! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
@@ -38,7 +38,7 @@ mod uid;
 #[cfg(test)]
 mod tests;
 
-pub use beat::{BeatEnd, BeatObject, DicomBeat, EndResults};
+pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};

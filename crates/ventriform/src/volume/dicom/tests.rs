@@ -417,6 +417,7 @@ fn every_gate_is_read_with_the_timing_of_the_beats() {
         .map(|gate| gate.voxels.clone())
         .collect();
     assert_eq!(found, later);
+    assert_eq!(reading.first_frame, 2);
     let told = |warning: &String| warning.contains("2 R-R intervals of 2 gates: interval 2");
     assert!(reading.facts.warnings.iter().any(told));
 }

@@ -1,0 +1,92 @@
+//! DICOM objects of a stored beat.
+//!
+//! The walls at both ends are the stored labels of their gates, and each end refers to the frames of its gate in the
+//! kept upload.
+
+use super::super::problems::{Explain, broken_result};
+use super::super::upload::UploadFacts;
+use super::{scan, stored};
+use crate::items::{StoredItem, StoredResult};
+use crate::records::{Failure, Product};
+use ventriform::export::dicom::{BeatEnd, BeatObject, DicomBeat, EndWall, Structure};
+use ventriform::gated::{end_mesh, gate_labels};
+use ventriform::report::{BeatReport, BeatSummary};
+use ventriform::volume::ReadLimits;
+
+const REPORT_FILE: &str = "beat.json";
+
+/// The names of the files of `product` of which `object` is made.
+pub fn source_files(object: BeatObject, product: &Product) -> Vec<String> {
+    let mut names = vec![REPORT_FILE.to_owned()];
+    if let BeatObject::Mask(end) = object {
+        names.push(mesh_file(end));
+        let summary = serde_json::from_value::<BeatSummary>(product.summary.clone().into());
+        names.extend(summary.ok().map(|summary| gate_labels(gate(end, &summary))));
+    }
+    names
+}
+
+fn gate(end: BeatEnd, summary: &BeatSummary) -> usize {
+    match end {
+        BeatEnd::Diastole => summary.end_diastole_gate,
+        BeatEnd::Systole => summary.end_systole_gate,
+    }
+}
+
+fn mesh_file(end: BeatEnd) -> String {
+    format!("{}.json", end_mesh(end))
+}
+
+/// The bytes of one object.
+///
+/// # Errors
+/// As [`super::object`].
+pub fn object(
+    result: &StoredResult,
+    object: BeatObject,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<Vec<u8>, Failure> {
+    let facts = UploadFacts::of(&result.volume).map_err(|error| broken_result(&error))?;
+    let bytes = stored::required(&result.files, REPORT_FILE)?;
+    let report: BeatReport = stored::report(&bytes)?;
+    let text = stored::report_text(&bytes)?;
+    let scan = |end: BeatEnd| {
+        let number = end.gate(&report);
+        let gate = report.gates.iter().find(|gate| gate.gate == number);
+        let gate = gate.ok_or_else(|| broken_result(&format!("there is no gate {number}")))?;
+        scan::source(result, &facts, Some(gate.frame), secret, limits)
+    };
+    let scans = [scan(BeatEnd::Diastole)?, scan(BeatEnd::Systole)?];
+    let beat = DicomBeat::new(Structure::of("left_ventricle"), &scans, &report, &text);
+    let made = match object {
+        BeatObject::Mask(end) => {
+            let labels = gate_labels(end.gate(&report));
+            let wall = wall(
+                &result.files,
+                (&mesh_file(end), &labels),
+                facts.shape,
+                limits,
+            )?;
+            beat.mask(end, &wall)
+        }
+        BeatObject::Measurements => beat.measurements(),
+    };
+    made.map_err(|error| error.explain())
+}
+
+/// The wall of the gate with these files of mesh and labels.
+fn wall(
+    item: &StoredItem,
+    (mesh, labels): (&str, &str),
+    shape: [usize; 3],
+    limits: &ReadLimits,
+) -> Result<EndWall, Failure> {
+    let volume = stored::voxels(item, labels, shape, limits)?;
+    let label = |label: f32| stored::mask(&volume, |value| (value - label).abs() < 0.5);
+    Ok(EndWall {
+        wall: label(1.0),
+        cavity: label(2.0),
+        mesh: stored::mesh(item, mesh)?,
+    })
+}

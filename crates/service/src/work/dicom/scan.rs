@@ -1,0 +1,111 @@
+//! Whose scan a result is of, and which images or frames it was made of.
+
+use super::super::files::volume_files;
+use super::super::problems::{
+    Explain, broken_result, identity_needed, malformed_identity, unknown_identity,
+};
+use super::super::upload::UploadFacts;
+use crate::items::StoredResult;
+use crate::records::{Failure, ScanFields, ScanIdentity, Timestamp, rfc3339};
+use nalgebra::Matrix3;
+use serde_json::{Map, Value};
+use ventriform::export::dicom::{
+    Deidentification, DicomError, Moment, SourceScan, StatedIdentity, identity,
+};
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::progress::Monitor;
+use ventriform::volume::{self, AffineSource, Provenance, ReadLimits, ReadOptions};
+
+/// Checks what a person states of a scan's identity beside what its file says, and completes one by
+/// the other.
+///
+/// # Errors
+/// A field that DICOM does not allow, that is unknown, or that differs from what the file says; or
+/// the study or the patient is unknown.
+pub fn check_stated(scan: &ScanIdentity, stated: &Map<String, Value>) -> Result<(), Failure> {
+    for (name, value) in stated {
+        if !StatedIdentity::FIELDS.contains(&name.as_str()) {
+            return Err(unknown_identity(name));
+        }
+        if !value.is_string() {
+            return Err(malformed_identity(name));
+        }
+    }
+    let known: StatedIdentity = serde_json::from_value(stated.clone().into()).unwrap_or_default();
+    let found = scan.found.as_ref().map(provenance);
+    identity(found.as_ref(), &known).map_err(|error| error.explain())?;
+    Ok(())
+}
+
+/// The texts of the fields; those of another type are left out.
+fn provenance(fields: &ScanFields) -> Provenance {
+    serde_json::from_value(fields.0.clone().into()).unwrap_or_default()
+}
+
+/// The scan that the objects of a result belong to: of the volume with the number `frame`, or of all where it is `None`.
+/// With a `secret` it is freed of the patient's identity.
+///
+/// # Errors
+/// `identity-needed` if patient or study are unknown, or were erased; or if the upload cannot be read.
+pub fn source(
+    result: &StoredResult,
+    facts: &UploadFacts,
+    frame: Option<usize>,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<SourceScan, Failure> {
+    let found = match &result.scan.found {
+        Some(_) => {
+            let files = volume_files(&result.volume_files);
+            volume::provenance(&files, &ReadOptions { frame }, limits, &Monitor::silent())
+                .map_err(|error| error.explain())?
+        }
+        None => None,
+    };
+    let stated = match &result.scan.stated {
+        Some(fields) => serde_json::from_value(fields.0.clone().into()).unwrap_or_default(),
+        None => StatedIdentity::default(),
+    };
+    let known = identity(found.as_ref(), &stated).map_err(|error| match error {
+        DicomError::NoIdentity { .. } => identity_needed(&error, &result.volume.id),
+        other => other.explain(),
+    })?;
+    let assumed = [AffineSource::Pixdim, AffineSource::UnknownOrigin];
+    let placed = !assumed.iter().any(|a| a.as_str() == facts.affine_source);
+    let made = moment(result.made_at);
+    let scan = SourceScan::new(known, voxel_to_patient(facts)?, facts.shape, placed, made);
+    Ok(match secret {
+        Some(secret) => {
+            let how = Deidentification {
+                secret: secret.to_owned(),
+            };
+            scan.deidentified(&how, &StatedIdentity::default())
+        }
+        None => scan,
+    })
+}
+
+/// The place of the volume's voxels.
+///
+/// # Errors
+/// If the record is damaged.
+pub fn voxel_to_patient(facts: &UploadFacts) -> Result<VoxelToPatient, Failure> {
+    let a = &facts.affine;
+    let linear = Matrix3::from_fn(|row, column| a[row][column]);
+    let origin = Vec3::from_fn(|row, _| a[row][3]);
+    VoxelToPatient::new(linear, origin).map_err(|error| broken_result(&error))
+}
+
+/// `YYYYMMDD` and `HHMMSS` of a moment, in UTC.
+fn moment(at: Timestamp) -> Moment {
+    let text = rfc3339(at);
+    let digits = |range: std::ops::Range<usize>| {
+        let part = text.get(range).unwrap_or_default().chars();
+        part.filter(char::is_ascii_digit).collect()
+    };
+    Moment {
+        date: digits(0..10),
+        time: digits(11..19),
+    }
+}

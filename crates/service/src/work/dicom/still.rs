@@ -1,0 +1,98 @@
+//! DICOM objects of a stored segmentation or model.
+
+use super::super::problems::{Explain, broken_result};
+use super::super::upload::UploadFacts;
+use super::{scan, stored};
+use crate::items::{StoredItem, StoredResult};
+use crate::records::{Failure, Resource};
+use serde_json::Value;
+use ventriform::export::dicom::{DicomObject, DicomResults, Structure};
+use ventriform::grid::voxelise::voxelise;
+use ventriform::progress::Monitor;
+use ventriform::report::SegmentationReport;
+use ventriform::segmentation::cavity;
+use ventriform::volume::ReadLimits;
+
+/// The files of a result of which objects are made.
+pub const SOURCE_FILES: [&str; 5] = [MASK_FILE, MESH_FILE, REPORT_FILE, SLICES_FILE, POLAR_FILE];
+
+/// The picture of the polar map.
+pub const POLAR_FILE: &str = "polar.png";
+
+const MASK_FILE: &str = "mask.nii.gz";
+const MESH_FILE: &str = "mesh.json";
+const REPORT_FILE: &str = "report.json";
+const SLICES_FILE: &str = "slices.png";
+
+/// The bytes of one object; `None` if the result has no picture of that name.
+///
+/// # Errors
+/// As [`super::object`].
+pub fn object(
+    result: &StoredResult,
+    object: DicomObject,
+    secret: Option<&[u8]>,
+    limits: &ReadLimits,
+) -> Result<Option<Vec<u8>>, Failure> {
+    let facts = UploadFacts::of(&result.volume).map_err(|error| broken_result(&error))?;
+    let frame = scan::voxel_to_patient(&facts)?;
+    let item = &result.files;
+    let number = item.parameters.get("frame").and_then(Value::as_u64);
+    let number = number.and_then(|number| usize::try_from(number).ok());
+    let scan = scan::source(result, &facts, number, secret, limits)?;
+    let mesh = stored::mesh(item, MESH_FILE)?;
+    let mask = match Resource::of(&item.id) {
+        // A mask that is stored on another grid than the scan's.
+        Some(Resource::Segmentation)
+            if item.parameters.get("mask_grid") == Some(&"orthogonal".into()) =>
+        {
+            voxelise(&mesh, facts.shape, &frame)
+        }
+        Some(Resource::Segmentation) => {
+            let volume = stored::voxels(item, MASK_FILE, facts.shape, limits)?;
+            stored::mask(&volume, |value| value > 0.5)
+        }
+        _ => voxelise(&mesh, facts.shape, &frame),
+    };
+    let report = stored::required(item, REPORT_FILE)?;
+    let text = stored::report_text(&report)?;
+    let figures: Option<SegmentationReport> = match Resource::of(&item.id) {
+        Some(Resource::Segmentation) => Some(stored::report(&report)?),
+        _ => None,
+    };
+    let pictures = [
+        stored::read(item, SLICES_FILE)?,
+        stored::read(item, POLAR_FILE)?,
+    ];
+    let [slices, polar] = pictures.each_ref().map(Option::as_deref);
+    let axes = match object {
+        DicomObject::Mask => figures.as_ref().and_then(SegmentationReport::axes),
+        _ => None,
+    };
+    let cavity = axes.and_then(|(axis, superior)| {
+        // A silent monitor is never cancelled.
+        let cavity = cavity(&axis, &superior, &mesh, (&mask, &frame), &Monitor::silent());
+        cavity.unwrap_or_default()
+    });
+    let results = DicomResults::new(&scan, structure(item, &facts), &mask, &mesh, &text)
+        .with_cavity(cavity.as_ref())
+        .with_pictures(slices, polar);
+    let results = match &figures {
+        Some(report) => results.with_figures(report),
+        None => results,
+    };
+    results.write(object).map_err(|error| error.explain())
+}
+
+/// The content of a result, by the parameters it was made with.
+fn structure(item: &StoredItem, facts: &UploadFacts) -> Structure {
+    let parameter = |name: &str| item.parameters.get(name).and_then(Value::as_str);
+    match Resource::of(&item.id) {
+        Some(Resource::Segmentation) => Structure::of(parameter("organ").unwrap_or_default()),
+        // Of a volume of intensities, and without a choice by the caller, it is the left ventricle.
+        _ if parameter("isolate") == Some("auto") && facts.labels.is_none() => {
+            Structure::of("left_ventricle")
+        }
+        _ => Structure::of(""),
+    }
+}
