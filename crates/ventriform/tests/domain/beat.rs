@@ -281,6 +281,14 @@ fn a_known_mass_is_met() {
 }
 
 /// Meshes of all gates: the same triangles, closed without meeting themselves, as much muscle as the fit keeps.
+/// Sides are named by the direction to the head, which views of the beat need; with no body about the heart, it is the frame's.
+#[test]
+fn the_report_says_which_way_is_up() {
+    let posture = whole().report().posture.unwrap();
+    assert_eq!(posture.superior, [0.0, 0.0, 1.0]);
+    assert_eq!(posture.source, "frame");
+}
+
 #[test]
 fn every_gate_has_a_mesh_that_does_not_meet_itself() {
     let heart = whole();
