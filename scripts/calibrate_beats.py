@@ -30,7 +30,7 @@ HEADER = '''\
 //!
 //! In: figures of fits to simulated gated studies, and the true ones. Out: mean and deviation of the error.
 
-use super::intervals::ErrorTerms;
+use super::error_terms::ErrorTerms;
 '''
 FIGURES = {
     "EF_ERROR": "Error of the ejection fraction, points.",

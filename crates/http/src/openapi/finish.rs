@@ -194,7 +194,8 @@ fn of_numbered_files(pattern: &Value, any: &Value) -> Value {
     let mut one = any.clone();
     let parameters = one["parameters"].as_array_mut();
     if let Some(parameters) = parameters {
-        parameters.retain(|parameter| parameter["name"] != "part");
+        // Meshes and labels of one gate name no patient, and have no parts.
+        parameters.retain(|parameter| parameter["name"] == "file" || parameter["in"] != "query");
         let file = parameters.iter_mut().find(|one| one["name"] == "file");
         if let Some(file) = file {
             file["schema"] = json!({"type": "string", "pattern": pattern});
@@ -231,7 +232,10 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
         parameters.retain(|parameter| match parameter["name"].as_str() {
             Some("file") => false,
             Some("deidentify") => is_object || name == REPORT_PAGE,
-            Some("part") => !is_object && name.starts_with("mesh"),
+            // The animation of a beat is one file, whole.
+            Some("part") => {
+                !is_object && name.starts_with("mesh") && !folder.starts_with("/v1/beats")
+            }
             _ => true,
         });
     }
