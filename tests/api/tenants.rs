@@ -292,6 +292,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 "volumes",
                 "models",
                 "segmentations",
+                "beats",
                 "templates",
                 "readers",
                 "jobs",
@@ -309,27 +310,32 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
     assert!(tried > 30, "only {tried} operations were tried");
     assert!(lists > 20, "only {lists} lists were read");
 
-    let order = |volume: &str, parameters: Value| {
-        let body = json!({"kind": "segmentation", "volume": volume, "parameters": parameters});
+    let order = |job: &str, volume: &str, parameters: Value| {
+        let body = json!({"kind": job, "volume": volume, "parameters": parameters});
         b.post("/v1/jobs").json(&body).send()
     };
-    let foreign = order(&theirs.ids["volumes"], json!({})).await.unwrap();
-    let refused = problem(foreign, 422, "invalid-field").await;
-    assert_eq!(refused["field"], "volume");
+    for job in ["segmentation", "beat"] {
+        let foreign = order(job, &theirs.ids["volumes"], json!({})).await.unwrap();
+        let refused = problem(foreign, 422, "invalid-field").await;
+        assert_eq!(refused["field"], "volume");
+    }
     let mine = b.volume("sphere mine").await;
-    for (field, kind) in [
-        ("model", "models"),
-        ("model", "segmentations"),
-        ("model", "templates"),
-        ("reader", "readers"),
-        ("expert", "volumes"),
+    for (job, field, kind) in [
+        ("segmentation", "model", "models"),
+        ("segmentation", "model", "segmentations"),
+        ("segmentation", "model", "templates"),
+        ("segmentation", "reader", "readers"),
+        ("segmentation", "expert", "volumes"),
+        ("beat", "model", "models"),
+        ("beat", "model", "segmentations"),
+        ("beat", "model", "templates"),
     ] {
         let foreign = json!({field: theirs.ids[kind]});
-        let foreign = order(&mine, foreign).await.unwrap();
+        let foreign = order(job, &mine, foreign).await.unwrap();
         let refused = problem(foreign, 422, "invalid-field").await;
         assert_eq!(refused["field"], field);
         assert!(!text(&refused["detail"]).contains("erased"), "{refused}");
-        let path = format!("/v1/segmentations?{field}={}", theirs.ids[kind]);
+        let path = format!("/v1/{job}s?{field}={}", theirs.ids[kind]);
         let upload = b.post(&path).body(volume("sphere mine")).send();
         problem(upload.await.unwrap(), 422, "invalid-field").await;
     }
