@@ -12,7 +12,7 @@ use ventriform::volume::Volume;
 
 impl TestApp {
     /// Makes a beat; returns it.
-    async fn beat(&self, words: &str) -> Value {
+    pub async fn beat(&self, words: &str) -> Value {
         let answer = self.post("/v1/beats").body(volume(words)).send().await;
         let answer = answer.unwrap();
         assert_eq!(answer.status(), StatusCode::ACCEPTED);
