@@ -5,7 +5,7 @@
     calibrate_beats.py --write              estimates the constants from scripts/calibration/beats.csv and writes
                                             crates/ventriform/src/beat/calibration.rs
 
-A table is what the tool `beats` prints; the committed one has the studies of seeds 500 to 502 and the set "dev" of the
+A table is what the tool `beats` prints; the committed one has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
 simulator of gated hearts (no part of this project):
 
     gated.py --out CASES --seed 500 --n 20

@@ -11,7 +11,7 @@
 //!
 //! Not guaranteed: that a bright neighbour within reach, such as gut, is told from the wall.
 
-use super::fields::harmonics;
+use super::fields::{gate_harmonics, harmonics};
 use super::fit::BeatFit;
 use super::study::GatedStudy;
 use crate::geometry::Vec3;
@@ -66,9 +66,7 @@ impl WallCounts {
     /// Through the values of each gate on each ray.
     fn through(gates: &[Vec<f64>]) -> Self {
         let width = 1.0 / gates.len() as f64;
-        let bases: Vec<Vec<f64>> = (0..gates.len())
-            .map(|gate| harmonics(HARMONICS, (gate as f64 + 0.5) * width, width))
-            .collect();
+        let bases = gate_harmonics(HARMONICS, gates.len());
         let of_ray = |ray: usize| {
             let mut of = [0.0; 1 + 2 * HARMONICS];
             of[0] = gates.iter().map(|gate| gate[ray]).sum::<f64>() * width;

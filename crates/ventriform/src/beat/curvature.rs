@@ -14,7 +14,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
-use super::fields::{COLUMNS, Layout, Nodes, StateGradient, WallState};
+use super::fields::{COLUMNS, Layout, Nodes, WallState};
 use super::image::{Blur, Change, HeartGrid};
 use super::objective::{Objective, VALUE_SCALE};
 use crate::progress::{Cancelled, Monitor};
@@ -243,7 +243,7 @@ impl ImageChanges {
             .map(|(s, w)| f64::from(w * s * s))
             .sum::<f64>()
             / total;
-        let products = |painted: Vec<Vec<(usize, f32)>>| {
+        let products_of = |painted: Vec<Vec<(usize, f32)>>| {
             let blurred = |entries: &Vec<(usize, f32)>| {
                 monitor.check()?;
                 Ok(Blurred::of(
@@ -260,8 +260,8 @@ impl ImageChanges {
             Ok(products(&columns, 2.0 * VALUE_SCALE / total))
         };
         Ok(Self {
-            still: products(painted)?,
-            motion: products(moved)?,
+            still: products_of(painted)?,
+            motion: products_of(moved)?,
             mean_square,
         })
     }
@@ -275,18 +275,19 @@ struct Thinning {
 
 impl Thinning {
     fn of(objective: &Objective, state: &WallState) -> Self {
-        let layout = &objective.layout;
-        let mut by = StateGradient::zero(layout);
         let conservation = &objective.conservation;
-        for node in 0..layout.nodes() {
+        let walls = state.mid_wall.iter().zip(&state.thickness).enumerate();
+        let by_node = walls.map(|(node, (mid, thick))| {
             let row = node / COLUMNS;
-            by.mid_wall[node] =
-                -conservation.distance[row] * state.thickness[node] / state.mid_wall[node];
-            by.thickness[node] = -conservation.stretch[row] * state.thickness[node];
-        }
+            (
+                -conservation.distance[row] * thick / mid,
+                -conservation.stretch[row] * thick,
+            )
+        });
+        let (by_motion, by_stretch) = by_node.unzip();
         Self {
-            by_motion: by.mid_wall,
-            by_stretch: by.thickness,
+            by_motion,
+            by_stretch,
         }
     }
 }

@@ -115,6 +115,14 @@ pub(super) fn harmonics(count: usize, turns: f64, width: f64) -> Vec<f64> {
     [cosines, sines].concat()
 }
 
+/// The harmonics of each of `gates`, in the mean over its width.
+pub(super) fn gate_harmonics(count: usize, gates: usize) -> Vec<Vec<f64>> {
+    let width = 1.0 / gates as f64;
+    (0..gates)
+        .map(|gate| harmonics(count, (gate as f64 + 0.5) * width, width))
+        .collect()
+}
+
 /// The wall at one moment of the beat, or in the mean over a gate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WallState {

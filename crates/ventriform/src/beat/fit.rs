@@ -20,7 +20,7 @@ use std::ops::Range;
 use super::carried::CarriedNodes;
 use super::curvature::Curvature;
 use super::error::BeatError;
-use super::fields::{COLUMNS, Layout, Nodes, ROW_SPACING_MM, WallState, harmonics};
+use super::fields::{COLUMNS, Layout, Nodes, ROW_SPACING_MM, WallState, gate_harmonics, harmonics};
 use super::image::HeartGrid;
 use super::moment::WallMoment;
 use super::objective::{Objective, Observed, Priors};
@@ -157,10 +157,6 @@ pub fn fit(
             }
         })
         .collect();
-    let width = 1.0 / count as f64;
-    let bases = (0..count)
-        .map(|gate| harmonics(harmonic_count, (gate as f64 + 0.5) * width, width))
-        .collect();
     let priors = &parameters.priors;
     let relative: Vec<f64> = (still.peaks.iter())
         .map(|peak| peak / (scale * count as f64))
@@ -172,7 +168,7 @@ pub fn fit(
             .map(|counted| f64::from(u8::from(*counted)))
             .collect(),
         weights,
-        bases,
+        bases: gate_harmonics(harmonic_count, count),
         rim: still.rim.clone(),
         dark: dark_nodes(&layout, &still, &relative),
     };

@@ -268,7 +268,7 @@ impl Objective {
         }
         for (range, weight) in self.smooth_fields() {
             let field = &unknowns[range.clone()];
-            value += weight * self.roughness(field, weight, &mut gradient[range]);
+            value += self.roughness(field, weight, &mut gradient[range]);
         }
         value += self.add_levels(unknowns, gradient);
         Ok(value)
@@ -348,7 +348,7 @@ impl Objective {
         value
     }
 
-    /// Squares of the second differences of a field, along columns and about the axis; `weight` times its gradient is
+    /// `weight` times the squares of the second differences of a field, along columns and about the axis; the gradient is
     /// added.
     pub fn roughness(&self, field: &[f64], weight: f64, gradient: &mut [f64]) -> f64 {
         let rows = self.layout.rows;
@@ -387,7 +387,7 @@ impl Objective {
                 gradient[node] += 2.0 * weight * together * d;
             }
         }
-        value
+        weight * value
     }
 }
 
@@ -398,7 +398,7 @@ fn around(coordinates: &RayCoordinates, arc: f64) -> f64 {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::fields::harmonics;
+    use super::super::fields::gate_harmonics;
     use super::*;
     use crate::geometry::Vec3;
 
@@ -428,9 +428,7 @@ pub(super) mod tests {
             weights: (0..grid.points.len())
                 .map(|v| wave(v, 0.11) as f32)
                 .collect(),
-            bases: (0..3)
-                .map(|gate| harmonics(2, (gate as f64 + 0.5) / 3.0, 1.0 / 3.0))
-                .collect(),
+            bases: gate_harmonics(2, 3),
             rim: vec![60.0; COLUMNS],
             dark: (0..layout.nodes()).map(|n| wave(n, 0.7)).collect(),
         };

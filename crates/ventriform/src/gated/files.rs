@@ -203,12 +203,9 @@ impl GatedHeart {
         let wall = |end: BeatEnd| {
             let gate = self.gate_at(end);
             let mesh = meshes[gate].clone();
-            // A silent monitor is never cancelled.
-            let masks = self.masks(gate, &mesh, &Monitor::silent());
-            let [wall, cavity] = masks.unwrap_or_else(|Cancelled| {
-                let empty = || Mask::empty(self.reading.gates[gate].shape);
-                [empty(), empty()]
-            });
+            let [wall, cavity] = self
+                .masks(gate, &mesh, &Monitor::silent())
+                .expect("a silent monitor is never cancelled");
             EndWall { wall, cavity, mesh }
         };
         BeatObject::ALL
@@ -229,10 +226,7 @@ impl GatedHeart {
 
     /// The gate at that end, from 0.
     fn gate_at(&self, end: BeatEnd) -> usize {
-        match end {
-            BeatEnd::Diastole => self.beat.end_diastole.gate,
-            BeatEnd::Systole => self.beat.end_systole.gate,
-        }
+        end.of([self.beat.end_diastole.gate, self.beat.end_systole.gate])
     }
 
     /// The wall as 1 and the cavity as 2 in a gate.

@@ -65,16 +65,17 @@ pub fn minimise<E>(
         let free: Vec<f64> = (0..count)
             .map(|i| if held(i) { 0.0 } else { gradient[i] })
             .collect();
-        let mut direction = descent(&free, &memory, &solve);
-        (0..count)
-            .filter(|i| held(*i))
-            .for_each(|i| direction[i] = 0.0);
-        if dot(&direction, &free) >= 0.0 {
-            memory.clear();
-            direction = descent(&free, &memory, &solve);
+        let descend = |memory: &VecDeque<Step>| {
+            let mut direction = descent(&free, memory, &solve);
             (0..count)
                 .filter(|i| held(*i))
                 .for_each(|i| direction[i] = 0.0);
+            direction
+        };
+        let mut direction = descend(&memory);
+        if dot(&direction, &free) >= 0.0 {
+            memory.clear();
+            direction = descend(&memory);
         }
         let mut length = 1.0;
         let mut lower = None;

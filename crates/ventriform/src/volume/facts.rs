@@ -92,9 +92,12 @@ pub enum AffineSource {
 }
 
 impl AffineSource {
+    /// Those by which orientation or origin in the patient are assumed.
+    pub const ASSUMED: [Self; 2] = [Self::Pixdim, Self::UnknownOrigin];
+
     /// Whether orientation and origin in the patient are stated, not assumed.
     pub fn is_placed(self) -> bool {
-        !matches!(self, Self::Pixdim | Self::UnknownOrigin)
+        !Self::ASSUMED.contains(&self)
     }
 
     /// The name in JSON: `sform`, `qform`, `pixdim`, `image-position`, `unknown-origin`, `mesh`,

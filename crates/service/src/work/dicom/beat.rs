@@ -21,16 +21,11 @@ pub fn source_files(object: BeatObject, product: &Product) -> Vec<String> {
     if let BeatObject::Mask(end) = object {
         names.push(mesh_file(end));
         let summary = serde_json::from_value::<BeatSummary>(product.summary.clone().into());
-        names.extend(summary.ok().map(|summary| gate_labels(gate(end, &summary))));
+        names.extend(summary.ok().map(|summary| {
+            gate_labels(end.of([summary.end_diastole_gate, summary.end_systole_gate]))
+        }));
     }
     names
-}
-
-fn gate(end: BeatEnd, summary: &BeatSummary) -> usize {
-    match end {
-        BeatEnd::Diastole => summary.end_diastole_gate,
-        BeatEnd::Systole => summary.end_systole_gate,
-    }
 }
 
 fn mesh_file(end: BeatEnd) -> String {

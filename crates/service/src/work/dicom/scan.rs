@@ -71,8 +71,9 @@ pub fn source(
         DicomError::NoIdentity { .. } => identity_needed(&error, &result.volume.id),
         other => other.explain(),
     })?;
-    let assumed = [AffineSource::Pixdim, AffineSource::UnknownOrigin];
-    let placed = !assumed.iter().any(|a| a.as_str() == facts.affine_source);
+    let placed = !AffineSource::ASSUMED
+        .iter()
+        .any(|a| a.as_str() == facts.affine_source);
     let made = moment(result.made_at);
     let scan = SourceScan::new(known, voxel_to_patient(facts)?, facts.shape, placed, made);
     Ok(match secret {

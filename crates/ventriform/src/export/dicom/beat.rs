@@ -33,27 +33,29 @@ impl BeatEnd {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Diastole, Self::Systole];
 
-    /// The number of the gate at this end of the beat of `report`, counted from 1.
-    pub fn gate(self, report: &BeatReport) -> usize {
+    /// That of this end, of what both ends have: end diastole first.
+    pub fn of<T>(self, [diastole, systole]: [T; 2]) -> T {
         match self {
-            Self::Diastole => report.end_diastole_gate,
-            Self::Systole => report.end_systole_gate,
+            Self::Diastole => diastole,
+            Self::Systole => systole,
         }
     }
 
+    /// The number of the gate at this end of the beat of `report`, counted from 1.
+    pub fn gate(self, report: &BeatReport) -> usize {
+        self.of([report.end_diastole_gate, report.end_systole_gate])
+    }
+
     fn code(self) -> Code {
-        match self {
-            Self::Diastole => sct("416190007", "End diastole"),
-            Self::Systole => sct("416430001", "End Systole"),
-        }
+        self.of([
+            sct("416190007", "End diastole"),
+            sct("416430001", "End Systole"),
+        ])
     }
 
     /// Its name, for people.
     pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Diastole => "end diastole",
-            Self::Systole => "end systole",
-        }
+        self.of(["end diastole", "end systole"])
     }
 }
 
@@ -127,10 +129,7 @@ impl<'a> DicomBeat<'a> {
     /// # Errors
     /// See [`DicomError`].
     pub fn mask(&self, end: BeatEnd, of: &EndWall) -> Result<Vec<u8>, DicomError> {
-        let scan = match end {
-            BeatEnd::Diastole => &self.scans[0],
-            BeatEnd::Systole => &self.scans[1],
-        };
+        let scan = end.of(self.scans.each_ref());
         DicomResults::new(scan, self.structure, &of.wall, &of.mesh, self.text)
             .with_cavity(Some(&of.cavity))
             .at(end)
