@@ -97,6 +97,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
         ],
     ),
+    ("normals", &["numeric", "polar"]),
     (
         "reader",
         &["geometry", "mesh", "progress", "grid", "model", "deform"],
@@ -136,6 +137,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "judge",
             "polar",
             "beat",
+            "normals",
             "reader",
             "parameters",
         ],

@@ -137,6 +137,8 @@ pub mod polar;
 
 pub mod beat;
 
+pub mod normals;
+
 pub mod reader;
 
 pub mod parameters;

@@ -54,7 +54,8 @@ use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::locate::patient_orientation::OrientationSource;
-use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall, WallRay};
+pub use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
+use crate::model::wall::{VentricleWall, WallRay};
 use levels::MiddleSurface;
 
 /// Parameters of [`map`].
@@ -101,6 +102,15 @@ impl Default for PolarParameters {
     }
 }
 
+/// What a ray meets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlaceState {
+    /// Muscle.
+    Muscle,
+    /// The valves, or too little of the muscle's end to tell its uptake: shown, and in no figure.
+    ValvePlane,
+}
+
 /// The values along one ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
@@ -110,6 +120,15 @@ pub struct Pixel {
     pub area: f64,
     /// Share of that area that counts: 0 at the rim, 1 far from it.
     pub weight: f64,
+    /// What the ray meets.
+    pub state: PlaceState,
+}
+
+impl Pixel {
+    /// Whether the ray meets muscle.
+    pub fn is_muscle(&self) -> bool {
+        self.state == PlaceState::Muscle
+    }
 }
 
 /// One of the 17 segments.
@@ -195,7 +214,7 @@ pub fn territory(segment: usize) -> &'static str {
 }
 
 /// The names of the arteries of [`territory`].
-const ARTERY_NAMES: [&str; 3] = ["LAD", "LCX", "RCA"];
+pub const ARTERY_NAMES: [&str; 3] = ["LAD", "LCX", "RCA"];
 
 /// The segment of a `level` at `angle` degrees counter-clockwise from lateral.
 pub fn segment_at(level: Level, angle: f64) -> usize {
@@ -401,6 +420,7 @@ fn pixel(field: &Field, ray: &WallRay, area: f64, extension: f64) -> Option<Pixe
         max,
         area,
         weight: 1.0,
+        state: PlaceState::Muscle,
     })
 }
 

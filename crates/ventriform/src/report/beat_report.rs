@@ -5,7 +5,8 @@
 use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
 use super::json_number::round;
-use super::segmentation_report::{RaisedFlag, Resolution, SegmentationReport};
+use super::raised_flag::RaisedFlag;
+use super::segmentation_report::{Resolution, SegmentationReport};
 use crate::beat::phase::HISTOGRAM_BINS;
 use crate::beat::{Beat, Extreme, SegmentMotion};
 use crate::volume::GateTiming;

@@ -26,6 +26,8 @@ mod json_number;
 pub mod measure;
 mod model_page;
 mod model_report;
+mod perfusion_report;
+mod raised_flag;
 mod sections;
 mod segmentation_page;
 pub(crate) mod segmentation_report;
@@ -48,14 +50,18 @@ pub use input::{FileFacts, IntensityFacts, Scaling};
 pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;
 pub use model_report::{ModelReport, ReportInput};
+pub use perfusion_report::{
+    FigureBeside, NormalsUsed, PerfusionReport, SegmentScore, TerritoryScore,
+};
+pub use raised_flag::RaisedFlag;
 pub use sections::{
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,
     OptimiseReport, Program, RetileReport, StartSummary, SurfaceReport,
 };
 pub use segmentation_page::{SegmentationPage, segmentation_page};
 pub use segmentation_report::{
-    AgreementReport, AppliedReaderReport, CandidateReport, RaisedFlag, RefusedTemplateReport,
-    Resolution, SegmentationParts, SegmentationReport,
+    AgreementReport, AppliedReaderReport, CandidateReport, RefusedTemplateReport, Resolution,
+    SegmentationParts, SegmentationReport,
 };
 pub use summaries::{
     BeatSummary, ModelSummary, ReaderSummary, SegmentationSummary, TemplateSummary, object,

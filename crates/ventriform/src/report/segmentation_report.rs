@@ -10,6 +10,8 @@ use super::fit_report::{
 };
 use super::input::FileFacts;
 use super::json_number::{not_stated, or_nan, round};
+use super::perfusion_report::PerfusionReport;
+use super::raised_flag::RaisedFlag;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::judge::Fit;
@@ -17,7 +19,6 @@ use crate::polar::PolarSummary;
 use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
-use std::fmt::Display;
 
 /// The report of a segmentation. Lengths are millimetres in the patient frame LPS.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,6 +58,9 @@ pub struct SegmentationReport {
     pub measures: Option<AgreementReport>,
     /// Uptake of the wall; ventricles only.
     pub polar: Option<PolarSummary>,
+    /// The wall's uptake beside normal limits, if some were given.
+    #[serde(default)]
+    pub perfusion: Option<PerfusionReport>,
     /// Reasons to look closer.
     pub flags: Vec<RaisedFlag>,
     /// Which voxels the mask holds.
@@ -155,26 +159,6 @@ pub struct AgreementReport {
     pub volume_difference_percent: Option<f64>,
 }
 
-/// A reason to look closer.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Flag))]
-pub struct RaisedFlag {
-    /// Its stable name.
-    pub code: String,
-    /// The finding.
-    pub reason: String,
-}
-
-impl RaisedFlag {
-    /// A flag with this stable name, whose text says what was found.
-    pub fn new(code: &str, flag: &impl Display) -> Self {
-        Self {
-            code: code.to_owned(),
-            reason: flag.to_string(),
-        }
-    }
-}
-
 /// The parts of a [`SegmentationReport`] beside the fit.
 #[derive(Debug)]
 pub struct SegmentationParts {
@@ -194,6 +178,8 @@ pub struct SegmentationParts {
     pub measures: Option<AgreementReport>,
     /// Uptake of the wall; ventricles only.
     pub polar: Option<PolarSummary>,
+    /// The wall's uptake beside normal limits.
+    pub perfusion: Option<PerfusionReport>,
     /// Every parameter by its name, defaults written out.
     pub parameters: Map<String, Value>,
     /// Facts about the volume's file.
@@ -229,6 +215,7 @@ impl SegmentationReport {
             reader: parts.reader,
             measures: parts.measures,
             polar: parts.polar,
+            perfusion: parts.perfusion,
             flags: (judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
                 .collect(),

@@ -2,9 +2,8 @@
 
 use super::beat_report::BeatReport;
 use super::fit_report::FittedVolumes;
-use super::segmentation_report::{
-    AgreementReport, CandidateReport, RaisedFlag, SegmentationReport,
-};
+use super::raised_flag::RaisedFlag;
+use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
 use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};

@@ -32,6 +32,7 @@ impl SegmentedVolume {
             }),
             measures: segmentation.agreement.as_ref().map(AgreementReport::of),
             polar: segmentation.polar.as_ref().map(PolarSummary::of),
+            perfusion: None,
             parameters: self.parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),
             warnings: self.warnings(),

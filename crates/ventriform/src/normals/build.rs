@@ -1,0 +1,1 @@
+//! Limits from the maps of healthy people.
