@@ -67,6 +67,8 @@ export function css(lut: Lut, share: number): string {
 /** Where a polar map shows no wall, and the line about what lies below its threshold. */
 export const NO_WALL = uptake.no_wall as [number, number, number];
 const THRESHOLD = hex(uptake.threshold);
+/** The hatching of places beyond the muscle's end. */
+export const VALVE_PLANE = hex(uptake.valve_plane);
 
 /** The line that is seen on a map of these colours: the service's own has one for itself. */
 export function thresholdOn(lut: Lut): string {

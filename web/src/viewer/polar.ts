@@ -1,13 +1,13 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
 import type { PolarMap } from "../generated/openapi";
-import { CYCLE, LUTS, type Lut, NO_WALL, OUTWARD, colour, thresholdOn } from "./colours";
+import { CYCLE, LUTS, type Lut, NO_WALL, OUTWARD, VALVE_PLANE, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
 /** The place of every pixel of a map. */
-type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings">;
+type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings"> & Partial<Pick<PolarMap, "states">>;
 
 /** A map of one figure of the wall. */
 export interface DrawnMap extends Laid {
@@ -62,6 +62,11 @@ export function uptakeMap(map: PolarMap): DrawnMap {
     below: null,
     cyclic: false,
   };
+}
+
+/** Whether a place lies beyond the muscle's end. */
+function isValvePlane(map: Laid, row: number, column: number): boolean {
+  return map.states?.[row]?.[column] === "valve_plane";
 }
 
 /** The colour of a value; grey where there is no wall. */
@@ -255,7 +260,8 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
       const nearest = columnAt(map, columns);
       const rows = rowsAt(map, radius, nearest);
       const row = Math.min(map.rows - 1, Math.floor(rows));
-      const value = style.segments ? (means.get(map.segment_of[row]![nearest]!) ?? NaN) : valueAt(map, rows, columns);
+      const painted = style.segments ? (means.get(map.segment_of[row]![nearest]!) ?? NaN) : valueAt(map, rows, columns);
+      const value = isValvePlane(map, row, nearest) ? NaN : painted;
       const at = 4 * (y * pixels + x);
       image.data.set([...colourOn(map, style.lut, value), 255], at);
     }
@@ -269,6 +275,16 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   const at = (radius: number, turns: number): [number, number] => [middle + full * radius * Math.cos(2 * Math.PI * turns), middle - full * radius * Math.sin(2 * Math.PI * turns)];
   const oriented = map.orientation !== "unknown";
   context.lineWidth = 1;
+  context.strokeStyle = VALVE_PLANE;
+  context.beginPath();
+  for (let row = 0; row < map.rows; row++) {
+    for (let column = 0; column < map.columns; column++) {
+      if (!isValvePlane(map, row, column)) continue;
+      context.moveTo(...at(radiusOf(map, row, column), column / map.columns));
+      context.lineTo(...at(radiusOf(map, row + 1, column), (column + 1) / map.columns));
+    }
+  }
+  context.stroke();
   context.strokeStyle = "rgba(255,255,255,.55)";
   const rings = ringsOf(map);
   for (const ring of rings) {

@@ -27,7 +27,7 @@ use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::anterior;
+use crate::model::wall::{HalfPlane, anterior, rim_height};
 use crate::numeric::order;
 
 /// Directions about the axis: from lateral over anterior, septal and inferior.
@@ -175,30 +175,18 @@ impl RimFrame {
         moved
     }
 
-    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex: the most basal
-    /// crossing of its edges with the half plane there. `None` if there is a direction without any.
+    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex. `None` if there is a direction without
+    /// any.
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         (0..RIM_DIRECTIONS)
             .map(|direction| {
                 let (sin, cos) = (TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64).sin_cos();
-                let outward = self.lateral * cos + self.anterior * sin;
-                let aside = self.anterior * cos - self.lateral * sin;
-                let mut height = f64::INFINITY;
-                for triangle in 0..mesh.triangles.len() {
-                    let corners = mesh.corners(triangle);
-                    for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                        let (p, q) = (corners[a] - self.centre, corners[b] - self.centre);
-                        let (from, to) = (p.dot(&aside), q.dot(&aside));
-                        if from * to > 0.0 || from == to {
-                            continue;
-                        }
-                        let crossing = p + (q - p) * (from / (from - to));
-                        if crossing.dot(&outward) > 0.0 {
-                            height = height.min(crossing.dot(&self.axis));
-                        }
-                    }
-                }
-                height.is_finite().then_some(height)
+                let plane = HalfPlane {
+                    axis: self.axis,
+                    outward: self.lateral * cos + self.anterior * sin,
+                    aside: self.anterior * cos - self.lateral * sin,
+                };
+                rim_height(mesh, &self.centre, &plane)
             })
             .collect()
     }

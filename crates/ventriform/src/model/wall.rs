@@ -88,6 +88,9 @@ pub struct VentricleWall {
     pub thickness_spread: f64,
     /// Share of the basal half's rays that find no wall.
     pub gaps: f64,
+    /// Axis position of the rim in the direction of every column, mm from the cup's centre; `None` where the mesh has no
+    /// part in that direction.
+    pub rims: Vec<Option<f64>>,
     frame: AxisFrame,
 }
 
@@ -201,6 +204,12 @@ impl VentricleWall {
             gaps: basal.iter().filter(|r| r.wall.is_none()).count() as f64 / basal.len() as f64,
             row_spacing: frame.row_spacing(),
             extent: [frame.rim, frame.apex],
+            rims: (0..RAY_COLUMNS)
+                .map(|column| {
+                    let turn = (column as f64 + 0.5) / RAY_COLUMNS as f64;
+                    rim_height(mesh, &frame.centre, &frame.half_plane(turn))
+                })
+                .collect(),
             rays,
             frame,
         })
@@ -359,6 +368,16 @@ impl AxisFrame {
         }
     }
 
+    /// The half plane from the axis at an angle about it, turns.
+    fn half_plane(&self, turn: f64) -> HalfPlane {
+        let (sin, cos) = (TAU * turn).sin_cos();
+        HalfPlane {
+            axis: self.axis,
+            outward: self.lateral * cos + self.anterior * sin,
+            aside: self.anterior * cos - self.lateral * sin,
+        }
+    }
+
     fn arc(&self) -> f64 {
         FRAC_PI_2 * (self.apex - self.focus)
     }
@@ -426,6 +445,38 @@ impl AxisFrame {
         }
         volume
     }
+}
+
+/// A half plane that ends at the long axis; three unit vectors at right angles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfPlane {
+    /// From base to apex.
+    pub axis: Vec3,
+    /// Away from the axis, in the half plane.
+    pub outward: Vec3,
+    /// Across the half plane.
+    pub aside: Vec3,
+}
+
+/// The height at which `mesh` begins in a half plane whose axis runs through `centre`, mm from there towards the apex: the
+/// most basal crossing of its edges with it. `None` without any.
+pub fn rim_height(mesh: &TriMesh, centre: &Vec3, plane: &HalfPlane) -> Option<f64> {
+    let mut height = f64::INFINITY;
+    for triangle in 0..mesh.triangles.len() {
+        let corners = mesh.corners(triangle);
+        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+            let (p, q) = (corners[a] - centre, corners[b] - centre);
+            let (from, to) = (p.dot(&plane.aside), q.dot(&plane.aside));
+            if from * to > 0.0 || from == to {
+                continue;
+            }
+            let crossing = p + (q - p) * (from / (from - to));
+            if crossing.dot(&plane.outward) > 0.0 {
+                height = height.min(crossing.dot(&plane.axis));
+            }
+        }
+    }
+    height.is_finite().then_some(height)
 }
 
 /// The distance at which each ray enters the wall, mm. Where a ray misses the wall (a low rim), that of the

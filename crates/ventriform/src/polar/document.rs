@@ -2,7 +2,7 @@
 
 use super::figure::{FigureMap, WallFigure};
 use super::picture::rings;
-use super::{PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
+use super::{Pixel, PlaceState, PolarMap, RAY_COLUMNS, RAY_ROWS, Segment, territory};
 use serde::{Deserialize, Serialize};
 
 /// A polar map without its pixels.
@@ -44,8 +44,11 @@ pub struct PolarDocument {
     /// All but the pixels.
     #[serde(flatten)]
     pub summary: PolarSummary,
-    /// The pixels in per cent of the reference; null where there is no wall.
+    /// The pixels in per cent of the reference; null where there is no muscle.
     pub values_percent: Vec<Vec<Option<f64>>>,
+    /// What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. Absent from maps of older
+    /// versions, which have no valve plane.
+    pub states: Option<Vec<Vec<PlaceState>>>,
     /// The number of the segment to which each pixel belongs.
     pub segment_of: Vec<Vec<usize>>,
     /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
@@ -66,7 +69,7 @@ pub struct PolarTerritory {
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold.
     pub extent_percent: f64,
-    /// Its area, mm².
+    /// Area of its muscle, mm².
     pub area_mm2: f64,
 }
 
@@ -84,7 +87,7 @@ pub struct PolarSegment {
     pub mean_percent: Option<f64>,
     /// Share of its area below the threshold.
     pub extent_percent: f64,
-    /// Its area, mm².
+    /// Area of its muscle, mm².
     pub area_mm2: f64,
 }
 
@@ -170,7 +173,7 @@ impl PolarSummary {
 }
 
 impl PolarDocument {
-    /// The summary, the pixels in per cent of the reference (`None` where there is no wall), and where the
+    /// The summary, the pixels in per cent of the reference (`None` where there is no muscle), and where the
     /// picture has them.
     pub fn of(map: &PolarMap) -> Self {
         let percent = |x: f64| {
@@ -181,10 +184,14 @@ impl PolarDocument {
             }
         };
         let pixels = map.pixels.chunks(RAY_COLUMNS);
-        let pixels = pixels.map(|row| row.iter().map(|p| p.map(|p| percent(p.max))).collect());
+        let pixels = pixels.map(|row| {
+            let muscle = |p: &Option<Pixel>| p.filter(Pixel::is_muscle).map(|p| percent(p.max));
+            row.iter().map(muscle).collect()
+        });
         Self {
             summary: PolarSummary::of(map),
             values_percent: pixels.collect(),
+            states: Some(states(map)),
             segment_of: segment_numbers(map),
             level_ends: Some(level_ends(map)),
             rings: Some(ring_shares(map).into()),
@@ -218,6 +225,16 @@ impl FigureDocument {
             rings: ring_shares(map),
         }
     }
+}
+
+/// What lies at each pixel.
+fn states(map: &PolarMap) -> Vec<Vec<PlaceState>> {
+    let row = |row| {
+        (0..RAY_COLUMNS)
+            .map(move |column| map.state(row, column))
+            .collect()
+    };
+    (0..RAY_ROWS).map(row).collect()
 }
 
 /// The number of the segment to which each pixel belongs.

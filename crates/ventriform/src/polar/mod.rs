@@ -23,10 +23,8 @@
 //! Association draws them; with [`Projection::Area`] every level has the share of the map that it has of
 //! the wall.
 //!
-//! Towards the rim, blur mixes the wall with what lies beyond it, and the model's end is the least
-//! certain part of a fit. The uptake of the last [`PolarParameters::rim_margin`] millimetres is therefore
-//! shown but not counted, and over the next [`PolarParameters::rim_fade`] millimetres the weight rises to 1,
-//! so that a small change of the fit does not add or remove a whole ray.
+//! Where the muscle ends at the base is read in every direction from the image and the rim of the anatomical wall (`polar/base.rs`). Places beyond it, and the last
+//! [`PolarParameters::rim_margin`] millimetres before it, of which blur takes much, are [`PlaceState::ValvePlane`]: drawn hatched, and in no figure.
 //!
 //! [`FigureMap`] lays other figures of the same wall flat, such as its motion over a beat.
 //!
@@ -37,6 +35,7 @@
 //! diagnosis. Without attenuation correction the base, which lies deeper in the body, is 20 to
 //! 30 % below the apex in a heart of even uptake.
 
+mod base;
 mod document;
 mod figure;
 mod levels;
@@ -57,6 +56,7 @@ use crate::locate::patient_orientation::OrientationSource;
 pub use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
 use crate::model::wall::{VentricleWall, WallRay};
 use levels::MiddleSurface;
+use serde::{Deserialize, Serialize};
 
 /// Parameters of [`map`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,12 +69,10 @@ pub struct PolarParameters {
     pub threshold: f64,
     /// Length beyond the wall that is sampled on both sides, mm, 0..=10. Default 3.
     pub extension: f64,
-    /// Gaussian blur of the image before it is sampled, sigma in mm, 0..=10. Default 4.5.
+    /// Gaussian blur of the image before it is sampled, sigma in mm, 0..=10. Default 3.
     pub blur: f64,
-    /// Length of wall at the rim that is not counted, mm, 0..=20. Default 3.
+    /// Length of muscle at its end at the base that is masked, mm, 0..=20: blur takes more than a tenth of its uptake. Default 7.
     pub rim_margin: f64,
-    /// Length of wall next to it over which the weight rises to 1, mm, 0..=30. Default 12.
-    pub rim_fade: f64,
     /// Widths of the levels. Default [`Projection::Standard`].
     pub projection: Projection,
 }
@@ -94,21 +92,24 @@ impl Default for PolarParameters {
         Self {
             threshold: 0.6,
             extension: 3.0,
-            blur: 4.5,
-            rim_margin: 3.0,
-            rim_fade: 12.0,
+            blur: 3.0,
+            rim_margin: 7.0,
             projection: Projection::Standard,
         }
     }
 }
 
 /// What a ray meets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
 pub enum PlaceState {
     /// Muscle.
     Muscle,
-    /// The valves, or too little of the muscle's end to tell its uptake: shown, and in no figure.
+    /// The valves, or too little of the muscle's end to tell its uptake: hatched, and in no figure.
     ValvePlane,
+    /// The fitted wall has no such place.
+    NoWall,
 }
 
 /// The values along one ray.
@@ -118,8 +119,6 @@ pub struct Pixel {
     pub max: f64,
     /// Area of wall that the ray stands for, mm².
     pub area: f64,
-    /// Share of that area that counts: 0 at the rim, 1 far from it.
-    pub weight: f64,
     /// What the ray meets.
     pub state: PlaceState,
 }
@@ -137,11 +136,11 @@ pub struct Segment {
     /// 1..=17.
     pub number: usize,
     /// Area-weighted mean of the pixels' maxima in per cent of the reference; `None` where no
-    /// ray met the wall.
+    /// ray met muscle.
     pub mean_percent: Option<f64>,
-    /// Share of its area below the threshold, per cent.
+    /// Share of its muscle below the threshold, per cent.
     pub extent_percent: f64,
-    /// Wall area, mm².
+    /// Area of its muscle, mm².
     pub area: f64,
 }
 
@@ -162,7 +161,7 @@ pub struct Territory {
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarMap {
     /// [`RAY_ROWS`] × [`RAY_COLUMNS`] pixels, apex first; columns from lateral over anterior, septal
-    /// and inferior. `None` where there is no wall.
+    /// and inferior. `None` where the fitted wall has no place.
     pub pixels: Vec<Option<Pixel>>,
     /// Mean maximum over the hottest quarter of the wall, image units: 100 per cent.
     pub reference: f64,
@@ -306,7 +305,7 @@ impl PolarMap {
     }
 
     /// The uptake of the wall at a point, per cent of the reference, linear between the rays of `wall`, by
-    /// which the map was made; NaN where no ray near it met the wall.
+    /// which the map was made; NaN where no ray near it met muscle.
     pub fn uptake_at(&self, wall: &VentricleWall, point: &Vec3) -> f64 {
         let position = wall.position(point);
         let row = position.row.clamp(0.0, RAY_ROWS as f64 - 1.0);
@@ -317,7 +316,7 @@ impl PolarMap {
                 (position.column.floor() + 1.0, position.column.fract()),
             ] {
                 let pixel = self.pixels[r as usize * RAY_COLUMNS + c as usize % RAY_COLUMNS];
-                if let Some(pixel) = pixel {
+                if let Some(pixel) = pixel.filter(Pixel::is_muscle) {
                     sum += of_row * of_column * pixel.max;
                     weight += of_row * of_column;
                 }
@@ -327,6 +326,18 @@ impl PolarMap {
             100.0 * sum / weight / self.reference
         } else {
             f64::NAN
+        }
+    }
+
+    /// What lies at a pixel. Places beyond a column's last one with wall are of the valve plane.
+    pub fn state(&self, row: usize, column: usize) -> PlaceState {
+        let at = |row: usize| self.pixels[row * RAY_COLUMNS + column];
+        match at(row) {
+            Some(pixel) => pixel.state,
+            None if row > RAY_ROWS / 2 && (row..RAY_ROWS).all(|row| at(row).is_none()) => {
+                PlaceState::ValvePlane
+            }
+            None => PlaceState::NoWall,
         }
     }
 
@@ -359,41 +370,56 @@ pub fn map(
     region.min -= border;
     region.max += border;
     let field = Field::new(volume, Some(&region), parameters.blur);
-    let rims = rims(wall);
     let middle = MiddleSurface::of(wall);
     let levels = Levels::of(&middle, anatomical);
-    let pixels: Vec<Option<Pixel>> = wall
-        .rays
-        .iter()
-        .enumerate()
+    let reaches = reaches(wall);
+    let largest: Vec<f64> = (wall.rays.iter().zip(&reaches))
+        .map(|(ray, reach)| {
+            reach.map_or(0.0, |reach| {
+                largest(&field, ray, reach, parameters.extension)
+            })
+        })
+        .collect();
+    let ends = base::muscle_ends(&largest, wall, anatomical);
+    let state = |row: usize, column: usize| {
+        let left_mm = (ends[column] - (row as f64 + 0.5)) * wall.row_spacing;
+        if left_mm < parameters.rim_margin {
+            PlaceState::ValvePlane
+        } else {
+            PlaceState::Muscle
+        }
+    };
+    let pixels: Vec<Option<Pixel>> = (wall.rays.iter().enumerate())
         .map(|(index, ray)| {
-            let area = middle.area(index / RAY_COLUMNS, index % RAY_COLUMNS);
-            let pixel = pixel(&field, ray, area, parameters.extension)?;
-            let rows = rims[index % RAY_COLUMNS] as f64 - 0.5 - (index / RAY_COLUMNS) as f64;
-            let counted = rows * wall.row_spacing - parameters.rim_margin;
-            // Without a fade the weight is a step, and NaN (0 / 0) at the step counts as 0.
-            let weight = (counted / parameters.rim_fade).clamp(0.0, 1.0);
-            let weight = if weight.is_nan() { 0.0 } else { weight };
-            Some(Pixel { weight, ..pixel })
+            let (row, column) = (index / RAY_COLUMNS, index % RAY_COLUMNS);
+            ray.wall.map(|_| Pixel {
+                max: largest[index],
+                area: middle.area(row, column),
+                state: state(row, column),
+            })
         })
         .collect();
     PolarMap::through(pixels, levels, parameters.threshold, parameters.projection)
 }
 
-/// For every column, one more than the last row that meets the wall.
-fn rims(wall: &VentricleWall) -> [usize; RAY_COLUMNS] {
-    std::array::from_fn(|column| {
-        let met = |row: &usize| wall.rays[row * RAY_COLUMNS + column].wall.is_some();
-        (0..RAY_ROWS).rev().find(met).map_or(0, |row| row + 1)
-    })
+/// The distances at which each ray enters and leaves the wall; of one that misses it, those of the nearest ray of its column towards the apex that does not.
+fn reaches(wall: &VentricleWall) -> Vec<Option<[f64; 2]>> {
+    let mut last = [None; RAY_COLUMNS];
+    let reach = |(index, ray): (usize, &WallRay)| {
+        let last = &mut last[index % RAY_COLUMNS];
+        *last = ray.wall.or(*last);
+        *last
+    };
+    wall.rays.iter().enumerate().map(reach).collect()
 }
 
-/// Mean of the maxima over the hottest quarter of the counted wall; 0 without any.
+/// Mean of the maxima over the hottest quarter of the muscle; 0 without any.
 fn reference(pixels: &[Option<Pixel>]) -> f64 {
     let mut hottest: Vec<(f64, f64)> = pixels
         .iter()
         .flatten()
-        .map(|p| (p.max, p.area * p.weight))
+        .filter(|p| p.is_muscle())
+        .map(|p| (p.max, p.area))
         .collect();
     hottest.sort_by(|a, b| b.0.total_cmp(&a.0));
     let quarter = 0.25 * hottest.iter().map(|h| h.1).sum::<f64>();
@@ -406,8 +432,8 @@ fn reference(pixels: &[Option<Pixel>]) -> f64 {
     if area > 0.0 { sum / area } else { 0.0 }
 }
 
-fn pixel(field: &Field, ray: &WallRay, area: f64, extension: f64) -> Option<Pixel> {
-    let [enters, leaves] = ray.wall?;
+/// The largest value on a ray between two distances, extended on both sides.
+fn largest(field: &Field, ray: &WallRay, [enters, leaves]: [f64; 2], extension: f64) -> f64 {
     let from = (enters - extension).max(0.0);
     let to = leaves + extension;
     let steps = ((to - from).ceil() as usize).clamp(1, 200);
@@ -416,12 +442,7 @@ fn pixel(field: &Field, ray: &WallRay, area: f64, extension: f64) -> Option<Pixe
         let distance = from + (to - from) * step as f64 / steps as f64;
         max = max.max(field.at(&(ray.start + ray.direction * distance)));
     }
-    Some(Pixel {
-        max,
-        area,
-        weight: 1.0,
-        state: PlaceState::Muscle,
-    })
+    max
 }
 
 fn summarise(
@@ -430,31 +451,27 @@ fn summarise(
     reference: f64,
     limit: f64,
 ) -> Segment {
-    let (mut sum, mut counted, mut low, mut area) = (0.0, 0.0, 0.0, 0.0);
+    let (mut sum, mut low, mut area) = (0.0, 0.0, 0.0);
     for p in pixels {
-        let share = p.area * p.weight;
-        sum += share * p.max;
-        counted += share;
+        if !p.is_muscle() {
+            continue;
+        }
         area += p.area;
+        sum += p.area * p.max;
         if p.max < limit {
-            low += share;
+            low += p.area;
         }
     }
-    let known = counted > 0.0 && reference > 0.0;
+    let known = area > 0.0 && reference > 0.0;
     Segment {
         number,
-        mean_percent: known.then(|| 100.0 * sum / counted / reference),
-        extent_percent: if counted > 0.0 {
-            100.0 * low / counted
-        } else {
-            0.0
-        },
+        mean_percent: known.then(|| 100.0 * sum / area / reference),
+        extent_percent: if area > 0.0 { 100.0 * low / area } else { 0.0 },
         area,
     }
 }
 
-/// Mean, extent and area of several segments together, each by its whole area: the part of the base that is
-/// not counted is as dark or bright as the rest of its segment.
+/// Mean, extent and area of several segments together, each by the area of its muscle.
 fn together<'a>(segments: impl Iterator<Item = &'a Segment>) -> (Option<f64>, f64, f64) {
     let (mut sum, mut low, mut area) = (0.0, 0.0, 0.0);
     for segment in segments {
@@ -607,8 +624,8 @@ mod tests {
             map.extent_percent
         );
         let areas: f64 = map.segments.iter().map(|s| s.area).sum();
-        let counted = map.pixels.iter().flatten();
-        let all: f64 = counted.map(|p| p.area).sum();
+        let muscle = map.pixels.iter().flatten().filter(|p| p.is_muscle());
+        let all: f64 = muscle.map(|p| p.area).sum();
         assert!((areas - all).abs() < 1e-6);
     }
 

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::figure::{FigureMap, WallFigure};
-use super::{Level, PolarMap, Projection, RAY_COLUMNS, RAY_ROWS, territory};
+use super::{Level, Pixel, PlaceState, PolarMap, Projection, RAY_COLUMNS, RAY_ROWS, territory};
 use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
 
 /// Height of the picture, pixels.
@@ -29,6 +29,8 @@ struct Palette {
     colours: [[f64; 3]; 6],
     /// Outside of the wall.
     no_wall: Rgb,
+    /// The hatching of the valve plane.
+    valve_plane: Rgb,
     /// The line about the wall below the threshold.
     threshold: Rgb,
 }
@@ -62,7 +64,7 @@ const BLACK_RGB: Rgb = [0; 3];
 const SIDE_LETTERS: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
 
 /// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
-/// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall.
+/// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall, hatched the valve plane.
 /// Without orientation, "ORIENTATION UNKNOWN" instead of sides and territories.
 pub fn svg(map: &PolarMap) -> String {
     drawing(map).svg()
@@ -132,7 +134,7 @@ fn drawing(map: &PolarMap) -> Drawing {
     });
     Drawing {
         title: format!(
-            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall{}",
+            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall; hatched: valve plane{}",
             map.reference,
             100.0 * map.threshold,
             map.extent_percent,
@@ -141,6 +143,7 @@ fn drawing(map: &PolarMap) -> Drawing {
         width: PICTURE_WIDTH_PX,
         height: PICTURE_HEIGHT_PX,
         shapes: tiles(map, &rings, |row, column| shade(map, row, column))
+            .chain(hatching(map, &rings))
             .chain(threshold_line(map, &rings))
             .chain(borders(map, &rings))
             .chain(means)
@@ -162,6 +165,22 @@ fn tiles(
         corners: tile(map, rings, row, column),
         fill: shade(row, column),
     })
+}
+
+/// A diagonal across every pixel of the valve plane.
+fn hatching(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
+    let places = (0..RAY_ROWS).flat_map(|row| (0..RAY_COLUMNS).map(move |column| (row, column)));
+    let masked = places.filter(|(row, column)| map.state(*row, *column) == PlaceState::ValvePlane);
+    let place = |rows: usize, column: usize, side: usize| {
+        let share = map.levels.share(rows as f64, column, rings);
+        screen(share, (column + side) as f64 / RAY_COLUMNS as f64)
+    };
+    let line = |(row, column)| VectorShape::Line {
+        ends: [place(row, column, 0), place(row + 1, column, 1)],
+        stroke: PALETTE.valve_plane,
+        width: 1.5,
+    };
+    masked.map(line).collect()
 }
 
 /// The radii at which the levels end, as shares of the map's.
@@ -194,7 +213,7 @@ pub(super) fn rings(map: &PolarMap) -> [f64; 4] {
 
 /// The colour of a place of the map.
 fn shade(map: &PolarMap, row: usize, column: usize) -> Rgb {
-    match map.pixels[row * RAY_COLUMNS + column] {
+    match map.pixels[row * RAY_COLUMNS + column].filter(Pixel::is_muscle) {
         Some(pixel) if map.reference > 0.0 => colour(pixel.max / map.reference),
         _ => PALETTE.no_wall,
     }
@@ -251,7 +270,9 @@ fn threshold_line(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
     let limit = map.threshold * map.reference;
     let below = |row: usize, column: usize| {
         let pixel = map.pixels[row * RAY_COLUMNS + column % RAY_COLUMNS];
-        pixel.map(|pixel| pixel.max < limit)
+        pixel
+            .filter(Pixel::is_muscle)
+            .map(|pixel| pixel.max < limit)
     };
     let place = |rows: usize, column: usize, side: usize| {
         let share = map.levels.share(rows as f64, column % RAY_COLUMNS, rings);
