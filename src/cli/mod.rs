@@ -5,6 +5,7 @@ mod bar;
 mod beat;
 mod calibrate;
 mod cohort_args;
+mod compare;
 mod data_args;
 mod demo;
 mod dicom_args;
@@ -60,6 +61,7 @@ enum Command {
     Generate(Box<generate::GenerateArgs>),
     Segment(Box<segment::SegmentArgs>),
     Beat(Box<beat::BeatArgs>),
+    Compare(Box<compare::CompareArgs>),
     Inspect(inspect::InspectArgs),
     Measure(measure::MeasureArgs),
     Calibrate(Box<calibrate::CalibrateArgs>),
@@ -97,6 +99,7 @@ pub fn main() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Segment(args) => segment::run(&args),
         Command::Beat(args) => beat::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

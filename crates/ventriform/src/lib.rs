@@ -151,6 +151,7 @@ pub mod pipeline;
 
 pub mod segmentation;
 
+pub mod comparison;
 pub mod gated;
 
 pub mod evaluate;

@@ -114,6 +114,20 @@ impl Plan {
     ]);
 }
 
+impl Plan {
+    /// A comparison of two scans: each segmented, or a beat made of it.
+    pub const COMPARISON: Plan = Plan(&[
+        (Stage::Read, 0.08),
+        (Stage::Localise, 0.2),
+        (Stage::Align, 0.05),
+        (Stage::Deform, 0.2),
+        (Stage::Polar, 0.05),
+        (Stage::Report, 0.05),
+        (Stage::Beat, 0.33),
+        (Stage::Export, 0.04),
+    ]);
+}
+
 /// The completed fraction of a [`Plan`]. It never decreases, although stages may be repeated: when
 /// several models are fitted one after the other, each goes through the same stages.
 #[derive(Debug)]

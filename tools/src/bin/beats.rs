@@ -84,7 +84,7 @@ fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> R
             .on(&study.sum)
             .map_err(|error| anyhow!("{}", error.message))?,
         polar: fit.polar,
-        reader: None,
+        ..SegmentationParameters::default()
     };
     let templates = built_in::templates(&quiet)?;
     let made = segment(&study.sum, &templates, &order, None, &quiet)?;

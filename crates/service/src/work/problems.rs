@@ -11,6 +11,7 @@ use crate::records::{Failure, Fault};
 use std::error::Error;
 use std::fmt::Display;
 use ventriform::beat::BeatError;
+use ventriform::comparison::{ComparisonError, WhichScan};
 use ventriform::deform::DeformError;
 use ventriform::export::dicom::{DicomError, StatedIdentity};
 use ventriform::export::read_json::ReadMeshError;
@@ -275,6 +276,51 @@ impl Explain for GatedError {
     fn is_cancelled(&self) -> bool {
         matches!(self, GatedError::Cancelled(_))
     }
+}
+
+impl Explain for ComparisonError {
+    fn explain(&self) -> Failure {
+        let (kind, field, advice) = match self {
+            ComparisonError::Volume { scan, error } => return of_scan(*scan, error.explain()),
+            ComparisonError::Segmentation { scan, error } => {
+                return of_scan(*scan, error.explain());
+            }
+            ComparisonError::Gated { scan, error } => return of_scan(*scan, error.explain()),
+            ComparisonError::NoVentricle { scan } => (
+                (Fault::Request, "no-ventricle"),
+                Some(scan.as_str()),
+                "Give a model of a left ventricle, or leave `model` out.",
+            ),
+            ComparisonError::SameScan(_) => (
+                (Fault::Content, "same-scan"),
+                Some("rest"),
+                "Give the scan at rest and the scan at stress.",
+            ),
+            ComparisonError::OtherPatient(_) => (
+                (Fault::Content, "other-patient"),
+                Some("rest"),
+                "Give two scans of one patient; if these are, and one was pseudonymised, set `same_patient` to true.",
+            ),
+            ComparisonError::NothingInCommon => (
+                (Fault::Content, "nothing-in-common"),
+                None,
+                "Look at both polar maps with `segment`: one of the scans shows no left ventricle.",
+            ),
+            ComparisonError::Files(_) => ((Fault::Service, "unwritable"), None, ""),
+            ComparisonError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN),
+        };
+        failure(kind, self, field, advice.into())
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, ComparisonError::Cancelled(_))
+    }
+}
+
+/// A failure of one of two scans: its text begins with the scan's name.
+fn of_scan(scan: WhichScan, mut told: Failure) -> Failure {
+    told.detail = format!("{scan}: {}", told.detail);
+    told
 }
 
 fn beat_advice(error: &BeatError) -> ((Fault, &'static str), &'static str) {

@@ -106,7 +106,7 @@ impl GatedHeart {
             files.push(svg_file(&format!("{name}.svg"), polar::svg(&map)));
             files.push(json_file(&format!("{name}.json"), &PolarDocument::of(&map)));
         }
-        for figure in WallFigure::ALL {
+        for figure in WallFigure::OF_BEAT {
             monitor.check()?;
             let figure = self.figure_map(map, figure);
             let name = format!("polar_{}", figure.figure.as_str());
@@ -127,11 +127,13 @@ impl GatedHeart {
             WallFigure::Motion => Some(contraction.motion_mm[ray]),
             WallFigure::Thickening => Some(contraction.thickening_percent[ray]),
             WallFigure::Phase => beat.phases.degrees[ray],
+            WallFigure::Difference => None,
         };
         let of_segment = |segment: &SegmentMotion| match figure {
             WallFigure::Motion => Some(segment.motion_mm),
             WallFigure::Thickening => Some(segment.thickening_percent),
             WallFigure::Phase => segment.phase_degrees,
+            WallFigure::Difference => None,
         };
         FigureMap {
             map,

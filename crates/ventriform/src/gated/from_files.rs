@@ -57,6 +57,7 @@ pub fn from_files(
             .on(&study.sum)
             .map_err(crate::segmentation::SegmentationError::from)?,
         polar: parameters.polar,
+        kept_model: parameters.kept_model.clone(),
         reader: None,
     };
     let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;

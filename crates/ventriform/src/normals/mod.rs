@@ -41,4 +41,4 @@ pub use perfusion::{
     ComparedFigure, DEFICIT_OF_FULL_SCORE, Perfusion, SegmentPerfusion, TerritoryPerfusion,
     Z_LIMIT, apply,
 };
-pub use place_limits::PlaceLimits;
+pub use place_limits::{PlaceLimits, ScanPlaces};

@@ -1,9 +1,8 @@
 //! The parameters of a beat: its own, and those of the fit to the gates' sum.
 
-use super::input::RawValue;
-use super::table::{from_inputs, unknown};
-use super::{FIT_SPECS, FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
-use serde_json::{Map, Value, json};
+use super::with_fit::{BesideFit, WithFit};
+use super::{Kind, ParameterError, ParameterSpec, Parameters};
+use serde_json::json;
 use std::ops::RangeInclusive;
 
 /// Masses that a left ventricle's muscle can have, g.
@@ -93,108 +92,30 @@ pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
     },
 ];
 
-/// Parameters of a fit that a beat has no use for, and why.
-const WITHOUT_USE: &[(&str, &str)] = &[
-    ("frame", "all gates are fitted together"),
-    ("expert", NO_EXPERT),
-    ("label", NO_EXPERT),
-    ("resample", NO_EXPERT),
-    ("mesh_unit", NO_EXPERT),
-    ("mesh_frame", NO_EXPERT),
-    ("reader", "readers draw one wall, not a beat"),
-    ("edge", "a beat has the anatomical wall"),
-    ("organ", "only the left ventricle has a beat"),
-    ("mask_grid", "labels lie on the gates' grid"),
-];
+impl BesideFit for BeatChoice {
+    const WORK: &'static str = "a beat";
+    const WITHOUT_USE: &'static [(&'static str, &'static str)] = &[
+        ("frame", "all gates are fitted together"),
+        ("expert", NO_EXPERT),
+        ("label", NO_EXPERT),
+        ("resample", NO_EXPERT),
+        ("mesh_unit", NO_EXPERT),
+        ("mesh_frame", NO_EXPERT),
+        ("reader", "readers draw one wall, not a beat"),
+        ("edge", "a beat has the anatomical wall"),
+        ("organ", "only the left ventricle has a beat"),
+        ("mask_grid", "labels lie on the gates' grid"),
+    ];
+}
 
 const NO_EXPERT: &str = "a beat is compared with no expert's mask";
 
 /// Everything that determines a beat, apart from the files.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct GatedParameters {
-    /// The parameters of the fit to the gates' sum.
-    pub fit: FitParameters,
-    /// The beat's own.
-    pub choice: BeatChoice,
-}
-
-impl GatedParameters {
-    /// The rows of the parameters of a fit that a beat takes.
-    pub fn fit_specs() -> impl Iterator<Item = &'static ParameterSpec<FitParameters>> {
-        FIT_SPECS
-            .iter()
-            .filter(|spec| why_unused(spec.name).is_none())
-    }
-
-    /// Reads parameters given as text, from a query string or a command line.
-    ///
-    /// # Errors
-    /// As [`Parameters::from_pairs`]; also for parameters of a fit that a beat has no use for.
-    pub fn from_pairs<'a>(
-        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
-    ) -> Result<Self, ParameterError> {
-        let pairs = pairs.into_iter();
-        Self::from_each(pairs.map(|(name, text)| (name, RawValue::Text(text))))
-    }
-
-    /// Reads parameters given as a JSON object. Types are strict: `"130"` is not a number.
-    ///
-    /// # Errors
-    /// As [`GatedParameters::from_pairs`].
-    pub fn from_json(object: &Map<String, Value>) -> Result<Self, ParameterError> {
-        let fields = object.iter();
-        Self::from_each(fields.map(|(name, value)| (name.as_str(), RawValue::Json(value))))
-    }
-
-    /// Every parameter that is set, by name, including defaults. [`GatedParameters::from_json`] reads it back.
-    pub fn to_json(&self) -> Map<String, Value> {
-        let mut all = self.fit.to_json();
-        all.retain(|name, _| why_unused(name).is_none());
-        all.extend(self.choice.to_json());
-        all
-    }
-
-    fn from_each<'a>(
-        given: impl Iterator<Item = (&'a str, RawValue<'a>)>,
-    ) -> Result<Self, ParameterError> {
-        let (mut own, mut of_fit) = (Vec::new(), Vec::new());
-        for (name, value) in given {
-            if BEAT_SPECS.iter().any(|spec| spec.name == name) {
-                own.push((name, value));
-                continue;
-            }
-            if let Some(why) = why_unused(name) {
-                return Err(ParameterError {
-                    field: name.into(),
-                    message: format!("a beat has no use for it: {why}"),
-                    fix: "Leave it out.".into(),
-                });
-            }
-            let mut aliases = FitParameters::ALIASES.iter().map(|(other, _)| *other);
-            let mut known = Self::fit_specs().map(|spec| spec.name);
-            if !known.any(|known| known == name) && !aliases.any(|alias| alias == name) {
-                let names = Self::fit_specs().map(|spec| spec.name);
-                let names = names.chain(BEAT_SPECS.iter().map(|spec| spec.name));
-                let aliases = FitParameters::ALIASES.iter().map(|(other, _)| *other);
-                return Err(unknown(name, &names.collect::<Vec<_>>(), aliases));
-            }
-            of_fit.push((name, value));
-        }
-        Ok(Self {
-            fit: from_inputs(of_fit.into_iter())?,
-            choice: from_inputs(own.into_iter())?,
-        })
-    }
-}
-
-fn why_unused(name: &str) -> Option<&'static str> {
-    let unused = WITHOUT_USE.iter().find(|(unused, _)| *unused == name);
-    unused.map(|(_, why)| *why)
-}
+pub type GatedParameters = WithFit<BeatChoice>;
 
 #[cfg(test)]
 mod tests {
-    use super::super::checks;
+    use super::super::{FIT_SPECS, checks};
     use super::*;
 
     fn pairs(list: &[(&str, &str)]) -> Result<GatedParameters, ParameterError> {
@@ -219,7 +140,7 @@ mod tests {
     #[test]
     fn what_a_beat_has_no_use_for_is_refused_and_not_written() {
         let written = GatedParameters::default().to_json();
-        for (name, why) in WITHOUT_USE {
+        for (name, why) in BeatChoice::WITHOUT_USE {
             assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
             assert!(!written.contains_key(*name), "{name}");
             let refused = pairs(&[(name, "1")]).unwrap_err();

@@ -18,6 +18,8 @@ pub struct FitParameters {
     /// Id of the model to fit, or `auto` for the best of the built-in hearts and the library; ids of
     /// further models may follow `auto`, separated by commas.
     pub model: String,
+    /// Name of the fitted model that is kept; `None` for that with the greatest confidence.
+    pub kept_model: Option<String>,
     /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
     /// Which structure of a mask's file is meant, and whether a mask on another grid is resampled.
@@ -52,6 +54,7 @@ impl Default for FitParameters {
         Self {
             frame: None,
             model: FitParameters::AUTO_MODEL.into(),
+            kept_model: None,
             expert: None,
             mask: MaskChoice::default(),
             reader: None,

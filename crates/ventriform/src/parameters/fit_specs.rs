@@ -46,6 +46,26 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         write: |p| json!(p.model),
     },
     ParameterSpec {
+        name: "kept_model",
+        kind: Kind::Text {
+            pattern: "^[^\\x00-\\x1f]{1,200}$",
+            example: "built-in usual",
+        },
+        default: "",
+        summary: "Name of the model whose fit is kept, of those that are fitted, as a report names its template: a \
+                  correction by the position, the axis or the base then keeps its heart. Default: the one with the \
+                  greatest confidence",
+        read: |d, v| {
+            let name = v.text();
+            if name.is_empty() || name.len() > 200 {
+                return Err("a name has 1 to 200 bytes".into());
+            }
+            d.kept_model = Some(name.into());
+            Ok(())
+        },
+        write: |p| json!(p.kept_model),
+    },
+    ParameterSpec {
         name: "expert",
         kind: Kind::Stored {
             prefixes: &["vol_"],

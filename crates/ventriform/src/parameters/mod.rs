@@ -1,13 +1,14 @@
-//! The parameters of a model, of a fit and of a beat, by the names that users give them.
+//! The parameters of a model, of a fit, of a beat and of a comparison, by the names that users give them.
 //!
-//! Three tables, [`SPECS`], [`FIT_SPECS`] and [`BEAT_SPECS`], define names, types, ranges, defaults and help texts for
+//! Tables, [`SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`] and [`COMPARISON_SPECS`], define names, types, ranges, defaults and help texts for
 //! the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
-//! in; [`ModelParameters`], [`FitParameters`] or [`GatedParameters`] come out, with every value of the right type and in
+//! in; [`ModelParameters`], [`FitParameters`] or [`WithFit`] come out, with every value of the right type and in
 //! its range, or a [`ParameterError`] with the name of the first invalid parameter.
 
 mod beat;
 #[cfg(test)]
 mod checks;
+mod comparison;
 mod fit;
 mod fit_specs;
 mod input;
@@ -17,8 +18,10 @@ mod model;
 mod schema;
 mod specs;
 mod table;
+mod with_fit;
 
 pub use beat::{BEAT_SPECS, BeatChoice, GatedParameters, MASS_G, RR_MS};
+pub use comparison::{COMPARISON_SPECS, ComparisonChoice, ComparisonParameters};
 pub use fit::{FitParameters, KnownPosition, MaskGrid};
 pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
@@ -28,6 +31,7 @@ pub use model::ModelParameters;
 pub use schema::schema_of;
 pub use specs::SPECS;
 pub use table::{ParameterSpec, Parameters};
+pub use with_fit::{BesideFit, WithFit};
 
 /// An invalid parameter, and what to give instead.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

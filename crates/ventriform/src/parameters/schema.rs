@@ -1,7 +1,8 @@
 //! The tables of parameters as schemas of OpenAPI.
 
 use super::{
-    BeatChoice, FitParameters, GatedParameters, Kind, ModelParameters, ParameterSpec, Parameters,
+    BeatChoice, BesideFit, ComparisonChoice, ComparisonParameters, FitParameters, GatedParameters,
+    Kind, ModelParameters, ParameterSpec, Parameters, WithFit,
 };
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -43,12 +44,26 @@ impl ToSchema for GatedParameters {
 
 impl PartialSchema for GatedParameters {
     fn schema() -> RefOr<Schema> {
-        let of_fit = Self::fit_specs().map(|spec| (spec.name, schema_of(spec)));
-        let own = BeatChoice::SPECS
-            .iter()
-            .map(|spec| (spec.name, schema_of(spec)));
-        object_with("The parameters of a beat", of_fit.chain(own))
+        with_fit::<BeatChoice>()
     }
+}
+
+impl ToSchema for ComparisonParameters {
+    fn name() -> Cow<'static, str> {
+        "ComparisonParameters".into()
+    }
+}
+
+impl PartialSchema for ComparisonParameters {
+    fn schema() -> RefOr<Schema> {
+        with_fit::<ComparisonChoice>()
+    }
+}
+
+fn with_fit<C: BesideFit>() -> RefOr<Schema> {
+    let of_fit = WithFit::<C>::fit_specs().map(|spec| (spec.name, schema_of(spec)));
+    let own = C::SPECS.iter().map(|spec| (spec.name, schema_of(spec)));
+    object_with(&format!("The parameters of {}", C::WORK), of_fit.chain(own))
 }
 
 fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {

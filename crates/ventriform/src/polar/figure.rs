@@ -18,11 +18,13 @@ pub enum WallFigure {
     Thickening,
     /// Phase of the greatest thickness, degrees of the cycle.
     Phase,
+    /// Uptake at rest less that at stress, per cent of that at rest.
+    Difference,
 }
 
 impl WallFigure {
-    /// Every figure.
-    pub const ALL: [Self; 3] = [Self::Motion, Self::Thickening, Self::Phase];
+    /// The figures of a beat.
+    pub const OF_BEAT: [Self; 3] = [Self::Motion, Self::Thickening, Self::Phase];
 
     /// Its name in reports and file names.
     pub fn as_str(self) -> &'static str {
@@ -30,6 +32,7 @@ impl WallFigure {
             Self::Motion => "motion",
             Self::Thickening => "thickening",
             Self::Phase => "phase",
+            Self::Difference => "difference",
         }
     }
 
@@ -37,7 +40,7 @@ impl WallFigure {
     pub fn unit(self) -> &'static str {
         match self {
             Self::Motion => "mm",
-            Self::Thickening => "%",
+            Self::Thickening | Self::Difference => "%",
             Self::Phase => "degrees",
         }
     }
@@ -48,6 +51,7 @@ impl WallFigure {
             Self::Motion => [0.0, 12.0],
             Self::Thickening => [0.0, 80.0],
             Self::Phase => [0.0, 360.0],
+            Self::Difference => [-50.0, 50.0],
         }
     }
 
@@ -56,6 +60,7 @@ impl WallFigure {
             Self::Motion => &[0.0, 3.0, 6.0, 9.0, 12.0],
             Self::Thickening => &[0.0, 20.0, 40.0, 60.0, 80.0],
             Self::Phase => &[0.0, 90.0, 180.0, 270.0, 360.0],
+            Self::Difference => &[-50.0, -25.0, 0.0, 25.0, 50.0],
         }
     }
 
@@ -69,6 +74,9 @@ impl WallFigure {
             }
             Self::Phase => {
                 "Phase of the wall's greatest thickness, degrees of the cycle; grey: no wall, or none that moves"
+            }
+            Self::Difference => {
+                "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; grey: no wall in one of them"
             }
         }
     }

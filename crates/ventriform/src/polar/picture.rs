@@ -47,6 +47,8 @@ struct FigurePalette {
     outward: Rgb,
     /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has them).
     cycle: [[f64; 3]; 12],
+    /// More uptake at stress, as much, less.
+    difference: [[f64; 3]; 3],
 }
 
 static FIGURE_PALETTE: LazyLock<FigurePalette> = LazyLock::new(|| {
@@ -82,6 +84,7 @@ pub fn figure_svg(figure: &FigureMap<'_>) -> String {
     let what = figure.figure;
     let colour_at = |value: f64| match what {
         WallFigure::Phase => cycle_colour(value / 360.0),
+        WallFigure::Difference => difference_colour(value / what.range()[1]),
         _ if value < 0.0 => FIGURE_PALETTE.outward,
         _ => colour(value / what.range()[1]),
     };
@@ -91,6 +94,7 @@ pub fn figure_svg(figure: &FigureMap<'_>) -> String {
     let means = figure.segments.iter().enumerate().map(|(index, mean)| {
         let bright = match what {
             WallFigure::Phase => true,
+            WallFigure::Difference => false,
             _ => mean.is_some_and(|mean| mean > BRIGHT_SHARE * what.range()[1]),
         };
         label(index + 1, *mean, bright, &rings)
@@ -246,6 +250,13 @@ fn cycle_colour(turns: f64) -> Rgb {
         colours[(step + 1) % colours.len()],
         at - step as f64,
     )
+}
+
+/// The colour of a difference, -1 (more at stress) to 1.
+fn difference_colour(share: f64) -> Rgb {
+    let [more, alike, less] = FIGURE_PALETTE.difference;
+    let end = if share < 0.0 { more } else { less };
+    between(alike, end, share.abs().min(1.0))
 }
 
 fn between(from: [f64; 3], to: [f64; 3], share: f64) -> Rgb {

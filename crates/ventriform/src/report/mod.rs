@@ -16,6 +16,7 @@
 
 mod beat_report;
 pub mod closeness;
+mod comparison_report;
 pub mod distance;
 mod distance_pictures;
 pub mod elements;
@@ -41,6 +42,10 @@ pub use beat_report::{
     TimingReport,
 };
 pub use closeness::{Closeness, MeasuredSurface};
+pub use comparison_report::{
+    BeatChange, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
+    UptakeChange,
+};
 pub use distance_pictures::vertex_colours;
 pub use fit_report::{
     EvidenceReport, FitReport, FittedVolumes, LocalisationReport, LongAxis, Posture, Thickness,

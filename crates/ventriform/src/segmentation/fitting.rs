@@ -8,6 +8,7 @@ use crate::fit::{Fit, fit_at};
 use crate::judge::{Evidence, consensus};
 use crate::locate::LocateError;
 use crate::model::Template;
+use crate::parameters::ParameterError;
 use crate::progress::Monitor;
 use crate::volume::Volume;
 
@@ -115,11 +116,12 @@ impl Trials {
         }
     }
 
-    /// The fit with the greatest confidence, of equals the one with the greatest merit, of those the
-    /// first, as the built-in hearts' fits judge it, and its place; `None` without any fit.
-    pub fn best(&self, edge: WallEdge) -> Option<(usize, Fit)> {
+    /// The fit of the template with the name `kept`, or else the fit with the greatest confidence, of equals the one with the
+    /// greatest merit, of those the first, as the built-in hearts' fits judge it, and its place; `None` without such a fit.
+    pub fn best(&self, kept: Option<&str>, edge: WallEdge) -> Option<(usize, Fit)> {
+        let may_be = |n: &usize| kept.is_none_or(|name| self.candidates[*n].name == name);
         let rank = |n: usize| (self.candidates[n].confidence, self.candidates[n].merit);
-        let best = (0..self.fits.len()).rev().max_by(|a, b| {
+        let best = (0..self.fits.len()).rev().filter(may_be).max_by(|a, b| {
             let ((a, merit), (b, other)) = (rank(*a), rank(*b));
             a.total_cmp(&b).then(merit.total_cmp(&other))
         })?;
@@ -137,6 +139,22 @@ impl Trials {
         let model = fit.model.clone();
         Some((best, Fit { model, judgement }))
     }
+
+    /// The error about a template to keep that was not fitted.
+    pub fn not_fitted(&self, name: &str) -> SegmentationError {
+        let failed = self.refused.iter().find(|refused| refused.name == name);
+        let message = match failed {
+            Some(refused) => format!("{name} could not be fitted: {}", refused.reason),
+            None => format!("{name} is none of the models that are fitted"),
+        };
+        let fitted: Vec<&str> = self.candidates.iter().map(|c| c.name.as_str()).collect();
+        ParameterError {
+            field: "kept_model".into(),
+            message,
+            fix: format!("Give one of {}, or leave it out.", fitted.join(", ")),
+        }
+        .into()
+    }
 }
 
 /// The fit that `auto` keeps without further models: of the built-in hearts, to the heart in `volume`,
@@ -152,7 +170,7 @@ pub fn fit_built_in(
 ) -> Result<Fit, SegmentationError> {
     let templates = built_in::templates(monitor)?;
     let trials = try_all(volume, &templates, parameters, search, monitor)?;
-    let best = trials.best(parameters.edge);
+    let best = trials.best(None, parameters.edge);
     best.map_or(Err(SegmentationError::NoTemplate), |(_, fit)| Ok(fit))
 }
 

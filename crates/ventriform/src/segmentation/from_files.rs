@@ -93,6 +93,7 @@ pub fn from_files(
     let fit = SegmentationParameters {
         deform: parameters.on(&reading.volume)?,
         polar: parameters.polar,
+        kept_model: parameters.kept_model.clone(),
         reader: order.reader.clone(),
     };
     check_reader(order)?;

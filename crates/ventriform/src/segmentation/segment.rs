@@ -21,6 +21,8 @@ pub struct SegmentationParameters {
     pub deform: DeformParameters,
     /// The polar map's.
     pub polar: PolarParameters,
+    /// Name of the template whose fit is kept. Default: that with the greatest confidence.
+    pub kept_model: Option<String>,
     /// The reader as whom to draw the wall. The profile must start from the wall that
     /// [`DeformParameters::edge`] asks for. Default: none.
     pub reader: Option<NamedReader>,
@@ -101,9 +103,12 @@ pub fn segment(
 ) -> Result<Segmentation, SegmentationError> {
     let mut search = OrganSearch::default();
     let trials = try_all(volume, templates, &parameters.deform, &mut search, monitor)?;
-    let (chosen, fit) = trials
-        .best(parameters.deform.edge)
-        .ok_or(SegmentationError::NoTemplate)?;
+    let kept = parameters.kept_model.as_deref();
+    let (chosen, fit) = match (trials.best(kept, parameters.deform.edge), kept) {
+        (Some(best), _) => best,
+        (None, Some(name)) => return Err(trials.not_fitted(name)),
+        (None, None) => return Err(SegmentationError::NoTemplate),
+    };
     let Trials {
         candidates,
         refused,

@@ -114,10 +114,28 @@ provenance! {
     software_versions,
     /// Protocol Name (0018,1030).
     protocol_name,
+    /// Corrected Image (0028,0051), values separated by backslashes: with `ATTN` attenuation was corrected.
+    corrected_image,
+    /// Units (0054,1001).
+    units,
+    /// Patient Position (0018,5100), such as `HFS`, or the meaning of the Patient Orientation Modifier Code (0054,0412).
+    patient_position,
     /// Reconstruction Method (0054,1103).
     reconstruction_method,
     /// Convolution Kernel (0018,1210).
     convolution_kernel,
+}
+
+impl Provenance {
+    /// Whether attenuation was corrected; `None` where the header does not say.
+    pub fn attenuation_corrected(&self) -> Option<bool> {
+        let corrections = self.corrected_image.as_deref()?;
+        Some(
+            corrections
+                .split('\\')
+                .any(|correction| correction.trim() == "ATTN"),
+        )
+    }
 }
 
 impl fmt::Debug for Provenance {

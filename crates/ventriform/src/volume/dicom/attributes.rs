@@ -55,6 +55,7 @@ const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
 const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
 const CONTEXT_NAME: &[Tag] = &[Tag(0x0040, 0x0555), Tag(0x0040, 0xa168)];
 const PROTOCOL_CODE: &[Tag] = &[Tag(0x0040, 0x0260)];
+const POSTURE_CODE: &[Tag] = &[Tag(0x0054, 0x0410), Tag(0x0054, 0x0412)];
 const FRAME_POSITION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9113)];
 const FRAME_ORIENTATION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9116)];
 const FRAME_MEASURES: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0028, 0x9110)];
@@ -147,6 +148,8 @@ attributes! {
     POSITION_REFERENCE = &[], 0x0020, 0x1040, "Position Reference Indicator (0020,1040)";
     SAMPLES = &[], 0x0028, 0x0002, "Samples per Pixel (0028,0002)";
     PHOTOMETRIC = &[], 0x0028, 0x0004, "Photometric Interpretation (0028,0004)";
+    PATIENT_POSITION = &[], 0x0018, 0x5100, "Patient Position (0018,5100)";
+    CORRECTED_IMAGE = &[], 0x0028, 0x0051, "Corrected Image (0028,0051)";
     NUMBER_OF_FRAMES = &[], 0x0028, 0x0008, "Number of Frames (0028,0008)";
     FRAME_POINTER = &[], 0x0028, 0x0009, "Frame Increment Pointer (0028,0009)";
     ROWS = &[], 0x0028, 0x0010, "Rows (0028,0010)";
@@ -192,6 +195,7 @@ attributes! {
     INJECTION_TIME = PHARMACEUTICAL_PATH, 0x0018, 0x1072, "Radiopharmaceutical Start Time (0018,1072)";
     PHARMACEUTICAL_MEANING = PHARMACEUTICAL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     NUCLIDE_MEANING = NUCLIDE_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
+    POSTURE_MEANING = POSTURE_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     CONTEXT_MEANING = CONTEXT_NAME, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     PROTOCOL_MEANING = PROTOCOL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     FRAME_POSITION = FRAME_POSITION_PATH, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";

@@ -1,0 +1,195 @@
+//! Whether two scans can be compared: one patient, one at stress and one at rest, made alike.
+
+use super::difference::Change;
+use super::error::ComparisonError;
+use super::flags::{ComparisonFlag, Reason, WhichScan};
+use super::hearts::ComparedHeart;
+use crate::volume::Provenance;
+
+/// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
+/// per cent for every millimetre of blur.
+const RESOLUTION_MM: f64 = 1.5;
+/// Quotient of the walls' volumes beyond which they are hardly of one heart (scripts/calibrate_comparison.py).
+const MUSCLE_QUOTIENT: f64 = 1.4;
+/// Share of the wall that is reversible from which TID is uncertain, per cent.
+const LARGE_REVERSIBLE_PERCENT: f64 = 10.0;
+/// Share of the wall that sets the scale below which it is uncertain, per cent.
+const FEW_MATCHED_PERCENT: f64 = 40.0;
+
+/// Refuses one scan given twice, and scans of two patients unless the caller says that they are one.
+pub(super) fn refuse(
+    stress: &ComparedHeart,
+    rest: &ComparedHeart,
+    same_patient: bool,
+) -> Result<(), ComparisonError> {
+    if let (Some(a), Some(b)) = (stress.provenance(), rest.provenance()) {
+        if a.sop_instance_uid.is_some() && a.sop_instance_uid == b.sop_instance_uid {
+            return Err(ComparisonError::SameScan("they have one SOP Instance UID"));
+        }
+        let differ = other_patient(a, b);
+        if !differ.is_empty() && !same_patient {
+            return Err(ComparisonError::OtherPatient(differ));
+        }
+    }
+    if stress.has_voxels_of(rest) {
+        return Err(ComparisonError::SameScan("they have the same voxels"));
+    }
+    Ok(())
+}
+
+/// The fields by which the headers name two patients. The name decides only where no number does: it changes by marriage and by spelling.
+fn other_patient(a: &Provenance, b: &Provenance) -> Vec<&'static str> {
+    let plain = |text: &Option<String>| {
+        let text = text.as_deref()?.trim_matches(['^', ' ']).to_uppercase();
+        (!text.is_empty()).then_some(text)
+    };
+    let differ =
+        |a: &Option<String>, b: &Option<String>| plain(a).zip(plain(b)).map(|(a, b)| a != b);
+    let number = differ(&a.patient_id, &b.patient_id);
+    let fields = [
+        ("Patient ID (0010,0020)", number),
+        (
+            "Patient's Birth Date (0010,0030)",
+            differ(&a.patient_birth_date, &b.patient_birth_date),
+        ),
+        (
+            "Patient's Sex (0010,0040)",
+            differ(&a.patient_sex, &b.patient_sex),
+        ),
+        (
+            "Patient's Name (0010,0010)",
+            differ(&a.patient_name, &b.patient_name).filter(|_| number != Some(false)),
+        ),
+    ];
+    let named = fields
+        .into_iter()
+        .filter(|(_, differ)| *differ == Some(true));
+    named.map(|(name, _)| name).collect()
+}
+
+/// Reasons to look closer.
+pub(super) fn flags(
+    stress: &ComparedHeart,
+    rest: &ComparedHeart,
+    change: &Change,
+) -> Vec<ComparisonFlag> {
+    let mut flags = Vec::new();
+    let both = [(WhichScan::Stress, stress), (WhichScan::Rest, rest)];
+    for (scan, heart) in both {
+        match heart.stated_role() {
+            Some(stated) if stated != scan => {
+                flags.push(ComparisonFlag::NotComparable(Reason::Role { scan, stated }));
+            }
+            Some(_) => {}
+            None => flags.push(ComparisonFlag::RoleNotStated { scan }),
+        }
+    }
+    if let (Some(a), Some(b)) = (stress.provenance(), rest.provenance()) {
+        flags.extend(of_headers(a, b));
+    }
+    if let (Some(stress_mm), Some(rest_mm)) = (stress.resolution_mm(), rest.resolution_mm())
+        && (stress_mm - rest_mm).abs() > RESOLUTION_MM
+    {
+        flags.push(ComparisonFlag::NotComparable(Reason::Resolution {
+            stress_mm,
+            rest_mm,
+        }));
+    }
+    let [stress_ml, rest_ml] = [stress, rest].map(ComparedHeart::muscle_ml);
+    let quotient = stress_ml / rest_ml;
+    if !(1.0 / MUSCLE_QUOTIENT..=MUSCLE_QUOTIENT).contains(&quotient) {
+        flags.push(ComparisonFlag::NotComparable(Reason::Muscle {
+            stress_ml,
+            rest_ml,
+        }));
+    }
+    if change.reversible_percent > LARGE_REVERSIBLE_PERCENT {
+        flags.push(ComparisonFlag::TidUncertain {
+            reversible_percent: change.reversible_percent,
+        });
+    }
+    if change.matched_percent < FEW_MATCHED_PERCENT {
+        flags.push(ComparisonFlag::ScaleUncertain {
+            percent: change.matched_percent,
+        });
+    }
+    if change.turn.degrees != 0.0 {
+        flags.push(ComparisonFlag::Turned {
+            degrees: change.turn.degrees,
+        });
+    }
+    for (scan, heart) in both {
+        let own = heart.segmentation().fit.judgement.flags.iter();
+        flags.extend(own.map(|flag| ComparisonFlag::OfScan {
+            scan,
+            code: flag.code(),
+            reason: flag.to_string(),
+        }));
+    }
+    flags
+}
+
+/// What the headers say of how both scans were made.
+fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
+    let mut flags = Vec::new();
+    let patient = other_patient(stress, rest);
+    if !patient.is_empty() {
+        flags.push(ComparisonFlag::NotComparable(Reason::Patient(patient)));
+    }
+    if let (Some(at_stress), Some(at_rest)) =
+        (stress.attenuation_corrected(), rest.attenuation_corrected())
+        && at_stress != at_rest
+    {
+        let corrected = if at_stress {
+            WhichScan::Stress
+        } else {
+            WhichScan::Rest
+        };
+        flags.push(ComparisonFlag::NotComparable(
+            Reason::AttenuationCorrection { corrected },
+        ));
+    }
+    let differing = |a: &Option<String>, b: &Option<String>| {
+        let (a, b) = (a.as_deref()?.trim(), b.as_deref()?.trim());
+        let differ = !a.is_empty() && !b.is_empty() && !a.eq_ignore_ascii_case(b);
+        differ.then(|| (a.to_owned(), b.to_owned()))
+    };
+    let tracers = [
+        (&stress.radiopharmaceutical, &rest.radiopharmaceutical),
+        (&stress.radionuclide, &rest.radionuclide),
+    ];
+    if let Some((stress, rest)) = tracers.into_iter().find_map(|(a, b)| differing(a, b)) {
+        flags.push(ComparisonFlag::NotComparable(Reason::Tracer {
+            stress,
+            rest,
+        }));
+    }
+    for (field, a, b) in [
+        ("the camera", &stress.model_name, &rest.model_name),
+        ("the unit of uptake", &stress.units, &rest.units),
+        (
+            "the patient's position",
+            &stress.patient_position,
+            &rest.patient_position,
+        ),
+        (
+            "the reconstruction",
+            &stress.reconstruction_method,
+            &rest.reconstruction_method,
+        ),
+        (
+            "the filter",
+            &stress.convolution_kernel,
+            &rest.convolution_kernel,
+        ),
+    ] {
+        if let Some((stress, rest)) = differing(a, b) {
+            flags.push(ComparisonFlag::MadeOtherwise {
+                field,
+                stress,
+                rest,
+            });
+        }
+    }
+    flags
+}

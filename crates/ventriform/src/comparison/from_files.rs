@@ -1,0 +1,159 @@
+//! A comparison from files: read, fit both hearts by one model, compare.
+
+use super::checks;
+use super::difference::{Change, Sides};
+use super::error::ComparisonError;
+use super::flags::WhichScan;
+use super::hearts::{ComparedHeart, ComparedHearts};
+use super::order::ComparisonOrder;
+use crate::gated::{self, GatedError, GatedOrder};
+use crate::parameters::{BeatChoice, FitParameters};
+use crate::progress::Monitor;
+use crate::segmentation::{self, RankedTemplate, SegmentationOrder};
+use crate::volume::{ReadLimits, VolumeError, VolumeFile};
+
+/// Compares the scans of `order`. Both are fitted as beats if both are gated, as images otherwise.
+///
+/// # Errors
+/// [`ComparisonError`].
+pub fn from_files(
+    order: &ComparisonOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<ComparedHearts, ComparisonError> {
+    let scans = [
+        (WhichScan::Stress, order.stress),
+        (WhichScan::Rest, order.rest),
+    ];
+    let fit = |gated: bool, kept: Option<&str>, which: usize| {
+        let (scan, files) = scans[which];
+        let monitor = monitor.part(which, scans.len());
+        if gated {
+            beating(order, scan, files, kept, limits, &monitor)
+        } else {
+            still(order, scan, files, kept, limits, &monitor).map(Some)
+        }
+    };
+    let both = |gated: bool| -> Result<Option<[ComparedHeart; 2]>, ComparisonError> {
+        let (Some(stress), Some(rest)) = (fit(gated, None, 0)?, fit(gated, None, 1)?) else {
+            return Ok(None);
+        };
+        Ok(Some([stress, rest]))
+    };
+    let (gated, [mut stress, mut rest]) = match both(true)? {
+        Some(hearts) => (true, hearts),
+        None => {
+            let hearts = both(false)?;
+            (false, hearts.ok_or(ComparisonError::NothingInCommon)?)
+        }
+    };
+    checks::refuse(&stress, &rest, order.parameters.choice.same_patient)?;
+    if let Some(common) = common_template(&stress, &rest) {
+        let again = |heart: ComparedHeart, which: usize| {
+            if heart.template() == common {
+                return Ok(heart);
+            }
+            Ok::<_, ComparisonError>(fit(gated, Some(&common), which)?.unwrap_or(heart))
+        };
+        stress = again(stress, 0)?;
+        rest = again(rest, 1)?;
+    }
+    let map = |heart: &ComparedHeart, scan: WhichScan| {
+        heart
+            .map()
+            .cloned()
+            .ok_or(ComparisonError::NoVentricle { scan })
+    };
+    let (at_stress, at_rest) = (
+        map(&stress, WhichScan::Stress)?,
+        map(&rest, WhichScan::Rest)?,
+    );
+    let sides = Sides {
+        stress: &at_stress,
+        rest: &at_rest,
+    };
+    let change = Change::between(&sides).ok_or(ComparisonError::NothingInCommon)?;
+    Ok(ComparedHearts {
+        flags: checks::flags(&stress, &rest, &change),
+        stress,
+        rest,
+        change,
+        parameters: order.parameters.fit.clone(),
+        choice: order.parameters.choice,
+    })
+}
+
+/// The model in which both fits together have the greatest confidence, if they chose different ones and both can have it.
+fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<String> {
+    if stress.template() == rest.template() {
+        return None;
+    }
+    let other = &rest.segmentation().candidates;
+    let together = stress.segmentation().candidates.iter().filter_map(|own| {
+        let same = |candidate: &&RankedTemplate| candidate.name == own.name;
+        let at_rest = other.iter().find(same)?;
+        Some((own.confidence + at_rest.confidence, own.name.clone()))
+    });
+    let best = together.max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, name)| name)
+}
+
+/// The parameters of both fits, and the model to keep.
+fn keeping(order: &ComparisonOrder<'_>, kept: Option<&str>) -> FitParameters {
+    let own = order.parameters.fit.clone();
+    FitParameters {
+        kept_model: kept.map(str::to_owned).or(own.kept_model),
+        ..own
+    }
+}
+
+fn still(
+    order: &ComparisonOrder<'_>,
+    scan: WhichScan,
+    files: &[VolumeFile],
+    kept: Option<&str>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<ComparedHeart, ComparisonError> {
+    let parameters = keeping(order, kept);
+    let own = SegmentationOrder {
+        volume: files,
+        expert: None,
+        auto: order.auto,
+        models: order.models.clone(),
+        reader: None,
+        parameters: &parameters,
+    };
+    let made = segmentation::from_files(&own, limits, monitor)
+        .map_err(|error| ComparisonError::of_segmentation(scan, error))?;
+    Ok(ComparedHeart::Still(Box::new(made)))
+}
+
+/// `None` if the file has one volume, or several that are no gates.
+fn beating(
+    order: &ComparisonOrder<'_>,
+    scan: WhichScan,
+    files: &[VolumeFile],
+    kept: Option<&str>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<Option<ComparedHeart>, ComparisonError> {
+    let parameters = keeping(order, kept);
+    let own = GatedOrder {
+        gates: files,
+        auto: order.auto,
+        models: order.models.clone(),
+        parameters: &parameters,
+        choice: BeatChoice {
+            gated: order.parameters.choice.gated,
+            ..BeatChoice::default()
+        },
+    };
+    match gated::from_files(&own, limits, monitor) {
+        Ok(made) => Ok(Some(ComparedHeart::Beating(Box::new(made)))),
+        Err(GatedError::Volume(VolumeError::NotGated { .. } | VolumeError::FrameNeeded { .. })) => {
+            Ok(None)
+        }
+        Err(error) => Err(ComparisonError::of_gated(scan, error)),
+    }
+}

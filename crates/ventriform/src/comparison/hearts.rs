@@ -1,0 +1,133 @@
+//! The two hearts of a comparison, each with the work that was made of its scan.
+
+use super::difference::{Change, Sides};
+use super::flags::{ComparisonFlag, WhichScan};
+use crate::gated::GatedHeart;
+use crate::parameters::{ComparisonChoice, FitParameters};
+use crate::polar::PolarMap;
+use crate::segmentation::{Segmentation, SegmentedVolume};
+use crate::volume::{Provenance, VolumeFacts};
+
+/// A heart of a comparison.
+#[derive(Debug)]
+pub enum ComparedHeart {
+    /// From an image that is not gated.
+    Still(Box<SegmentedVolume>),
+    /// From gates.
+    Beating(Box<GatedHeart>),
+}
+
+impl ComparedHeart {
+    /// The segmentation of the image, or of the gates' sum.
+    pub fn segmentation(&self) -> &Segmentation {
+        match self {
+            Self::Still(made) => &made.segmentation,
+            Self::Beating(made) => &made.segmentation,
+        }
+    }
+
+    /// The beat, if there is one.
+    pub fn beat(&self) -> Option<&GatedHeart> {
+        match self {
+            Self::Still(_) => None,
+            Self::Beating(made) => Some(made),
+        }
+    }
+
+    /// Whose scan it is; `None` unless the files are DICOM.
+    pub fn provenance(&self) -> Option<&Provenance> {
+        match self {
+            Self::Still(made) => made.reading.provenance.as_ref(),
+            Self::Beating(made) => made.reading.provenance(),
+        }
+    }
+
+    /// Facts about the files.
+    pub fn facts(&self) -> &VolumeFacts {
+        match self {
+            Self::Still(made) => &made.reading.facts,
+            Self::Beating(made) => &made.reading.facts,
+        }
+    }
+
+    /// The polar map of the wall's uptake.
+    pub fn map(&self) -> Option<&PolarMap> {
+        self.segmentation().polar.as_ref()
+    }
+
+    /// Volume of the cavity of the wall as it looks, ml.
+    pub fn cavity_ml(&self) -> f64 {
+        let surfaces = self.segmentation().fit.model.surfaces.as_ref();
+        surfaces.map_or(f64::NAN, |both| both.apparent.wall.cavity_ml)
+    }
+
+    /// Volume of the anatomical wall's muscle, ml.
+    pub fn muscle_ml(&self) -> f64 {
+        let surfaces = self.segmentation().fit.model.surfaces.as_ref();
+        surfaces.map_or(f64::NAN, |both| both.anatomical.wall_ml)
+    }
+
+    /// The image's resolution, mm.
+    pub fn resolution_mm(&self) -> Option<f64> {
+        Some(self.segmentation().resolution?.value)
+    }
+
+    /// What the header says of when the scan was made.
+    pub fn stated_role(&self) -> Option<WhichScan> {
+        match self.provenance()?.rest_or_stress.as_deref()? {
+            "stress" => Some(WhichScan::Stress),
+            "rest" => Some(WhichScan::Rest),
+            _ => None,
+        }
+    }
+
+    /// The name of the model that was fitted.
+    pub fn template(&self) -> &str {
+        let segmentation = self.segmentation();
+        &segmentation.candidates[segmentation.chosen].name
+    }
+
+    /// Whether the scans have the same voxels.
+    pub(super) fn has_voxels_of(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Still(a), Self::Still(b)) => a.reading.volume.voxels == b.reading.volume.voxels,
+            (Self::Beating(a), Self::Beating(b)) => {
+                let (a, b) = (&a.reading.gates, &b.reading.gates);
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.voxels == b.voxels)
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Two scans of one patient, compared.
+#[derive(Debug)]
+pub struct ComparedHearts {
+    /// At stress.
+    pub stress: ComparedHeart,
+    /// At rest.
+    pub rest: ComparedHeart,
+    /// The change of the wall's uptake.
+    pub change: Change,
+    /// Reasons to look closer.
+    pub flags: Vec<ComparisonFlag>,
+    /// The parameters of both fits.
+    pub parameters: FitParameters,
+    /// The parameters of the comparison.
+    pub choice: ComparisonChoice,
+}
+
+impl ComparedHearts {
+    /// Both maps.
+    pub fn sides(&self) -> Option<Sides<'_>> {
+        Some(Sides {
+            stress: self.stress.map()?,
+            rest: self.rest.map()?,
+        })
+    }
+
+    /// The ratio of the cavities, stress to rest (transient ischaemic dilation).
+    pub fn tid(&self) -> f64 {
+        self.stress.cavity_ml() / self.rest.cavity_ml()
+    }
+}

@@ -1,0 +1,98 @@
+//! `ventriform compare`: rest and stress of one patient.
+
+use super::limit_args::LimitArgs;
+use super::output::note;
+use super::parameter_args::TableArgs;
+use super::segment::{MODEL_AUTO, chosen_models, write_all};
+use super::volume_args::volume_files;
+use super::{Bar, FitArgs, UnusableArgument};
+use anyhow::{Result, anyhow};
+use clap::Args;
+use std::path::PathBuf;
+use ventriform::comparison::{ComparedHearts, ComparisonOrder, from_files};
+use ventriform::mesh_files::MeshStatement;
+use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
+use ventriform::progress::{CancelToken, Monitor, Plan};
+use ventriform_service::work::problems::Explain;
+
+/// Compare rest and stress of one patient: where the wall lacks blood only under stress
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  ventriform compare --stress stress.dcm --rest rest.dcm -o out
+  ventriform compare --stress stress.nii.gz --rest rest.nii.gz -o out
+Both scans are fitted by the same model. Where both are gated, a beat is fitted to each, and EF, motion and thickening are compared too.
+Writes comparison.json (TID, reversible and fixed share of the wall, segments, territories, flags), segments.csv and polar maps
+(polar_stress, polar_rest, polar_difference).
+One scan given twice and scans of two patients are refused.")]
+pub struct CompareArgs {
+    /// The scan at stress: a file, or all files of it
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    stress: Vec<PathBuf>,
+    /// The scan at rest
+    #[arg(long, value_name = "FILE", required = true, num_args = 1..)]
+    rest: Vec<PathBuf>,
+    /// Folder to write to (created if missing)
+    #[arg(short, long = "output", value_name = "OUTDIR")]
+    output: PathBuf,
+    /// Model to fit to both scans: a closed mesh, or auto for the built-in hearts (repeatable: the one in which both fits
+    /// together have the greatest confidence is kept)
+    #[arg(long, value_name = "MODEL", default_value = MODEL_AUTO)]
+    model: Vec<PathBuf>,
+    #[command(flatten)]
+    choice: TableArgs<ComparisonChoice>,
+    #[command(flatten)]
+    fit: FitArgs,
+    #[command(flatten)]
+    limits: LimitArgs,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// If a file cannot be read, a heart cannot be fitted, the scans cannot be compared, or a file cannot be written. Nothing is
+/// written unless the comparison is complete.
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let pairs = args.choice.pairs().iter().chain(args.fit.pairs());
+    let pairs = pairs.map(|(name, text)| (*name, text.as_str()));
+    let parameters = ComparisonParameters::from_pairs(pairs).map_err(UnusableArgument::from)?;
+    let limits = args.limits.limits()?;
+    let stress = volume_files(&args.stress, &limits)?;
+    let rest = volume_files(&args.rest, &limits)?;
+    let (auto, models) = chosen_models(&args.model, &MeshStatement::default(), &limits)?;
+    let order = ComparisonOrder {
+        stress: &stress,
+        rest: &rest,
+        auto,
+        models,
+        parameters: &parameters,
+    };
+    let bar = Bar::over(Plan::COMPARISON);
+    let monitor = Monitor::new(&bar, CancelToken::new());
+    let made = from_files(&order, &limits, &monitor)
+        .map_err(|error| anyhow!(error.with_advice()))
+        .and_then(|made| Ok((made.files(&monitor)?, made)));
+    bar.finish();
+    let (files, made) = made?;
+    write_all(&args.output, &files)?;
+    note!("{}", headline(&made));
+    let report = made.report();
+    for scan in [&report.stress, &report.rest] {
+        for warning in &scan.warnings {
+            note!("warning: {warning}");
+        }
+    }
+    for flag in &report.flags {
+        note!("warning: {}", flag.reason);
+    }
+    Ok(())
+}
+
+fn headline(made: &ComparedHearts) -> String {
+    let change = &made.change;
+    format!(
+        "TID {:.2}, reversible {:.0} % of the wall, fixed {:.0} %",
+        made.tid(),
+        change.reversible_percent,
+        change.fixed_percent
+    )
+}
