@@ -1,5 +1,6 @@
 //! Whether two scans can be compared: one patient, one at stress and one at rest, made alike.
 
+use super::calibration::MOST_MUSCLE_QUOTIENT;
 use super::difference::Change;
 use super::error::ComparisonError;
 use super::flags::{ComparisonFlag, Reason, WhichScan};
@@ -9,8 +10,6 @@ use crate::volume::Provenance;
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
 /// per cent for every millimetre of blur.
 const RESOLUTION_MM: f64 = 1.5;
-/// Quotient of the walls' volumes beyond which they are hardly of one heart (scripts/calibrate_comparison.py).
-const MUSCLE_QUOTIENT: f64 = 1.4;
 /// Share of the wall that is reversible from which TID is uncertain, per cent.
 const LARGE_REVERSIBLE_PERCENT: f64 = 10.0;
 /// Share of the wall that sets the scale below which it is uncertain, per cent.
@@ -76,6 +75,10 @@ pub(super) fn flags(
     let mut flags = Vec::new();
     let both = [(WhichScan::Stress, stress), (WhichScan::Rest, rest)];
     for (scan, heart) in both {
+        if heart.provenance().is_none() {
+            flags.push(ComparisonFlag::OriginNotStated { scan });
+            continue;
+        }
         match heart.stated_role() {
             Some(stated) if stated != scan => {
                 flags.push(ComparisonFlag::NotComparable(Reason::Role { scan, stated }));
@@ -97,7 +100,7 @@ pub(super) fn flags(
     }
     let [stress_ml, rest_ml] = [stress, rest].map(ComparedHeart::muscle_ml);
     let quotient = stress_ml / rest_ml;
-    if !(1.0 / MUSCLE_QUOTIENT..=MUSCLE_QUOTIENT).contains(&quotient) {
+    if !(1.0 / MOST_MUSCLE_QUOTIENT..=MOST_MUSCLE_QUOTIENT).contains(&quotient) {
         flags.push(ComparisonFlag::NotComparable(Reason::Muscle {
             stress_ml,
             rest_ml,

@@ -1,13 +1,11 @@
 //! The difference of two polar maps of one heart, and what it says of places, segments and territories.
 
+use super::calibration::DIFFERENCE_SD_POINTS;
 use super::turn::{self, Turn};
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
-use crate::normals::{PlaceLimits, ScanPlaces, matched_scale};
+use crate::normals::{MatchedScale, PlaceLimits, ScanPlaces, matched_scale};
 use crate::polar::{ARTERY_NAMES, PolarMap, territory};
 
-/// Standard deviation of the difference where nothing changed, per cent of the rest map's reference
-/// (scripts/calibrate_comparison.py, docs/comparison.md).
-pub const DIFFERENCE_SD_POINTS: f64 = 5.0;
 /// Loss of uptake at stress beyond which wall is reversible, per cent of the rest map's reference.
 pub const REVERSIBLE_POINTS: f64 = 2.5 * DIFFERENCE_SD_POINTS;
 /// Standard deviations of the smoothing of the difference, rows and columns.
@@ -129,14 +127,7 @@ impl Change {
             ..rest.clone()
         };
         let reference = sides.rest.reference;
-        // Where nothing changed, stress is rest but for noise: the rest map stands in for the normal mean.
-        let as_limits = PlaceLimits {
-            mean: (rest.uptake.iter())
-                .map(|uptake| uptake.filter(|uptake| *uptake > 0.0))
-                .collect(),
-            sd: vec![Some(DIFFERENCE_SD_POINTS / 100.0 * reference); rest.uptake.len()],
-        };
-        let matched = matched_scale(&stress, &as_limits)?;
+        let matched = matched(&stress, &rest, reference)?;
         let percent = |uptake: Option<f64>, other: Option<f64>, unit: f64| {
             other?;
             Some(100.0 * uptake? / unit)
@@ -204,6 +195,21 @@ impl Change {
             }),
         })
     }
+}
+
+/// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the normal mean.
+pub(super) fn matched(
+    stress: &ScanPlaces,
+    rest: &ScanPlaces,
+    reference: f64,
+) -> Option<MatchedScale> {
+    let as_limits = PlaceLimits {
+        mean: (rest.uptake.iter())
+            .map(|uptake| uptake.filter(|uptake| *uptake > 0.0))
+            .collect(),
+        sd: vec![Some(DIFFERENCE_SD_POINTS / 100.0 * reference); rest.uptake.len()],
+    };
+    matched_scale(stress, &as_limits)
 }
 
 /// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and columns.

@@ -37,6 +37,11 @@ pub enum ComparisonFlag {
         /// Share of the wall that is reversible, per cent.
         reversible_percent: f64,
     },
+    /// A file does not say whose scan it is and how it was made.
+    OriginNotStated {
+        /// Which scan.
+        scan: WhichScan,
+    },
     /// A header does not say whether the scan is at rest or at stress.
     RoleNotStated {
         /// Which scan.
@@ -118,6 +123,7 @@ impl ComparisonFlag {
         match self {
             Self::NotComparable(_) => "not_comparable",
             Self::TidUncertain { .. } => "tid_uncertain",
+            Self::OriginNotStated { .. } => "origin_not_stated",
             Self::RoleNotStated { .. } => "role_not_stated",
             Self::MadeOtherwise { .. } => "made_otherwise",
             Self::ScaleUncertain { .. } => "scale_uncertain",
@@ -134,6 +140,10 @@ impl fmt::Display for ComparisonFlag {
             Self::TidUncertain { reversible_percent } => write!(
                 f,
                 "{reversible_percent:.0} % of the wall is reversible: a wall that lacks uptake looks thinner, so the ratio of the cavities is too large by an unknown part"
+            ),
+            Self::OriginNotStated { scan } => write!(
+                f,
+                "the {scan} scan's file names no patient, tracer or attenuation correction: make sure that they are those of the other scan"
             ),
             Self::RoleNotStated { scan } => write!(
                 f,

@@ -55,10 +55,10 @@ impl ComparedHeart {
         self.segmentation().polar.as_ref()
     }
 
-    /// Volume of the cavity of the wall as it looks, ml.
+    /// Volume of the cavity of the anatomical wall, ml.
     pub fn cavity_ml(&self) -> f64 {
         let surfaces = self.segmentation().fit.model.surfaces.as_ref();
-        surfaces.map_or(f64::NAN, |both| both.apparent.wall.cavity_ml)
+        surfaces.map_or(f64::NAN, |both| both.anatomical.wall.cavity_ml)
     }
 
     /// Volume of the anatomical wall's muscle, ml.

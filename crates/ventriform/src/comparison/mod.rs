@@ -12,13 +12,14 @@
 //!    never by each map's maximum.
 //! 5. The difference, rest less stress, is smoothed over the wall ([`difference`]). Wall that loses more at stress than
 //!    [`REVERSIBLE_POINTS`] is reversible; wall below the threshold of both maps is fixed.
-//! 6. The ratio of the cavities (transient ischaemic dilation, TID) is that of the walls as they look, in the images of all gates.
+//! 6. The ratio of the cavities (transient ischaemic dilation, TID) is that of the anatomical walls, in the images of all gates.
 //!
 //! Guaranteed: a scan multiplied by a factor gives the same figures.
 //!
 //! Not guaranteed: without normal limits it is not known what is normal: a defect at rest that fills under stress shows as a negative
 //! difference and counts as nothing. No category is derived.
 
+mod calibration;
 mod checks;
 mod difference;
 mod error;
@@ -29,9 +30,9 @@ mod hearts;
 mod order;
 mod turn;
 
+pub use calibration::DIFFERENCE_SD_POINTS;
 pub use difference::{
-    Change, ComparedSegment, ComparedTerritory, DIFFERENCE_SD_POINTS, PartFigures,
-    REVERSIBLE_POINTS, Sides,
+    Change, ComparedSegment, ComparedTerritory, PartFigures, REVERSIBLE_POINTS, Sides,
 };
 pub use error::ComparisonError;
 pub use flags::{ComparisonFlag, Reason, WhichScan};

@@ -1,26 +1,29 @@
 //! The turn of one polar map against another about the long axis.
 //!
-//! In: two maps. Out: the angle at which they agree best, or 0 where another angle is not significantly better. The posture that both were
-//! named by is the better guess as long as the images do not contradict it.
+//! In: two maps. Out: the angle at which they differ least, or 0 where no other angle is significantly better: the posture that both were
+//! named by is the better guess as long as the images do not contradict it. A difference counts up to [`CAP_SD`] deviations, so that a
+//! defect in one of them does not decide.
 
-use super::difference::Sides;
+use super::calibration::{DIFFERENCE_SD_POINTS, SIGNIFICANT_TURN_GAIN};
+use super::difference::{Sides, matched};
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
+use crate::normals::ScanPlaces;
 use crate::polar::{Pixel, PolarMap};
 
 /// Greatest turn, degrees.
 pub const MOST_DEGREES: f64 = 15.0;
 /// Angles that are tried, each this far from the next, degrees.
 const STEP_DEGREES: f64 = 1.5;
-/// Columns and rows in the width of a point of the image: the values of a map are no more independent than that.
-const INDEPENDENT_PLACES: f64 = 24.0;
-/// Quotient of the unexplained variances from which a turn is significant: that of an F test of one number at one per cent.
-const SIGNIFICANT_F: f64 = 7.0;
+/// Standard deviations of the difference up to which a difference counts.
+const CAP_SD: f64 = 2.5;
 
 /// How one map is turned against another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     /// Counter-clockwise as the map is drawn, degrees; 0 where the maps do not ask for one.
     pub degrees: f64,
+    /// Share by which the best angle lowers the mean squared difference.
+    pub gain: f64,
     /// Correlation of the maps at that turn.
     pub correlation: f64,
 }
@@ -28,30 +31,52 @@ pub struct Turn {
 impl Turn {
     /// The turn of the stress map against the rest map.
     pub(super) fn of(sides: &Sides<'_>) -> Self {
-        let at = |degrees: f64| Self {
-            degrees,
-            correlation: correlation(sides.rest, &turned(sides.stress, degrees)),
-        };
-        let posture = at(0.0);
+        let rest = ScanPlaces::of(sides.rest);
+        let squares = |degrees: f64| mean_square(sides, &rest, degrees);
+        let posture = squares(0.0);
         let steps = (MOST_DEGREES / STEP_DEGREES) as i32;
         let best = (-steps..=steps)
-            .map(|step| at(f64::from(step) * STEP_DEGREES))
-            .fold(posture, |best, next| {
-                if next.correlation > best.correlation {
-                    next
-                } else {
-                    best
-                }
-            });
-        let unexplained = |turn: &Self| 1.0 - turn.correlation.powi(2);
-        let independent = (RAY_ROWS * RAY_COLUMNS) as f64 / INDEPENDENT_PLACES;
-        let gain = unexplained(&posture) / unexplained(&best).max(1e-9) - 1.0;
-        if gain * (independent - 2.0) > SIGNIFICANT_F {
-            best
+            .map(|step| f64::from(step) * STEP_DEGREES)
+            .map(|degrees| (degrees, squares(degrees)))
+            .fold(
+                (0.0, posture),
+                |best, next| if next.1 < best.1 { next } else { best },
+            );
+        let gain = 1.0 - best.1 / posture;
+        // At the end of the range, the best angle lies beyond it: the maps differ in something else.
+        let inside = best.0.abs() < MOST_DEGREES;
+        let degrees = if gain > SIGNIFICANT_TURN_GAIN && inside {
+            best.0
         } else {
-            posture
+            0.0
+        };
+        Self {
+            degrees,
+            gain,
+            correlation: correlation(sides.rest, &turned(sides.stress, degrees)),
         }
     }
+}
+
+/// Mean over the compared area of the squared difference at that turn, per cent of the reference.
+fn mean_square(sides: &Sides<'_>, rest: &ScanPlaces, degrees: f64) -> f64 {
+    let stress = ScanPlaces {
+        uptake: turned(sides.stress, degrees),
+        ..rest.clone()
+    };
+    let Some(scale) = matched(&stress, rest, sides.rest.reference) else {
+        return f64::INFINITY;
+    };
+    let (mut sum, mut area) = (0.0, 0.0);
+    for (index, own) in rest.area.iter().enumerate() {
+        let (Some(at_rest), Some(at_stress)) = (rest.uptake[index], stress.uptake[index]) else {
+            continue;
+        };
+        let points = 100.0 * (at_rest - at_stress / scale.counts) / sides.rest.reference;
+        sum += own * points.abs().min(CAP_SD * DIFFERENCE_SD_POINTS).powi(2);
+        area += own;
+    }
+    sum / area
 }
 
 /// The uptake of the muscle of `map` turned by `degrees`, linear between columns; `None` beside a place without muscle.

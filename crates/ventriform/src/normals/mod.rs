@@ -36,7 +36,7 @@ pub use document::{
 pub use error::NormalsError;
 pub use flags::NormalsFlag;
 pub use kind::{GroupSex, ScanKind, Sex};
-pub use matching::{MATCHED_LEAST_Z, matched_scale};
+pub use matching::{MATCHED_LEAST_Z, MatchedScale, matched_scale};
 pub use perfusion::{
     ComparedFigure, DEFICIT_OF_FULL_SCORE, Perfusion, SegmentPerfusion, TerritoryPerfusion,
     Z_LIMIT, apply,

@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ComparisonReport {
-    /// Ratio of the cavities, stress to rest (transient ischaemic dilation), in the images of all gates.
+    /// Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
     pub tid: f64,
     /// Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
     pub sss: Option<u32>,
@@ -135,7 +135,7 @@ pub struct ComparedScan {
     pub template: String,
     /// Confidence of the fit, 0..=1.
     pub confidence: f64,
-    /// Volume of the cavity of the wall as it looks.
+    /// Volume of the cavity of the anatomical wall.
     pub cavity_ml: f64,
     /// Volume of the anatomical wall's muscle.
     pub muscle_ml: f64,

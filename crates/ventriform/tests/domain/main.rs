@@ -26,6 +26,7 @@ mod deform_oracle;
 mod deform_varied;
 mod flags;
 
+mod comparison;
 mod containers;
 mod edges;
 mod hot_neighbours;

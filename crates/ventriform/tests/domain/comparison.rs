@@ -1,0 +1,129 @@
+//! Rest and stress: one heart with and without a defect.
+
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+use ventriform::comparison::{
+    ComparedHearts, ComparisonError, ComparisonOrder, REVERSIBLE_POINTS, from_files,
+};
+use ventriform::parameters::ComparisonParameters;
+use ventriform::progress::Monitor;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+
+/// Mid and apical segments of the LAD.
+const LAD: [u8; 4] = [7, 8, 13, 14];
+
+fn scan(seed: u64, severity: f64) -> Volume {
+    let defects = LAD.map(|segment| PerfusionDefect { segment, severity });
+    let parameters = PhantomParameters {
+        shape: [64; 3],
+        spacing_mm: [4.4; 3],
+        // The heart lies where it lay; only the noise is another.
+        pose_spread_deg: 0.0,
+        pose_spread_mm: 0.0,
+        seed,
+        defects: defects.into_iter().filter(|_| severity > 0.0).collect(),
+        ..PhantomParameters::default()
+    };
+    phantom(&parameters, &Monitor::silent()).unwrap().volume
+}
+
+fn file(volume: &Volume) -> Vec<VolumeFile> {
+    let bytes = nifti::write(volume, StoredType::Float32, false).unwrap();
+    vec![VolumeFile::in_memory("scan.nii", bytes)]
+}
+
+fn compared(stress: &Volume, rest: &Volume) -> Result<ComparedHearts, ComparisonError> {
+    let (stress, rest) = (file(stress), file(rest));
+    let order = ComparisonOrder {
+        stress: &stress,
+        rest: &rest,
+        auto: true,
+        models: Vec::new(),
+        parameters: &ComparisonParameters::default(),
+    };
+    from_files(&order, &ReadLimits::default(), &Monitor::silent())
+}
+
+fn scaled(volume: &Volume, factor: f32) -> Volume {
+    Volume {
+        voxels: volume.voxels.iter().map(|v| factor * v).collect(),
+        ..volume.clone()
+    }
+}
+
+#[test]
+fn a_defect_at_stress_alone_is_reversible_and_one_in_both_is_fixed() {
+    let made = compared(&scan(1, 0.6), &scan(2, 0.0)).unwrap();
+    let change = &made.change;
+    assert!(change.reversible_percent > 8.0, "{change:?}");
+    assert!(change.fixed_percent < 2.0, "{}", change.fixed_percent);
+    let losses = |in_defect: bool| {
+        let own = change.segments.iter();
+        own.filter(move |own| LAD.contains(&(own.segment as u8)) == in_defect)
+            .map(|own| own.figures.difference_points.unwrap())
+    };
+    let least = losses(true).fold(f64::MAX, f64::min);
+    // Blur carries some of the loss into the next segments.
+    let most = losses(false).fold(f64::MIN, f64::max);
+    assert!(least > 1.5 * REVERSIBLE_POINTS, "{least}");
+    assert!(most < 0.6 * least, "{most} of {least}");
+    let [lad, lcx, rca] = change.territories.map(|own| own.figures.reversible_percent);
+    assert!(lad > 50.0 && lcx < 20.0 && rca < 20.0, "{lad} {lcx} {rca}");
+
+    // The other way round nothing is lost at stress.
+    let swapped = compared(&scan(2, 0.0), &scan(1, 0.6)).unwrap();
+    assert!(swapped.change.reversible_percent < 2.0);
+
+    let fixed = compared(&scan(1, 0.6), &scan(2, 0.6)).unwrap();
+    assert!(fixed.change.reversible_percent < 2.0);
+    assert!(fixed.change.fixed_percent > 8.0, "{:?}", fixed.change);
+}
+
+#[test]
+fn an_unchanged_heart_has_no_reversible_wall_and_cavities_alike() {
+    for (stress, rest) in [(1, 2), (3, 4)] {
+        let made = compared(&scan(stress, 0.0), &scan(rest, 0.0)).unwrap();
+        let change = &made.change;
+        assert!(
+            change.reversible_percent < 3.0,
+            "{}",
+            change.reversible_percent
+        );
+        assert!((made.tid() - 1.0).abs() < 0.05, "{}", made.tid());
+        assert_eq!(change.turn.degrees, 0.0);
+        assert!(change.matched_percent > 80.0, "{}", change.matched_percent);
+    }
+}
+
+#[test]
+fn a_factor_changes_no_figure() {
+    let (stress, rest) = (scan(1, 0.4), scan(2, 0.0));
+    let made = compared(&stress, &rest).unwrap();
+    let brighter = compared(&scaled(&stress, 8.0), &rest).unwrap();
+    assert!((brighter.change.scale / made.change.scale - 8.0).abs() < 1e-3);
+    let percent = |made: &ComparedHearts| made.change.reversible_percent;
+    assert!((percent(&brighter) - percent(&made)).abs() < 0.1);
+    assert!((brighter.tid() - made.tid()).abs() < 1e-3);
+}
+
+#[test]
+fn one_scan_twice_is_refused() {
+    let rest = scan(2, 0.0);
+    let refused = compared(&rest, &rest).unwrap_err();
+    assert!(matches!(refused, ComparisonError::SameScan(_)), "{refused}");
+}
+
+#[test]
+fn files_that_name_no_patient_are_flagged() {
+    let made = compared(&scan(1, 0.0), &scan(2, 0.0)).unwrap();
+    let report = made.report();
+    let codes: Vec<&str> = report.flags.iter().map(|flag| flag.code.as_str()).collect();
+    assert_eq!(codes, ["origin_not_stated", "origin_not_stated"]);
+    assert_eq!((report.sss, report.sds), (None, None));
+    let text = serde_json::to_string(&report).unwrap();
+    let read: ventriform::report::ComparisonReport = serde_json::from_str(&text).unwrap();
+    assert_eq!(read, report);
+}
