@@ -196,3 +196,80 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
     }
     flags
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(change: impl Fn(&mut Provenance)) -> Provenance {
+        let text = |text: &str| Some(text.to_owned());
+        let mut scan = Provenance {
+            patient_id: text("17"),
+            patient_name: text("DOE^ANN^"),
+            patient_birth_date: text("19500102"),
+            patient_sex: text("F"),
+            radiopharmaceutical: text("Tc-99m tetrofosmin"),
+            corrected_image: text("UNIF\\COR"),
+            model_name: text("Camera 1"),
+            ..Provenance::default()
+        };
+        change(&mut scan);
+        scan
+    }
+
+    /// Spelling is no other patient, nor is a new name with the old number; every other difference is.
+    #[test]
+    fn patients_are_told_apart_by_what_does_not_change() {
+        let text = |text: &str| Some(text.to_owned());
+        let one = scan(|_| {});
+        for same in [
+            scan(|s| s.patient_name = text("Doe^Ann")),
+            scan(|s| s.patient_name = text("MILLER^ANN")),
+            scan(|s| s.patient_birth_date = None),
+            scan(|s| s.patient_id = text("")),
+        ] {
+            assert_eq!(other_patient(&one, &same), Vec::<&str>::new());
+        }
+        for other in [
+            scan(|s| s.patient_id = text("18")),
+            scan(|s| s.patient_birth_date = text("19500103")),
+            scan(|s| s.patient_sex = text("M")),
+            scan(|s| (s.patient_id, s.patient_name) = (None, text("MILLER^ANN"))),
+        ] {
+            assert!(!other_patient(&one, &other).is_empty());
+        }
+    }
+
+    #[test]
+    fn scans_made_otherwise_are_named() {
+        let text = |text: &str| Some(text.to_owned());
+        let one = scan(|_| {});
+        let codes = |other: &Provenance| -> Vec<&'static str> {
+            let flags = of_headers(&one, other);
+            flags.iter().map(ComparisonFlag::code).collect()
+        };
+        assert_eq!(codes(&one), Vec::<&str>::new());
+        for other in [
+            scan(|s| s.corrected_image = text("UNIF\\COR\\ATTN")),
+            scan(|s| s.radiopharmaceutical = text("Tl-201 chloride")),
+            scan(|s| s.patient_id = text("18")),
+        ] {
+            assert_eq!(codes(&other), ["not_comparable"]);
+        }
+        for other in [
+            scan(|s| s.model_name = text("Camera 2")),
+            scan(|s| s.model_name = text("camera 1 ")),
+        ] {
+            let expected: &[&str] = match other.model_name.as_deref() {
+                Some("Camera 2") => &["made_otherwise"],
+                _ => &[],
+            };
+            assert_eq!(codes(&other), expected);
+        }
+        // What a header does not say is no difference.
+        assert_eq!(
+            codes(&scan(|s| s.corrected_image = None)),
+            Vec::<&str>::new()
+        );
+    }
+}

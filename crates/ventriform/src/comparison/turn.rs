@@ -125,3 +125,56 @@ fn correlation(rest: &PolarMap, stress: &[Option<f64>]) -> f64 {
         0.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::polar::tests::map_of;
+
+    /// Uptake with a defect a fifth of the circle wide.
+    fn uptake(degrees: f64) -> impl Fn(usize, usize) -> f64 {
+        move |row, column| {
+            let angle = 6.0 * (column as f64 + 0.5) - degrees;
+            let away = ((angle - 90.0 + 180.0).rem_euclid(360.0) - 180.0).abs();
+            let dark = 0.5 / (1.0 + ((away - 36.0) / 6.0).exp());
+            100.0 * (1.0 - if row > 6 { dark } else { 0.0 })
+        }
+    }
+
+    #[test]
+    fn a_map_that_is_turned_is_turned_back() {
+        let rest = map_of(uptake(0.0));
+        for degrees in [-12.0, -6.0, 0.0, 9.0] {
+            let stress = map_of(uptake(degrees));
+            let found = Turn::of(&Sides {
+                stress: &stress,
+                rest: &rest,
+            });
+            assert!(
+                (found.degrees - degrees).abs() < 1.0,
+                "{degrees}: {found:?}"
+            );
+            assert!(found.correlation > 0.98);
+        }
+    }
+
+    /// A defect at stress alone is no turn.
+    #[test]
+    fn a_defect_in_one_map_turns_nothing() {
+        let (stress, rest) = (map_of(uptake(0.0)), map_of(|_, _| 100.0));
+        let found = Turn::of(&Sides {
+            stress: &stress,
+            rest: &rest,
+        });
+        assert_eq!(found.degrees, 0.0);
+    }
+
+    #[test]
+    fn a_turn_of_whole_columns_moves_columns() {
+        let map = map_of(|row, column| (row * 100 + column) as f64);
+        let moved = turned(&map, 12.0);
+        assert_eq!(moved[3 * RAY_COLUMNS + 5], Some(307.0));
+        assert_eq!(moved[3 * RAY_COLUMNS + 59], Some(301.0));
+        assert_eq!(turned(&map, -3.0)[0], Some(29.5));
+    }
+}

@@ -86,7 +86,7 @@ mod tests {
             &[("gated", "true"), ("same_patient", "true")],
         ]);
         checks::table_states_defaults::<ComparisonChoice>();
-        let given = [("same_patient", "true"), ("superior", "y")];
+        let given = [("same_patient", "true"), ("superior", "0,0,1")];
         let both = ComparisonParameters::from_pairs(given).unwrap();
         assert_eq!(
             ComparisonParameters::from_json(&both.to_json()).unwrap(),

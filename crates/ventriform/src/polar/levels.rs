@@ -33,6 +33,16 @@ pub struct Levels {
 }
 
 impl Levels {
+    /// Apex to row 4, then three levels of equal height, in every column.
+    #[cfg(test)]
+    pub(super) fn even() -> Self {
+        let rows = super::RAY_ROWS as f64;
+        let ends = [1.0, 2.0, 3.0].map(|n| 4.0 + n * (rows - 4.0) / 3.0);
+        Self {
+            ends: vec![[4.0, ends[0], ends[1], ends[2]]; RAY_COLUMNS],
+        }
+    }
+
     /// The levels of a wall with this middle, by rim and cavity of the `anatomical` wall.
     pub(super) fn of(middle: &MiddleSurface, anatomical: &VentricleWall) -> Self {
         let [rim, _] = anatomical.extent;

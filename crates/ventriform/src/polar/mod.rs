@@ -489,13 +489,26 @@ fn together<'a>(segments: impl Iterator<Item = &'a Segment>) -> (Option<f64>, f6
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::draw::image::tests::decoded;
     use crate::geometry::frame::VoxelToPatient;
     use crate::grid::voxelise::voxelise;
     use crate::locate::cup::Cup;
     use crate::mesh::shapes;
+
+    /// A map of muscle with this uptake (row, column), the places of a row together as large as those of any other.
+    pub fn map_of(uptake: impl Fn(usize, usize) -> f64) -> PolarMap {
+        let pixels = (0..RAY_ROWS * RAY_COLUMNS).map(|index| {
+            Some(Pixel {
+                max: uptake(index / RAY_COLUMNS, index % RAY_COLUMNS),
+                area: 10.0,
+                state: PlaceState::Muscle,
+            })
+        });
+        PolarMap::through(pixels.collect(), Levels::even(), 0.6, Projection::Standard)
+            .counted_by(OrientationSource::Frame)
+    }
 
     /// A cup of revolution about an axis that points forward, with its wall hot but for the
     /// patient's left side, which has half the uptake.
