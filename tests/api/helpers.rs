@@ -417,6 +417,7 @@ impl UploadReader for FakeReader {
                 not_finite: 0,
             },
             labels: None,
+            gates: None,
             warnings: files.iter().map(|path| name(path)).collect(),
         })
     }

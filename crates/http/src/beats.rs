@@ -102,7 +102,8 @@ fn offers() -> Vec<Offer> {
 
 /// Fit one model in motion to a gated study
 ///
-/// The body is the gated volume: a gated DICOM series, or a 4-D NIfTI file whose volumes are the gates. The service
+/// The body is the gated volume: a gated DICOM series, a 4-D NIfTI file whose volumes are the gates, or a form with one
+/// NIfTI file for each gate, in the order of the numbers in their names or else of the form. The service
 /// stores it, files a job, and answers 202 with the job. With `Prefer: wait=60` it waits up to 60 seconds for the job to
 /// end and answers 200 with what `Accept` asks for: the report (`application/json`), or the wall at end diastole. Every
 /// parameter is a query parameter: those of a beat, and those of the fit to the gates' sum, by which its axis and rim

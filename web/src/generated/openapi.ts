@@ -1138,6 +1138,34 @@ export interface components {
              */
             wall_ml: number;
         };
+        /** @description The gates of a study, and what its files say of the beats. */
+        Gates: {
+            /**
+             * Format: double
+             * @description Beats accepted.
+             */
+            beats_accepted?: number | null;
+            /**
+             * Format: double
+             * @description Beats rejected.
+             */
+            beats_rejected?: number | null;
+            /**
+             * Format: int64
+             * @description R-R intervals into which the beats were sorted by their length.
+             */
+            intervals: number;
+            /**
+             * Format: int64
+             * @description Gates of one R-R interval.
+             */
+            number: number;
+            /**
+             * Format: double
+             * @description The R-R interval, ms.
+             */
+            rr_ms?: number | null;
+        };
         /** @description The state of the service. */
         Health: {
             /**
@@ -3664,7 +3692,7 @@ export interface components {
         UploadForm: {
             /**
              * Format: binary
-             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series
+             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series, or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form
              */
             file: string;
         };
@@ -3740,6 +3768,7 @@ export interface components {
              *     one.
              */
             frames: number;
+            gates?: components["schemas"]["Gates"] | null;
             /**
              * @description Derived from the SHA-256 of the content, so it is the same on every machine.
              * @example vol_9f86d081884c7d659a2feaa0c55ad015
@@ -3893,6 +3922,7 @@ export type FitnessTerms = components['schemas']['FitnessTerms'];
 export type FittedVolumes = components['schemas']['FittedVolumes'];
 export type Flag = components['schemas']['Flag'];
 export type GateReport = components['schemas']['GateReport'];
+export type Gates = components['schemas']['Gates'];
 export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
 export type Histograms = components['schemas']['Histograms'];

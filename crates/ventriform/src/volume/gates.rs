@@ -10,6 +10,13 @@ use super::nifti::grid::StatedGrid;
 use super::open::Reading;
 use super::provenance::Provenance;
 use super::{Volume, VolumeError};
+use std::ops::RangeInclusive;
+
+/// Gates that a study may have: fewer do not show a beat, more no scanner makes.
+pub const GATES: RangeInclusive<usize> = 6..=32;
+
+/// Farthest that a gate's voxels may lie from those of the first gate, mm.
+pub const SAME_PLACE_MM: f64 = 0.01;
 
 /// The gates of a study and the facts of its files.
 #[derive(Debug, Clone)]
@@ -51,8 +58,8 @@ impl GatedReading {
             scans.push(reading.provenance);
         }
         let mut first_frame = 0;
-        let each = timing.gates_per_interval.unwrap_or(gates.len());
-        if each > 0 && each < gates.len() && gates.len().is_multiple_of(each) {
+        let each = timing.gates_of_interval(gates.len());
+        if each < gates.len() {
             let counts: Vec<f64> = (gates.chunks(each))
                 .map(|gates| gates.iter().map(Volume::counts).sum())
                 .collect();

@@ -346,11 +346,19 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
     let mut other = gates().to_vec();
     other[3].frame = VoxelToPatient::centred([40; 3], [4.0; 3], Vec3::zeros()).unwrap();
     let other = beat_of(&other, BeatChoice::default()).unwrap_err();
+    let elsewhere = other.to_string();
     assert!(
-        other
-            .to_string()
-            .starts_with("gate 4 has 40 x 40 x 40 voxels"),
-        "{other}"
+        elsewhere.starts_with("gate 4 lies elsewhere"),
+        "{elsewhere}"
+    );
+    let mut smaller = gates().to_vec();
+    let frame = gates()[0].frame.clone();
+    smaller[6] = Volume::sampled([40, 40, 39], frame, |_| 1.0);
+    let smaller = beat_of(&smaller, BeatChoice::default()).unwrap_err();
+    let text = smaller.to_string();
+    assert!(
+        text.starts_with("gate 7 has 40 x 40 x 39 voxels where gate 1 has 40 x 40 x 40"),
+        "{text}"
     );
     let mut empty = gates().to_vec();
     empty[2].voxels.fill(0.0);
@@ -370,6 +378,47 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
     };
     let heavy = beat_of(gates(), heavy).unwrap_err();
     assert_eq!(heavy.to_string(), "`mass_g` is 10000; it must be 20 to 600");
+}
+
+/// Shells and folders sort `gate10` before `gate2`.
+#[test]
+fn files_of_gates_are_read_in_the_order_of_their_numbers() {
+    let named = |index: usize, name: String| {
+        let bytes = nifti::write(&gates()[index], StoredType::Float32, true).unwrap();
+        VolumeFile::in_memory(name, bytes)
+    };
+    let read = |files: &[VolumeFile]| {
+        read_gates(files, false, &ReadLimits::default(), &Monitor::silent()).unwrap()
+    };
+    let mut files: Vec<_> = (0..GATES)
+        .map(|index| named(index, format!("gate{}.nii.gz", index + 5)))
+        .collect();
+    files.sort_by(|a, b| a.name().cmp(b.name()));
+    assert_eq!(files[0].name(), "gate10.nii.gz");
+    let numbered = read(&files);
+    let warnings = numbered.facts.warnings.join(" ");
+    assert!(
+        warnings.contains("8 files of one volume each")
+            && warnings.contains("numbers in their names")
+    );
+    assert_eq!(numbered.facts.gates.unwrap().number, GATES);
+    let files: Vec<_> = "hbdfgcae"
+        .chars()
+        .zip(0..)
+        .map(|(name, index)| named(index, format!("{name}.nii.gz")))
+        .collect();
+    for reading in [numbered, read(&files)] {
+        for (read, made) in reading.gates.iter().zip(gates()) {
+            assert_eq!(read.voxels, made.voxels);
+        }
+    }
+    // All together are within the limits of one file.
+    let limits = ReadLimits {
+        unpacked_bytes: 1_000_000,
+        ..ReadLimits::default()
+    };
+    let large = read_gates(&files, false, &limits, &Monitor::silent()).unwrap_err();
+    assert!(matches!(large, VolumeError::TooLarge { .. }), "{large}");
 }
 
 /// Volumes of a file whose header says that they are no gates are taken for gates only where the caller says so.
