@@ -196,7 +196,7 @@ pub struct GateFacts {
     pub number: usize,
     /// R-R intervals into which the beats were sorted by their length.
     pub intervals: usize,
-    /// The R-R interval, ms.
+    /// The R-R interval, ms; `null` if the files do not say, or have several: that with the most counts is taken.
     pub rr_ms: Option<f64>,
     /// Beats accepted.
     pub beats_accepted: Option<f64>,

@@ -25,12 +25,15 @@ impl GateTiming {
     /// Facts about a study of `volumes` gates of all R-R intervals.
     pub(super) fn facts(&self, volumes: usize) -> GateFacts {
         let number = self.gates_of_interval(volumes);
+        // What a file states first is of its first interval, and another one may be taken.
+        let unknown = Self::default();
+        let known = if number < volumes { &unknown } else { self };
         GateFacts {
             number,
-            intervals: volumes / number,
-            rr_ms: self.rr_of(number),
-            beats_accepted: self.beats_accepted,
-            beats_rejected: self.beats_rejected,
+            intervals: volumes / number.max(1),
+            rr_ms: known.rr_of(number),
+            beats_accepted: known.beats_accepted,
+            beats_rejected: known.beats_rejected,
         }
     }
 

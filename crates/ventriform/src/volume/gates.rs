@@ -64,10 +64,22 @@ impl GatedReading {
                 .map(|gates| gates.iter().map(Volume::counts).sum())
                 .collect();
             let main = (1..counts.len()).fold(0, |m, n| if counts[n] > counts[m] { n } else { m });
+            let others = (0..counts.len()).filter(|n| *n != main);
+            let others: Vec<String> = others
+                .map(|n| {
+                    format!(
+                        "interval {} has {:.0} %",
+                        n + 1,
+                        100.0 * counts[n] / counts[main]
+                    )
+                })
+                .collect();
             facts.warnings.push(format!(
-                "The file has {} R-R intervals of {each} gates: interval {} has the most counts and was taken.",
+                "The file has {} R-R intervals of {each} gates: interval {} has the most counts and was taken. Of its \
+                 counts, {}.",
                 counts.len(),
-                main + 1
+                main + 1,
+                others.join(", ")
             ));
             first_frame = main * each;
             gates = gates.split_off(first_frame);

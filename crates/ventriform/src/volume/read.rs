@@ -56,7 +56,11 @@ pub fn read_gates(
     let apart = (2..=*GATES.end()).contains(&files.len())
         && match &opened {
             Ok(opened) => opened.file.header().frames == 1,
-            Err(VolumeError::Cancelled(_) | VolumeError::OtherGate { .. }) => false,
+            Err(
+                VolumeError::Cancelled(_)
+                | VolumeError::OtherGate { .. }
+                | VolumeError::TooLarge { .. },
+            ) => false,
             Err(_) => true,
         };
     if apart {
