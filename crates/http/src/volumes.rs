@@ -290,13 +290,7 @@ impl VolumeBody {
 #[utoipa::path(post, path = "/v1/volumes", tag = "volumes",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
-        (Vec<u8> = "application/gzip"),
-        (Vec<u8> = "application/zip"),
-        (Vec<u8> = "application/dicom"),
-        (Vec<u8> = "application/nifti"),
-        (openapi::UploadForm = "multipart/form-data"),
-        (Vec<u8> = "multipart/related"),
-    )),
+        (openapi::UploadForm = "multipart/form-data"))),
     params(TagQuery),
     responses(
         (status = 201, description = "Stored", body = VolumeBody,
