@@ -1,7 +1,8 @@
 //! `/v1/beats`: with the fake computation, and with the real one in the real program.
 
 use crate::dicom::{JANE, nm, nm_of};
-use crate::helpers::{Service, TestApp, beating, heart, nifti_of, problem, text, volume as words};
+use crate::gated::{beating, nifti_of};
+use crate::helpers::{Service, TestApp, heart, problem, text, volume as words};
 use reqwest::header::{ACCEPT, LOCATION};
 use reqwest::multipart::{Form, Part};
 use reqwest::{Response, StatusCode};
@@ -55,11 +56,14 @@ async fn beats_are_listed_downloaded_and_deleted_like_segmentations() {
     assert_eq!(place, format!("{path}/mesh_ed.stl"));
     let labels = get("labels_gate01.nii.gz", "*/*").await;
     assert_eq!(labels.headers()["content-type"], "application/gzip");
-    for name in ["labels_gate09.nii.gz", "report.html", "mask.dcm"] {
+    let page = get("report", "text/html").await;
+    assert_eq!(page.status(), StatusCode::OK);
+    assert_eq!(page.headers()["content-type"], "text/html; charset=utf-8");
+    assert_eq!(text(&made["links"]["page"]), format!("{path}/report.html"));
+    for name in ["labels_gate09.nii.gz", "mask.dcm"] {
         let refused = problem(get(name, "*/*").await, 404, "not-found").await;
         assert!(text(&refused["fix"]).contains("beat.json"), "{refused}");
     }
-    problem(get("report", "text/html").await, 406, "not-acceptable").await;
     let as_model = format!("/v1/models/{}", text(&made["id"]));
     problem(app.get(&as_model).send().await.unwrap(), 404, "not-found").await;
 
@@ -253,6 +257,48 @@ async fn a_gated_study_becomes_a_beat_whatever_its_format() {
     let [ed, first] = ["mesh_ed.json", "mesh_gate01.json"].map(|name| format!("{path}/{name}"));
     let (ed, first) = (json(&ed).await, json(&first).await);
     assert_eq!(ed["triangles"], first["triangles"]);
+
+    // Parts of every mesh are open surfaces of fewer triangles.
+    let get = async |name: &str| service.get(&format!("{path}/{name}")).send().await.unwrap();
+    for mesh in [
+        "mesh_ed.json",
+        "mesh_es.json",
+        "mesh_gate01.json",
+        "mesh_gate08.json",
+    ] {
+        let whole = json(&format!("{path}/{mesh}")).await["triangles"].clone();
+        let mut together = 0;
+        for part in ["endocardium", "epicardium"] {
+            let part = json(&format!("{path}/{mesh}?part={part}")).await["triangles"].clone();
+            together += part.as_array().unwrap().len();
+        }
+        let whole = whole.as_array().unwrap().len();
+        assert!(
+            (whole / 2..whole).contains(&together),
+            "{mesh}: {together} of {whole}"
+        );
+    }
+    let by_accept = get("mesh?part=endocardium").await;
+    assert_eq!(by_accept.status(), 200);
+    let animation = get("mesh.glb?part=endocardium").await;
+    let animation = problem(animation, 400, "unknown-parameter").await;
+    assert_eq!(animation["field"], "part");
+    problem(
+        get("mesh_gate09.json?part=endocardium").await,
+        404,
+        "not-found",
+    )
+    .await;
+
+    // The page has every figure and picture in it.
+    let page = get("report.html").await.text().await.unwrap();
+    assert!(page.contains("Left ventricle: beat") && !page.contains("<script"));
+    assert_eq!(page.matches("data:image/svg+xml").count(), 8);
+    let ef = report["ef_percent"].as_f64().unwrap();
+    assert!(
+        page.contains(&format!("<b>{ef:.0} <small>%</small></b>")),
+        "EF {ef}"
+    );
 
     // The same study as DICOM has the same figures, up to the rounding of its place.
     let gates: Vec<&Volume> = beating().iter().collect();

@@ -2,8 +2,9 @@
 
 use super::files::volume_files;
 use super::models::{MESH_FILE, named_models, stored_models};
+use super::page;
 use super::problems::{Explain, not_exportable, work_error};
-use crate::items::{OutputFile, WorkOutput};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
@@ -73,5 +74,12 @@ impl Work for BeatWork {
             summary: object(&BeatSummary::of(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
+    }
+    fn page_files(&self) -> &'static [&'static str] {
+        page::BEAT_FILES
+    }
+
+    fn page(&self, beat: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
+        page::beat_page(&|name| beat.read(name), scan).map_err(|error| error.explain())
     }
 }
