@@ -147,6 +147,8 @@ export interface components {
             dicom: string[];
             /** @description The wall at end diastole, in the format that `Accept` asks for. */
             mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
             /** @description The histogram of the wall's phases. */
             phase: string;
             /** @description The report. */
@@ -1162,7 +1164,7 @@ export interface components {
             number: number;
             /**
              * Format: double
-             * @description The R-R interval, ms.
+             * @description The R-R interval, ms; `null` if the files do not say, or have several: that with the most counts is taken.
              */
             rr_ms?: number | null;
         };
