@@ -10,7 +10,7 @@ from ventriform_client.api.beats import get_beat, get_beat_mesh_glb, get_beat_re
 from ventriform_client.api.jobs import create_job, get_job
 from ventriform_client.api.models import get_model, get_model_mesh_glb, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import Beat, BeatReport, Job, JobState, Model, ModelReport, Problem, Volume, VolumeJobRequest
+from ventriform_client.models import Beat, BeatParameters, BeatReport, Job, JobState, Model, ModelParameters, ModelReport, Problem, Volume, VolumeJobRequest
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
@@ -29,7 +29,8 @@ def stored(path):
 
 def made(kind, volume, parameters):
     """The job of that kind, when it has succeeded."""
-    request = VolumeJobRequest.from_dict({"kind": kind, "volume": volume.id, "parameters": parameters})
+    request = VolumeJobRequest.from_dict({"kind": kind, "volume": volume.id})
+    request.parameters = parameters
     job = create_job.sync(client=client, body=request)
     assert isinstance(job, Job), job
     deadline = time.time() + 60
@@ -43,7 +44,7 @@ def made(kind, volume, parameters):
 
 volume = stored(sys.argv[1])
 assert volume.gates is None, volume
-job = made("model", volume, {"points": 110, "seed": 3})
+job = made("model", volume, ModelParameters(points=110, seed=3))
 model = get_model.sync(client=client, id=job.model)
 assert isinstance(model, Model) and model.summary.vertices == 110, model
 assert model.parameters.points == 110, model.parameters
@@ -56,7 +57,7 @@ assert model.id in [m.id for m in list_models.sync(client=client).models]
 
 gated = stored(sys.argv[2])
 assert gated.gates.number == 8, gated
-job = made("beat", gated, {"rr_ms": 900})
+job = made("beat", gated, BeatParameters(rr_ms=900.0))
 beat = get_beat.sync(client=client, id=job.beat)
 assert isinstance(beat, Beat) and beat.summary.gates == 8 and beat.parameters.rr_ms == 900, beat
 report = get_beat_report.sync(client=client, id=beat.id)

@@ -1,8 +1,5 @@
 //! `ventriform beat`: the files, keys, errors and exit statuses that other programs rely on.
 
-// Helpers of a test state their expectations by panicking, as tests do.
-#![allow(clippy::unwrap_used)]
-
 use crate::dicom::{JANE, nm, nm_of};
 use crate::gated::{beating, nifti_of};
 use serde_json::Value;

@@ -1,5 +1,8 @@
 //! What the program's commands write and say: files, keys and errors that other programs rely on.
 
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
 mod beat;
 /// Files of scans, which the tests of the service make too.
 #[allow(dead_code)]
