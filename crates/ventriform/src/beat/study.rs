@@ -6,8 +6,8 @@
 
 use super::error::BeatError;
 use crate::grid::Volume;
+use crate::grid::gates::{GATES, SAME_PLACE_MM};
 use crate::progress::{Cancelled, Monitor};
-use crate::volume::gates::{GATES, SAME_PLACE_MM};
 
 /// Share of its counts whose loss is told of a gate.
 pub const COUNT_LOSS_FLAG_SHARE: f64 = 0.10;

@@ -8,12 +8,12 @@
 //! of one beat; a fit tells ([`crate::beat`]), and a warning says what was taken for what.
 
 use super::VolumeError;
-use super::gates::SAME_PLACE_MM;
 use super::limits::ReadLimits;
 use super::nifti::{NiftiFile, StatedGrid};
 use super::open::{Decoded, HeaderFacts, OpenVolume};
 use super::source::VolumeFile;
 use super::summary::Tally;
+use crate::grid::gates::SAME_PLACE_MM;
 use crate::progress::Monitor;
 
 /// Files of one gate each.

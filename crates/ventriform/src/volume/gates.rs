@@ -10,13 +10,7 @@ use super::nifti::grid::StatedGrid;
 use super::open::Reading;
 use super::provenance::Provenance;
 use super::{Volume, VolumeError};
-use std::ops::RangeInclusive;
-
-/// Gates that a study may have: fewer do not show a beat, more no scanner makes.
-pub const GATES: RangeInclusive<usize> = 6..=32;
-
-/// Farthest that a gate's voxels may lie from those of the first gate, mm.
-pub const SAME_PLACE_MM: f64 = 0.01;
+pub use crate::grid::gates::GATES;
 
 /// The gates of a study and the facts of its files.
 #[derive(Debug, Clone)]

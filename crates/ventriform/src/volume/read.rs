@@ -3,7 +3,7 @@
 use super::dicom::DicomFile;
 use super::gate_files::{GateFiles, order_by_numbers};
 use super::gate_timing::GateTiming;
-use super::gates::{GATES, GatedReading};
+use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
@@ -12,6 +12,7 @@ use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
 use super::{LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
+use crate::grid::gates::GATES;
 use crate::mesh::TriMesh;
 use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;

@@ -2,10 +2,10 @@
 //!
 //! File names can be wrong and can get lost during an upload, so only the magic numbers count.
 
-use super::gates::GATES;
 use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
+use crate::grid::gates::GATES;
 
 /// Unpacked bytes that are examined.
 const EXAMINED_BYTES: usize = 1024;

@@ -6,8 +6,8 @@
 //! nothing contradicts, the volumes are taken for gates, whose sum is what the camera counted over
 //! the whole beat, and a warning says what was taken for what.
 
-use super::super::gates::GATES;
 use super::header::Header;
+use crate::grid::gates::GATES;
 
 /// Longest R-R interval, seconds: 24 beats per minute.
 const LONGEST_BEAT: f64 = 2.5;
