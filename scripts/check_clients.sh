@@ -12,6 +12,8 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed 2 >/dev/null 2>&1
 scan=$out/phantom/spect.nii.gz
+gated=$out/gated.nii.gz
+"$python" scripts/gated_phantom.py "$out/phantom" "$gated"
 
 # The generator has no bodies of multipart/related, and says so for each. They are left out: the same
 # operations take bytes.
@@ -29,7 +31,7 @@ PY
 # The generator drops what it cannot read, with a message, and carries on.
 if grep -iE 'unable|warning|error|removal|unsupported' "$out/log"; then cat "$out/log"; exit 1; fi
 echo "Python:"
-PYTHONPATH=$out "$python" scripts/clients/try_client.py "$scan"
+PYTHONPATH=$out "$python" scripts/clients/try_client.py "$scan" "$gated"
 
 cp scripts/clients/try_client.ts "$out/"
 ln -s "$modules" "$out/node_modules"
@@ -39,4 +41,4 @@ echo '{"type": "module"}' >"$out/package.json"
 (cd "$out" && "$modules/.bin/tsc" --strict --noUncheckedIndexedAccess --target es2022 --module esnext \
   --moduleResolution bundler --skipLibCheck --types node --typeRoots "$modules/@types" try_client.ts)
 echo "TypeScript:"
-node "$out/try_client.js" "$scan"
+node "$out/try_client.js" "$scan" "$gated"

@@ -328,6 +328,13 @@ def check_beat(program, folder):
     other = {m["quantity"]["CodeValue"]: float(m["value"]) for g in named[:3] for m in g["measurementItems"]}
     for code, value in wanted.items():
         assert np.isclose(found[code], value) and np.isclose(other[code], value), (code, found, other, value)
+    # The ranges of uncertainty are properties of their measurements.
+    for code, value, (low, high) in [("8821-1", report["edv_ml"], report["edv_interval_ml"]),
+                                     ("8823-7", report["esv_ml"], report["esv_interval_ml"]),
+                                     ("70822001", report["ef_percent"], report["ef_interval_percent"])]:
+        [of_figure] = [m for g in groups[:3] for m in g.get_measurements() if m.name.value == code]
+        ranges = {c.name.value: float(c.value) for c in of_figure[0].ContentSequence if c.relationship_type.value == "HAS PROPERTIES"}
+        assert np.isclose(ranges["371885007"], value - low) and np.isclose(ranges["371886008"], high - value), ranges
     for group, segment in zip(groups[3:], report["segments"]):
         found = {m.name.value: float(m.value) for m in group.get_measurements()}
         assert np.isclose(found["59092-7"], segment["thickening_percent"]), segment

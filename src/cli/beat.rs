@@ -23,14 +23,16 @@ use ventriform_service::work::problems::Explain;
   ventriform beat gated.nii.gz -o out
   ventriform beat gated.dcm -o out --mass-g 130
   ventriform beat gate1.nii.gz gate2.nii.gz ... gate8.nii.gz -o out --rr-ms 850
-Writes beat.json (EDV, ESV, EF, curve, motion, thickening and phase of each segment, flags), curve.svg, phase.svg, gates.csv,
+Writes beat.json (EDV, ESV, EF, curve, motion, thickening and phase of each segment, flags), report.html, curve.svg,
+phase.svg, gates.csv,
 segments.csv, polar maps (polar.svg and polar.json: uptake of all gates; polar_ed, polar_es, polar_motion, polar_thickening,
 polar_phase), mesh.glb (the beat as an animation), mesh_ed.glb and mesh_es.glb (end diastole and end systole),
 mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes and triangles) and labels_gate01.nii.gz, ...
 (wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {
-    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in their order
+    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in the order of the numbers in their
+    /// names (gate2 before gate10) or else as given
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// Folder to write to (created if missing)
@@ -70,6 +72,7 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     let limits = args.limits.limits()?;
     let gates = volume_files(&args.input, &limits)?;
     let dicom = args.dicom.order_of_gates(&gates, &limits)?;
+    let whose = args.dicom.whose_of_gates(&gates, &limits)?;
     let stated = MeshStatement::default();
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
     let order = GatedOrder {
@@ -86,6 +89,7 @@ pub fn run(args: &BeatArgs) -> Result<()> {
         .and_then(|made| Ok((made.files(&args.formats, &monitor)?, made)));
     bar.finish();
     let (mut files, made) = made?;
+    files.push(made.page(&files, whose.as_ref()));
     if let Some(order) = dicom {
         let objects = made.dicom_files(&order.of_beat(&made));
         files.extend(objects.map_err(|error| anyhow!(error.with_advice()))?);

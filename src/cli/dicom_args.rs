@@ -138,6 +138,23 @@ impl DicomArgs {
         }
     }
 
+    /// As [`DicomArgs::whose`], of the gates of one beat.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn whose_of_gates(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<Provenance>> {
+        match self.whose(files, Some(0), limits) {
+            Err(error) if files.len() > 1 => {
+                self.whose(&files[..1], Some(0), limits).map_err(|_| error)
+            }
+            whose => whose,
+        }
+    }
+
     /// Whose scan the report names: what `files` say, completed by the flags; nobody with
     /// `--deidentify`.
     ///

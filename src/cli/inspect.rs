@@ -11,7 +11,7 @@ use ventriform::report::{self, FileFacts};
 use ventriform::volume::{self, ReadOptions};
 use ventriform_service::work::problems::Explain;
 
-/// Print what is read of a volume: size, place, values and, of DICOM, whose scan it is
+/// Print what is read of a volume: size, place, values, gates and, of DICOM, whose scan it is
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform inspect scan.dcm
@@ -39,6 +39,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let from = volume::provenance(&files, &first, &limits, &monitor)
         .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
     let mut shown = report::object(&FileFacts::of(&facts));
+    shown.insert("gates".into(), serde_json::to_value(facts.gates)?);
     if let Some(from) = from {
         shown.insert("dicom".into(), serde_json::to_value(from)?);
     }

@@ -2,7 +2,8 @@
 
 use crate::dicom::{JANE, nm, nm_of};
 use crate::fake_archive::{FakeArchive, FakeScp, Fault, implicit};
-use crate::helpers::{TestApp, beating, engine_with, fake_engine, problem, sphere, text};
+use crate::gated::beating;
+use crate::helpers::{TestApp, engine_with, fake_engine, problem, sphere, text};
 use crate::scu::{Object, Scu};
 use crate::tls::{Authority, file as pem};
 use rcgen::ExtendedKeyUsagePurpose;

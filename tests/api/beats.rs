@@ -1,19 +1,25 @@
 //! `/v1/beats`: with the fake computation, and with the real one in the real program.
 
 use crate::dicom::{JANE, nm, nm_of};
-use crate::helpers::{Service, TestApp, beating, heart, nifti_of, problem, text, volume};
+use crate::gated::{beating, nifti_of};
+use crate::helpers::{Service, TestApp, heart, problem, text, volume as words};
 use reqwest::header::{ACCEPT, LOCATION};
+use reqwest::multipart::{Form, Part};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use ventriform::export::Format;
 use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN};
-use ventriform::volume::Volume;
+use ventriform::geometry::Vec3;
+use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::progress::Monitor;
+use ventriform::volume::nifti::{self, StoredType};
+use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 impl TestApp {
     /// Makes a beat; returns it.
-    pub async fn beat(&self, words: &str) -> Value {
-        let answer = self.post("/v1/beats").body(volume(words)).send().await;
+    pub async fn beat(&self, said: &str) -> Value {
+        let answer = self.post("/v1/beats").body(words(said)).send().await;
         let answer = answer.unwrap();
         assert_eq!(answer.status(), StatusCode::ACCEPTED);
         let job = answer.json().await.unwrap();
@@ -50,11 +56,14 @@ async fn beats_are_listed_downloaded_and_deleted_like_segmentations() {
     assert_eq!(place, format!("{path}/mesh_ed.stl"));
     let labels = get("labels_gate01.nii.gz", "*/*").await;
     assert_eq!(labels.headers()["content-type"], "application/gzip");
-    for name in ["labels_gate09.nii.gz", "report.html", "mask.dcm"] {
+    let page = get("report", "text/html").await;
+    assert_eq!(page.status(), StatusCode::OK);
+    assert_eq!(page.headers()["content-type"], "text/html; charset=utf-8");
+    assert_eq!(text(&made["links"]["page"]), format!("{path}/report.html"));
+    for name in ["labels_gate09.nii.gz", "mask.dcm"] {
         let refused = problem(get(name, "*/*").await, 404, "not-found").await;
         assert!(text(&refused["fix"]).contains("beat.json"), "{refused}");
     }
-    problem(get("report", "text/html").await, 406, "not-acceptable").await;
     let as_model = format!("/v1/models/{}", text(&made["id"]));
     problem(app.get(&as_model).send().await.unwrap(), 404, "not-found").await;
 
@@ -94,7 +103,7 @@ async fn invalid_parameters_of_a_beat_are_rejected_with_the_field() {
     ] {
         let answer = app
             .post(&format!("/v1/beats?{query}"))
-            .body(volume("sphere"));
+            .body(words("sphere"));
         let body = problem(answer.send().await.unwrap(), 422, "invalid-parameter").await;
         assert_eq!(body["field"], field, "{query}");
         assert!(text(&body["fix"]).contains(hint), "{body}");
@@ -133,7 +142,7 @@ async fn idempotency_keys_cancelling_and_webhooks_work_as_for_segmentations() {
     let post = |query: &str| {
         app.post(&format!("/v1/beats?{query}"))
             .header("idempotency-key", "k")
-            .body(volume("slow"))
+            .body(words("slow"))
             .send()
     };
     let first: Value = post("mass_g=130").await.unwrap().json().await.unwrap();
@@ -249,6 +258,48 @@ async fn a_gated_study_becomes_a_beat_whatever_its_format() {
     let (ed, first) = (json(&ed).await, json(&first).await);
     assert_eq!(ed["triangles"], first["triangles"]);
 
+    // Parts of every mesh are open surfaces of fewer triangles.
+    let get = async |name: &str| service.get(&format!("{path}/{name}")).send().await.unwrap();
+    for mesh in [
+        "mesh_ed.json",
+        "mesh_es.json",
+        "mesh_gate01.json",
+        "mesh_gate08.json",
+    ] {
+        let whole = json(&format!("{path}/{mesh}")).await["triangles"].clone();
+        let mut together = 0;
+        for part in ["endocardium", "epicardium"] {
+            let part = json(&format!("{path}/{mesh}?part={part}")).await["triangles"].clone();
+            together += part.as_array().unwrap().len();
+        }
+        let whole = whole.as_array().unwrap().len();
+        assert!(
+            (whole / 2..whole).contains(&together),
+            "{mesh}: {together} of {whole}"
+        );
+    }
+    let by_accept = get("mesh?part=endocardium").await;
+    assert_eq!(by_accept.status(), 200);
+    let animation = get("mesh.glb?part=endocardium").await;
+    let animation = problem(animation, 400, "unknown-parameter").await;
+    assert_eq!(animation["field"], "part");
+    problem(
+        get("mesh_gate09.json?part=endocardium").await,
+        404,
+        "not-found",
+    )
+    .await;
+
+    // The page has every figure and picture in it.
+    let page = get("report.html").await.text().await.unwrap();
+    assert!(page.contains("Left ventricle: beat") && !page.contains("<script"));
+    assert_eq!(page.matches("data:image/svg+xml").count(), 8);
+    let ef = report["ef_percent"].as_f64().unwrap();
+    assert!(
+        page.contains(&format!("<b>{ef:.0} <small>%</small></b>")),
+        "EF {ef}"
+    );
+
     // The same study as DICOM has the same figures, up to the rounding of its place.
     let gates: Vec<&Volume> = beating().iter().collect();
     let answer = post("?rr_ms=800", "model/gltf-binary", nm_of(&JANE, &gates)).await;
@@ -306,11 +357,7 @@ async fn what_is_no_gated_study_is_refused_with_advice() {
         let refused = problem(post("", ungated).await, 422, "not-gated").await;
         let fix = text(&refused["fix"]);
         assert!(fix.contains("gated series"), "{refused}");
-        // Gates in files of their own are no upload.
-        assert!(
-            fix.contains("4-D NIfTI") && !fix.contains("each gate"),
-            "{refused}"
-        );
+        assert!(fix.contains("one file for each gate"), "{refused}");
     }
     // Eight volumes that last a minute each are no heart beat.
     let dynamic = nifti_of(gates, Some(60.0));
@@ -335,4 +382,177 @@ async fn what_is_no_gated_study_is_refused_with_advice() {
     let report: Value = answer.json().await.unwrap();
     assert!(report["ef_percent"].is_null(), "{report}");
     assert!(report["flags"].to_string().contains("no_contraction"));
+}
+
+/// A form with one NIfTI file for each gate.
+fn form_of(files: Vec<(String, Vec<u8>)>) -> Form {
+    files.into_iter().fold(Form::new(), |form, (name, bytes)| {
+        form.part("file", Part::bytes(bytes).file_name(name))
+    })
+}
+
+#[tokio::test]
+async fn files_of_one_gate_each_become_one_gated_volume() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let post = async |path: &str, form: Form| -> Response {
+        let request = service.post(path).header("prefer", "wait=60");
+        request.multipart(form).send().await.unwrap()
+    };
+    let file = |gate: &Volume| nifti::write(gate, StoredType::Float32, true).unwrap();
+    let numbered = |order: [usize; 8]| {
+        let named = |gate: usize| (format!("Gate {}.nii.gz", gate + 5), file(&beating()[gate]));
+        form_of(order.map(named).into())
+    };
+    let stored: Value = post("/v1/volumes", numbered([7, 2, 5, 0, 1, 6, 3, 4]))
+        .await
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(stored["frames"], 8, "{stored}");
+    assert_eq!(stored["gates"]["number"], 8);
+    assert_eq!(stored["gates"]["intervals"], 1);
+    let again: Value = post("/v1/volumes", numbered([0, 1, 2, 3, 4, 5, 6, 7]))
+        .await
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(again["id"], stored["id"], "numbers decide, not the form");
+    for (gate, made) in beating().iter().enumerate() {
+        let path = format!(
+            "/v1/volumes/{}/voxels.nii.gz?frame={gate}",
+            text(&stored["id"])
+        );
+        let voxels = service
+            .get(&path)
+            .send()
+            .await
+            .unwrap()
+            .bytes()
+            .await
+            .unwrap();
+        let read = VolumeFile::in_memory("gate.nii.gz", voxels.to_vec());
+        let read = volume::read(
+            &[read],
+            &ReadOptions::default(),
+            &ReadLimits::default(),
+            &Monitor::silent(),
+        );
+        let read = read.unwrap().volume;
+        let pairs = read.voxels.iter().zip(&made.voxels);
+        assert!(
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) < 1.0,
+            "gate {gate}"
+        );
+    }
+    // Names without numbers leave the order to the form, which then makes another volume.
+    let lettered = |order: [usize; 8]| {
+        form_of(
+            order
+                .map(|gate| {
+                    (
+                        format!("{}.nii.gz", b"hgfedcba"[gate] as char),
+                        file(&beating()[gate]),
+                    )
+                })
+                .into(),
+        )
+    };
+    let straight: Value = post("/v1/volumes", lettered([0, 1, 2, 3, 4, 5, 6, 7]))
+        .await
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(straight["id"], stored["id"]);
+    let shuffled: Value = post("/v1/volumes", lettered([1, 0, 2, 3, 4, 5, 6, 7]))
+        .await
+        .json()
+        .await
+        .unwrap();
+    assert_ne!(shuffled["id"], stored["id"]);
+
+    // The beat is that of the same gates in one file.
+    let answer = post("/v1/beats", numbered([4, 2, 5, 0, 1, 6, 3, 7])).await;
+    assert_eq!(answer.status(), 200);
+    let of_files: Value = answer.json().await.unwrap();
+    let request = service.post("/v1/beats").header("prefer", "wait=60");
+    let answer = request
+        .body(nifti_of(beating(), None))
+        .send()
+        .await
+        .unwrap();
+    let of_one: Value = answer.json().await.unwrap();
+    for name in [
+        "edv_ml",
+        "esv_ml",
+        "ef_percent",
+        "gates",
+        "segments",
+        "phase",
+        "flags",
+    ] {
+        assert_eq!(of_files[name], of_one[name], "{name}");
+    }
+
+    // Gates on another grid are refused by what they are.
+    let other = |index: usize, gate: Volume| {
+        let mut gates = beating().to_vec();
+        gates[index] = gate;
+        form_of(
+            gates
+                .iter()
+                .enumerate()
+                .map(|(n, gate)| (format!("{n}.nii.gz"), file(gate)))
+                .collect(),
+        )
+    };
+    let frame = beating()[0].frame.clone();
+    let small = Volume::sampled([40, 40, 39], frame, |_| 1.0);
+    let moved = VoxelToPatient::centred([40; 3], [6.4; 3], Vec3::new(500.0, 0.0, 0.0)).unwrap();
+    let moved = Volume {
+        frame: moved,
+        ..beating()[5].clone()
+    };
+    for (form, said) in [
+        (
+            other(3, small),
+            "gate 4 has 40 x 40 x 39 voxels where gate 1 has 40 x 40 x 40",
+        ),
+        (other(5, moved), "gate 6 lies elsewhere"),
+    ] {
+        let refused = problem(post("/v1/volumes", form).await, 422, "gates-differ").await;
+        let detail = text(&refused["detail"]).to_lowercase();
+        assert!(detail.starts_with(said), "{refused}");
+    }
+    let few = form_of(
+        (0..4)
+            .map(|n| (format!("{n}.nii.gz"), file(&beating()[n])))
+            .collect(),
+    );
+    let few = problem(post("/v1/volumes", few).await, 422, "unusable-volume").await;
+    assert!(text(&few["fix"]).contains("6 to 32 NIfTI files"), "{few}");
+}
+
+#[tokio::test]
+async fn a_volume_says_whether_it_is_gated() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let gates = async |body: Vec<u8>| -> Value {
+        let answer = service.post("/v1/volumes").body(body).send().await.unwrap();
+        let volume: Value = answer.json().await.unwrap();
+        volume["gates"].clone()
+    };
+    assert_eq!(gates(heart().0).await, Value::Null);
+    assert_eq!(
+        gates(nifti_of(beating(), Some(60.0))).await,
+        Value::Null,
+        "a dynamic study"
+    );
+    let in_one = gates(nifti_of(beating(), None)).await;
+    assert_eq!(
+        in_one,
+        json!({"number": 8, "intervals": 1, "rr_ms": null, "beats_accepted": null, "beats_rejected": null})
+    );
+    let of_dicom = gates(nm_of(&JANE, &beating().iter().collect::<Vec<_>>())).await;
+    assert_eq!(of_dicom["number"], 8, "{of_dicom}");
 }

@@ -28,6 +28,7 @@ mod end_to_end;
 mod events;
 mod fake_archive;
 mod faults;
+mod gated;
 mod hostile;
 mod intake;
 #[cfg(target_os = "linux")]

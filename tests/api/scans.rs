@@ -1,7 +1,8 @@
 //! Whose scan a volume is: shown, searched, stated, erased; and DICOM objects of results.
 
 use crate::dicom::{JANE, Patient, contains, element, file, nm, nm_of, simulated};
-use crate::helpers::{Api, TestApp, beating, closed, key, problem, scan, text};
+use crate::gated::beating;
+use crate::helpers::{Api, TestApp, closed, key, problem, scan, text};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use reqwest::{Response, StatusCode};

@@ -1,4 +1,14 @@
 //! What the program's commands write and say: files, keys and errors that other programs rely on.
 
+// Helpers of a test state their expectations by panicking, as tests do.
+#![allow(clippy::unwrap_used)]
+
+mod beat;
+/// Files of scans, which the tests of the service make too.
+#[allow(dead_code)]
+#[path = "../api/dicom.rs"]
+mod dicom;
 mod evaluate;
+#[path = "../api/gated.rs"]
+mod gated;
 mod segment;

@@ -18,12 +18,15 @@ interface Wanted {
   object?: boolean;
 }
 
+/** Paths of the DICOM objects of a result, made when they are asked for. Of a scan that is not DICOM nobody knows whose they would be. */
+export function objectsOf(volume: Volume, result: Result): string[] {
+  return volume.dicom ? result.links.dicom ?? [] : [];
+}
+
 function filesOf(volume: Volume, result: Result, folder: string): Wanted[] {
   const page = result.links.page;
   const files = result.files.map(file => ({ name: `${folder}/${file.name}`, path: file.href }));
-  // DICOM objects are made when they are asked for. Of a scan that is not DICOM nobody knows whose they would be.
-  const objects = !volume.dicom ? [] : result.links.dicom ?? [];
-  const made = objects.map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
+  const made = objectsOf(volume, result).map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
   return [...files, ...(page ? [{ name: `${folder}/report.html`, path: page }] : []), ...made];
 }
 

@@ -4,7 +4,7 @@ import { at } from "./base";
 import { type Problem, ProblemError, type Volume, authorization, key, nextKey, page, problemOf, uploadLimit } from "./api";
 import { pathOf } from "./drop";
 import { Watched } from "./state";
-import { bytes } from "./words";
+import { LEAST_GATES, MOST_GATES, bytes } from "./words";
 
 export interface Group {
   name: string;
@@ -36,7 +36,10 @@ export function onStored(act: (volume: Volume) => void): void {
   whenStored = act;
 }
 
-/** Files that make up one scan: a header with its image, and the files of one DICOM series. */
+/** The name of a NIfTI file of one gate: what is before and after its number. */
+const GATE_NAME = /^(.*(?:gate|bin|phase|frame|slot)[ _-]*)\d+(.*\.nii(?:\.gz)?)$/i;
+
+/** Files that make up one scan: a header with its image, the files of one DICOM series, and NIfTI files named as the gates of one study. */
 export async function grouped(files: File[]): Promise<Group[]> {
   const groups = new Map<string, Group>();
   const add = (id: string, name: string, file: File) => {
@@ -52,11 +55,21 @@ export async function grouped(files: File[]): Promise<Group[]> {
       add(`pair ${folder}/${pair[1]}`, `${pair[1]}.hdr`, file);
       continue;
     }
+    const gate = GATE_NAME.exec(file.name);
+    if (gate) {
+      add(`gates ${folder}/${gate[1]}\n${gate[2]}`, `${gate[1]}${gate[2]}`, file);
+      continue;
+    }
     const series = await seriesOf(file);
     if (series) add(`series ${series}`, folder.split("/").pop() || file.name, file);
     else add(`file ${folder}/${file.name}`, file.name, file);
   }
-  return [...groups.values()].map(group => {
+  const apart = ([id, group]: [string, Group]): Group[] => {
+    const gates = group.files.length;
+    if (!id.startsWith("gates ") || (gates >= LEAST_GATES && gates <= MOST_GATES)) return [group];
+    return group.files.map(file => ({ name: file.name, files: [file] }));
+  };
+  return [...groups].flatMap(apart).map(group => {
     const name = group.files.length === 1 ? (group.files[0]?.name ?? group.name) : group.name;
     return { ...group, name };
   });

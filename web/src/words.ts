@@ -41,16 +41,19 @@ export function number(value: unknown, digits = 1, unit = ""): string {
 export function shape(volume: Volume): string {
   const voxel = volume.spacing_mm.slice(0, 3).map(mm => mm.toFixed(1));
   const edge = new Set(voxel).size === 1 ? voxel[0] : voxel.join(" × ");
-  const frames = volume.frames > 1 ? `, ${volume.frames} frames` : "";
+  const frames = volume.gates ? `, ${volume.gates.number} gates` : volume.frames > 1 ? `, ${volume.frames} frames` : "";
   return `${volume.shape.join(" × ")} voxels of ${edge} mm${frames}`;
 }
 
-/** Fewest and most gates of one heart beat that the service fits. */
-const GATES = [6, 32] as const;
+/** Fewest gates that show a beat. */
+export const LEAST_GATES = 6;
+/** Most gates of a study. */
+export const MOST_GATES = 32;
 
-/** Whether the frames of a scan count as gates of a heart beat; if they are none, the job says so. */
+/** Whether a scan has gates enough for a beat. */
 export function isGated(volume: Volume): boolean {
-  return volume.frames >= GATES[0] && volume.frames <= GATES[1] && !isLabelMap(volume);
+  const gates = volume.gates?.number ?? 0;
+  return gates >= LEAST_GATES && gates <= MOST_GATES;
 }
 
 export function isLabelMap(volume: Volume): boolean {

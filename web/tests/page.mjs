@@ -8,6 +8,7 @@ import { createRequire } from "node:module";
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, truncateSync, writeFileSync } from "node:fs";
 import net from "node:net";
 import { tmpdir } from "node:os";
+import { gunzipSync } from "node:zlib";
 import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
@@ -556,6 +557,25 @@ async function main() {
       await close();
       await own.stop();
     }
+    // Files of one gate each are one scan, whatever their order; others beside them stay their own.
+    const whole = gunzipSync(readFileSync(nifti));
+    const apart = Array.from({ length: 8 }, (_, n) => {
+      const [header, bytes] = [Buffer.from(whole.subarray(0, 352)), (whole.length - 352) / 8];
+      header.writeInt16LE(3, 40);
+      header.writeInt16LE(1, 48);
+      const file = join(folder, `gate${n + 4}.nii`);
+      writeFileSync(file, Buffer.concat([header, whole.subarray(352 + n * bytes, 352 + (n + 1) * bytes)]));
+      return file;
+    });
+    const several = await service();
+    const dropped = await tab(browser, several.address);
+    await dropped.page.waitForSelector(".welcome");
+    await choose(dropped.page, SCAN, ...apart.reverse());
+    await dropped.page.waitForFunction(() => document.querySelectorAll(".scan").length === 2);
+    const { volumes } = await (await fetch(`${several.address}/v1/volumes`)).json();
+    assert.deepEqual(volumes.map(volume => [volume.files, volume.gates?.number ?? null]).sort(), [[1, null], [8, 8]]);
+    await dropped.close();
+    await several.stop();
     // Frames that last minutes are no gates: said in words, and the first of them is shown.
     const { page, close } = await tab(browser, address, { expected: [/status of 4\d\d/] });
     await page.waitForSelector(".drop");

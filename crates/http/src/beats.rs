@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::files;
 use super::jobs::PriorityQuery;
 use super::jobs::filing::{self, UploadJob};
 use super::links::path_of;
@@ -15,7 +16,7 @@ use axum::extract::{Request, State};
 use serde::Serialize;
 use utoipa::ToSchema;
 use ventriform::export::dicom::BeatEnd;
-use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh};
+use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, is_gate_mesh};
 use ventriform_service::records::{Product, Resource};
 
 /// The collection of beats.
@@ -32,14 +33,20 @@ impl ProductCollection for Beats {
     const MESH: &'static str = MESH;
     const FILES: &'static [&'static str] = FILE_NAMES;
     const NUMBERED_FILES: Option<&'static str> = Some(GATE_FILE_PATTERN);
+
+    fn is_numbered_mesh(stem: &str) -> bool {
+        is_gate_mesh(stem)
+    }
+
     const REPORT_FILE: &'static str = REPORT_FILE;
     const FILE_SCHEMA: &'static str = "BeatFileName";
-    const FILE_HELP: &'static str = "`beat.json` (the report), `curve.svg` (the volume curve), `phase.svg` (the \
+    const FILE_HELP: &'static str = "`beat.json` (the report), `report.html` (made on request; it names patient, study and series as far as the \
+        key may see them), `curve.svg` (the volume curve), `phase.svg` (the \
         histogram of the wall's phases), `gates.csv` and `segments.csv`, polar maps of uptake (`polar`, `polar_ed`, `polar_es`), motion, thickening and \
         phase (`polar_motion`, ...) as `svg` and `json`, the beat as an animation (`mesh.glb`), the mesh at end diastole (`mesh_ed.*`) and at \
         end systole (`mesh_es.*`) in each format, and of every gate, counted from 01, its mesh in each format \
         (`mesh_gate01.*`) and its labels on the gates' grid (`labels_gate01.nii.gz`: wall 1, cavity 2). All meshes of a \
-        beat have the same nodes and triangles. DICOM objects are wall and cavity at end diastole and at end systole \
+        beat have the same nodes and triangles, and the parts that `part` names. DICOM objects are wall and cavity at end diastole and at end systole \
         (`mask_ed.dcm`, `mask_es.dcm`) and the figures (`measurements.dcm`).";
     type FileAnswer = openapi::BeatFileAnswer;
 }
@@ -66,6 +73,8 @@ struct BeatLinks {
     mesh: String,
     /// The report.
     report: String,
+    /// The report as an HTML page.
+    page: String,
     /// The volume curve.
     curve: String,
     /// The histogram of the wall's phases.
@@ -82,6 +91,7 @@ impl BeatLinks {
         Self {
             mesh: format!("{itself}/mesh"),
             report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
             curve: format!("{itself}/curve.svg"),
             phase: format!("{itself}/phase.svg"),
             dicom: object_paths(beat),
@@ -102,7 +112,8 @@ fn offers() -> Vec<Offer> {
 
 /// Fit one model in motion to a gated study
 ///
-/// The body is the gated volume: a gated DICOM series, or a 4-D NIfTI file whose volumes are the gates. The service
+/// The body is the gated volume: a gated DICOM series, a 4-D NIfTI file whose volumes are the gates, or a form with one
+/// NIfTI file for each gate, in the order of the numbers in their names or else of the form. The service
 /// stores it, files a job, and answers 202 with the job. With `Prefer: wait=60` it waits up to 60 seconds for the job to
 /// end and answers 200 with what `Accept` asks for: the report (`application/json`), or the wall at end diastole. Every
 /// parameter is a query parameter: those of a beat, and those of the fit to the gates' sum, by which its axis and rim
@@ -110,13 +121,7 @@ fn offers() -> Vec<Offer> {
 #[utoipa::path(post, path = "/v1/beats", tag = "beats",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
-        (Vec<u8> = "application/gzip"),
-        (Vec<u8> = "application/zip"),
-        (Vec<u8> = "application/dicom"),
-        (Vec<u8> = "application/nifti"),
-        (openapi::UploadForm = "multipart/form-data"),
-        (Vec<u8> = "multipart/related"),
-    )),
+        (openapi::UploadForm = "multipart/form-data"))),
     params(openapi::BeatQuery, TagQuery, PriorityQuery,
         openapi::IdempotencyHeader,
         openapi::PreferHeader, WebhookQuery, openapi::WebhookSecretHeader),

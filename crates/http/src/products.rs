@@ -69,6 +69,11 @@ pub trait ProductCollection: 'static {
     /// The form, as a regular expression, of further names, of which each product has as many as its scan has parts.
     const NUMBERED_FILES: Option<&'static str> = None;
 
+    /// Whether a further name without its extension is that of a mesh, of which parts can be had.
+    fn is_numbered_mesh(_stem: &str) -> bool {
+        false
+    }
+
     /// The file that holds the report; it has one if it is among its files.
     const REPORT_FILE: &'static str = "report.json";
 
@@ -539,7 +544,7 @@ async fn get_file<P: ProductCollection>(
     let (mut part, mut deidentify) = (None, false);
     if object.is_some() || name == files::REPORT_PAGE {
         deidentify = query.all::<DeidentifyQuery>()?.deidentify.unwrap_or(false);
-    } else if mesh_names::<P>().any(|mesh| mesh == name) {
+    } else if is_mesh::<P>(&name) {
         part = query.all::<PartQuery>()?.part;
     } else {
         query.all::<()>()?;
@@ -716,6 +721,13 @@ async fn send_named(
             Err(no_such_file(product.resource(), name, &names))
         }
     }
+}
+
+/// Whether a product of that kind may have a mesh of this name.
+fn is_mesh<P: ProductCollection>(name: &str) -> bool {
+    let (stem, extension) = name.rsplit_once('.').unwrap_or((name, ""));
+    let numbered = P::is_numbered_mesh(stem) && Format::from_extension(extension).is_some();
+    numbered || mesh_names::<P>().any(|mesh| mesh == name)
 }
 
 /// The names of the meshes that a product of that kind may have, in every format.

@@ -21,6 +21,7 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
+use ventriform::volume::GateFacts;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
     BlobError, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest, LocalFile,
@@ -119,6 +120,9 @@ pub struct VolumeBody {
     intensity: IntensityBody,
     /// The voxel values in rising order if the volume looks like a label map.
     label_values: Option<Vec<i64>>,
+    /// The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 NIfTI files of one gate each,
+    /// or a 4-D NIfTI file whose header does not contradict.
+    gates: Option<GateFacts>,
     /// Oddities of the file that do not prevent its use.
     warnings: Vec<String>,
     /// Whose scan it is, as far as the caller's scope allows to see it; absent if nothing is known.
@@ -262,6 +266,7 @@ impl VolumeBody {
                 not_finite: facts.intensity.not_finite,
             },
             label_values: facts.labels,
+            gates: facts.gates,
             warnings: facts.warnings,
             dicom: scans::shown(&ownership.scan, scope),
             links: VolumeLinks {
@@ -279,18 +284,13 @@ impl VolumeBody {
 /// Upload a volume
 ///
 /// The body is the file itself, or a form whose files make up one volume (a `.hdr`/`.img` pair, a
-/// DICOM series), or their parts as DICOMweb clients send them. The same bytes always get the same
-/// id.
+/// DICOM series, or 6 to 32 NIfTI files of one gate each), or their parts as DICOMweb clients send them. The same bytes
+/// always get the same id. Files of gates are taken in the order of the numbers in their names, where the names are the
+/// same but for one number; otherwise in the order of the form.
 #[utoipa::path(post, path = "/v1/volumes", tag = "volumes",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),
-        (Vec<u8> = "application/gzip"),
-        (Vec<u8> = "application/zip"),
-        (Vec<u8> = "application/dicom"),
-        (Vec<u8> = "application/nifti"),
-        (openapi::UploadForm = "multipart/form-data"),
-        (Vec<u8> = "multipart/related"),
-    )),
+        (openapi::UploadForm = "multipart/form-data"))),
     params(TagQuery),
     responses(
         (status = 201, description = "Stored", body = VolumeBody,

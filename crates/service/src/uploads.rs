@@ -24,6 +24,8 @@ use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::progress::Monitor;
+use ventriform::volume::gates::GATES;
+use ventriform::volume::order_by_numbers;
 
 /// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
 /// Up to the first write an upload lies in memory alone: clients that send a few bytes and then wait cost neither
@@ -58,15 +60,21 @@ pub struct Stored {
 /// One received file.
 pub struct ReceivedFile {
     name: String,
+    /// The client's name for it, which is not stored.
+    given: String,
     kind: &'static str,
+    /// Whether its first bytes are those of a NIfTI file that may hold a gate.
+    may_be_gate: bool,
     digest: [u8; 32],
     bytes: u64,
 }
 
 impl ReceivedFile {
-    /// Uses the extension of the client's name for the file where the content does not tell.
+    /// Keeps the client's name for the file, by which gates are ordered; uses its extension where the content does
+    /// not tell.
     pub fn known_as(&mut self, given: &str) {
         self.kind = kind_by_name(given).unwrap_or(self.kind);
+        self.given = given.to_owned();
     }
 }
 
@@ -135,14 +143,28 @@ impl Arriving<'_> {
     }
 }
 
+/// The extension of a gzipped file.
+const GZIPPED: &str = "nii.gz";
+
 /// The extension that the first bytes of the content imply.
 fn kind_by_content(head: &[u8]) -> &'static str {
     match head {
-        [0x1f, 0x8b, ..] => "nii.gz",
+        [0x1f, 0x8b, ..] => GZIPPED,
         [b'P', b'K', 3, 4, ..] => "zip",
         _ if head.get(128..132) == Some(b"DICM") => "dcm",
         _ => "nii",
     }
+}
+
+/// Whether a file that begins so is gzipped, or a NIfTI file: it begins with the length of its header.
+fn may_be_nifti(head: &[u8]) -> bool {
+    /// Length of a header of NIfTI-1 and of NIfTI-2, bytes.
+    const HEADER_BYTES: [u32; 2] = [348, 540];
+    let length = head
+        .first_chunk()
+        .map(|bytes| [u32::from_le_bytes(*bytes), u32::from_be_bytes(*bytes)]);
+    let stated = length.is_some_and(|both| both.iter().any(|length| HEADER_BYTES.contains(length)));
+    stated || kind_by_content(head) == GZIPPED
 }
 
 /// `hdr` or `img`, which only the file's name can tell apart.
@@ -214,7 +236,9 @@ impl VolumeUpload {
         arriving.end().await?;
         self.files.push(ReceivedFile {
             name,
+            given: String::new(),
             kind: kind_by_content(&head),
+            may_be_gate: may_be_nifti(&head),
             digest: hash.finalize().into(),
             bytes,
         });
@@ -245,10 +269,24 @@ impl VolumeUpload {
 
     /// The id of the volume of these files.
     pub fn volume_id(&mut self) -> String {
-        // The order of the form's parts has no meaning, so it must not change the id.
-        self.files
-            .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+        if !self.may_be_gates() {
+            // The order of the form's parts has no meaning, so it must not change the id.
+            self.files
+                .sort_by(|a, b| (a.kind, a.digest).cmp(&(b.kind, b.digest)));
+            return volume_id(&self.records());
+        }
+        let names: Vec<&str> = self.files.iter().map(|file| file.given.as_str()).collect();
+        if let Some(order) = order_by_numbers(&names) {
+            let mut files: Vec<Option<ReceivedFile>> = self.files.drain(..).map(Some).collect();
+            let in_order = order.into_iter().filter_map(|at| files[at].take());
+            self.files = in_order.collect();
+        }
         volume_id(&self.records())
+    }
+
+    /// Whether the files may be one gate each, so that their order has a meaning. Only reading them tells.
+    fn may_be_gates(&self) -> bool {
+        GATES.contains(&self.files.len()) && self.files.iter().all(|file| file.may_be_gate)
     }
 
     /// The files under their final names: `volume` with its extension for one file or a pair, else

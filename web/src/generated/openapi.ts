@@ -147,6 +147,8 @@ export interface components {
             dicom: string[];
             /** @description The wall at end diastole, in the format that `Accept` asks for. */
             mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
             /** @description The histogram of the wall's phases. */
             phase: string;
             /** @description The report. */
@@ -1137,6 +1139,34 @@ export interface components {
              * @description Volume of the muscle.
              */
             wall_ml: number;
+        };
+        /** @description The gates of a study, and what its files say of the beats. */
+        Gates: {
+            /**
+             * Format: double
+             * @description Beats accepted.
+             */
+            beats_accepted?: number | null;
+            /**
+             * Format: double
+             * @description Beats rejected.
+             */
+            beats_rejected?: number | null;
+            /**
+             * Format: int64
+             * @description R-R intervals into which the beats were sorted by their length.
+             */
+            intervals: number;
+            /**
+             * Format: int64
+             * @description Gates of one R-R interval.
+             */
+            number: number;
+            /**
+             * Format: double
+             * @description The R-R interval, ms; `null` if the files do not say, or have several: that with the most counts is taken.
+             */
+            rr_ms?: number | null;
         };
         /** @description The state of the service. */
         Health: {
@@ -3664,7 +3694,7 @@ export interface components {
         UploadForm: {
             /**
              * Format: binary
-             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series
+             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series, or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form
              */
             file: string;
         };
@@ -3740,6 +3770,7 @@ export interface components {
              *     one.
              */
             frames: number;
+            gates?: components["schemas"]["Gates"] | null;
             /**
              * @description Derived from the SHA-256 of the content, so it is the same on every machine.
              * @example vol_9f86d081884c7d659a2feaa0c55ad015
@@ -3893,6 +3924,7 @@ export type FitnessTerms = components['schemas']['FitnessTerms'];
 export type FittedVolumes = components['schemas']['FittedVolumes'];
 export type Flag = components['schemas']['Flag'];
 export type GateReport = components['schemas']['GateReport'];
+export type Gates = components['schemas']['Gates'];
 export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
 export type Histograms = components['schemas']['Histograms'];

@@ -3,7 +3,7 @@
 import { at } from "../base";
 import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
-import { fileNameOf, saveResult } from "../bundle";
+import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
 import type { Agreement, BeatReport, ModelSummary, SegmentationReport } from "../generated/openapi";
 import type { Loaded } from "./loaded";
@@ -142,6 +142,7 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
   const name = fileNameOf(volume);
   const failed = (error: unknown) => setState(words(error));
   const page = result.links.page;
+  const objects = objectsOf(volume, result);
   return (
     <section class="downloads" aria-label="Downloads">
       <div class="buttons">
@@ -163,6 +164,17 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
           ))}
         </ul>
       </details>
+      {objects.length > 0 && (
+        <details>
+          <summary>{objects.length} DICOM objects</summary>
+          <ul class="files">
+            {objects.map(path => {
+              const object = path.slice(path.lastIndexOf("/") + 1);
+              return <li key={path}><button type="button" class="plain" onClick={() => void save(path, `${name}_${object}`).catch(failed)}>{object}</button></li>;
+            })}
+          </ul>
+        </details>
+      )}
     </section>
   );
 }

@@ -1,10 +1,9 @@
 // A result with all that the views draw of it.
 
 import { type FileOfResult, type Result, type Volume, call, fieldOf, get } from "../api";
-import type { BeatReport, Closeness, PolarMap, SegmentationReport } from "../generated/openapi";
+import type { BeatReport, Closeness, PolarFigure, PolarMap, SegmentationReport } from "../generated/openapi";
 import { isBeat, isFit } from "../words";
 import { type Mesh, meanOf } from "./mesh";
-import type { FigureMap } from "./polar";
 import { type Shown, byVertex, heartOf, middleOf, wallNames } from "./shown";
 import { type Voxels, unpackNifti } from "./volume";
 
@@ -77,9 +76,9 @@ async function loadBeat(result: Result): Promise<Loaded> {
     json<PolarMap>("polar.json"),
     json<PolarMap>("polar_ed.json"),
     json<PolarMap>("polar_es.json"),
-    json<FigureMap>("polar_motion.json"),
-    json<FigureMap>("polar_thickening.json"),
-    json<FigureMap>("polar_phase.json"),
+    json<PolarFigure>("polar_motion.json"),
+    json<PolarFigure>("polar_thickening.json"),
+    json<PolarFigure>("polar_phase.json"),
   ]);
   const heart = heartOf({ fit: report, posture: report.posture ?? null, polar });
   const mesh = meanOf(meshes);

@@ -1,6 +1,6 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
-import type { PolarMap } from "../generated/openapi";
+import type { PolarFigure, PolarMap, WallFigure } from "../generated/openapi";
 import { CYCLE, LUTS, type Lut, NO_WALL, OUTWARD, VALVE_PLANE, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
@@ -25,30 +25,22 @@ export interface DrawnMap extends Laid {
   cyclic: boolean;
 }
 
-/** A figure of a beat's wall, as in `polar_motion.json`. */
-export interface FigureMap extends Laid {
-  figure: "motion" | "thickening" | "phase";
-  unit: string;
-  range: [number, number];
-  orientation: string;
-  segments: { number: number; name: string; mean: number | null }[];
-  values: (number | null)[][];
-}
-
 /** What the figures are called, and how their units are written. */
-export const FIGURES: Record<FigureMap["figure"], { name: string; unit: string }> = {
+export const FIGURES: Record<WallFigure, { name: string; unit: string }> = {
   motion: { name: "Motion inward", unit: "mm" },
   thickening: { name: "Thickening", unit: "%" },
   phase: { name: "Phase", unit: "°" },
 };
 
-export function figureLut(figure: FigureMap["figure"]): Lut {
+export function figureLut(figure: WallFigure): Lut {
   return figure === "phase" ? CYCLE : LUTS["Inferno"]!;
 }
 
-export function figureMap(map: FigureMap): DrawnMap {
+export function figureMap(map: PolarFigure): DrawnMap {
   const cyclic = map.figure === "phase";
-  return { ...map, unit: FIGURES[map.figure].unit, threshold: null, below: cyclic ? null : OUTWARD, cyclic };
+  const [least = 0, most = 1] = map.range;
+  const segments = map.segments.map(({ number, name, mean }) => ({ number, name, mean: mean ?? null }));
+  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: cyclic ? null : OUTWARD, cyclic };
 }
 
 export function uptakeMap(map: PolarMap): DrawnMap {

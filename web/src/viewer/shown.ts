@@ -1,8 +1,7 @@
 // What the views draw of a result, whether the service or a self-contained report holds it.
 
-import type { Closeness, Fit, PolarMap, PolarSummary, Posture } from "../generated/openapi";
+import type { Closeness, Fit, PolarFigure, PolarMap, PolarSummary, Posture } from "../generated/openapi";
 import type { Mesh } from "./mesh";
-import type { FigureMap } from "./polar";
 import type { Axis } from "./plane";
 import type { Layer } from "./scene";
 import type { Vec } from "./vector";
@@ -38,7 +37,7 @@ export interface Shown {
   /** The wall in every gate of a beat, with the same triangles as `mesh`, their mean. */
   gates: Mesh[] | null;
   /** Figures of a beat's wall, laid flat. */
-  figures: FigureMap[];
+  figures: PolarFigure[];
 }
 
 /** The heart's axis; it has no superior direction where nothing tells which side is anterior. */

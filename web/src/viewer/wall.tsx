@@ -10,8 +10,8 @@ import { FlatView } from "./flatview";
 import { MeshView } from "./glview";
 import { type Mesh, apart, between, thickness, triangleShape } from "./mesh";
 import { type Axis, frameOf, letters } from "./plane";
-import type { PolarMap } from "../generated/openapi";
-import { type DrawnMap, FIGURES, type FigureMap, WallFrame, colourOn, figureLut, figureMap, uptakeMap, valueAt } from "./polar";
+import type { PolarFigure, PolarMap } from "../generated/openapi";
+import { type DrawnMap, FIGURES, WallFrame, colourOn, figureLut, figureMap, uptakeMap, valueAt } from "./polar";
 import type { Scene } from "./scene";
 import { type Vec, add, dot, scale, sub, unit } from "./vector";
 import type { Voxels } from "./volume";
@@ -38,7 +38,7 @@ interface Props {
   surface: Float32Array | null;
   /** The wall in every gate of a beat, and figures of it. */
   gates: Mesh[] | null;
-  figures: FigureMap[];
+  figures: PolarFigure[];
   /** What is written over it, where there are two. */
   title?: string;
   /** Whether another wall says from where both are seen. */
@@ -80,7 +80,7 @@ function paints({ scene, mesh, inner, other, polar, displacement, surface, figur
   const seen = polar && heart ? true : scene.voxels.highest > scene.voxels.lowest;
   if (seen) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
   if (heart) {
-    for (const map of figures) list.push({ name: FIGURES[map.figure].name, unit: FIGURES[map.figure].unit, lut: figureLut(map.figure), range: map.range, below: figureMap(map).below, values: () => byMap(mesh, figureMap(map), heart) });
+    for (const { figure, drawn } of figures.map(map => ({ figure: map.figure, drawn: figureMap(map) }))) list.push({ name: FIGURES[figure].name, unit: drawn.unit, lut: figureLut(figure), range: drawn.range, below: drawn.below, values: () => byMap(mesh, drawn, heart) });
   }
   if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
   list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });

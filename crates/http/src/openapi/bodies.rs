@@ -417,7 +417,7 @@ macro_rules! forms {
 forms! {
     /// A form whose files are a volume.
     UploadForm {
-        "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series",
+        "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series, or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form",
     }
     /// A form with a volume and an expert's mask.
     SegmentationForm {

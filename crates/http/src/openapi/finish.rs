@@ -37,6 +37,7 @@ pub fn finish(document: &mut Value) {
         {
             // utoipa leaves it out where a body may have several media types.
             request.entry("required").or_insert(true.into());
+            add_upload_types(request);
         }
         type_report(path, operation);
         add_examples(operation, &recorded);
@@ -52,6 +53,29 @@ pub fn finish(document: &mut Value) {
         "description": "Names the request in the log; the answer repeats it",
         "schema": {"type": "string"},
     }});
+}
+
+/// The media types of uploaded volumes that the document names beside `application/octet-stream`, which stands for all of
+/// [`VOLUME_TYPES`](crate::upload::media_types::VOLUME_TYPES), and forms.
+const UPLOAD_TYPES: [&str; 5] = [
+    "application/gzip",
+    "application/zip",
+    "application/dicom",
+    "application/nifti",
+    "multipart/related",
+];
+
+/// Adds [`UPLOAD_TYPES`] to a request whose body is a volume or a form with one.
+fn add_upload_types(request: &mut Map<String, Value>) {
+    let Some(content) = request.get_mut("content").and_then(Value::as_object_mut) else {
+        return;
+    };
+    let bytes = content.get("application/octet-stream").cloned();
+    if let (Some(bytes), true) = (bytes, content.contains_key("multipart/form-data")) {
+        for media_type in UPLOAD_TYPES {
+            content.insert(media_type.to_owned(), bytes.clone());
+        }
+    }
 }
 
 /// Documents with a part that serde flattens. utoipa describes them as `allOf`, of which generators of clients make

@@ -2,22 +2,19 @@
 
 use super::files::volume_files;
 use super::models::{MESH_FILE, named_models, stored_models};
+use super::page;
 use super::problems::{Explain, not_exportable, work_error};
-use crate::items::{OutputFile, WorkOutput};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::Format;
-use ventriform::gated::{GatedError, GatedOrder, from_files};
+use ventriform::gated::{GatedOrder, from_files};
 use ventriform::parameters::GatedParameters;
 use ventriform::progress::{Monitor, Plan};
 use ventriform::report::{BeatSummary, object};
 use ventriform::segmentation::SegmentationFilesError;
-use ventriform::volume::{ReadLimits, VolumeError};
-
-/// Advice for a volume that holds no gates. A stored volume is one file or one series: files of one gate each are none.
-const GATED_SERIES: &str =
-    "Give the gated series: a 4-D NIfTI file of 6 to 32 volumes, or the DICOM files of one series.";
+use ventriform::volume::ReadLimits;
 
 /// Fits one wall in motion to the gates of volumes.
 #[derive(Debug, Clone, Copy)]
@@ -67,12 +64,7 @@ impl Work for BeatWork {
             parameters: &parameters.fit,
             choice: parameters.choice,
         };
-        let made = from_files(&order, &self.limits, monitor).map_err(|error| match error {
-            GatedError::Volume(VolumeError::NotGated { .. }) => {
-                WorkError::Failed(error.explain().fix(GATED_SERIES))
-            }
-            error => work_error(&error),
-        })?;
+        let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
         let files = made.files(&Format::ALL, monitor);
         let files = files.map_err(|error| match error {
             SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
@@ -82,5 +74,12 @@ impl Work for BeatWork {
             summary: object(&BeatSummary::of(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
+    }
+    fn page_files(&self) -> &'static [&'static str] {
+        page::BEAT_FILES
+    }
+
+    fn page(&self, beat: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
+        page::beat_page(&|name| beat.read(name), scan).map_err(|error| error.explain())
     }
 }

@@ -1,4 +1,4 @@
-//! HTML pages of stored models and segmentations.
+//! HTML pages of stored models, segmentations and beats.
 //!
 //! A page consists mostly of pictures: it is ten times as large as the other files together and
 //! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
@@ -9,7 +9,9 @@
 use serde_json::{Map, Value};
 use std::io;
 use ventriform::export::read_json::{self, ReadMeshError};
-use ventriform::report::{self, Closeness, ModelReport, SegmentationPage, SegmentationReport};
+use ventriform::report::{
+    self, BeatPage, BeatReport, Closeness, ModelReport, SegmentationPage, SegmentationReport,
+};
 use ventriform::volume::Provenance;
 
 /// Why there is no page.
@@ -24,8 +26,8 @@ pub enum PageError {
     /// A JSON file cannot be parsed.
     #[error("{0} cannot be parsed: {1}")]
     Json(&'static str, serde_json::Error),
-    /// The mesh cannot be parsed.
-    #[error("mesh.json cannot be used: {0}")]
+    /// A mesh cannot be parsed.
+    #[error("a mesh cannot be used: {0}")]
     Mesh(#[from] ReadMeshError),
 }
 
@@ -45,6 +47,34 @@ pub(super) const SEGMENTATION_FILES: &[&str] = &[
     "polar.svg",
     "polar.json",
     "region.nii.gz",
+];
+
+/// The files that [`beat_page`] reads.
+pub(super) const BEAT_FILES: &[&str] = &[
+    "beat.json",
+    END_MESHES[0],
+    END_MESHES[1],
+    "curve.svg",
+    "phase.svg",
+    BEAT_MAPS[0],
+    BEAT_MAPS[1],
+    BEAT_MAPS[2],
+    BEAT_MAPS[3],
+    BEAT_MAPS[4],
+    BEAT_MAPS[5],
+];
+
+/// The wall at end diastole and at end systole.
+const END_MESHES: [&str; 2] = ["mesh_ed.json", "mesh_es.json"];
+
+/// The pictures of [`BeatPage::MAPS`].
+const BEAT_MAPS: [&str; 6] = [
+    "polar.svg",
+    "polar_ed.svg",
+    "polar_es.svg",
+    "polar_motion.svg",
+    "polar_thickening.svg",
+    "polar_phase.svg",
 ];
 
 /// The mesh of the wall by the other edge: one of these, of a ventricle.
@@ -108,6 +138,36 @@ pub(super) fn segmentation_page(
         polar: polar.as_deref(),
         polar_map: polar_map.as_ref(),
         region: region.as_deref(),
+        scan: Some(&provenance(scan)),
+    }))
+}
+
+/// The page of a beat, made of `beat.json`, the meshes at both ends and those of [`BEAT_FILES`] that exist.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn beat_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
+    let report: BeatReport = from_json("beat.json", &required(read, "beat.json")?)?;
+    let diastole = read_json::decode(&required(read, END_MESHES[0])?)?;
+    let systole = read_json::decode(&required(read, END_MESHES[1])?)?;
+    let curve = optional(read, "curve.svg")?;
+    let phase = optional(read, "phase.svg")?;
+    let mut maps = Vec::new();
+    for ((name, _), file) in BeatPage::MAPS.into_iter().zip(BEAT_MAPS) {
+        maps.extend(optional(read, file)?.map(|svg| (name, svg)));
+    }
+    let maps: Vec<(&'static str, &[u8])> = (maps.iter())
+        .map(|(name, svg)| (*name, svg.as_slice()))
+        .collect();
+    Ok(report::beat_page(&BeatPage {
+        report: &report,
+        curve: curve.as_deref(),
+        phase: phase.as_deref(),
+        maps: &maps,
+        meshes: [&diastole, &systole],
         scan: Some(&provenance(scan)),
     }))
 }

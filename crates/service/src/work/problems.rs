@@ -91,6 +91,7 @@ impl Explain for VolumeError {
             VolumeError::SingleSlice { .. } => (Fault::Content, "single-slice"),
             VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
             VolumeError::NotGated { .. } => (Fault::Content, "not-gated"),
+            VolumeError::OtherGate { .. } => (Fault::Content, "gates-differ"),
             VolumeError::FrameOutOfRange { .. } => (Fault::Request, "frame-out-of-range"),
             VolumeError::Unsupported { .. } | VolumeError::NotVolume { .. } => {
                 (Fault::Content, "unsupported-format")
@@ -751,6 +752,9 @@ fn volume_advice(error: &VolumeError) -> String {
             let last = frames.saturating_sub(1);
             format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
         }
+        VolumeError::OtherGate { .. } => {
+            "Give the gates as they were reconstructed together: as many voxels, at the same place.".into()
+        }
         VolumeError::NotGated { .. } => {
             "Give the gated series (6 to 32 volumes of one heart beat in one file, or one file for each gate).".into()
         }
@@ -758,7 +762,8 @@ fn volume_advice(error: &VolumeError) -> String {
             "Give the .hdr and the .img together, or a single .nii.".into()
         }
         VolumeError::NotOneVolume { .. } => {
-            "Give one file, a .hdr with its .img, or the DICOM files of one series.".into()
+            "Give one file, a .hdr with its .img, the DICOM files of one series, or 6 to 32 NIfTI files of one gate each."
+                .into()
         }
         VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
         VolumeError::NoFiniteVoxel { .. } => EMPTY_FILE.into(),

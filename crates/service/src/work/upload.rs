@@ -11,7 +11,7 @@ use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::Monitor;
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::volume::{self, GateFacts, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 /// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
 /// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
@@ -130,6 +130,9 @@ pub struct UploadFacts {
     pub intensity: IntensityFacts,
     /// The labels, rising, if the volume looks like a label map.
     pub labels: Option<Vec<i64>>,
+    /// The gates, if it is gated; `None` for volumes stored by versions that did not keep this.
+    #[serde(default)]
+    pub gates: Option<GateFacts>,
     /// Oddities of the file that do not prevent its use.
     pub warnings: Vec<String>,
 }
@@ -195,6 +198,7 @@ impl UploadReader for DomainReader {
                 .intensity
                 .labels
                 .map(|labels| labels.iter().map(|l| l.label).collect()),
+            gates: facts.gates,
             warnings: facts.warnings,
         })
     }

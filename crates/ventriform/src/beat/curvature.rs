@@ -202,10 +202,10 @@ impl ImageChanges {
         let thinning = Thinning::of(objective, &state);
         let mut painted: Vec<Vec<(usize, f32)>> = vec![Vec::new(); 4 * nodes + COLUMNS + 1];
         let mut moved: Vec<Vec<(usize, f32)>> = vec![Vec::new(); nodes + 1];
-        let mut add = |voxel: usize, about: &Nodes, change: &Change, by_stretch: f64| {
-            let put = |list: &mut Vec<(usize, f32)>, value: f64| {
+        let mut add = |voxel: usize, about: &Nodes, change: &Change, by_stretch: f32| {
+            let put = |list: &mut Vec<(usize, f32)>, value: f32| {
                 if value != 0.0 {
-                    list.push((voxel, value as f32));
+                    list.push((voxel, value));
                 }
             };
             for (node, share) in about.shares() {
@@ -213,13 +213,14 @@ impl ImageChanges {
                 put(&mut painted[nodes + node], share * change.thickness);
                 put(
                     &mut painted[2 * nodes + node],
-                    share * change.uptake * activity.uptake[node],
+                    share * change.uptake * activity.uptake[node] as f32,
                 );
                 put(
                     &mut painted[3 * nodes + node],
-                    share * change.outside * activity.outside[node],
+                    share * change.outside * activity.outside[node] as f32,
                 );
-                let by_motion = change.mid_wall + thinning.by_motion[node] * change.thickness;
+                let thinner = thinning.by_motion[node] as f32;
+                let by_motion = change.mid_wall + thinner * change.thickness;
                 put(&mut moved[node], share * by_motion);
             }
             for (column, share) in about.rim_shares() {
@@ -227,16 +228,17 @@ impl ImageChanges {
             }
             put(
                 &mut painted[4 * nodes + COLUMNS],
-                change.blood * activity.blood,
+                change.blood * activity.blood as f32,
             );
-            let by_stretch = by_stretch + about.value(&thinning.by_stretch) * change.thickness;
+            let thinner = about.value(&thinning.by_stretch) as f32;
+            let by_stretch = by_stretch + thinner * change.thickness;
             put(&mut moved[nodes], by_stretch);
         };
         let samples = objective.grid.samples(layout, &state, &activity);
         objective
             .grid
             .changes(&samples, &state, &activity, &mut add);
-        let seen = objective.blur.apply(&HeartGrid::paint(&samples));
+        let seen = objective.blur.apply(HeartGrid::paint(&samples));
         let weights = &objective.observed.weights;
         let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
         let mean_square = (seen.iter().zip(weights))
@@ -387,9 +389,8 @@ fn along(
     for (start, from) in values.chunks(stride * sizes[axis]).enumerate() {
         let to = &mut blurred[start * stride * sizes[axis]..][..from.len()];
         for (at, to) in to.chunks_mut(stride).enumerate() {
-            let (first, weights) = blur.weights(axis, range.start + at);
-            for (n, weight) in weights.iter().enumerate() {
-                if let Some(source) = (first + n).checked_sub(range.start)
+            for (source, weight) in blur.weights(axis, range.start + at) {
+                if let Some(source) = source.checked_sub(range.start)
                     && source < sizes[axis]
                 {
                     let from = &from[source * stride..][..stride];

@@ -244,37 +244,49 @@ impl StateGradient {
     }
 }
 
-/// The four nodes about a point of the wall, and where it lies between them.
+/// The four nodes about a point of the wall, and where it lies between them. Every voxel of every gate has its own:
+/// small, and in single precision.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nodes {
-    row: usize,
-    columns: [usize; 2],
-    up: f64,
-    right: f64,
+    row: u16,
+    columns: [u8; 2],
+    up: f32,
+    right: f32,
     /// Whether the point lies between rows, not beyond the last one.
     inside: bool,
 }
 
 impl Nodes {
     /// About the point with this arc, mm, and column with a fraction; beyond the last row the value there continues.
-    #[inline]
     pub fn at(rows: usize, arc: f64, column: f64) -> Self {
-        let row = (arc / ROW_SPACING_MM).max(0.0);
+        Self::at_voxel(rows, arc as f32, column as f32)
+    }
+
+    /// The same in the precision of voxels.
+    #[inline]
+    pub fn at_voxel(rows: usize, arc: f32, column: f32) -> Self {
+        let row = (arc / ROW_SPACING_MM as f32).max(0.0);
         let low = (row as usize).min(rows - 2);
         let left = (column as usize) % COLUMNS;
         Self {
-            row: low,
-            columns: [left, (left + 1) % COLUMNS],
-            up: (row - low as f64).min(1.0),
+            row: low as u16,
+            columns: [left as u8, ((left + 1) % COLUMNS) as u8],
+            up: (row - low as f32).min(1.0),
             right: column - column.floor(),
-            inside: row <= (rows - 1) as f64,
+            inside: row <= (rows - 1) as f32,
         }
     }
 
     #[inline]
+    fn columns(&self) -> [usize; 2] {
+        self.columns.map(usize::from)
+    }
+
+    #[inline]
     fn indices(&self) -> [usize; 4] {
-        let [left, right] = self.columns;
-        let (low, high) = (self.row * COLUMNS, (self.row + 1) * COLUMNS);
+        let [left, right] = self.columns();
+        let low = usize::from(self.row) * COLUMNS;
+        let high = low + COLUMNS;
         [low + left, low + right, high + left, high + right]
     }
 
@@ -282,12 +294,14 @@ impl Nodes {
     #[inline]
     pub fn value(&self, field: &[f64]) -> f64 {
         let shares = self.shares().into_iter();
-        shares.map(|(node, share)| share * field[node]).sum()
+        shares
+            .map(|(node, share)| f64::from(share) * field[node])
+            .sum()
     }
 
     /// The values of four fields that stand side by side at every node.
     #[inline]
-    pub fn values(&self, fields: &[[f64; 4]]) -> [f64; 4] {
+    pub fn values(&self, fields: &[[f32; 4]]) -> [f32; 4] {
         let mut values = [0.0; 4];
         for (node, share) in self.shares() {
             for (value, field) in values.iter_mut().zip(fields[node]) {
@@ -299,20 +313,20 @@ impl Nodes {
 
     /// The changes of four fields by a millimetre of arc.
     #[inline]
-    pub fn slopes(&self, fields: &[[f64; 4]]) -> [f64; 4] {
+    pub fn slopes(&self, fields: &[[f32; 4]]) -> [f32; 4] {
         if !self.inside {
             return [0.0; 4];
         }
         let [a, b, c, d] = self.indices().map(|node| fields[node]);
         [0, 1, 2, 3].map(|n| {
             let (left, right) = (c[n] - a[n], d[n] - b[n]);
-            ((1.0 - self.right) * left + self.right * right) / ROW_SPACING_MM
+            ((1.0 - self.right) * left + self.right * right) / ROW_SPACING_MM as f32
         })
     }
 
     /// Adds what a change of the values of four fields here adds to the nodes.
     #[inline]
-    pub fn add(&self, fields: &mut [[f64; 4]], what: [f64; 4]) {
+    pub fn add(&self, fields: &mut [[f32; 4]], what: [f32; 4]) {
         for (node, share) in self.shares() {
             for (field, what) in fields[node].iter_mut().zip(what) {
                 *field += share * what;
@@ -322,7 +336,7 @@ impl Nodes {
 
     /// The nodes, and their shares in the value of a field.
     #[inline]
-    pub fn shares(&self) -> [(usize, f64); 4] {
+    pub fn shares(&self) -> [(usize, f32); 4] {
         let [a, b, c, d] = self.indices();
         [
             (a, (1.0 - self.up) * (1.0 - self.right)),
@@ -334,21 +348,23 @@ impl Nodes {
 
     /// The columns on both sides, and their shares in the arc of the rim.
     #[inline]
-    pub fn rim_shares(&self) -> [(usize, f64); 2] {
-        let [left, right] = self.columns;
+    pub fn rim_shares(&self) -> [(usize, f32); 2] {
+        let [left, right] = self.columns();
         [(left, 1.0 - self.right), (right, self.right)]
     }
 
     /// The arc of the rim in the point's column, mm.
+    #[inline]
     pub fn rim(&self, rim: &[f64]) -> f64 {
-        let [left, right] = self.columns;
-        (1.0 - self.right) * rim[left] + self.right * rim[right]
+        let [left, right] = self.columns().map(|column| rim[column]);
+        left + f64::from(self.right) * (right - left)
     }
 
     /// Adds what a change of the rim's arc here adds to that of the columns.
-    pub fn add_to_rim(&self, rim: &mut [f64], what: f64) {
+    #[inline]
+    pub fn add_to_rim(&self, rim: &mut [f64], what: f32) {
         for (column, share) in self.rim_shares() {
-            rim[column] += share * what;
+            rim[column] += f64::from(share * what);
         }
     }
 }

@@ -146,7 +146,7 @@ pub fn fit(
         .map(|node| still.mid_wall(node))
         .collect();
     let weights = (grid.positions())
-        .map(|(arc, column, distance)| {
+        .map(|[arc, column, distance]| {
             let far = distance - Nodes::at(layout.rows, arc, column).value(&middle);
             if far >= REACH_MM[0] || arc >= coordinates.rim_arc + BEYOND_RIM_MM {
                 0.0

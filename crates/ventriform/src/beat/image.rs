@@ -21,24 +21,24 @@ pub(super) struct HeartGrid {
     /// Centres, LPS mm.
     pub points: Vec<Vec3>,
     voxels: Vec<Voxel>,
-    cap_arc: f64,
+    cap_arc: f32,
 }
 
 /// A voxel in the coordinates of the rays.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Voxel {
     /// Distance from the start of the ray through it, mm.
-    pub distance: f64,
+    pub distance: f32,
     /// Apical of the focus its arc; basal of it minus how far basal, mm.
-    along: f64,
-    column: f64,
+    along: f32,
+    column: f32,
     cap: bool,
 }
 
 impl Voxel {
     /// Arc of the voxel with the long axis stretched by `stretch`, mm.
     #[inline]
-    pub fn arc(&self, cap_arc: f64, stretch: f64) -> f64 {
+    pub fn arc(&self, cap_arc: f32, stretch: f32) -> f32 {
         if self.cap {
             self.along
         } else {
@@ -107,33 +107,35 @@ impl HeartGrid {
             shape,
             points,
             voxels,
-            cap_arc: FRAC_PI_2 * coordinates.cap_radius,
+            cap_arc: (FRAC_PI_2 * coordinates.cap_radius) as f32,
         }
     }
 
     /// Arc, column and distance of every voxel, the axis not stretched.
-    pub fn positions(&self) -> impl Iterator<Item = (f64, f64, f64)> {
+    pub fn positions(&self) -> impl Iterator<Item = [f64; 3]> {
         let cap_arc = self.cap_arc;
-        (self.voxels.iter())
-            .map(move |voxel| (voxel.arc(cap_arc, 1.0), voxel.column, voxel.distance))
+        (self.voxels.iter()).map(move |voxel| {
+            [voxel.arc(cap_arc, 1.0), voxel.column, voxel.distance].map(f64::from)
+        })
     }
 
     /// The wall at every voxel.
     pub fn samples(&self, layout: &Layout, state: &WallState, activity: &Activity) -> Vec<Sample> {
         let fields = side_by_side(state, activity);
+        let (stretch, blood) = (state.stretch as f32, activity.blood as f32);
         let sample = |voxel: &Voxel| {
-            let arc = voxel.arc(self.cap_arc, state.stretch);
-            let nodes = Nodes::at(layout.rows, arc, voxel.column);
+            let arc = voxel.arc(self.cap_arc, stretch);
+            let nodes = Nodes::at_voxel(layout.rows, arc, voxel.column);
             let [mid, thick, uptake, outside] = nodes.values(&fields);
             let beyond = voxel.distance - mid;
             Sample {
                 nodes,
                 uptake,
                 outside,
-                blood: activity.blood,
+                blood,
                 inner: Ramp::new(beyond + thick / 2.0),
                 outer: Ramp::new(thick / 2.0 - beyond),
-                apical: Ramp::new(nodes.rim(&activity.rim) - arc),
+                apical: Ramp::new(nodes.rim(&activity.rim) as f32 - arc),
             }
         };
         self.voxels.iter().map(sample).collect()
@@ -141,7 +143,7 @@ impl HeartGrid {
 
     /// The activity of every voxel.
     pub fn paint(samples: &[Sample]) -> Vec<f32> {
-        samples.iter().map(|sample| sample.value() as f32).collect()
+        samples.iter().map(Sample::value).collect()
     }
 
     /// Adds the gradients by the wall and by the activity of something whose gradient by the painted voxels is
@@ -157,19 +159,24 @@ impl HeartGrid {
     ) {
         let fields = side_by_side(state, activity);
         let mut by_fields = vec![[0.0; 4]; fields.len()];
+        let stretch = state.stretch as f32;
         for ((voxel, sample), by) in self.voxels.iter().zip(samples).zip(by_voxel) {
-            let by = f64::from(*by);
+            let by = *by;
             if by == 0.0 {
                 continue;
             }
             let nodes = &sample.nodes;
             let change = sample.change();
             nodes.add(&mut by_fields, change.fields().map(|change| by * change));
-            nodes.add_to_rim(&mut by_activity.rim, by * change.rim);
-            by_activity.blood += by * change.blood;
-            by_state.stretch += by * stretch_change(voxel, sample, &change, state, &fields);
+            if change.rim != 0.0 {
+                nodes.add_to_rim(&mut by_activity.rim, by * change.rim);
+            }
+            by_activity.blood += f64::from(by * change.blood);
+            let by_stretch = stretch_change(voxel, sample, &change, stretch, &fields);
+            by_state.stretch += f64::from(by * by_stretch);
         }
         for (node, by) in by_fields.into_iter().enumerate() {
+            let by = by.map(f64::from);
             by_state.mid_wall[node] += by[0];
             by_state.thickness[node] += by[1];
             by_activity.uptake[node] += by[2];
@@ -184,19 +191,20 @@ impl HeartGrid {
         samples: &[Sample],
         state: &WallState,
         activity: &Activity,
-        mut add: impl FnMut(usize, &Nodes, &Change, f64),
+        mut add: impl FnMut(usize, &Nodes, &Change, f32),
     ) {
         let fields = side_by_side(state, activity);
+        let stretch = state.stretch as f32;
         for (index, (voxel, sample)) in self.voxels.iter().zip(samples).enumerate() {
             let change = sample.change();
-            let by_stretch = stretch_change(voxel, sample, &change, state, &fields);
+            let by_stretch = stretch_change(voxel, sample, &change, stretch, &fields);
             add(index, &sample.nodes, &change, by_stretch);
         }
     }
 }
 
 /// Distance, thickness, uptake and activity outside of the wall, side by side at every node.
-fn side_by_side(state: &WallState, activity: &Activity) -> Vec<[f64; 4]> {
+fn side_by_side(state: &WallState, activity: &Activity) -> Vec<[f32; 4]> {
     let of_node = |node: usize| {
         [
             state.mid_wall[node],
@@ -204,6 +212,7 @@ fn side_by_side(state: &WallState, activity: &Activity) -> Vec<[f64; 4]> {
             activity.uptake[node],
             activity.outside[node],
         ]
+        .map(|value| value as f32)
     };
     (0..state.mid_wall.len()).map(of_node).collect()
 }
@@ -214,33 +223,33 @@ fn stretch_change(
     voxel: &Voxel,
     sample: &Sample,
     change: &Change,
-    state: &WallState,
-    fields: &[[f64; 4]],
-) -> f64 {
+    stretch: f32,
+    fields: &[[f32; 4]],
+) -> f32 {
     if voxel.cap {
         return 0.0;
     }
-    let arc_by_stretch = voxel.along / (state.stretch * state.stretch);
+    let arc_by_stretch = voxel.along / (stretch * stretch);
     let slopes = sample.nodes.slopes(fields).into_iter();
-    let by_fields: f64 = slopes.zip(change.fields()).map(|(s, c)| s * c).sum();
+    let by_fields: f32 = slopes.zip(change.fields()).map(|(s, c)| s * c).sum();
     (by_fields - change.rim) * arc_by_stretch
 }
 
 /// The change of a voxel's activity by a unit of each value of the wall at the voxel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Change {
-    pub mid_wall: f64,
-    pub thickness: f64,
-    pub uptake: f64,
-    pub outside: f64,
-    pub rim: f64,
-    pub blood: f64,
+    pub mid_wall: f32,
+    pub thickness: f32,
+    pub uptake: f32,
+    pub outside: f32,
+    pub rim: f32,
+    pub blood: f32,
 }
 
 impl Change {
     /// Those by the fields, in the order of [`side_by_side`].
     #[inline]
-    fn fields(&self) -> [f64; 4] {
+    fn fields(&self) -> [f32; 4] {
         [self.mid_wall, self.thickness, self.uptake, self.outside]
     }
 }
@@ -249,37 +258,38 @@ fn voxel(coordinates: &RayCoordinates, [s, x, y]: [f64; 3]) -> Voxel {
     let across = x.hypot(y);
     let cap = s > 0.0;
     let turn = y.atan2(x).rem_euclid(TAU) / TAU;
+    let distance = if cap { s.hypot(across) } else { across };
+    let along = if cap {
+        coordinates.cap_radius * across.atan2(s)
+    } else {
+        s
+    };
     Voxel {
-        distance: if cap { s.hypot(across) } else { across },
-        along: if cap {
-            coordinates.cap_radius * across.atan2(s)
-        } else {
-            s
-        },
-        column: (turn * COLUMNS as f64) % COLUMNS as f64,
+        distance: distance as f32,
+        along: along as f32,
+        column: (turn * COLUMNS as f64) as f32 % COLUMNS as f32,
         cap,
     }
 }
 
-/// A border through a voxel: the share of the voxel on its inside, and the change of that by a millimetre.
+/// A border through a voxel: the share of the voxel on its inside.
 #[derive(Debug, Clone, Copy)]
-struct Ramp {
-    share: f64,
-    slope: f64,
-}
+struct Ramp(f32);
 
 impl Ramp {
     /// Of a voxel whose centre lies `depth` mm inside.
     #[inline]
-    fn new(depth: f64) -> Self {
-        let share = depth / GRID_STEP_MM + 0.5;
-        Self {
-            share: share.clamp(0.0, 1.0),
-            slope: if share > 0.0 && share < 1.0 {
-                1.0 / GRID_STEP_MM
-            } else {
-                0.0
-            },
+    fn new(depth: f32) -> Self {
+        Self((depth / GRID_STEP_MM as f32 + 0.5).clamp(0.0, 1.0))
+    }
+
+    /// The change of the share by a millimetre of depth.
+    #[inline]
+    fn slope(self) -> f32 {
+        if self.0 > 0.0 && self.0 < 1.0 {
+            1.0 / GRID_STEP_MM as f32
+        } else {
+            0.0
         }
     }
 }
@@ -288,9 +298,9 @@ impl Ramp {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     nodes: Nodes,
-    uptake: f64,
-    outside: f64,
-    blood: f64,
+    uptake: f32,
+    outside: f32,
+    blood: f32,
     inner: Ramp,
     outer: Ramp,
     apical: Ramp,
@@ -298,8 +308,8 @@ pub(super) struct Sample {
 
 impl Sample {
     #[inline]
-    fn value(&self) -> f64 {
-        let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.share);
+    fn value(&self) -> f32 {
+        let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.0);
         self.uptake * oi * oo * ob
             + self.blood * (1.0 - oi)
             + self.outside * ((1.0 - oo) + oi * oo * (1.0 - ob))
@@ -307,29 +317,29 @@ impl Sample {
 
     #[inline]
     fn change(&self) -> Change {
-        let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.share);
+        let [oi, oo, ob] = [self.inner, self.outer, self.apical].map(|ramp| ramp.0);
         let (u, b) = (self.uptake, self.outside);
-        let by_inner = (u * oo * ob - self.blood + b * oo * (1.0 - ob)) * self.inner.slope;
-        let by_outer = (u * oi * ob - b + b * oi * (1.0 - ob)) * self.outer.slope;
+        let by_inner = (u * oo * ob - self.blood + b * oo * (1.0 - ob)) * self.inner.slope();
+        let by_outer = (u * oi * ob - b + b * oi * (1.0 - ob)) * self.outer.slope();
         Change {
             mid_wall: by_outer - by_inner,
             thickness: (by_inner + by_outer) / 2.0,
             uptake: oi * oo * ob,
             outside: (1.0 - oo) + oi * oo * (1.0 - ob),
-            rim: (u - b) * oi * oo * self.apical.slope,
+            rim: (u - b) * oi * oo * self.apical.slope(),
             blood: 1.0 - oi,
         }
     }
 }
 
-/// The blur of a grid by a Gaussian, as one matrix along each axis; every row adds up to 1.
+/// The blur of a grid by a Gaussian along each axis: every blurred value is a weighted mean of values within the grid.
 #[derive(Debug, Clone)]
 pub(super) struct Blur {
     shape: [usize; 3],
-    /// For every output along an axis the first input and the weights.
-    rows: [Vec<(usize, Vec<f32>)>; 3],
-    /// The same of the transposed matrices.
-    columns: [Vec<(usize, Vec<f32>)>; 3],
+    /// Weights of voxels 0, 1, 2, ... away along an axis.
+    kernel: Vec<f32>,
+    /// For every place along an axis, the factor by which the weights within the grid add up to 1.
+    norms: [Vec<f32>; 3],
 }
 
 impl Blur {
@@ -337,88 +347,99 @@ impl Blur {
     pub fn new(shape: [usize; 3], width: f64) -> Self {
         let sigma = width / FWHM_PER_SIGMA / GRID_STEP_MM;
         let reach = (4.0 * sigma).ceil() as usize;
-        let matrix = |count: usize| -> Vec<(usize, Vec<f32>)> {
-            (0..count)
-                .map(|i| {
-                    let (from, to) = (i.saturating_sub(reach), (i + reach + 1).min(count));
-                    let weight = |j: usize| (-0.5 * ((i as f64 - j as f64) / sigma).powi(2)).exp();
-                    let sum: f64 = (from..to).map(weight).sum();
-                    (from, (from..to).map(|j| (weight(j) / sum) as f32).collect())
-                })
-                .collect()
-        };
-        let rows = shape.map(matrix);
-        let columns = [0, 1, 2].map(|axis| {
-            let rows: &Vec<(usize, Vec<f32>)> = &rows[axis];
-            (0..shape[axis])
-                .map(|j| {
-                    let (from, to) = (j.saturating_sub(reach), (j + reach + 1).min(shape[axis]));
-                    let weights = (from..to).map(|i| rows[i].1[j - rows[i].0]).collect();
-                    (from, weights)
-                })
-                .collect()
+        let weight = |away: usize| (-0.5 * (away as f64 / sigma).powi(2)).exp();
+        let norms = shape.map(|count| {
+            let norm = |at: usize| {
+                let within = at.saturating_sub(reach)..(at + reach + 1).min(count);
+                let sum: f64 = within.map(|from| weight(from.abs_diff(at))).sum();
+                (1.0 / sum) as f32
+            };
+            (0..count).map(norm).collect()
         });
         Self {
             shape,
-            rows,
-            columns,
+            kernel: (0..=reach).map(|away| weight(away) as f32).collect(),
+            norms,
         }
     }
 
     /// Blurs `values`.
-    pub fn apply(&self, values: &[f32]) -> Vec<f32> {
-        along_axes(values, self.shape, &self.rows)
-    }
-
-    /// The first voxel along `axis` that the blurred voxel `at` takes from, and the weights from there on.
-    pub fn weights(&self, axis: usize, at: usize) -> (usize, &[f32]) {
-        let (first, weights) = &self.rows[axis][at];
-        (*first, weights)
+    pub fn apply(&self, mut values: Vec<f32>) -> Vec<f32> {
+        self.spread(&mut values);
+        self.normalise(&mut values);
+        values
     }
 
     /// The transposed blur, for gradients.
-    pub fn transposed(&self, values: &[f32]) -> Vec<f32> {
-        along_axes(values, self.shape, &self.columns)
+    pub fn transposed(&self, mut values: Vec<f32>) -> Vec<f32> {
+        self.normalise(&mut values);
+        self.spread(&mut values);
+        values
     }
-}
 
-fn along_axes(
-    values: &[f32],
-    [ns, nx, ny]: [usize; 3],
-    [s, x, y]: &[Vec<(usize, Vec<f32>)>; 3],
-) -> Vec<f32> {
-    let mut once = vec![0.0; values.len()];
-    for (from, to) in values.chunks(ny).zip(once.chunks_mut(ny)) {
-        for (to, (first, weights)) in to.iter_mut().zip(y) {
-            *to = (from[*first..].iter().zip(weights))
-                .map(|(v, w)| v * w)
-                .sum();
+    /// The voxels along `axis` that the blurred voxel `at` takes from, and the weight of each.
+    pub fn weights(&self, axis: usize, at: usize) -> impl Iterator<Item = (usize, f32)> {
+        let reach = self.kernel.len() - 1;
+        let within = at.saturating_sub(reach)..(at + reach + 1).min(self.shape[axis]);
+        let norm = self.norms[axis][at];
+        within.map(move |from| (from, norm * self.kernel[from.abs_diff(at)]))
+    }
+
+    fn normalise(&self, values: &mut [f32]) {
+        let [of_s, of_x, of_y] = &self.norms;
+        let lines = of_s.iter().flat_map(|s| of_x.iter().map(move |x| s * x));
+        for (line, norm) in values.chunks_mut(of_y.len()).zip(lines) {
+            let of_line = line.iter_mut().zip(of_y);
+            of_line.for_each(|(value, y)| *value *= norm * y);
         }
     }
-    let mut twice = vec![0.0; values.len()];
-    for slice in 0..ns {
-        for (row, (first, weights)) in x.iter().enumerate() {
-            let to = (slice * nx + row) * ny;
-            for (n, weight) in weights.iter().enumerate() {
-                let from = (slice * nx + first + n) * ny;
-                add_scaled(&mut twice[to..to + ny], &once[from..from + ny], *weight);
+
+    /// The sums of values times the kernel, along every axis.
+    fn spread(&self, values: &mut Vec<f32>) {
+        let [ns, nx, ny] = self.shape;
+        let mut summed = vec![0.0; values.len()];
+        let reach = self.kernel.len() - 1;
+        let mut padded = vec![0.0; ny + 2 * reach];
+        for (line, to) in values.chunks(ny).zip(summed.chunks_mut(ny)) {
+            padded[reach..reach + ny].copy_from_slice(line);
+            for (away, weight) in self.kernel.iter().enumerate() {
+                let (before, after) = (&padded[reach - away..][..ny], &padded[reach + away..]);
+                add_pair(to, (away > 0).then_some(before), Some(after), *weight);
+            }
+        }
+        std::mem::swap(values, &mut summed);
+        for (from, to) in (values.chunks(nx * ny)).zip(summed.chunks_mut(nx * ny)) {
+            self.spread_lines(from, to, [nx, ny]);
+        }
+        std::mem::swap(values, &mut summed);
+        self.spread_lines(values, &mut summed, [ns, nx * ny]);
+        std::mem::swap(values, &mut summed);
+    }
+
+    /// Along the slower axis of `count` lines of `length` values.
+    fn spread_lines(&self, from: &[f32], to: &mut [f32], [count, length]: [usize; 2]) {
+        for (at, to) in to.chunks_mut(length).enumerate() {
+            to.fill(0.0);
+            let line = |at: usize| (at < count).then(|| &from[at * length..]);
+            for (away, weight) in self.kernel.iter().enumerate() {
+                let before = at.checked_sub(away).filter(|_| away > 0).and_then(line);
+                add_pair(to, before, line(at + away), *weight);
             }
         }
     }
-    let size = nx * ny;
-    once.fill(0.0);
-    for (slice, (first, weights)) in s.iter().enumerate() {
-        for (n, weight) in weights.iter().enumerate() {
-            let from = (first + n) * size;
-            let to = &mut once[slice * size..(slice + 1) * size];
-            add_scaled(to, &twice[from..from + size], *weight);
-        }
-    }
-    once
 }
 
-fn add_scaled(to: &mut [f32], from: &[f32], weight: f32) {
-    to.iter_mut()
-        .zip(from)
-        .for_each(|(to, from)| *to += weight * from);
+/// Adds `weight` times the values of up to two lines.
+#[inline]
+fn add_pair(to: &mut [f32], before: Option<&[f32]>, after: Option<&[f32]>, weight: f32) {
+    match (before, after) {
+        (Some(before), Some(after)) => {
+            let values = before.iter().zip(after);
+            (to.iter_mut().zip(values)).for_each(|(to, (b, a))| *to += weight * (b + a));
+        }
+        (Some(line), None) | (None, Some(line)) => {
+            (to.iter_mut().zip(line)).for_each(|(to, value)| *to += weight * value);
+        }
+        (None, None) => {}
+    }
 }

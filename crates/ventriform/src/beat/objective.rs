@@ -217,9 +217,9 @@ impl Objective {
                     .state(layout, unknowns, &observed.bases[gate]);
                 let gain = unknowns[layout.gains().start + gate].exp() as f32;
                 let samples = self.grid.samples(layout, &state, &activity);
-                let seen = self.blur.apply(&HeartGrid::paint(&samples));
+                let seen = self.blur.apply(HeartGrid::paint(&samples));
                 let (mut value, mut by_gain) = (0.0, 0.0);
-                let by_seen: Vec<f32> = (0..seen.len())
+                let by_seen = (0..seen.len())
                     .map(|v| {
                         let weight = observed.weights[v];
                         let off = gain * seen[v] - observed.images[gate][v];
@@ -228,7 +228,7 @@ impl Objective {
                         2.0 * scale as f32 * weight * off * gain
                     })
                     .collect();
-                let by_voxel = self.blur.transposed(&by_seen);
+                let by_voxel = self.blur.transposed(by_seen);
                 let mut by_state = StateGradient::zero(layout);
                 let mut by_activity = ActivityGradient::zero(layout);
                 self.grid.gradient(
@@ -464,7 +464,7 @@ pub(super) mod tests {
             let images = (self.observed.bases.iter()).map(|basis| {
                 let state = self.conservation.state(&self.layout, unknowns, basis);
                 let samples = self.grid.samples(&self.layout, &state, &activity);
-                self.blur.apply(&HeartGrid::paint(&samples))
+                self.blur.apply(HeartGrid::paint(&samples))
             });
             self.observed.images = images.collect();
             self

@@ -5,13 +5,9 @@
 //! last gates; without the factor the wall looks thinner there, and EF rises by 7 points where a quarter is lost.
 
 use super::error::BeatError;
-use crate::geometry::Vec3;
 use crate::grid::Volume;
+use crate::grid::gates::{GATES, SAME_PLACE_MM};
 use crate::progress::{Cancelled, Monitor};
-use std::ops::RangeInclusive;
-
-/// Gates that a study may have: fewer do not show a beat, more no scanner makes.
-pub const GATES: RangeInclusive<usize> = 6..=32;
 
 /// Share of its counts whose loss is told of a gate.
 pub const COUNT_LOSS_FLAG_SHARE: f64 = 0.10;
@@ -47,7 +43,8 @@ impl GatedStudy {
         }
         let first = &gates[0];
         for (index, gate) in gates.iter().enumerate() {
-            if gate.shape != first.shape || !same_place(gate, first) {
+            let apart = first.frame.greatest_distance(&gate.frame, gate.shape);
+            if gate.shape != first.shape || apart > SAME_PLACE_MM {
                 return Err(BeatError::OtherGrid {
                     gate: index + 1,
                     found: gate.shape,
@@ -87,13 +84,4 @@ impl GatedStudy {
         let enough = |loss: &f64| *loss <= COUNT_LOSS_LEFT_OUT_SHARE;
         self.losses.iter().map(enough).collect()
     }
-}
-
-/// Whether the corners of both grids lie within a hundredth of a millimetre.
-fn same_place(a: &Volume, b: &Volume) -> bool {
-    let last = a.shape.map(|n| (n - 1) as f64);
-    (0..8).all(|corner| {
-        let index = Vec3::from_fn(|axis, _| f64::from(corner >> axis & 1) * last[axis]);
-        (a.frame.to_patient(&index) - b.frame.to_patient(&index)).norm() < 0.01
-    })
 }

@@ -15,7 +15,7 @@ use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
 use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::report::{self, BeatReport};
+use crate::report::{self, BeatPage, BeatReport};
 use crate::segmentation::{NamedFile, SegmentationFilesError, json_file, json_line};
 use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
@@ -51,7 +51,7 @@ impl GatedHeart {
             ),
         ];
         files.extend(self.maps(monitor)?);
-        let meshes = self.meshes();
+        let meshes = &self.meshes;
         let ends = BeatEnd::ALL.map(|end| (names::end_mesh(end).to_owned(), self.gate_at(end)));
         let gates = (0..meshes.len()).map(|gate| (names::gate_mesh(gate + 1), gate));
         let known = self.metadata(&report, monitor)?;
@@ -70,7 +70,7 @@ impl GatedHeart {
             }
         }
         let cycle = Cycle {
-            meshes: &meshes,
+            meshes,
             rest: self.beat.end_diastole.gate,
             seconds: self.rr_ms.map_or(UNKNOWN_CYCLE_S, |ms| ms / 1000.0),
         };
@@ -150,9 +150,28 @@ impl GatedHeart {
         }
     }
 
-    /// The wall of every gate, in the mean over its width, LPS mm.
-    fn meshes(&self) -> Vec<TriMesh> {
-        self.beat.fit.carried(&self.wall.mesh, &self.wall.wall)
+    /// The report as a self-contained page; `files` are those of [`GatedHeart::files`]. It names patient, study and
+    /// series as far as `scan` does.
+    pub fn page(&self, files: &[NamedFile], scan: Option<&Provenance>) -> NamedFile {
+        let bytes = |name: &str| {
+            let found = files.iter().find(|file| file.name == name);
+            found.map(|file| file.bytes.as_slice())
+        };
+        let picture = |(name, _)| Some((name, bytes(&format!("{name}.svg"))?));
+        let maps: Vec<(&str, &[u8])> = BeatPage::MAPS.into_iter().filter_map(picture).collect();
+        let page = report::beat_page(&BeatPage {
+            report: &self.report(),
+            curve: bytes("curve.svg"),
+            phase: bytes("phase.svg"),
+            maps: &maps,
+            meshes: BeatEnd::ALL.map(|end| &self.meshes[self.gate_at(end)]),
+            scan,
+        });
+        NamedFile {
+            name: "report.html".into(),
+            media_type: "text/html; charset=utf-8",
+            bytes: page.into_bytes(),
+        }
     }
 
     /// What is known of the meshes: parts and uptake are those of the gates' sum, whose nodes they have.
@@ -198,13 +217,12 @@ impl GatedHeart {
     /// # Errors
     /// See [`DicomError`].
     pub fn dicom_files(&self, scans: &[SourceScan; 2]) -> Result<Vec<NamedFile>, DicomError> {
-        let meshes = self.meshes();
         let report = self.report();
         let text = json_line(&report);
         let results = DicomBeat::new(self.structure(), scans, &report, &text);
         let wall = |end: BeatEnd| {
             let gate = self.gate_at(end);
-            let mesh = meshes[gate].clone();
+            let mesh = self.meshes[gate].clone();
             let [wall, cavity] = self
                 .masks(gate, &mesh, &Monitor::silent())
                 .expect("a silent monitor is never cancelled");

@@ -4,6 +4,7 @@ use super::error::GatedError;
 use super::order::GatedOrder;
 use crate::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::deform::WallSurface;
+use crate::mesh::TriMesh;
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::polar::SEGMENT_NAMES;
 use crate::progress::Monitor;
@@ -24,6 +25,8 @@ pub struct GatedHeart {
     pub wall: WallSurface,
     /// The beat.
     pub beat: Beat,
+    /// The wall of every gate, in the mean over its width, LPS mm.
+    pub meshes: Vec<TriMesh>,
     /// The parameters of the fit to the gates' sum.
     pub parameters: FitParameters,
     /// The parameters of the beat.
@@ -85,6 +88,7 @@ pub fn from_files(
     let beat = Beat::of(fitted, &study, map, rr_ms);
     reading.gates = study.gates;
     Ok(GatedHeart {
+        meshes: beat.fit.carried(&wall.mesh, &wall.wall),
         reading,
         wall,
         beat,

@@ -4,7 +4,8 @@
 //! 2. [`from_files`](mod@from_files) reads the gates ([`crate::volume::read_gates`]), checks and scales them
 //!    ([`GatedStudy`](crate::beat::GatedStudy)), segments their sum as
 //!    [`segmentation`](mod@crate::segmentation) does, and fits one wall to all gates ([`crate::beat`]).
-//! 3. [`GatedHeart::report`] is the report; [`GatedHeart::files`] are the files written.
+//! 3. [`GatedHeart::report`] is the report; [`GatedHeart::files`] are the files written,
+//!    [`GatedHeart::page`] a page of them for people.
 
 mod error;
 mod files;
@@ -15,5 +16,5 @@ mod pictures;
 
 pub use error::GatedError;
 pub use from_files::{GatedHeart, from_files};
-pub use names::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, gate_labels};
+pub use names::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, gate_labels, is_gate_mesh};
 pub use order::GatedOrder;

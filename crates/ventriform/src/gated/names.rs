@@ -2,10 +2,11 @@
 
 use crate::export::dicom::BeatEnd;
 
-/// The files that every beat has beside the meshes of its gates: report, pictures, tables, polar maps, and the beat as an
-/// animation.
+/// The files that every beat has beside the meshes of its gates: report, its page, pictures, tables, polar maps, and the
+/// beat as an animation.
 pub const FILE_NAMES: &[&str] = &[
     "beat.json",
+    "report.html",
     "curve.svg",
     "phase.svg",
     "gates.csv",
@@ -35,6 +36,13 @@ pub const fn end_mesh(end: BeatEnd) -> &'static str {
         BeatEnd::Diastole => "mesh_ed",
         BeatEnd::Systole => "mesh_es",
     }
+}
+
+/// Whether `stem` is the name, without extension, of the mesh of a gate.
+pub fn is_gate_mesh(stem: &str) -> bool {
+    let number = stem.strip_prefix("mesh_gate");
+    let number = number.and_then(|digits| digits.parse().ok());
+    number.is_some_and(|number| gate_mesh(number) == stem)
 }
 
 /// The name, without extension, of the mesh of the gate with that number, counted from 1.

@@ -107,6 +107,17 @@ impl VoxelToPatient {
         self.inverse * (patient - self.origin)
     }
 
+    /// How far `other` takes a voxel of a grid of `shape` from where this map takes it, at most, mm.
+    pub fn greatest_distance(&self, other: &Self, shape: [usize; 3]) -> f64 {
+        let last = shape.map(|n| n.saturating_sub(1) as f64);
+        // Both are affine: no voxel is farther apart than one of the corners.
+        let corners = (0..8).map(|corner| {
+            let index = Vec3::from_fn(|axis, _| f64::from(corner >> axis & 1) * last[axis]);
+            (self.to_patient(&index) - other.to_patient(&index)).norm()
+        });
+        corners.fold(0.0, f64::max)
+    }
+
     /// The 3×3 linear part, whose columns are the steps along i, j, k in mm.
     pub fn linear(&self) -> &Matrix3<f64> {
         &self.linear

@@ -7,6 +7,7 @@
 //! - [`field`]: a blurred volume as a smooth function of position;
 //! - [`labels`], [`components`]: sets of voxels, their topology and connected parts;
 //! - [`voxelise`]: from a closed mesh to the mask of the voxels inside it;
+//! - [`gates`]: how many volumes, and how alike in place, are the gates of one study;
 //! - [`agreement`]: how well two masks agree (Jaccard, contour distance, Dice, Hausdorff).
 
 pub mod agreement;
@@ -14,6 +15,7 @@ pub mod blocks;
 pub mod blur;
 pub mod components;
 pub mod field;
+pub mod gates;
 pub mod labels;
 pub mod survey;
 pub mod volume;

@@ -1,11 +1,11 @@
-//! Figures about a mesh, the report of a model, and the pages of a model and a segmentation.
+//! Figures about a mesh, the report of a model, and the pages of a model, a segmentation and a beat.
 //!
 //! [`measure`](measure::measure) takes any mesh and its reference surface S and gives counts and
 //! topology (self-intersections found exactly), shape (radius ratios, angles, edge lengths,
 //! valences), smoothness (dihedral angles) and closeness (two-sided distances, volume, area).
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
-//! segmentation's [`SegmentationReport`].
+//! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
 //! with the feature `schema`, what the OpenAPI document describes.
@@ -14,6 +14,7 @@
 //! millilitres, as the names' endings say. Everything but `timings_ms` is the same for the
 //! same input, parameters and seed, whatever the number of threads.
 
+mod beat_page;
 mod beat_report;
 pub mod closeness;
 mod comparison_report;
@@ -37,6 +38,7 @@ mod summaries;
 pub mod summary;
 mod whose;
 
+pub use beat_page::{BeatPage, beat_page};
 pub use beat_report::{
     BeatParts, BeatReport, CurvePoint, GateReport, PhaseReport, RatesReport, SegmentMotionReport,
     TimingReport,

@@ -131,6 +131,14 @@ pub enum VolumeError {
         /// The file's name.
         file: String,
     },
+    /// A file that is given as a gate and does not lie on the first gate's grid.
+    #[error("gate {gate} {}: files of one gate each must have one grid", .difference)]
+    OtherGate {
+        /// The gate, from 1.
+        gate: usize,
+        /// How it differs, in words that follow the gate.
+        difference: String,
+    },
     /// The chosen volume does not exist.
     #[error("the file holds {frames} frames, counted from 0; there is no frame {frame}")]
     FrameOutOfRange {

@@ -182,8 +182,26 @@ pub struct VolumeFacts {
     pub unit: LengthUnit,
     /// Figures over the values.
     pub intensity: IntensitySummary,
+    /// The gates; `None` if the file holds one volume, or its volumes are no gates of a heart beat.
+    pub gates: Option<GateFacts>,
     /// Assumptions, contradictions and oddities, in sentences.
     pub warnings: Vec<String>,
+}
+
+/// The gates of a study, and what its files say of the beats.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = Gates))]
+pub struct GateFacts {
+    /// Gates of one R-R interval.
+    pub number: usize,
+    /// R-R intervals into which the beats were sorted by their length.
+    pub intervals: usize,
+    /// The R-R interval, ms; `null` if the files do not say, or have several: that with the most counts is taken.
+    pub rr_ms: Option<f64>,
+    /// Beats accepted.
+    pub beats_accepted: Option<f64>,
+    /// Beats rejected.
+    pub beats_rejected: Option<f64>,
 }
 
 /// Figures over the values of a volume, or of all volumes of a file.

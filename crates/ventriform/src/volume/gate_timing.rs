@@ -1,5 +1,7 @@
 //! What a file says of the beats that were gated.
 
+use super::facts::GateFacts;
+
 /// What a file says of the beats that were gated. Parts that it leaves out are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GateTiming {
@@ -20,6 +22,28 @@ pub struct GateTiming {
 }
 
 impl GateTiming {
+    /// Facts about a study of `volumes` gates of all R-R intervals.
+    pub(super) fn facts(&self, volumes: usize) -> GateFacts {
+        let number = self.gates_of_interval(volumes);
+        // What a file states first is of its first interval, and another one may be taken.
+        let unknown = Self::default();
+        let known = if number < volumes { &unknown } else { self };
+        GateFacts {
+            number,
+            intervals: volumes / number.max(1),
+            rr_ms: known.rr_of(number),
+            beats_accepted: known.beats_accepted,
+            beats_rejected: known.beats_rejected,
+        }
+    }
+
+    /// Gates of each R-R interval of `volumes` gates.
+    pub(super) fn gates_of_interval(&self, volumes: usize) -> usize {
+        let stated = self.gates_per_interval;
+        let divides = stated.filter(|each| *each > 0 && volumes.is_multiple_of(*each));
+        divides.unwrap_or(volumes)
+    }
+
     /// The R-R interval of `gates` gates, ms: as stated, or of the length of a gate.
     pub fn rr_of(&self, gates: usize) -> Option<f64> {
         let of_frames = || self.frame_time_ms.map(|ms| ms * gates as f64);

@@ -10,6 +10,7 @@ use super::nifti::grid::StatedGrid;
 use super::open::Reading;
 use super::provenance::Provenance;
 use super::{Volume, VolumeError};
+pub use crate::grid::gates::GATES;
 
 /// The gates of a study and the facts of its files.
 #[derive(Debug, Clone)]
@@ -51,16 +52,28 @@ impl GatedReading {
             scans.push(reading.provenance);
         }
         let mut first_frame = 0;
-        let each = timing.gates_per_interval.unwrap_or(gates.len());
-        if each > 0 && each < gates.len() && gates.len().is_multiple_of(each) {
+        let each = timing.gates_of_interval(gates.len());
+        if each < gates.len() {
             let counts: Vec<f64> = (gates.chunks(each))
                 .map(|gates| gates.iter().map(Volume::counts).sum())
                 .collect();
             let main = (1..counts.len()).fold(0, |m, n| if counts[n] > counts[m] { n } else { m });
+            let others = (0..counts.len()).filter(|n| *n != main);
+            let others: Vec<String> = others
+                .map(|n| {
+                    format!(
+                        "interval {} has {:.0} %",
+                        n + 1,
+                        100.0 * counts[n] / counts[main]
+                    )
+                })
+                .collect();
             facts.warnings.push(format!(
-                "The file has {} R-R intervals of {each} gates: interval {} has the most counts and was taken.",
+                "The file has {} R-R intervals of {each} gates: interval {} has the most counts and was taken. Of its \
+                 counts, {}.",
                 counts.len(),
-                main + 1
+                main + 1,
+                others.join(", ")
             ));
             first_frame = main * each;
             gates = gates.split_off(first_frame);

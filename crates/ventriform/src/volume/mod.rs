@@ -20,6 +20,8 @@
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
+//! `gate_files` reads files of one gate each as the gates of one study.
+//!
 //! `surface_file` reads a closed surface (STL, PLY, OBJ, VTK, VTP, glTF) as the voxels inside it.
 //!
 //! [`given_mask`] reads masks: one structure of a label map, a segmentation or a binary volume.
@@ -50,6 +52,7 @@ pub mod dicom;
 pub mod error;
 pub mod facts;
 mod folder;
+mod gate_files;
 mod gate_timing;
 pub mod gates;
 pub mod given_mask;
@@ -70,8 +73,10 @@ mod unpack;
 pub use crate::grid::Volume;
 pub use error::VolumeError;
 pub use facts::{
-    AffineSource, ByteOrder, FileFormat, IntensitySummary, LabelCount, LengthUnit, VolumeFacts,
+    AffineSource, ByteOrder, FileFormat, GateFacts, IntensitySummary, LabelCount, LengthUnit,
+    VolumeFacts,
 };
+pub use gate_files::order_by_numbers;
 pub use gate_timing::GateTiming;
 pub use gates::GatedReading;
 pub use limits::{ReadLimits, ReadOptions};

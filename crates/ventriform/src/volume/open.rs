@@ -4,7 +4,7 @@
 
 use super::decode::DataType;
 use super::facts::{
-    AffineSource, ByteOrder, FileFormat, IntensitySummary, LengthUnit, VolumeFacts,
+    AffineSource, ByteOrder, FileFormat, GateFacts, IntensitySummary, LengthUnit, VolumeFacts,
 };
 use super::gate_timing::GateTiming;
 use super::limits::ReadOptions;
@@ -223,7 +223,10 @@ pub(super) fn read(
         frame: header.placement.frame.clone(),
         integral: intensity.integral,
     };
-    let facts = facts(header, frame, intensity, decoded.warnings)?;
+    let facts = VolumeFacts {
+        gates: gates_of(file),
+        ..facts(header, frame, intensity, decoded.warnings)?
+    };
     let provenance = file.provenance(frame.unwrap_or(0));
     Ok(Reading {
         volume,
@@ -232,6 +235,13 @@ pub(super) fn read(
         stated_grid: file.stated_grid(),
         problem: file.problem(),
     })
+}
+
+/// The gates of `file`; `None` if its volumes are no gates.
+fn gates_of(file: &dyn OpenVolume) -> Option<GateFacts> {
+    let header = file.header();
+    let frames = header.frames;
+    header.gated.then(|| file.gate_timing().facts(frames))
 }
 
 /// `error` with the reason why the volumes are not summed.
@@ -278,7 +288,11 @@ pub(super) fn inspect<'a>(
     let (frames, row) = (file.header().frames, file.header().shape[0]);
     if frames > 1 {
         let (tally, warnings) = file.decode_all(&mut |_, _| {}, monitor)?;
-        return facts(file.header(), None, tally.summary(None), warnings);
+        let facts = facts(file.header(), None, tally.summary(None), warnings)?;
+        return Ok(VolumeFacts {
+            gates: gates_of(&*file),
+            ..facts
+        });
     }
     let mut coherence = Coherence::new(row);
     let mut compare = |first, voxels: &[f32]| coherence.add(first, voxels);
@@ -357,6 +371,7 @@ fn facts(
         file_shape: header.file_shape,
         frames: header.frames,
         frame,
+        gates: None,
         shape: header.shape,
         spacing_mm: placement.frame.spacing(),
         // Adding 0 turns negative zeros into positive ones.

@@ -1,6 +1,7 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
 use super::dicom::DicomFile;
+use super::gate_files::{GateFiles, order_by_numbers};
 use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
@@ -11,17 +12,15 @@ use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
 use super::{LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
+use crate::grid::gates::GATES;
 use crate::mesh::TriMesh;
 use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
 use std::cell::RefCell;
 
-/// Most files that are read as one gate each: no scanner makes more gates.
-const MOST_GATE_FILES: usize = 32;
-
 /// Reads one volume from `files`: a single file, a `.hdr` file and its `.img` file in any order, the
-/// DICOM files of a series, or a zip archive of any of these. Of several files, those that are no
-/// volumes are left out.
+/// DICOM files of a series, or a zip archive of any of these; or 6 to 32 NIfTI files, which are the gates of a
+/// study. Of several files, those that are no volumes are left out.
 ///
 /// # Errors
 /// [`VolumeError`]; in particular [`VolumeError::FrameNeeded`] if the file holds several volumes
@@ -43,7 +42,7 @@ pub fn read(
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
-/// order given. Volumes whose header says that they are no gates are refused unless `gated` says that they are.
+/// order of the numbers in their names ([`order_by_numbers`]), or else in the order given. Volumes whose header says that they are no gates are refused unless `gated` says that they are.
 ///
 /// # Errors
 /// [`VolumeError`], also for a single volume, and for gates that have together more voxels than a volume may.
@@ -55,14 +54,21 @@ pub fn read_gates(
 ) -> Result<GatedReading, VolumeError> {
     let opened = open(files, limits, monitor);
     // Files of one gate each are not one volume.
-    let apart = (2..=MOST_GATE_FILES).contains(&files.len())
+    let apart = (2..=*GATES.end()).contains(&files.len())
         && match &opened {
             Ok(opened) => opened.file.header().frames == 1,
-            Err(VolumeError::Cancelled(_)) => false,
+            Err(
+                VolumeError::Cancelled(_)
+                | VolumeError::OtherGate { .. }
+                | VolumeError::TooLarge { .. },
+            ) => false,
             Err(_) => true,
         };
     if apart {
-        return match one_by_one(files, limits, monitor) {
+        let names: Vec<&str> = files.iter().map(VolumeFile::name).collect();
+        let order = order_by_numbers(&names).unwrap_or_else(|| (0..files.len()).collect());
+        let files: Vec<VolumeFile> = order.into_iter().map(|at| files[at].clone()).collect();
+        return match one_by_one(&files, limits, monitor) {
             // What the files are together says more than that one of them is no volume.
             Err(error) if !matches!(error, VolumeError::Cancelled(_)) => {
                 Err(opened.err().unwrap_or(error))
@@ -313,6 +319,7 @@ fn open_as(
         Recognised::Nifti { header, voxels } => {
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
+        Recognised::Gates(files) => Box::new(GateFiles::open(&files, limits)?),
         Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
         Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits)?),
     };

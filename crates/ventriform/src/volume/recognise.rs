@@ -5,6 +5,7 @@
 use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
+use crate::grid::gates::GATES;
 
 /// Unpacked bytes that are examined.
 const EXAMINED_BYTES: usize = 1024;
@@ -17,6 +18,8 @@ pub(super) enum Recognised<'a> {
         header: &'a VolumeFile,
         voxels: &'a VolumeFile,
     },
+    /// NIfTI files of one gate each, in their order.
+    Gates(Vec<&'a VolumeFile>),
     /// DICOM files.
     Dicom(Vec<&'a VolumeFile>),
     /// A closed surface.
@@ -96,6 +99,10 @@ impl<'a> Sorted<'a> {
                 header: self.singles[0],
                 voxels: self.singles[0],
             }),
+            // Whoever names several files says that they belong together; a folder or an archive may hold anything.
+            ([singles, 0, 0], []) if self.may_be_gates(singles, inside) => {
+                Ok(Recognised::Gates(self.singles.clone()))
+            }
             ([0, 1, _], _) => self.pair(self.headers[0], inside, limits),
             ([0, 0, dicom], _) if dicom > 0 => Ok(Recognised::Dicom(self.dicom.clone())),
             ([0, 0, 0], []) if self.empty.is_empty() => Err(VolumeError::NoFile),
@@ -118,6 +125,11 @@ impl<'a> Sorted<'a> {
             }
             _ => Err(self.not_one(inside)),
         }
+    }
+
+    /// Whether so many NIfTI files, found in the archive or folder `inside`, can be one gate each.
+    fn may_be_gates(&self, singles: usize, inside: Option<&str>) -> bool {
+        GATES.contains(&singles) && inside.is_none() && self.empty.is_empty()
     }
 
     /// A header and the file with its voxels: the `.img` of the same name, or the only `.img`, or the
@@ -180,7 +192,7 @@ impl<'a> Sorted<'a> {
     fn notes(&self, volume: &Recognised<'_>) -> Vec<String> {
         let used = |file: &VolumeFile| match volume {
             Recognised::Nifti { voxels, .. } => std::ptr::eq(file, *voxels),
-            Recognised::Dicom(_) => false,
+            Recognised::Gates(_) | Recognised::Dicom(_) => false,
             Recognised::Mesh(mesh) => std::ptr::eq(file, *mesh),
         };
         let foreign = self.others.iter().map(|(file, _)| *file);

@@ -109,7 +109,8 @@ impl Tally {
         }
     }
 
-    fn merge(&mut self, other: &Tally) {
+    /// Adds the figures of `other`.
+    pub(super) fn merge(&mut self, other: &Tally) {
         self.minimum = self.minimum.min(other.minimum);
         self.maximum = self.maximum.max(other.maximum);
         self.sum += other.sum;

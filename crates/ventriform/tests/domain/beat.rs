@@ -20,6 +20,7 @@ use ventriform::grid::blur::{Kernel, blur};
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::parameters::{BeatChoice, FitParameters};
 use ventriform::progress::Monitor;
+use ventriform::report::BeatReport;
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{Provenance, ReadLimits, VolumeError, VolumeFile, read_gates};
 
@@ -267,6 +268,127 @@ fn gates_that_show_no_beat_have_no_ejection_fraction() {
     }
 }
 
+/// Gates that are all their mean do not move, whatever their noise.
+#[test]
+fn a_flat_study_has_no_ejection_fraction() {
+    let count = gates()[0].voxels.len();
+    let mean: Vec<f32> = (0..count)
+        .map(|at| gates().iter().map(|gate| gate.voxels[at]).sum::<f32>() / GATES as f32)
+        .collect();
+    for noise in [0.0, 3.0] {
+        let mut state = 1u32;
+        let mut draw = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32 - 0.5
+        };
+        let mut gate = |_| Volume {
+            voxels: mean.iter().map(|v| v + noise * draw()).collect(),
+            ..gates()[0].clone()
+        };
+        let flat: Vec<Volume> = (0..GATES).map(&mut gate).collect();
+        let heart = beat_of(&flat, BeatChoice::default()).unwrap();
+        assert!(
+            codes(&heart).contains(&"no_contraction".to_owned()),
+            "noise {noise}"
+        );
+        assert_eq!(heart.report().ef_percent, None, "noise {noise}");
+    }
+}
+
+/// More than three tenths of a gate's counts are gone: it is left out of the curve, and told.
+#[test]
+fn a_gate_with_few_counts_is_left_out_of_the_curve() {
+    let mut lossy = gates().to_vec();
+    lossy[7].voxels.iter_mut().for_each(|v| *v *= 0.6);
+    let report = beat_of(&lossy, BeatChoice::default()).unwrap().report();
+    let told = report
+        .flags
+        .iter()
+        .find(|flag| flag.code == "count_loss")
+        .unwrap();
+    assert!(told.reason.contains("gate 8 40 %") && told.reason.contains("left out"));
+    let [found, first] = [&report, &whole().report()].map(|report| report.ef_percent.unwrap());
+    assert!((found - first).abs() < 3.0, "{found} {first}");
+}
+
+/// The gates, each voxel as `change` makes it of its value, its place and the turns of the cycle.
+fn changed(change: impl Fn(f32, &Vec3, f64) -> f32) -> Vec<Volume> {
+    let changed = |(index, gate): (usize, &Volume)| {
+        let turns = (index as f64 + 0.5) / GATES as f64;
+        let [columns, rows, _] = gate.shape;
+        let place = |at: usize| {
+            let index = [at % columns, at / columns % rows, at / columns / rows];
+            gate.frame.to_patient(&Vec3::from(index.map(|n| n as f64)))
+        };
+        let voxels = gate.voxels.iter().enumerate();
+        Volume {
+            voxels: voxels
+                .map(|(at, v)| change(*v, &place(at), turns))
+                .collect(),
+            ..gate.clone()
+        }
+    };
+    gates().iter().enumerate().map(changed).collect()
+}
+
+/// Where the apex takes up nothing, it shows no motion: told, and the ejection fraction is less certain.
+#[test]
+fn a_dark_apex_is_told_and_widens_the_interval() {
+    let apex = Vec3::new(20.0, -20.0, 30.0) + 54.0 * Vec3::new(0.64, -0.60, -0.48).normalize();
+    let dark = changed(|v, place, _| {
+        let share = (-((place - apex).norm() / 22.0).powi(4)).exp();
+        v * (1.0 - share as f32) + 5.0 * share as f32
+    });
+    let heart = beat_of(&dark, BeatChoice::default()).unwrap();
+    let raised = codes(&heart);
+    assert!(raised.contains(&"dark_wall".to_owned()), "{raised:?}");
+    let [report, first] = [heart.report(), whole().report()];
+    let width = |report: &BeatReport| {
+        let [low, high] = report.ef_interval_percent.unwrap();
+        high - low
+    };
+    assert!(
+        width(&report) > width(&first),
+        "{} {}",
+        width(&report),
+        width(&first)
+    );
+    let [found, first] = [report, first].map(|report| report.ef_percent.unwrap());
+    assert!((found - first).abs() < 6.0, "{found} {first}");
+}
+
+/// Gut beside the inferior wall, as bright as the wall, which moves against the beat.
+#[test]
+fn gut_that_moves_beside_the_wall_changes_little() {
+    let beside = Vec3::new(28.0, -26.0, -24.0);
+    let hot = changed(|v, place, turns| {
+        let middle = beside + Vec3::new(0.0, 0.0, 6.0 * (2.0 * PI * turns).cos());
+        v + 60.0 * (-(place - middle).norm_squared() / (2.0 * 9.0 * 9.0)).exp() as f32
+    });
+    let report = beat_of(&hot, BeatChoice::default()).unwrap().report();
+    let [found, first] = [&report, &whole().report()].map(|report| report.ef_percent.unwrap());
+    assert!((found - first).abs() < 5.0, "{found} {first}");
+}
+
+/// The apex lies outside of the volume.
+#[test]
+fn a_heart_that_leaves_the_field_is_told() {
+    let cut = |gate: &Volume| {
+        let [columns, rows, slices] = gate.shape;
+        let first = 14;
+        let origin = gate.frame.to_patient(&Vec3::new(0.0, 0.0, first as f64));
+        Volume {
+            shape: [columns, rows, slices - first],
+            voxels: gate.voxels[columns * rows * first..].to_vec(),
+            frame: VoxelToPatient::new(*gate.frame.linear(), origin).unwrap(),
+            integral: false,
+        }
+    };
+    let cut: Vec<Volume> = gates().iter().map(cut).collect();
+    let raised = codes(&beat_of(&cut, BeatChoice::default()).unwrap());
+    assert!(raised.contains(&"leaves_field".to_owned()), "{raised:?}");
+}
+
 #[test]
 fn a_known_mass_is_met() {
     let [inner, outer] = [0.0, 9.0].map(|more| volume_ml(cavity_axes(0.0).map(|a| a + more)));
@@ -301,6 +423,44 @@ fn every_gate_has_a_mesh_that_does_not_meet_itself() {
         let kept = heart.report().wall_ml;
         assert!((muscle / kept - 1.0).abs() < 0.08, "{muscle} of {kept}");
     }
+}
+
+/// What a person reads says the figures of the report, and names nobody without a scan.
+#[test]
+fn the_page_has_figures_pictures_and_flags() {
+    let heart = whole();
+    let files = heart.files(&[], &Monitor::silent()).unwrap();
+    let page = heart.page(&files, None);
+    assert_eq!(page.name, "report.html");
+    let page = String::from_utf8(page.bytes).unwrap();
+    let report = heart.report();
+    let [low, high] = report.ef_interval_percent.unwrap();
+    for text in [
+        format!("<b>{:.0} <small>%</small></b>", report.ef_percent.unwrap()),
+        format!("ejection fraction; 90 %: {low:.0} to {high:.0}"),
+        format!("<b>{:.0} <small>ml</small></b>", report.edv_ml),
+        "8 gates".to_owned(),
+        format!("No rates: {}.", report.no_rates.clone().unwrap()),
+        "The wall at end systole".to_owned(),
+        report.segments[6].name.clone(),
+    ] {
+        assert!(page.contains(&text), "{text}");
+    }
+    assert_eq!(page.matches("data:image/svg+xml").count(), 8);
+    assert!(!page.contains("Patient"));
+    let named = Provenance {
+        patient_name: Some("Doe^Jane".into()),
+        ..Provenance::default()
+    };
+    let named = String::from_utf8(heart.page(&files, Some(&named)).bytes).unwrap();
+    assert!(named.contains("Doe^Jane"));
+    let still = beat_of(&vec![gates()[0].clone(); 8], BeatChoice::default()).unwrap();
+    let still = String::from_utf8(still.page(&[], None).bytes).unwrap();
+    assert!(
+        still.contains("there is no ejection fraction")
+            && still.contains("no: The gates are moments")
+    );
+    assert!(!still.contains("data:image/svg+xml"));
 }
 
 #[test]
@@ -346,11 +506,19 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
     let mut other = gates().to_vec();
     other[3].frame = VoxelToPatient::centred([40; 3], [4.0; 3], Vec3::zeros()).unwrap();
     let other = beat_of(&other, BeatChoice::default()).unwrap_err();
+    let elsewhere = other.to_string();
     assert!(
-        other
-            .to_string()
-            .starts_with("gate 4 has 40 x 40 x 40 voxels"),
-        "{other}"
+        elsewhere.starts_with("gate 4 lies elsewhere"),
+        "{elsewhere}"
+    );
+    let mut smaller = gates().to_vec();
+    let frame = gates()[0].frame.clone();
+    smaller[6] = Volume::sampled([40, 40, 39], frame, |_| 1.0);
+    let smaller = beat_of(&smaller, BeatChoice::default()).unwrap_err();
+    let text = smaller.to_string();
+    assert!(
+        text.starts_with("gate 7 has 40 x 40 x 39 voxels where gate 1 has 40 x 40 x 40"),
+        "{text}"
     );
     let mut empty = gates().to_vec();
     empty[2].voxels.fill(0.0);
@@ -370,6 +538,50 @@ fn what_is_no_gated_study_is_refused_by_what_it_is() {
     };
     let heavy = beat_of(gates(), heavy).unwrap_err();
     assert_eq!(heavy.to_string(), "`mass_g` is 10000; it must be 20 to 600");
+}
+
+/// Shells and folders sort `gate10` before `gate2`.
+#[test]
+fn files_of_gates_are_read_in_the_order_of_their_numbers() {
+    let named = |index: usize, name: String| {
+        let bytes = nifti::write(&gates()[index], StoredType::Float32, true).unwrap();
+        VolumeFile::in_memory(name, bytes)
+    };
+    let read = |files: &[VolumeFile]| {
+        read_gates(files, false, &ReadLimits::default(), &Monitor::silent()).unwrap()
+    };
+    let mut files: Vec<_> = (0..GATES)
+        .map(|index| named(index, format!("gate{}.nii.gz", index + 5)))
+        .collect();
+    files.sort_by(|a, b| a.name().cmp(b.name()));
+    assert_eq!(files[0].name(), "gate10.nii.gz");
+    let numbered = read(&files);
+    let warnings = numbered.facts.warnings.join(" ");
+    assert!(
+        warnings.contains("8 files of one volume each")
+            && warnings.contains("numbers in their names")
+    );
+    assert_eq!(numbered.facts.gates.unwrap().number, GATES);
+    let files: Vec<_> = "hbdfgcae"
+        .chars()
+        .zip(0..)
+        .map(|(name, index)| named(index, format!("{name}.nii.gz")))
+        .collect();
+    for reading in [numbered, read(&files)] {
+        for (read, made) in reading.gates.iter().zip(gates()) {
+            assert_eq!(read.voxels, made.voxels);
+        }
+    }
+    // All together are within the limits of one file.
+    let limits = ReadLimits {
+        unpacked_bytes: 1_000_000,
+        ..ReadLimits::default()
+    };
+    let large = read_gates(&files, false, &limits, &Monitor::silent());
+    let Err(large) = large else {
+        panic!("a study beyond the limit was read");
+    };
+    assert!(matches!(large, VolumeError::TooLarge { .. }), "{large}");
 }
 
 /// Volumes of a file whose header says that they are no gates are taken for gates only where the caller says so.
@@ -685,6 +897,27 @@ fn a_beat_is_written_as_dicom() {
     };
     assert_eq!(of("8821-1"), [report.edv_ml]);
     assert_eq!(of("8823-7"), [report.esv_ml]);
+    // How far the true value may lie below and above EDV, ESV and EF.
+    let ef = (
+        report.ef_percent.unwrap(),
+        report.ef_interval_percent.unwrap(),
+    );
+    let figures_with_ranges = [
+        (report.edv_ml, report.edv_interval_ml),
+        (report.esv_ml, report.esv_interval_ml),
+        ef,
+    ];
+    for (code, below) in [("371885007", true), ("371886008", false)] {
+        let wanted = figures_with_ranges.map(|(value, [low, high])| match below {
+            true => value - low,
+            false => high - value,
+        });
+        let found = of(code);
+        assert_eq!(found.len(), 3);
+        for (found, wanted) in found.iter().zip(wanted) {
+            assert!((found - wanted).abs() < 1e-6, "{code}: {found} of {wanted}");
+        }
+    }
     assert_eq!(of("90096001"), [report.sv_ml]);
     assert_eq!(of("70822001"), [report.ef_percent.unwrap()]);
     assert_eq!(of("122447"), [report.mass_g]);

@@ -6,13 +6,14 @@
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
-//! segments. A figure that the report lacks is left out.
+//! segments. A figure that the report lacks is left out. EDV, ESV and EF have the ends of the interval that holds the
+//! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
 use super::codes::{Code, MILLIMETRE, dcm, own, sct, ucum};
 use super::data_set::DataSet;
 use super::structured_report::{
     self as sr, Figure, GRAM, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site,
-    group, measured, text, tracking,
+    group, measured, text, tracking, within,
 };
 use super::uid::Uids;
 use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
@@ -188,6 +189,7 @@ impl<'a> DicomBeat<'a> {
         if self.report.phase.reliable {
             content.extend(measured(self.report, PHASE_FIGURES));
         }
+        content.push(text("CONTAINS", dcm("121106", "Comment"), RANGES));
         let flags = self.report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
         groups.push(group("1501", content));
@@ -212,20 +214,29 @@ impl<'a> DicomBeat<'a> {
     }
 }
 
+/// How the ranges of uncertainty are meant, which no code says.
+const RANGES: &str = "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
+
 const VOLUMES_PER_SECOND: Code = ucum("{EDV}/s", "end-diastolic volumes per second");
 const MILLISECOND: Code = ucum("ms", "millisecond");
 const DEGREE: Code = ucum("deg", "degree");
 
-const DIASTOLIC_FIGURES: &[Figure<BeatReport>] = &[figure(
-    |r| Some(r.edv_ml),
-    loinc("8821-1", "Left Ventricular ED Volume"),
-    MILLILITRE,
+const DIASTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
+    figure(
+        |r| Some(r.edv_ml),
+        loinc("8821-1", "Left Ventricular ED Volume"),
+        MILLILITRE,
+    ),
+    |r| Some(r.edv_interval_ml),
 )];
 
-const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[figure(
-    |r| Some(r.esv_ml),
-    loinc("8823-7", "Left Ventricular ES Volume"),
-    MILLILITRE,
+const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
+    figure(
+        |r| Some(r.esv_ml),
+        loinc("8823-7", "Left Ventricular ES Volume"),
+        MILLILITRE,
+    ),
+    |r| Some(r.esv_interval_ml),
 )];
 
 /// Measurements over the whole beat. Without a beat there is neither stroke nor ejection.
@@ -235,10 +246,13 @@ const BEAT_FIGURES: &[Figure<BeatReport>] = &[
         sct("90096001", "Stroke Volume"),
         MILLILITRE,
     ),
-    figure(
-        |r| r.ef_percent,
-        sct("70822001", "Cardiac ejection fraction"),
-        PERCENT,
+    within(
+        figure(
+            |r| r.ef_percent,
+            sct("70822001", "Cardiac ejection fraction"),
+            PERCENT,
+        ),
+        |r| r.ef_interval_percent,
     ),
     figure(|r| Some(r.mass_g), dcm("122447", "Wall Mass"), GRAM),
     figure(

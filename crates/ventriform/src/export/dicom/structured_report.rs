@@ -18,7 +18,16 @@ pub(super) struct Figure<T> {
     pub unit: Code,
     /// Derivation from the single values.
     pub derivation: Option<Code>,
+    /// An interval about the figure that holds the true value with a stated chance.
+    pub interval: Option<Interval<T>>,
 }
+
+/// The ends of an interval about a figure.
+type Interval<T> = fn(&T) -> Option<[f64; 2]>;
+
+/// How far the true value may lie below a figure, and above it (CID 225).
+const BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
+const ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
 
 pub(super) const MEAN: Code = sct("373098007", "Mean");
 pub(super) const MILLILITRE: Code = ucum("ml", "milliliter");
@@ -35,6 +44,18 @@ pub(super) const fn figure<T>(
         concept,
         unit,
         derivation: None,
+        interval: None,
+    }
+}
+
+/// `figure` with an interval about it, whose ends are properties of the measurement (TID 310).
+pub(super) const fn within<T>(figure: Figure<T>, interval: Interval<T>) -> Figure<T> {
+    Figure {
+        value: figure.value,
+        concept: figure.concept,
+        unit: figure.unit,
+        derivation: figure.derivation,
+        interval: Some(interval),
     }
 }
 
@@ -44,6 +65,7 @@ pub(super) const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: C
         concept,
         unit,
         derivation: Some(MEAN),
+        interval: None,
     }
 }
 
@@ -197,22 +219,34 @@ fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<(&'a str, Vec<(&'a str, &'a st
 /// Those of `figures` that `source` has, as NUM items.
 pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
     let item = |figure: &Figure<T>| {
-        let number = (figure.value)(source).filter(|number| number.is_finite())?;
-        let mut value = DataSet::new();
-        value.decimals(tags::NUMERIC_VALUE, &[number]);
-        value.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, figure.unit);
-        let mut item = item("CONTAINS", "NUM", Some(figure.concept));
-        item.item(tags::MEASURED_VALUE_SEQUENCE, value);
-        if let Some(code) = figure.derivation {
-            let derivation = dcm("121401", "Derivation");
-            item.item(
-                tags::CONTENT_SEQUENCE,
-                concept("HAS CONCEPT MOD", derivation, code),
-            );
+        let value = (figure.value)(source).filter(|value| value.is_finite())?;
+        let mut item = number("CONTAINS", figure.concept, value, figure.unit);
+        let derived = dcm("121401", "Derivation");
+        let derivation = (figure.derivation).map(|code| concept("HAS CONCEPT MOD", derived, code));
+        let interval = figure.interval.and_then(|interval| interval(source));
+        let ends = interval.into_iter().flat_map(|[low, high]| {
+            let ends = [(BELOW, value - low), (ABOVE, high - value)];
+            // As many decimals as the figures of a report have.
+            let rounded = |range: f64| (1e4 * range).round() / 1e4;
+            ends.map(|(name, range)| number("HAS PROPERTIES", name, rounded(range), figure.unit))
+        });
+        let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();
+        if !properties.is_empty() {
+            item.items(tags::CONTENT_SEQUENCE, properties);
         }
         Some(item)
     };
     figures.iter().filter_map(item).collect()
+}
+
+/// A NUM item.
+fn number(relationship: &str, name: Code, value: f64, unit: Code) -> DataSet {
+    let mut measured = DataSet::new();
+    measured.decimals(tags::NUMERIC_VALUE, &[value]);
+    measured.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, unit);
+    let mut item = item(relationship, "NUM", Some(name));
+    item.item(tags::MEASURED_VALUE_SEQUENCE, measured);
+    item
 }
 
 pub(super) fn tracking(name: &str, uid: &str) -> Vec<DataSet> {

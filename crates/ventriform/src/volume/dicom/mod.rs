@@ -50,8 +50,8 @@ pub(super) use syntax::is_dicom;
 
 use self::attributes::{
     Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
-    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS,
-    SOP_INSTANCE, TIME_SLICES, TIME_SLOTS, clip,
+    NUMBER_OF_SLICES, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER,
+    SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE, TIME_SLICES, TIME_SLOT_VECTOR, TIME_SLOTS, clip,
 };
 use self::frames::FrameOrder;
 use self::kind::Kind;
@@ -453,10 +453,17 @@ fn check_numbers(
             ));
         }
     }
-    let of_gates = stated(TIME_SLOTS).unwrap_or(1) * stated(RR_INTERVALS).unwrap_or(1);
-    if of_gates > gates {
-        let reason = format!("the frames hold {gates} gates; gates are missing");
-        return Err(a.wrong(TIME_SLOTS.name, &of_gates.to_string(), reason));
+    let counted = |vector| a.shorts(vector).into_iter().max().map(usize::from);
+    for (number, vector, what) in [
+        (TIME_SLOTS, TIME_SLOT_VECTOR, "time slots"),
+        (RR_INTERVALS, RR_INTERVAL_VECTOR, "R-R intervals"),
+    ] {
+        let (stated, held) = (stated(number).unwrap_or(1), counted(vector).unwrap_or(1));
+        if stated > held {
+            let reason =
+                format!("the frames hold {held} {what} ({gates} gates); gates are missing");
+            return Err(a.wrong(number.name, &stated.to_string(), reason));
+        }
     }
     Ok(())
 }

@@ -420,6 +420,21 @@ fn every_gate_is_read_with_the_timing_of_the_beats() {
     assert_eq!(reading.first_frame, 2);
     let told = |warning: &String| warning.contains("2 R-R intervals of 2 gates: interval 2");
     assert!(reading.facts.warnings.iter().any(told));
+    let gates = reading.facts.gates.unwrap();
+    assert_eq!((gates.number, gates.intervals, gates.rr_ms), (2, 2, None));
+}
+
+#[test]
+fn more_gates_stated_than_the_vectors_count_are_missing() {
+    for (tag, name) in [
+        ((0x54, 0x61), "Number of R-R Intervals (0054,0061)"),
+        ((0x54, 0x71), "Number of Time Slots (0054,0071)"),
+    ] {
+        let mut elements = gated();
+        elements.insert(tag, ("US", Shorts(vec![3])));
+        let (field, value) = complaint(read_frame(Encoding::Explicit.file(&elements), Some(0)));
+        assert_eq!((field, &*value), (name, "3"));
+    }
 }
 
 #[test]

@@ -7,9 +7,7 @@
 //! the whole beat, and a warning says what was taken for what.
 
 use super::header::Header;
-
-/// Most gates of a study: 8 and 16 are usual, 32 the most that scanners offer.
-const MOST_GATES: usize = 32;
+use crate::grid::gates::GATES;
 
 /// Longest R-R interval, seconds: 24 beats per minute.
 const LONGEST_BEAT: f64 = 2.5;
@@ -34,9 +32,10 @@ pub(super) fn contradiction(header: &Header) -> Option<String> {
             header.intent_code
         ));
     }
-    if volumes > MOST_GATES {
+    let most = *GATES.end();
+    if volumes > most {
         return Some(format!(
-            "dim[4] is {volumes}, more than the {MOST_GATES} gates of a heart beat"
+            "dim[4] is {volumes}, more than the {most} gates of a heart beat"
         ));
     }
     let step = header.pixdim[4].abs();

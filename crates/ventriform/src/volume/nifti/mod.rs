@@ -81,6 +81,11 @@ impl NiftiFile {
             not_gates,
         })
     }
+
+    /// Bytes of the unpacked file up to the last voxel.
+    pub(super) fn end(&self) -> u64 {
+        self.header.frame_begin(self.header.frames)
+    }
 }
 
 impl OpenVolume for NiftiFile {

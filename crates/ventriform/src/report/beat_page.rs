@@ -1,0 +1,376 @@
+//! The page of a beat: flags, figures with their intervals, curves, polar maps, segments, gates, the wall at both ends.
+
+use maud::{Markup, html};
+use serde_json::{Map, Value};
+
+use super::beat_report::{BeatReport, SegmentMotionReport};
+use super::sections::Program;
+use super::summaries::object;
+use super::whose;
+use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
+use crate::draw::text::{data_uri, number};
+use crate::draw::views;
+use crate::mesh::TriMesh;
+use crate::volume::Provenance;
+
+/// A beat's report with its pictures, all of them SVG.
+#[derive(Debug, Clone, Copy)]
+pub struct BeatPage<'a> {
+    /// The report.
+    pub report: &'a BeatReport,
+    /// The volume curve.
+    pub curve: Option<&'a [u8]>,
+    /// The histogram of phases.
+    pub phase: Option<&'a [u8]>,
+    /// The polar maps: file name without extension, and picture.
+    pub maps: &'a [(&'static str, &'a [u8])],
+    /// The wall at end diastole and at end systole.
+    pub meshes: [&'a TriMesh; 2],
+    /// Whose scan it is, as far as the page is to name it.
+    pub scan: Option<&'a Provenance>,
+}
+
+impl BeatPage<'_> {
+    /// The polar maps of a beat, by file name without extension, in their order, each with its title.
+    pub const MAPS: [(&'static str, &'static str); 6] = [
+        ("polar", "Uptake, all gates"),
+        ("polar_ed", "Uptake, end diastole"),
+        ("polar_es", "Uptake, end systole"),
+        ("polar_motion", "Motion inward"),
+        ("polar_thickening", "Thickening"),
+        ("polar_phase", "Phase"),
+    ];
+}
+
+/// The page as HTML. What the report does not contain is left out.
+pub fn beat_page(page: &BeatPage) -> String {
+    let report = page.report;
+    let reasons = report.flags.iter().map(|flag| flag.reason.as_str());
+    let [diastole, systole] = page.meshes;
+    HtmlDocument {
+        title: "Left ventricle: beat",
+        subtitle: &origin(report),
+        body: html! {
+            (whose::section(page.scan))
+            (verdict(report))
+            (figures(report))
+            (document::notes("Reasons to look closer", reasons))
+            (document::notes("Please note", report.warnings.iter().map(String::as_str)))
+            (curves(page))
+            (maps(page))
+            section {
+                h2 { "Gates and segments" }
+                div.row.beside { (gates(report)) (segments(report)) }
+            }
+            (views::section("The wall at end diastole", diastole, &[], false))
+            (views::section("The wall at end systole", systole, &[], false))
+            (particulars(report))
+        },
+        data: None,
+        footer: &Program::this().footer(),
+    }
+    .html()
+}
+
+/// One line on where the beat comes from.
+fn origin(report: &BeatReport) -> String {
+    let input = &report.input;
+    let times = |numbers: [f64; 3], decimals| numbers.map(|x| number(x, decimals)).join(" × ");
+    let parts = [
+        Some(format!("{} gates", report.gates.len())),
+        (report.rr_ms).map(|rr| format!("R-R interval {} ms", number(rr, 0))),
+        Some(format!("model {}", report.template)),
+        Some(format!("volume: {}", input.format)),
+        Some(format!(
+            "{} voxels",
+            times(input.shape.map(|n| n as f64), 0)
+        )),
+        Some(format!("{} mm", times(input.spacing_mm, 2))),
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
+}
+
+/// The things that could be flagged, each with whether it is in order.
+fn checks(report: &BeatReport) -> Vec<(bool, String)> {
+    let raised = |code: &str| report.flags.iter().any(|flag| flag.code == code);
+    let mut checks: Vec<(bool, String)> = [
+        ("no_contraction", "The gates are moments of one beat"),
+        ("count_loss", "No gate lacks counts"),
+        ("beats_rejected", "Few beats were rejected"),
+        ("leaves_field", "The heart lies inside of the volume"),
+        ("dark_wall", "The wall takes up enough to show its motion"),
+        ("small_heart", "The cavity is wider than the image blurs"),
+        (
+            "phase_unreliable",
+            "Enough of the wall moves to have a phase",
+        ),
+        ("outward_motion", "Every segment moves inward"),
+    ]
+    .map(|(code, text)| (!raised(code), text.to_owned()))
+    .into();
+    checks.push((
+        !raised("uncertain_fit"),
+        format!(
+            "Confidence of the fit to the gates' sum: {} %",
+            number(100.0 * report.confidence, 0)
+        ),
+    ));
+    checks
+}
+
+fn verdict(report: &BeatReport) -> Markup {
+    let (sign, headline) = match (report.ef_percent, report.flags.len()) {
+        (None, _) => (
+            Sign::Bad,
+            "The gates show no beat: there is no ejection fraction.".to_owned(),
+        ),
+        (_, 0) => (
+            Sign::Good,
+            "Nothing gives reason to doubt this beat.".to_owned(),
+        ),
+        (_, 1) => (Sign::Flag, "There is one reason to look closer.".to_owned()),
+        (_, n) => (Sign::Flag, format!("There are {n} reasons to look closer.")),
+    };
+    document::verdict(sign, &headline, &checks(report))
+}
+
+fn figures(report: &BeatReport) -> Markup {
+    let within = |label: &str, interval: Option<[f64; 2]>, decimals| match interval {
+        Some([low, high]) => format!(
+            "{label}; 90 %: {} to {}",
+            number(low, decimals),
+            number(high, decimals)
+        ),
+        None => label.to_owned(),
+    };
+    let figure = |value: Option<f64>, decimals, unit, label: String| {
+        Some(HeadlineFigure {
+            value: number(value?, decimals),
+            unit,
+            label,
+        })
+    };
+    let plain = |value, decimals, unit, label: &str| figure(value, decimals, unit, label.into());
+    let rates = report.rates.as_ref();
+    let phase = report.phase.reliable.then_some(&report.phase);
+    let all = [
+        figure(
+            report.ef_percent,
+            0,
+            "%",
+            within("ejection fraction", report.ef_interval_percent, 0),
+        ),
+        figure(
+            Some(report.edv_ml),
+            0,
+            "ml",
+            within("end-diastolic volume", Some(report.edv_interval_ml), 0),
+        ),
+        figure(
+            Some(report.esv_ml),
+            0,
+            "ml",
+            within("end-systolic volume", Some(report.esv_interval_ml), 0),
+        ),
+        plain(Some(report.sv_ml), 0, "ml", "stroke volume"),
+        plain(Some(report.mass_g), 0, "g", "mass of the wall (1.05 g/ml)"),
+        plain(
+            rates.map(|rates| rates.peak_ejection_edv_per_s),
+            2,
+            "EDV/s",
+            "peak ejection rate",
+        ),
+        plain(
+            rates.map(|rates| rates.peak_filling_edv_per_s),
+            2,
+            "EDV/s",
+            "peak filling rate",
+        ),
+        plain(
+            rates.map(|rates| rates.time_to_peak_filling_ms),
+            0,
+            "ms",
+            "end systole to peak filling",
+        ),
+        plain(
+            phase.map(|phase| phase.sd_degrees),
+            0,
+            "°",
+            "standard deviation of the phases",
+        ),
+        plain(
+            phase.map(|phase| phase.bandwidth_degrees),
+            0,
+            "°",
+            "bandwidth of the phases: 95 % of the wall",
+        ),
+    ];
+    let all: Vec<HeadlineFigure> = all.into_iter().flatten().collect();
+    html! {
+        (document::figures(&all))
+        @if let Some(reason) = &report.no_rates { p.hint { "No rates: " (reason) "." } }
+    }
+}
+
+/// The volume curve and the histogram of phases.
+fn curves(page: &BeatPage) -> Markup {
+    let phase = &page.report.phase;
+    let picture = |svg: Option<&[u8]>, alt: &str, caption: String| {
+        html! {
+            @if let Some(svg) = svg {
+                figure.paper.curve {
+                    img src=(data_uri("image/svg+xml", svg)) alt=(alt);
+                    figcaption { (caption) }
+                }
+            }
+        }
+    };
+    let reliable = if phase.reliable { "" } else { "; not reliable" };
+    html! {
+        @if page.curve.is_some() || page.phase.is_some() {
+            section {
+                h2 { "Volume and phases" }
+                p.hint {
+                    "Bars are the gates, each a mean over its width; the curve has that width taken off. "
+                    "Phase 0 is the beginning of the first gate."
+                }
+                div.row.even {
+                    (picture(page.curve, "Volume of the cavity over the beat", "Volume of the cavity, ml".into()))
+                    (picture(page.phase, "Histogram of the wall's phases", format!(
+                        "Phases of the wall: SD {}°, bandwidth {}°, entropy {} %{reliable}",
+                        number(phase.sd_degrees, 0),
+                        number(phase.bandwidth_degrees, 0),
+                        number(phase.entropy_percent, 0),
+                    )))
+                }
+            }
+        }
+    }
+}
+
+fn maps(page: &BeatPage) -> Markup {
+    let titled = BeatPage::MAPS.into_iter().filter_map(|(name, title)| {
+        let found = page.maps.iter().find(|(known, _)| *known == name)?;
+        Some((title, found.1))
+    });
+    let mut titled = titled.peekable();
+    html! {
+        @if titled.peek().is_some() {
+            section {
+                h2 { "Maps of the wall" }
+                p.hint {
+                    "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's wall; "
+                    "motion in mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle. "
+                    "There is no normal database behind them."
+                }
+                div.row {
+                    @for (title, svg) in titled {
+                        figure.paper {
+                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
+                            figcaption { (title) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn segments(report: &BeatReport) -> Markup {
+    let known = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
+    let cells = |segment: &SegmentMotionReport| {
+        [
+            number(segment.motion_mm, 1),
+            number(segment.thickening_percent, 0),
+            known(segment.thickening_counts_percent, 0),
+            known(segment.phase_degrees, 0),
+        ]
+    };
+    let columns = [
+        "motion inward, mm",
+        "thickening, %",
+        "by counts, %",
+        "phase, °",
+    ];
+    html! {
+        div {
+            div.scroll tabindex="0" role="group" aria-label="Table of segments, scrollable" {
+                table {
+                    thead {
+                        tr {
+                            th.n scope="col" { "No." }
+                            th scope="col" { "Segment" }
+                            @for column in columns { th.n scope="col" { (column) } }
+                        }
+                    }
+                    tbody {
+                        @for segment in &report.segments {
+                            tr {
+                                td.n { (segment.segment) }
+                                th scope="row" { (segment.name) }
+                                @for cell in cells(segment) { td.n { (cell) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn gates(report: &BeatReport) -> Markup {
+    let end = |gate: usize| match gate {
+        gate if gate == report.end_diastole_gate => "end diastole",
+        gate if gate == report.end_systole_gate => "end systole",
+        _ => "",
+    };
+    html! {
+        div {
+            div.scroll tabindex="0" role="group" aria-label="Table of gates, scrollable" {
+                table {
+                    thead {
+                        tr {
+                            th.n scope="col" { "Gate" }
+                            th.n scope="col" { "cavity, ml" }
+                            th.n scope="col" { "muscle, ml" }
+                            th.n scope="col" { "factor of counts" }
+                            th scope="col" { "end of the beat" }
+                        }
+                    }
+                    tbody {
+                        @for gate in &report.gates {
+                            tr {
+                                th.n scope="row" { (gate.gate) }
+                                td.n { (number(gate.cavity_ml, 1)) }
+                                td.n { (number(gate.wall_ml, 1)) }
+                                td.n { (number(gate.counts_factor, 3)) }
+                                td { (end(gate.gate)) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Everything else, by its name in the report, without long lists.
+fn particulars(report: &BeatReport) -> Markup {
+    let short = |mut object: Map<String, Value>| {
+        object.retain(|name, value| {
+            let long = value.as_array().is_some_and(|list| list.len() > 4);
+            !long && !name.starts_with("affine")
+        });
+        Value::Object(object)
+    };
+    let mut beat = object(report);
+    for told in ["parameters", "input", "timing", "phase", "rates", "flags"] {
+        beat.remove(told);
+    }
+    document::particulars(&[
+        ("Parameters", short(report.parameters.clone())),
+        ("Beat", short(beat)),
+        ("Beats in the file", short(object(&report.timing))),
+        ("Input", short(object(&report.input))),
+    ])
+}
