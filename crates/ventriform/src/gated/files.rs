@@ -16,7 +16,9 @@ use crate::model::wall::VentricleWall;
 use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, BeatReport};
-use crate::segmentation::{NamedFile, SegmentationFilesError, json_file, json_line};
+use crate::segmentation::{
+    NamedFile, SegmentationFilesError, json_file, json_line, perfusion_files,
+};
 use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
 use serde_json::json;
@@ -106,7 +108,7 @@ impl GatedHeart {
             files.push(svg_file(&format!("{name}.svg"), polar::svg(&map)));
             files.push(json_file(&format!("{name}.json"), &PolarDocument::of(&map)));
         }
-        for figure in WallFigure::ALL {
+        for figure in WallFigure::OF_BEAT {
             monitor.check()?;
             let figure = self.figure_map(map, figure);
             let name = format!("polar_{}", figure.figure.as_str());
@@ -115,6 +117,10 @@ impl GatedHeart {
                 &format!("{name}.json"),
                 &FigureDocument::of(&figure),
             ));
+        }
+        if let Some(perfusion) = &self.perfusion {
+            monitor.check()?;
+            files.extend(perfusion_files(perfusion, map));
         }
         Ok(files)
     }
@@ -127,11 +133,13 @@ impl GatedHeart {
             WallFigure::Motion => Some(contraction.motion_mm[ray]),
             WallFigure::Thickening => Some(contraction.thickening_percent[ray]),
             WallFigure::Phase => beat.phases.degrees[ray],
+            WallFigure::Z | WallFigure::Score => None,
         };
         let of_segment = |segment: &SegmentMotion| match figure {
             WallFigure::Motion => Some(segment.motion_mm),
             WallFigure::Thickening => Some(segment.thickening_percent),
             WallFigure::Phase => segment.phase_degrees,
+            WallFigure::Z | WallFigure::Score => None,
         };
         FigureMap {
             map,

@@ -18,11 +18,15 @@ pub enum WallFigure {
     Thickening,
     /// Phase of the greatest thickness, degrees of the cycle.
     Phase,
+    /// Uptake against normal limits, standard deviations from the normal mean.
+    Z,
+    /// Score of the uptake against normal limits, 0 to 4.
+    Score,
 }
 
 impl WallFigure {
-    /// Every figure.
-    pub const ALL: [Self; 3] = [Self::Motion, Self::Thickening, Self::Phase];
+    /// Those of a beat.
+    pub const OF_BEAT: [Self; 3] = [Self::Motion, Self::Thickening, Self::Phase];
 
     /// Its name in reports and file names.
     pub fn as_str(self) -> &'static str {
@@ -30,6 +34,8 @@ impl WallFigure {
             Self::Motion => "motion",
             Self::Thickening => "thickening",
             Self::Phase => "phase",
+            Self::Z => "z",
+            Self::Score => "score",
         }
     }
 
@@ -39,6 +45,8 @@ impl WallFigure {
             Self::Motion => "mm",
             Self::Thickening => "%",
             Self::Phase => "degrees",
+            Self::Z => "SD",
+            Self::Score => "score",
         }
     }
 
@@ -48,7 +56,19 @@ impl WallFigure {
             Self::Motion => [0.0, 12.0],
             Self::Thickening => [0.0, 80.0],
             Self::Phase => [0.0, 360.0],
+            Self::Z => [-5.0, 0.0],
+            Self::Score => [4.0, 0.0],
         }
+    }
+
+    /// Decimals of a segment's mean on the drawn map.
+    pub(super) fn decimals(self) -> usize {
+        usize::from(self == Self::Z)
+    }
+
+    /// Whether the figure stands on uptake, so that it has no place in the valve plane.
+    pub fn is_of_uptake(self) -> bool {
+        matches!(self, Self::Z | Self::Score)
     }
 
     pub(super) fn ticks(self) -> &'static [f64] {
@@ -56,6 +76,8 @@ impl WallFigure {
             Self::Motion => &[0.0, 3.0, 6.0, 9.0, 12.0],
             Self::Thickening => &[0.0, 20.0, 40.0, 60.0, 80.0],
             Self::Phase => &[0.0, 90.0, 180.0, 270.0, 360.0],
+            Self::Z => &[-5.0, -4.0, -3.0, -2.0, -1.0, 0.0],
+            Self::Score => &[4.0, 3.0, 2.0, 1.0, 0.0],
         }
     }
 
@@ -69,6 +91,12 @@ impl WallFigure {
             }
             Self::Phase => {
                 "Phase of the wall's greatest thickness, degrees of the cycle; grey: no wall, or none that moves"
+            }
+            Self::Z => {
+                "Uptake against normal limits, standard deviations from the normal mean; grey: nothing to compare; hatched: valve plane"
+            }
+            Self::Score => {
+                "Score of the uptake against normal limits, 0 to 4; grey: nothing to compare; hatched: valve plane"
             }
         }
     }

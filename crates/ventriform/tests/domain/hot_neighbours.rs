@@ -32,6 +32,7 @@ fn segmented(scan: &Phantom, edge: &str) -> SegmentedVolume {
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent()).unwrap()
