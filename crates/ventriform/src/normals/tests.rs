@@ -8,6 +8,7 @@ use super::perfusion::{DEFICIT_OF_FULL_SCORE, HeartFigure, Z_LIMIT, figures, sco
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use crate::geometry::random::{Purpose, stream, uniform};
 use crate::polar::{Level, RAY_COLUMNS, RAY_ROWS, segment_at};
+use std::sync::LazyLock;
 
 const PLACES: usize = RAY_ROWS * RAY_COLUMNS;
 
@@ -79,7 +80,9 @@ fn people(number: u64) -> Vec<HealthyScan> {
 }
 
 fn group() -> NormalGroup {
-    group_of(&kind(), &people(14)).unwrap().0
+    static GROUP: LazyLock<NormalGroup> =
+        LazyLock::new(|| group_of(&kind(), &people(14)).unwrap().0);
+    GROUP.clone()
 }
 
 fn file() -> NormalLimits {

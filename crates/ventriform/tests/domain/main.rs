@@ -33,6 +33,7 @@ mod orientation;
 mod pipeline;
 mod quality;
 
+mod normals;
 mod reader;
 
 mod beat;
