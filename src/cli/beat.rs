@@ -2,6 +2,7 @@
 
 use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
+use super::normals::{NormalLimitArgs, normals_line};
 use super::output::note;
 use super::parameter_args::TableArgs;
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
@@ -55,6 +56,8 @@ pub struct BeatArgs {
     #[command(flatten)]
     fit: FitArgs,
     #[command(flatten)]
+    normals: NormalLimitArgs,
+    #[command(flatten)]
     dicom: DicomArgs,
     #[command(flatten)]
     limits: LimitArgs,
@@ -75,10 +78,12 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     let whose = args.dicom.whose_of_gates(&gates, &limits)?;
     let stated = MeshStatement::default();
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
+    let normals = args.normals.order()?;
     let order = GatedOrder {
         gates: &gates,
         auto,
         models,
+        normals: normals.as_ref(),
         parameters: &parameters.fit,
         choice: parameters.choice,
     };
@@ -96,6 +101,12 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     }
     write_all(&args.output, &files)?;
     note!("{}", headline(&made));
+    if let Some(perfusion) = &made.perfusion {
+        note!("{}", normals_line(perfusion));
+        for flag in &perfusion.flags {
+            note!("warning: {flag}");
+        }
+    }
     let report = made.report();
     for warning in &report.warnings {
         note!("warning: {warning}");

@@ -20,6 +20,7 @@ mod log;
 mod measure;
 mod mesh_args;
 mod migrate;
+mod normals;
 mod output;
 mod parameter_args;
 mod phantom;
@@ -67,6 +68,7 @@ enum Command {
     Calibrate(Box<calibrate::CalibrateArgs>),
     Evaluate(Box<evaluate::EvaluateArgs>),
     Templates(templates::TemplatesArgs),
+    Normals(normals::NormalsArgs),
     Statistics(statistics::StatisticsArgs),
     Serve(Box<serve::ServeArgs>),
     Keys(keys::KeysArgs),
@@ -105,6 +107,7 @@ pub fn main() -> ExitCode {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Templates(args) => templates::run(&args),
+        Command::Normals(args) => normals::run(&args),
         Command::Statistics(args) => statistics::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::Serve(args) => serve::run(&args),

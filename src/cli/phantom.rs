@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use ventriform::progress::{CancelToken, Monitor};
 use ventriform::volume::Volume;
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_person, phantom};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]
@@ -16,17 +16,26 @@ use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
   ventriform phantom -o phantom --spacing 2 --seed 7 --defect 8:0.7
   ventriform phantom -o moved --motion 20
   ventriform phantom -o infarct --defect 3:1 --defect 9:1 --right-ventricle 1.2
-writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json")]
+writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json
+  ventriform phantom -o healthy --normal --seed 5
+writes 30 healthy hearts (--cases) and healthy/cohort.csv, from which `ventriform normals build` makes limits for tests. They are
+simulated, not patients: such limits say so, and are not for patients.")]
 pub struct PhantomArgs {
     /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "DIR", default_value = "phantom")]
     output: PathBuf,
-    /// Voxels along each axis
-    #[arg(long, value_name = "N", default_value_t = 128)]
-    size: usize,
-    /// Distance between voxel centres, millimetres
-    #[arg(long, value_name = "MM", default_value_t = 3.2)]
-    spacing: f64,
+    /// Simulated healthy hearts that differ as people do, with a cohort.csv for `normals build`: simulated, not patients
+    #[arg(long, conflicts_with_all = ["defect", "motion"])]
+    normal: bool,
+    /// Number of healthy hearts, with --normal [default: 30]
+    #[arg(long, value_name = "N", requires = "normal", value_parser = clap::value_parser!(u32).range(1..=500))]
+    cases: Option<u32>,
+    /// Voxels along each axis [default: 128, with --normal 64]
+    #[arg(long, value_name = "N")]
+    size: Option<usize>,
+    /// Distance between voxel centres, millimetres [default: 3.2, with --normal 6.4]
+    #[arg(long, value_name = "MM")]
+    spacing: Option<f64>,
     /// Counting noise: standard deviation divided by the mean in healthy wall; 0 for none
     #[arg(long, value_name = "X", default_value_t = 0.05)]
     noise: f64,
@@ -74,8 +83,8 @@ fn parse_defect(text: &str) -> Result<PerfusionDefect, String> {
 /// If a parameter is out of range or a file cannot be written.
 pub fn run(args: &PhantomArgs) -> Result<()> {
     let parameters = PhantomParameters {
-        shape: [args.size; 3],
-        spacing_mm: [args.spacing; 3],
+        shape: [args.size.unwrap_or(if args.normal { 64 } else { 128 }); 3],
+        spacing_mm: [args.spacing.unwrap_or(if args.normal { 6.4 } else { 3.2 }); 3],
         noise: args.noise,
         liver: args.liver,
         right_ventricle: args.right_ventricle,
@@ -85,6 +94,9 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
         seed: args.seed,
         ..PhantomParameters::default()
     };
+    if args.normal {
+        return healthy(args, &parameters);
+    }
     let bar = Bar::start();
     let made = phantom(&parameters, &Monitor::new(&bar, CancelToken::new()));
     bar.finish();
@@ -101,6 +113,45 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     );
     Ok(())
 }
+
+/// What the simulated healthy people are called in their files.
+const PEOPLE: &str = "simulated, not patients";
+
+/// Healthy hearts of as many seeds as asked for, and the table of who they are.
+fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
+    create_folder(&args.output)?;
+    let mut table = String::from("case,file,sex,protocol,tracer,attenuation_corrected,healthy\n");
+    for number in 0..args.cases.unwrap_or(30) {
+        let person = healthy_person(args.seed.wrapping_add(u64::from(number)), base);
+        let made = phantom(&person.parameters, &Monitor::silent())?;
+        let case = format!("n{number:03}");
+        let folder = args.output.join(&case);
+        create_folder(&folder)?;
+        write_volume(
+            &folder.join("spect.nii.gz"),
+            &made.volume,
+            StoredType::Int16,
+        )?;
+        let mut facts = serde_json::to_value(&made.parameters)?;
+        facts["people"] = PEOPLE.into();
+        write_file(
+            &folder.join("params.json"),
+            serde_json::to_string_pretty(&facts)?.as_bytes(),
+        )?;
+        let sex = if person.female { "F" } else { "M" };
+        table += &format!("{case},{case}/spect.nii.gz,{sex},phantom,{PEOPLE_TRACER},no,yes\n");
+    }
+    write_file(&args.output.join("cohort.csv"), table.as_bytes())?;
+    note!(
+        "Written: {} healthy hearts ({PEOPLE}) and cohort.csv in {}",
+        args.cases.unwrap_or(30),
+        args.output.display()
+    );
+    Ok(())
+}
+
+/// The tracer of the table, by which limits know that their people are simulated.
+const PEOPLE_TRACER: &str = "none (simulated)";
 
 fn write_volume(path: &Path, volume: &Volume, stored: StoredType) -> Result<()> {
     write_file(path, &nifti::write(volume, stored, true)?)

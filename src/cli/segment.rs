@@ -4,6 +4,7 @@ use super::dicom_args::DicomArgs;
 use super::generate::parse_part;
 use super::limit_args::LimitArgs;
 use super::mesh_args::read_mesh;
+use super::normals::{NormalLimitArgs, normals_line};
 use super::output::{create_folder, note, write_file};
 use super::volume_args::volume_files;
 use super::{Bar, FitArgs, UnusableArgument};
@@ -62,6 +63,8 @@ pub struct SegmentArgs {
     #[arg(long = "part", value_name = "PART", value_parser = parse_part)]
     parts: Vec<Part>,
     #[command(flatten)]
+    normals: NormalLimitArgs,
+    #[command(flatten)]
     dicom: DicomArgs,
     #[command(flatten)]
     fit: FitArgs,
@@ -93,12 +96,14 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     let stated = parameters.mask.mesh;
     let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
+    let normals = args.normals.order()?;
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),
         auto,
         models,
         reader: args.reader.as_deref().map(reader).transpose()?,
+        normals: normals.as_ref(),
         parameters: &parameters,
     };
     let bar = Bar::over(Plan::SEGMENTATION);
@@ -126,6 +131,12 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     }
     write_all(&args.output, &files)?;
     note!("{}", headline(&made.segmentation));
+    if let Some(perfusion) = &made.perfusion {
+        note!("{}", normals_line(perfusion));
+        for flag in &perfusion.flags {
+            note!("warning: {flag}");
+        }
+    }
     for warning in made.warnings() {
         note!("warning: {warning}");
     }

@@ -349,6 +349,7 @@ impl Watcher {
             auto: true,
             models: Vec::new(),
             reader: None,
+            normals: None,
             parameters: &parameters,
         };
         match from_files(&order, &ReadLimits::default(), &monitor) {

@@ -22,6 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &parameters,
     };
     let quiet = Monitor::silent();

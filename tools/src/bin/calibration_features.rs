@@ -142,6 +142,7 @@ fn segmented(
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())

@@ -38,6 +38,7 @@ fn row(folder: &Path) -> Result<String> {
         rest: &rest,
         auto: true,
         models: Vec::new(),
+        normals: None,
         parameters: &parameters,
     };
     let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())

@@ -58,6 +58,7 @@ fn line(case: &Path) -> Result<String> {
             auto: true,
             models: Vec::new(),
             reader: None,
+            normals: None,
             parameters: &parameters,
         };
         from_files(&order, &limits, &monitor)

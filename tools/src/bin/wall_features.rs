@@ -232,6 +232,7 @@ fn segmented(case: &Path, edge: WallEdge) -> Result<SegmentedVolume> {
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &parameters,
     };
     Ok(from_files(

@@ -59,6 +59,7 @@ impl Work for BeatWork {
             GatedParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
         let order = GatedOrder {
             gates: &volume_files(&input.files),
+            normals: None,
             auto: parameters.fit.is_auto(),
             models: stored_models(input, &parameters.fit)?,
             parameters: &parameters.fit,

@@ -19,6 +19,7 @@ use ventriform::gated::GatedError;
 use ventriform::locate::LocateError;
 use ventriform::mesh_files::MeshFileError;
 use ventriform::model::{Organ, TemplateError};
+use ventriform::normals::NormalsError;
 use ventriform::parameters::ParameterError;
 use ventriform::pipeline::PipelineError;
 use ventriform::reader::ProfileError;
@@ -223,6 +224,7 @@ impl Explain for SegmentationError {
                 let named = failure.field.is_some() && !matches!(mask, GivenMaskError::File(_));
                 return if named { failure } else { failure.at("expert") };
             }
+            SegmentationError::Normals(error) => return error.explain(),
             SegmentationError::Cancelled(_) => {
                 return failure(CANCELLED_FAILURE, self, None, START_AGAIN.into());
             }
@@ -232,6 +234,47 @@ impl Explain for SegmentationError {
 
     fn is_cancelled(&self) -> bool {
         SegmentationError::is_cancelled(self)
+    }
+}
+
+impl Explain for NormalsError {
+    fn explain(&self) -> Failure {
+        let (field, advice) = match self {
+            Self::Syntax(_) | Self::Field { .. } => (
+                "normals",
+                "Give a file that `ventriform normals build` wrote.",
+            ),
+            Self::SchemaVersion(_) => (
+                "normals",
+                "Build the limits anew with this program, or use the program that wrote them.",
+            ),
+            Self::Edited { .. } => (
+                "normals",
+                "Give the file as it was written, or build it anew.",
+            ),
+            Self::TooFewCases { .. } => (
+                "normals",
+                "Add healthy cases of this kind, or make men and women one group.",
+            ),
+            Self::OtherKind { .. } => (
+                "normals",
+                "Give limits of this sex, protocol, tracer and attenuation correction.",
+            ),
+            Self::Ambiguous { .. } => (
+                "normals",
+                "State `sex`, `protocol`, `tracer` and `attenuation_corrected` of the scan.",
+            ),
+            Self::OtherSex { .. } => ("sex", "Leave `sex` out, or correct it."),
+            Self::Unoriented => (
+                "superior",
+                "State `superior`, the direction to the patient's head.",
+            ),
+            Self::TooLittleWall { .. } => (
+                "normals",
+                "Look at the fit: the base may be outside of the image, or the heart may not have been found.",
+            ),
+        };
+        failure(UNSUITABLE_CHOICE, self, Some(field), advice.into())
     }
 }
 

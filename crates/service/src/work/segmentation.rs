@@ -63,6 +63,7 @@ impl Work for SegmentationWork {
         let order = SegmentationOrder {
             volume: &volume_files(&input.files),
             expert: expert.as_deref(),
+            normals: None,
             auto: parameters.is_auto(),
             models: stored_models(input, &parameters)?,
             reader: reader(input)?,

@@ -3,7 +3,7 @@
 use super::calibration::DIFFERENCE_SD_POINTS;
 use super::turn::{self, Turn};
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
-use crate::normals::{MatchedScale, PlaceLimits, ScanPlaces, matched_scale};
+use crate::normals::{self, Matched, PlaceLimits, ScanPlaces, TermMatrix};
 use crate::polar::{ARTERY_NAMES, PolarMap, territory};
 
 /// Loss of uptake at stress beyond which wall is reversible, per cent of the rest map's reference.
@@ -198,18 +198,16 @@ impl Change {
 }
 
 /// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the normal mean.
-pub(super) fn matched(
-    stress: &ScanPlaces,
-    rest: &ScanPlaces,
-    reference: f64,
-) -> Option<MatchedScale> {
+pub(super) fn matched(stress: &ScanPlaces, rest: &ScanPlaces, reference: f64) -> Option<Matched> {
     let as_limits = PlaceLimits {
         mean: (rest.uptake.iter())
             .map(|uptake| uptake.filter(|uptake| *uptake > 0.0))
             .collect(),
         sd: vec![Some(DIFFERENCE_SD_POINTS / 100.0 * reference); rest.uptake.len()],
+        // The pattern of one heart is the same in both scans.
+        covariance: TermMatrix::zeros(),
     };
-    matched_scale(stress, &as_limits)
+    normals::matched(stress, &as_limits)
 }
 
 /// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and columns.

@@ -122,6 +122,7 @@ fn still(
         auto: order.auto,
         models: order.models.clone(),
         reader: None,
+        normals: order.normals.as_ref().map(|normals| normals.of(scan)),
         parameters: &parameters,
     };
     let made = segmentation::from_files(&own, limits, monitor)
@@ -141,6 +142,7 @@ fn beating(
     let parameters = keeping(order, kept);
     let own = GatedOrder {
         gates: files,
+        normals: order.normals.as_ref().map(|normals| normals.of(scan)),
         auto: order.auto,
         models: order.models.clone(),
         parameters: &parameters,

@@ -3,6 +3,7 @@
 use super::difference::{Change, Sides};
 use super::flags::{ComparisonFlag, WhichScan};
 use crate::gated::GatedHeart;
+use crate::normals::Perfusion;
 use crate::parameters::{ComparisonChoice, FitParameters};
 use crate::polar::PolarMap;
 use crate::segmentation::{Segmentation, SegmentedVolume};
@@ -47,6 +48,14 @@ impl ComparedHeart {
         match self {
             Self::Still(made) => &made.reading.facts,
             Self::Beating(made) => &made.reading.facts,
+        }
+    }
+
+    /// The wall's uptake beside normal limits, if some were given.
+    pub fn perfusion(&self) -> Option<&Perfusion> {
+        match self {
+            Self::Still(made) => made.perfusion.as_ref(),
+            Self::Beating(made) => made.perfusion.as_ref(),
         }
     }
 

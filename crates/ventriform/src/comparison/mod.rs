@@ -8,11 +8,12 @@
 //! 2. The scans are checked ([`checks`]): one patient, one at stress and one at rest, made alike. One scan given twice and scans of
 //!    different patients are refused; what makes figures doubtful is a [`ComparisonFlag`] with its numbers.
 //! 3. The stress map is turned about the long axis if the maps then agree significantly better ([`turn`]).
-//! 4. Stress is scaled to rest by the places that did not change ([`matched_scale`](crate::normals::matched_scale) with the rest map in place of the normal mean),
+//! 4. Stress is scaled to rest by the places that did not change ([`matched`](crate::normals::matched) with the rest map in place of the normal mean),
 //!    never by each map's maximum.
 //! 5. The difference, rest less stress, is smoothed over the wall ([`difference`]). Wall that loses more at stress than
 //!    [`REVERSIBLE_POINTS`] is reversible; wall below the threshold of both maps is fixed.
-//! 6. The ratio of the cavities (transient ischaemic dilation, TID) is that of the anatomical walls, in the images of all gates.
+//! 6. With normal limits, each scan is scored by the group of its own protocol; the summed difference score adds up what segments score more at stress.
+//! 7. The ratio of the cavities (transient ischaemic dilation, TID) is that of the anatomical walls, in the images of all gates.
 //!
 //! Guaranteed: a scan multiplied by a factor gives the same figures.
 //!
@@ -38,5 +39,5 @@ pub use error::ComparisonError;
 pub use flags::{ComparisonFlag, Reason, WhichScan};
 pub use from_files::from_files;
 pub use hearts::{ComparedHeart, ComparedHearts};
-pub use order::{ComparisonOrder, ScanOrder};
+pub use order::{ComparisonNormals, ComparisonOrder, ScanOrder};
 pub use turn::Turn;

@@ -229,6 +229,7 @@ impl ReadCase {
             auto: true,
             models: Vec::new(),
             reader: None,
+            normals: None,
             parameters,
         };
         let made = from_files(&order, &ReadLimits::default(), &monitor);

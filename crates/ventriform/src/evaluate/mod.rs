@@ -16,7 +16,7 @@
 //!    without it.
 //! 6. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!
-//! [`statistics`] stands beside this: mean shape and principal modes of fits of one model.
+//! [`normals`] stands beside this: limits from scans of healthy people. [`statistics`], too: mean shape and principal modes of fits of one model.
 //!
 //! Guaranteed: the same cohort, parameters and program give the same bytes, on any number of
 //! threads and however often the run was stopped.
@@ -31,6 +31,7 @@ pub mod findings;
 pub mod fits;
 pub mod leave_one_out;
 pub mod models;
+pub mod normals;
 pub mod observer;
 pub mod paired;
 pub mod parameters;

@@ -16,7 +16,9 @@ use crate::model::wall::VentricleWall;
 use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, BeatPage, BeatReport};
-use crate::segmentation::{NamedFile, SegmentationFilesError, json_file, json_line};
+use crate::segmentation::{
+    NamedFile, SegmentationFilesError, json_file, json_line, perfusion_files,
+};
 use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
 use serde_json::json;
@@ -116,6 +118,10 @@ impl GatedHeart {
                 &FigureDocument::of(&figure),
             ));
         }
+        if let Some(perfusion) = &self.perfusion {
+            monitor.check()?;
+            files.extend(perfusion_files(perfusion, map));
+        }
         Ok(files)
     }
 
@@ -127,13 +133,13 @@ impl GatedHeart {
             WallFigure::Motion => Some(contraction.motion_mm[ray]),
             WallFigure::Thickening => Some(contraction.thickening_percent[ray]),
             WallFigure::Phase => beat.phases.degrees[ray],
-            WallFigure::Difference => None,
+            WallFigure::Difference | WallFigure::Z | WallFigure::Score => None,
         };
         let of_segment = |segment: &SegmentMotion| match figure {
             WallFigure::Motion => Some(segment.motion_mm),
             WallFigure::Thickening => Some(segment.thickening_percent),
             WallFigure::Phase => segment.phase_degrees,
-            WallFigure::Difference => None,
+            WallFigure::Difference | WallFigure::Z | WallFigure::Score => None,
         };
         FigureMap {
             map,

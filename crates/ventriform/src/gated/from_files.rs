@@ -5,13 +5,17 @@ use super::order::GatedOrder;
 use crate::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
 use crate::deform::WallSurface;
 use crate::mesh::TriMesh;
+use crate::normals::{HeartFigure, Perfusion};
 use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
 use crate::polar::SEGMENT_NAMES;
 use crate::progress::Monitor;
 use crate::report::{
-    BeatParts, BeatReport, FileFacts, LongAxis, Posture, RaisedFlag, Resolution, SegmentationReport,
+    BeatParts, BeatReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
+    SegmentationReport,
 };
-use crate::segmentation::{Segmentation, SegmentationParameters, prepare, segment};
+use crate::segmentation::{
+    Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare, segment,
+};
 use crate::volume::{GatedReading, ReadLimits, read_gates};
 
 /// The beat of a study with what it was made from.
@@ -33,6 +37,8 @@ pub struct GatedHeart {
     pub choice: BeatChoice,
     /// The R-R interval, ms: as given, or as the file states it.
     pub rr_ms: Option<f64>,
+    /// Uptake and beat beside normal limits, if some were given.
+    pub perfusion: Option<Perfusion>,
 }
 
 /// Makes the beat of the study of `order`.
@@ -87,8 +93,15 @@ pub fn from_files(
     let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
     let beat = Beat::of(fitted, &study, map, rr_ms);
     reading.gates = study.gates;
+    let judged = |order| {
+        let figures = beat_figures(&segmentation, &beat);
+        let scan = reading.provenance();
+        judged_by_normals(&segmentation, &figures, scan, &parameters, order)
+    };
+    let perfusion = order.normals.map(judged).transpose()?;
     Ok(GatedHeart {
         meshes: beat.fit.carried(&wall.mesh, &wall.wall),
+        perfusion,
         reading,
         wall,
         beat,
@@ -97,6 +110,35 @@ pub fn from_files(
         rr_ms,
         segmentation,
     })
+}
+
+/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat.
+pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure> {
+    let whole = |figure, value| HeartFigure {
+        figure,
+        segment: None,
+        value,
+    };
+    let mut figures = heart_figures(segmentation);
+    figures.extend(beat.ef_percent.map(|ef| whole("ef_percent", ef)));
+    figures.extend([
+        whole("edv_ml", beat.end_diastole.cavity_ml),
+        whole("esv_ml", beat.end_systole.cavity_ml),
+        whole("phase_sd_degrees", beat.phases.sd_degrees),
+        whole("phase_bandwidth_degrees", beat.phases.bandwidth_degrees),
+    ]);
+    for segment in &beat.segments {
+        let own = |figure, value| HeartFigure {
+            figure,
+            segment: Some(segment.segment),
+            value,
+        };
+        figures.extend([
+            own("motion_mm", segment.motion_mm),
+            own("thickening_percent", segment.thickening_percent),
+        ]);
+    }
+    figures
 }
 
 impl GatedHeart {
@@ -133,6 +175,8 @@ impl GatedHeart {
             parameters: parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),
             warnings: self.reading.facts.warnings.clone(),
+            perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
+                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
         };
         BeatReport::new(&self.beat, parts)
     }

@@ -15,6 +15,6 @@ mod order;
 mod pictures;
 
 pub use error::GatedError;
-pub use from_files::{GatedHeart, from_files};
+pub use from_files::{GatedHeart, beat_figures, from_files};
 pub use names::{FILE_NAMES, GATE_FILE_PATTERN, end_mesh, gate_labels, is_gate_mesh};
 pub use order::GatedOrder;

@@ -1,7 +1,7 @@
 //! The input of a beat.
 
 use crate::parameters::{BeatChoice, FitParameters};
-use crate::segmentation::NamedMesh;
+use crate::segmentation::{NamedMesh, NormalsOrder};
 use crate::volume::VolumeFile;
 
 /// The files, models and parameters of a beat.
@@ -13,6 +13,8 @@ pub struct GatedOrder<'a> {
     pub auto: bool,
     /// Further models to fit.
     pub models: Vec<NamedMesh>,
+    /// The normal limits to compare the beat with.
+    pub normals: Option<&'a NormalsOrder>,
     /// The parameters of the fit to the gates' sum.
     pub parameters: &'a FitParameters,
     /// The parameters of the beat.

@@ -23,6 +23,8 @@ pub enum Purpose {
     PhantomShape = 5,
     /// Starting poses of the deformable model.
     Pose = 6,
+    /// How healthy phantoms differ.
+    PhantomPerson = 7,
 }
 
 /// The generator of the stream for `purpose` with this seed.

@@ -2,6 +2,7 @@
 
 use super::error::NormalsError;
 use super::kind::{GroupSex, ScanKind, yes_or_no};
+use super::pattern::TERMS;
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -99,6 +100,9 @@ pub struct LimitMap {
     pub mean: Vec<Vec<Option<f64>>>,
     /// Standard deviation, the uncertainty of so small a sample's mean and deviation included.
     pub sd: Vec<Vec<Option<f64>>>,
+    /// Covariance of the coefficients by which healthy people differ from the mean as a whole: of 2 r - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a,
+    /// r sin 2a, with the way r from apex (0) to base (1) and the angle a from lateral over anterior. `sd` is what is left beside these.
+    pub pattern_covariance: [[f64; TERMS]; TERMS],
 }
 
 /// Limits of a figure of the whole heart, or of a segment.
@@ -284,6 +288,15 @@ impl NormalLimits {
                 {
                     return Err(field(at(name), "its numbers must be above 0"));
                 }
+            }
+            let mut covariance = group.map.pattern_covariance.iter().flatten();
+            if covariance.any(|x| !x.is_finite())
+                || (0..TERMS).any(|n| group.map.pattern_covariance[n][n] < 0.0)
+            {
+                return Err(field(
+                    at("map.pattern_covariance"),
+                    "its numbers must be finite, those of the diagonal not below 0",
+                ));
             }
         }
         Ok(())

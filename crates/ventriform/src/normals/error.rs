@@ -1,7 +1,7 @@
 //! Why limits cannot be read, built or applied.
 
 use super::document::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
-use super::kind::ScanKind;
+use super::kind::{ScanKind, Sex};
 
 /// Why limits cannot be read, built or applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,6 +57,14 @@ pub enum NormalsError {
         scan: ScanKind,
         /// The groups that suit.
         groups: Vec<String>,
+    },
+    /// The scan's header states the other sex than the caller.
+    #[error("the scan's header has the patient's sex {}, and {} was given", .header.as_str(), .stated.as_str())]
+    OtherSex {
+        /// The header's.
+        header: Sex,
+        /// The caller's.
+        stated: Sex,
     },
     /// The sides of the wall are not known.
     #[error(

@@ -4,7 +4,8 @@ use super::document::{FEW_CASES, NormalGroup, NormalLimits};
 use super::error::NormalsError;
 use super::flags::NormalsFlag;
 use super::kind::{GroupSex, ScanKind};
-use super::matching::scale_of;
+use super::matching::matched_places;
+use super::pattern::Coefficients;
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use crate::polar::{ARTERY_NAMES, PolarMap, territory};
 
@@ -19,7 +20,7 @@ const FULL_SUMMED_SCORE: f64 = 68.0;
 /// Share of the wall that must be comparable, per cent.
 const LEAST_COMPARED_PERCENT: f64 = 50.0;
 /// Share of the basal segments without comparison above which a scan is flagged, per cent.
-const FLAGGED_BASE_PERCENT: f64 = 50.0;
+const FLAGGED_BASE_PERCENT: f64 = 60.0;
 /// Share of the wall that sets the scale below which a scan is flagged.
 const FLAGGED_MATCHED_SHARE: f64 = 0.4;
 
@@ -48,6 +49,8 @@ pub struct Perfusion {
     pub segments: [SegmentPerfusion; 17],
     /// The territories LAD, LCX and RCA.
     pub territories: [TerritoryPerfusion; 3],
+    /// The heart's figures that have limits.
+    pub figures: Vec<ComparedFigure>,
     /// Reasons to look closer.
     pub flags: Vec<NormalsFlag>,
 }
@@ -101,6 +104,17 @@ pub struct TerritoryPerfusion {
     pub deficit_percent: f64,
     /// Sum of its segments' scores.
     pub summed_score: u32,
+}
+
+/// A figure of the whole heart or of a segment, which may have limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeartFigure {
+    /// Its name, with its unit.
+    pub figure: &'static str,
+    /// The segment, 1 to 17; `None` for the whole heart.
+    pub segment: Option<usize>,
+    /// Its value.
+    pub value: f64,
 }
 
 /// A figure of the whole heart or of a segment beside its limits.
@@ -170,6 +184,7 @@ fn percent(part: f64, whole: f64) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Figures {
     pub scale: f64,
+    pub pattern: Coefficients,
     pub matched_share: f64,
     pub compared_percent: f64,
     pub z: Vec<Option<f64>>,
@@ -191,6 +206,11 @@ impl Figures {
     }
 }
 
+/// A sum of the segments' scores in per cent of the greatest.
+pub fn summed_percent(score: u32) -> f64 {
+    100.0 * f64::from(score) / FULL_SUMMED_SCORE
+}
+
 /// The score of a place: 0 at the limit, 4 at [`DEFICIT_OF_FULL_SCORE`] below the mean. `relative_sd` is the standard deviation as a share of the mean.
 pub fn score_of(deficit: f64, relative_sd: f64) -> f64 {
     let limit = Z_LIMIT * relative_sd;
@@ -208,14 +228,14 @@ pub fn score_of(deficit: f64, relative_sd: f64) -> f64 {
 /// The figures of a scan; `None` if nothing can be compared.
 pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures> {
     let places = limits.compared(scan);
-    let scale = scale_of(&places)?;
+    let scale = matched_places(&places, &limits.precision())?;
     let mut z = vec![None; scan.uptake.len()];
     let mut scores = z.clone();
     let mut of_segment = [Sums::default(); 17];
     for place in &places {
-        let own_z = place.z(scale.counts);
-        let deficit = 1.0 - place.uptake / scale.counts / place.mean;
-        let score = score_of(deficit, place.sd / place.mean);
+        let (own_z, expected) = (scale.z(place), scale.expected(place));
+        let deficit = 1.0 - place.uptake / scale.counts / expected;
+        let score = score_of(deficit, place.sd / expected);
         (z[place.index], scores[place.index]) = (Some(own_z), Some(score));
         let low = if own_z < -Z_LIMIT { place.area } else { 0.0 };
         let sums = &mut of_segment[scan.segment[place.index] - 1];
@@ -262,6 +282,7 @@ pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures
     let all = of_segment.into_iter().fold(Sums::default(), Sums::add);
     Some(Figures {
         scale: scale.counts,
+        pattern: scale.pattern,
         matched_share: scale.share,
         compared_percent: percent(all.area, areas.iter().sum()),
         z,
@@ -274,12 +295,13 @@ pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures
     })
 }
 
-/// `map` against the group of `limits` for a scan of this kind.
+/// `map` and the `heart`'s figures against the group of `limits` for a scan of this kind.
 ///
 /// # Errors
 /// [`NormalsError`]: there is no such group, or too little wall can be compared.
 pub fn apply(
     map: &PolarMap,
+    heart: &[HeartFigure],
     kind: &ScanKind,
     limits: &NormalLimits,
 ) -> Result<Perfusion, NormalsError> {
@@ -287,11 +309,12 @@ pub fn apply(
     if !map.is_oriented() {
         return Err(NormalsError::Unoriented);
     }
-    let found = figures(&ScanPlaces::of(map), &PlaceLimits::from(&group.map));
-    let Some(found) = found.filter(|found| found.compared_percent >= LEAST_COMPARED_PERCENT) else {
-        let percent = 0.0;
+    let found = figures(&ScanPlaces::of(map), &PlaceLimits::from(&group.map))
+        .ok_or(NormalsError::TooLittleWall { percent: 0.0 })?;
+    let percent = found.compared_percent;
+    if percent < LEAST_COMPARED_PERCENT {
         return Err(NormalsError::TooLittleWall { percent });
-    };
+    }
     let summed_score = found.summed_score();
     Ok(Perfusion {
         flags: flags(&found, kind, limits, group),
@@ -310,9 +333,13 @@ pub fn apply(
         severity: found.severity,
         deficit_percent: found.deficit_percent,
         summed_score,
-        summed_percent: 100.0 * f64::from(summed_score) / FULL_SUMMED_SCORE,
+        summed_percent: summed_percent(summed_score),
         segments: found.segments,
         territories: found.territories,
+        figures: heart
+            .iter()
+            .filter_map(|figure| group.beside(figure))
+            .collect(),
         z: found.z,
         scores: found.scores,
     })
@@ -355,33 +382,22 @@ fn flags(
     raised.into_iter().flatten().collect()
 }
 
-impl NormalLimits {
-    /// Figures of a scan of this kind, each as (name, segment, value), beside their limits; those without limits are left out.
-    ///
-    /// # Errors
-    /// [`NormalsError`]: there is no such group.
-    pub fn compared_figures(
-        &self,
-        kind: &ScanKind,
-        figures: &[(&str, Option<usize>, f64)],
-    ) -> Result<Vec<ComparedFigure>, NormalsError> {
-        let group = self.group(kind)?;
-        let beside = |(name, segment, value): &(&str, Option<usize>, f64)| {
-            let limit = (group.figures.iter())
-                .find(|limit| limit.figure == *name && limit.segment == *segment)?;
-            Some(ComparedFigure {
-                figure: limit.figure.clone(),
-                segment: limit.segment,
-                value: *value,
-                z: (limit.sd > 0.0).then(|| (value - limit.mean) / limit.sd),
-                within: (limit.low..=limit.high).contains(value),
-                n: limit.n,
-                mean: limit.mean,
-                sd: limit.sd,
-                low: limit.low,
-                high: limit.high,
-            })
-        };
-        Ok(figures.iter().filter_map(beside).collect())
+impl NormalGroup {
+    /// A figure beside its limits; `None` without any.
+    fn beside(&self, own: &HeartFigure) -> Option<ComparedFigure> {
+        let limit = (self.figures.iter())
+            .find(|limit| limit.figure == own.figure && limit.segment == own.segment)?;
+        Some(ComparedFigure {
+            figure: limit.figure.clone(),
+            segment: limit.segment,
+            value: own.value,
+            z: (limit.sd > 0.0).then(|| (own.value - limit.mean) / limit.sd),
+            within: (limit.low..=limit.high).contains(&own.value),
+            n: limit.n,
+            mean: limit.mean,
+            sd: limit.sd,
+            low: limit.low,
+            high: limit.high,
+        })
     }
 }

@@ -1,7 +1,11 @@
 //! Limits of every place of the map, and what of a scan is compared with them.
 
 use super::document::LimitMap;
+use super::pattern::TermMatrix;
 use crate::polar::{PolarMap, RAY_COLUMNS, RAY_ROWS};
+
+/// Variance of a coefficient that is added, so that a covariance has an inverse.
+const LEAST_VARIANCE: f64 = 1e-8;
 
 /// Normal mean and standard deviation of every place, row by row from apex to base; `None` where there are none.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,6 +14,8 @@ pub struct PlaceLimits {
     pub mean: Vec<Option<f64>>,
     /// Standard deviations, all above 0.
     pub sd: Vec<Option<f64>>,
+    /// Covariance of the coefficients of healthy people's patterns.
+    pub covariance: TermMatrix,
 }
 
 /// The wall of a scan as limits see it: one entry for each place, row by row from apex to base.
@@ -47,12 +53,12 @@ impl PlaceLimits {
         });
         places.collect()
     }
-}
 
-impl ComparedPlace {
-    /// Standard deviations from the mean, of a scan with this `scale`.
-    pub fn z(&self, scale: f64) -> f64 {
-        (self.uptake / scale - self.mean) / self.sd
+    /// The inverse of the covariance; a covariance that has none gives patterns that do not vary.
+    pub(super) fn precision(&self) -> TermMatrix {
+        let held = self.covariance + TermMatrix::identity() * LEAST_VARIANCE;
+        let still = TermMatrix::identity() / LEAST_VARIANCE;
+        held.cholesky().map_or(still, |solver| solver.inverse())
     }
 }
 
@@ -87,12 +93,13 @@ impl From<&LimitMap> for PlaceLimits {
         Self {
             mean: flat(&map.mean),
             sd: flat(&map.sd),
+            covariance: TermMatrix::from_fn(|a, b| map.pattern_covariance[a][b]),
         }
     }
 }
 
 impl From<&PlaceLimits> for LimitMap {
-    /// Numbers to six places.
+    /// Numbers to six places, covariances to twelve.
     fn from(limits: &PlaceLimits) -> Self {
         let round = |x: f64| (1e6 * x).round() / 1e6;
         let rows = |flat: &[Option<f64>]| -> Vec<Vec<Option<f64>>> {
@@ -103,6 +110,9 @@ impl From<&PlaceLimits> for LimitMap {
         Self {
             mean: rows(&limits.mean),
             sd: rows(&limits.sd),
+            pattern_covariance: std::array::from_fn(|a| {
+                std::array::from_fn(|b| (1e12 * limits.covariance[(a, b)]).round() / 1e12)
+            }),
         }
     }
 }

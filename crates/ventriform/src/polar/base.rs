@@ -30,9 +30,9 @@ const OUTLIER_MM: f64 = 3.0;
 /// Rounds of reweighting.
 const REWEIGHTING_ROUNDS: usize = 60;
 /// Distance before the fit up to which the image is followed, mm.
-const FOLLOWED_MM: f64 = 4.0;
+const FOLLOWED_MM: f64 = 2.0;
 /// Distance before the fit from which a column is dark, not short, mm.
-const DEFECT_MM: f64 = 8.0;
+const DEFECT_MM: f64 = 5.0;
 /// Standard deviation of the smoothing, columns.
 const SMOOTHING_COLUMNS: f64 = 1.0;
 

@@ -97,7 +97,7 @@ pub struct PolarSegment {
 pub struct FigureDocument {
     /// The figure.
     pub figure: WallFigure,
-    /// Its unit: `mm`, `%` or `degrees` of the cycle.
+    /// Its unit: `mm`, `%`, `degrees` of the cycle, `SD` or `score`.
     pub unit: String,
     /// The values of the first and the last colour of the drawn map.
     pub range: [f64; 2],
@@ -109,8 +109,11 @@ pub struct FigureDocument {
     pub orientation: String,
     /// The 17 segments.
     pub segments: Vec<FigureSegment>,
-    /// The pixels; null where there is no wall, or none that moves.
+    /// The pixels; null where there is no wall, none that moves, or nothing to compare.
     pub values: Vec<Vec<Option<f64>>>,
+    /// What lies at each pixel, of figures of uptake: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub states: Option<Vec<Vec<PlaceState>>>,
     /// The number of the segment to which each pixel belongs.
     pub segment_of: Vec<Vec<usize>>,
     /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
@@ -220,6 +223,7 @@ impl FigureDocument {
             values: rows
                 .map(|row| row.iter().map(|value| value.map(round)).collect())
                 .collect(),
+            states: figure.figure.is_of_uptake().then(|| states(map)),
             segment_of: segment_numbers(map),
             level_ends: level_ends(map),
             rings: ring_shares(map),

@@ -20,10 +20,14 @@ pub enum WallFigure {
     Phase,
     /// Uptake at rest less that at stress, per cent of that at rest.
     Difference,
+    /// Uptake against normal limits, standard deviations from the normal mean.
+    Z,
+    /// Score of the uptake against normal limits, 0 to 4.
+    Score,
 }
 
 impl WallFigure {
-    /// The figures of a beat.
+    /// Those of a beat.
     pub const OF_BEAT: [Self; 3] = [Self::Motion, Self::Thickening, Self::Phase];
 
     /// Its name in reports and file names.
@@ -33,6 +37,8 @@ impl WallFigure {
             Self::Thickening => "thickening",
             Self::Phase => "phase",
             Self::Difference => "difference",
+            Self::Z => "z",
+            Self::Score => "score",
         }
     }
 
@@ -42,6 +48,8 @@ impl WallFigure {
             Self::Motion => "mm",
             Self::Thickening | Self::Difference => "%",
             Self::Phase => "degrees",
+            Self::Z => "SD",
+            Self::Score => "score",
         }
     }
 
@@ -52,7 +60,19 @@ impl WallFigure {
             Self::Thickening => [0.0, 80.0],
             Self::Phase => [0.0, 360.0],
             Self::Difference => [-50.0, 50.0],
+            Self::Z => [-5.0, 0.0],
+            Self::Score => [4.0, 0.0],
         }
+    }
+
+    /// Decimals of a segment's mean on the drawn map.
+    pub(super) fn decimals(self) -> usize {
+        usize::from(self == Self::Z)
+    }
+
+    /// Whether the figure stands on uptake, so that it has no place in the valve plane.
+    pub fn is_of_uptake(self) -> bool {
+        matches!(self, Self::Z | Self::Score)
     }
 
     pub(super) fn ticks(self) -> &'static [f64] {
@@ -61,6 +81,8 @@ impl WallFigure {
             Self::Thickening => &[0.0, 20.0, 40.0, 60.0, 80.0],
             Self::Phase => &[0.0, 90.0, 180.0, 270.0, 360.0],
             Self::Difference => &[-50.0, -25.0, 0.0, 25.0, 50.0],
+            Self::Z => &[-5.0, -4.0, -3.0, -2.0, -1.0, 0.0],
+            Self::Score => &[4.0, 3.0, 2.0, 1.0, 0.0],
         }
     }
 
@@ -77,6 +99,12 @@ impl WallFigure {
             }
             Self::Difference => {
                 "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; grey: no wall in one of them"
+            }
+            Self::Z => {
+                "Uptake against normal limits, standard deviations from the normal mean; grey: nothing to compare; hatched: valve plane"
+            }
+            Self::Score => {
+                "Score of the uptake against normal limits, 0 to 4; grey: nothing to compare; hatched: valve plane"
             }
         }
     }

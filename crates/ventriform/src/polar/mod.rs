@@ -46,7 +46,7 @@ pub use document::{
 };
 pub use figure::{FigureMap, WallFigure};
 pub use levels::{Level, Levels};
-pub use picture::{colour_of, figure_svg, png, svg};
+pub use picture::{colour_of, figure_png, figure_svg, png, svg};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;

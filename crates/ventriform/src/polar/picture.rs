@@ -79,14 +79,25 @@ pub fn png(map: &PolarMap) -> Vec<u8> {
 
 /// A figure of the wall as SVG: the same map, the segments' means, and a colour bar with the figure's unit.
 pub fn figure_svg(figure: &FigureMap<'_>) -> String {
+    figure_drawing(figure).svg()
+}
+
+/// The same picture as an RGB PNG of 760 × 640 pixels.
+pub fn figure_png(figure: &FigureMap<'_>) -> Vec<u8> {
+    figure_drawing(figure).image().png()
+}
+
+fn figure_drawing(figure: &FigureMap<'_>) -> Drawing {
     let map = figure.map;
     let rings = rings(map);
     let what = figure.figure;
+    let [least, most] = what.range();
+    let share_of = |value: f64| (value - least) / (most - least);
     let colour_at = |value: f64| match what {
         WallFigure::Phase => cycle_colour(value / 360.0),
-        WallFigure::Difference => difference_colour(value / what.range()[1]),
-        _ if value < 0.0 => FIGURE_PALETTE.outward,
-        _ => colour(value / what.range()[1]),
+        WallFigure::Difference => difference_colour(value / most),
+        WallFigure::Motion | WallFigure::Thickening if value < 0.0 => FIGURE_PALETTE.outward,
+        _ => colour(share_of(value)),
     };
     let shade = |row: usize, column: usize| {
         figure.values[row * RAY_COLUMNS + column].map_or(PALETTE.no_wall, &colour_at)
@@ -95,29 +106,33 @@ pub fn figure_svg(figure: &FigureMap<'_>) -> String {
         let bright = match what {
             WallFigure::Phase => true,
             WallFigure::Difference => false,
-            _ => mean.is_some_and(|mean| mean > BRIGHT_SHARE * what.range()[1]),
+            _ => mean.is_some_and(|mean| share_of(mean) > BRIGHT_SHARE),
         };
-        label(index + 1, *mean, bright, &rings)
+        label(index + 1, *mean, what.decimals(), bright, &rings)
     });
-    let [least, most] = what.range();
     let bar = ColourBar {
         unit: what.unit(),
         ticks: what.ticks(),
-        share: |value| (value - least) / (most - least),
+        share: share_of,
         colour: |share| colour_at(least + share * (most - least)),
+    };
+    let hatched = if what.is_of_uptake() {
+        hatching(map, &rings)
+    } else {
+        Vec::new()
     };
     Drawing {
         title: format!("{}{}", what.title(), unknown_side(map)),
         width: PICTURE_WIDTH_PX,
         height: PICTURE_HEIGHT_PX,
         shapes: tiles(map, &rings, shade)
+            .chain(hatched)
             .chain(borders(map, &rings))
             .chain(means)
             .chain(sides(map))
             .chain(bar.shapes())
             .collect(),
     }
-    .svg()
 }
 
 /// The end of a title where no side is known.
@@ -134,7 +149,7 @@ fn drawing(map: &PolarMap) -> Drawing {
     let means = map.segments.iter().map(|segment| {
         let mean = segment.mean_percent;
         let bright = mean.is_some_and(|mean| mean > 100.0 * BRIGHT_SHARE);
-        label(segment.number, mean, bright, &rings)
+        label(segment.number, mean, 0, bright, &rings)
     });
     Drawing {
         title: format!(
@@ -344,11 +359,20 @@ fn borders(map: &PolarMap, rings: &[f64; 4]) -> Vec<VectorShape> {
 }
 
 /// The mean of a segment: black on bright tiles, white on dark ones.
-fn label(segment: usize, mean: Option<f64>, bright: bool, rings: &[f64; 4]) -> VectorShape {
+fn label(
+    segment: usize,
+    mean: Option<f64>,
+    decimals: usize,
+    bright: bool,
+    rings: &[f64; 4],
+) -> VectorShape {
     let (share, turns) = label_place(segment, rings);
     VectorShape::Label {
         middle: screen(share, turns),
-        text: mean.map_or_else(|| "-".to_owned(), |mean| format!("{:.0}", mean + 0.0)),
+        text: mean.map_or_else(
+            || "-".to_owned(),
+            |mean| format!("{:.decimals$}", mean + 0.0),
+        ),
         size: TEXT_HEIGHT_PX,
         ink: if bright { BLACK_RGB } else { WHITE_RGB },
         rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),

@@ -5,6 +5,7 @@
 use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
 use super::json_number::round;
+use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{Resolution, SegmentationReport};
 use crate::beat::phase::HISTOGRAM_BINS;
@@ -77,6 +78,9 @@ pub struct BeatReport {
     pub steps: usize,
     /// Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat.
     pub flags: Vec<RaisedFlag>,
+    /// Uptake and beat beside normal limits, if some were given.
+    #[serde(default)]
+    pub perfusion: Option<PerfusionReport>,
     /// Every parameter, defaults written out.
     pub parameters: Map<String, Value>,
     /// The file of the gates.
@@ -203,6 +207,8 @@ pub struct BeatParts {
     pub confidence: f64,
     /// Flags of that fit, and of what the file says of the beats.
     pub flags: Vec<RaisedFlag>,
+    /// Uptake and beat beside normal limits.
+    pub perfusion: Option<PerfusionReport>,
     /// Every parameter.
     pub parameters: Map<String, Value>,
     /// The file of the gates.
@@ -297,6 +303,7 @@ impl BeatReport {
             confidence: round(parts.confidence),
             steps: beat.fit.steps,
             flags: parts.flags.into_iter().chain(raised).collect(),
+            perfusion: parts.perfusion,
             parameters: parts.parameters,
             input: parts.input,
             warnings: parts.warnings,

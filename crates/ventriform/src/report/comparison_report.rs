@@ -9,6 +9,7 @@ use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::Resolution;
 use crate::comparison::{ComparedHeart, ComparedHearts, PartFigures, REVERSIBLE_POINTS};
+use crate::normals::{Perfusion, summed_percent};
 use crate::polar::PolarSummary;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -161,6 +162,10 @@ pub struct ComparedScan {
     pub warnings: Vec<String>,
 }
 
+fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
+    perfusion?.segments[segment - 1].score
+}
+
 impl UptakeChange {
     fn of(figures: &PartFigures) -> Self {
         Self {
@@ -193,7 +198,8 @@ impl ComparedScan {
             radiopharmaceutical: scan.and_then(|scan| scan.radiopharmaceutical.clone()),
             injected_dose: scan.and_then(|scan| scan.injected_dose.clone()),
             polar: heart.map().map(PolarSummary::of),
-            perfusion: None,
+            perfusion: (heart.perfusion().zip(heart.map()))
+                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
             input: FileFacts::of(facts),
             warnings: facts.warnings.clone(),
         }
@@ -221,19 +227,30 @@ impl ComparisonReport {
             segment: own.segment,
             name: map.map_or_else(String::new, |map| map.name_of(own.segment)),
             uptake: UptakeChange::of(&own.figures),
-            stress_score: None,
-            rest_score: None,
+            stress_score: score(hearts.stress.perfusion(), own.segment),
+            rest_score: score(hearts.rest.perfusion(), own.segment),
             motion_change_mm: motion(own.segment).map(|change| round(change.0)),
             thickening_change_points: motion(own.segment).map(|change| round(change.1)),
         });
+        let summed =
+            (hearts.stress.perfusion().zip(hearts.rest.perfusion())).map(|(stress, rest)| {
+                let scores = |perfusion: &Perfusion| perfusion.segments.map(|own| own.score);
+                let pairs = scores(stress).into_iter().zip(scores(rest));
+                let more = pairs.filter_map(|(stress, rest)| Some(stress?.saturating_sub(rest?)));
+                [
+                    stress.summed_score,
+                    rest.summed_score,
+                    more.map(u32::from).sum(),
+                ]
+            });
         let oriented = map.is_some_and(crate::polar::PolarMap::is_oriented);
         let territories = change.territories.iter().filter(|_| oriented);
         Self {
             tid: round(hearts.tid()),
-            sss: None,
-            srs: None,
-            sds: None,
-            summed_percent: None,
+            sss: summed.map(|[sss, _, _]| sss),
+            srs: summed.map(|[_, srs, _]| srs),
+            sds: summed.map(|[_, _, sds]| sds),
+            summed_percent: summed.map(|sums| sums.map(|sum| round(summed_percent(sum)))),
             reversible_percent: round(change.reversible_percent),
             reversible_points: REVERSIBLE_POINTS,
             fixed_percent: round(change.fixed_percent),

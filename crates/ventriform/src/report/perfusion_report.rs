@@ -123,8 +123,8 @@ pub struct FigureBeside {
 }
 
 impl PerfusionReport {
-    /// The figures of `perfusion`, whose segments `map` names, and `figures` of the same heart.
-    pub fn of(perfusion: &Perfusion, map: &PolarMap, figures: &[ComparedFigure]) -> Self {
+    /// The figures of `perfusion`, whose segments `map` names.
+    pub fn of(perfusion: &Perfusion, map: &PolarMap) -> Self {
         let group = &perfusion.group;
         let flag = |flag: &NormalsFlag| RaisedFlag::new(flag.code(), flag);
         Self {
@@ -164,7 +164,7 @@ impl PerfusionReport {
                     summed_score: territory.summed_score,
                 })
                 .collect(),
-            figures: figures.iter().map(FigureBeside::of).collect(),
+            figures: perfusion.figures.iter().map(FigureBeside::of).collect(),
             flags: perfusion.flags.iter().map(flag).collect(),
         }
     }

@@ -4,6 +4,7 @@ use crate::deform::DeformError;
 use crate::export::read_json::ReadMeshError;
 use crate::locate::LocateError;
 use crate::model::TemplateError;
+use crate::normals::NormalsError;
 use crate::parameters::ParameterError;
 use crate::progress::Cancelled;
 use crate::volume::VolumeError;
@@ -81,6 +82,9 @@ pub enum SegmentationError {
     /// No model could be fitted: the first one's error, if it is not that the organ is not found.
     #[error(transparent)]
     Fit(DeformError),
+    /// The wall's uptake cannot be compared with the normal limits.
+    #[error(transparent)]
+    Normals(#[from] NormalsError),
     /// The caller asked for an end.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),

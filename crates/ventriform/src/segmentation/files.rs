@@ -13,7 +13,8 @@ use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
 use crate::model::wall_parts;
-use crate::polar::{self, PolarDocument};
+use crate::normals::{Perfusion, SegmentPerfusion};
+use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationSummary};
 use crate::volume::Provenance;
@@ -358,12 +359,50 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: polar::png(map),
         };
-        Ok(vec![
-            json_file("polar.json", &PolarDocument::of(map)),
-            svg,
-            png,
-        ])
+        let mut files = vec![json_file("polar.json", &PolarDocument::of(map)), svg, png];
+        if let Some(perfusion) = &self.perfusion {
+            monitor.check()?;
+            files.extend(perfusion_files(perfusion, map));
+        }
+        Ok(files)
     }
+}
+
+/// The maps of a wall beside normal limits: `polar_z` and `polar_score`, each as JSON, SVG and PNG.
+pub(crate) fn perfusion_files(perfusion: &Perfusion, map: &PolarMap) -> Vec<NamedFile> {
+    let figures = [WallFigure::Z, WallFigure::Score];
+    let files = figures.map(|figure| {
+        let of_segment = |segment: &SegmentPerfusion| match figure {
+            WallFigure::Z => segment.z,
+            _ => segment.score.map(f64::from),
+        };
+        let values = if figure == WallFigure::Z {
+            &perfusion.z
+        } else {
+            &perfusion.scores
+        };
+        let map = FigureMap {
+            map,
+            figure,
+            values: values.clone(),
+            segments: perfusion.segments.each_ref().map(of_segment),
+        };
+        let name = format!("polar_{}", figure.as_str());
+        [
+            json_file(&format!("{name}.json"), &FigureDocument::of(&map)),
+            NamedFile {
+                name: format!("{name}.svg"),
+                media_type: "image/svg+xml",
+                bytes: polar::figure_svg(&map).into_bytes(),
+            },
+            NamedFile {
+                name: format!("{name}.png"),
+                media_type: "image/png",
+                bytes: polar::figure_png(&map),
+            },
+        ]
+    });
+    files.into_iter().flatten().collect()
 }
 
 impl Segmentation {

@@ -1,10 +1,12 @@
 //! A segmentation from files: read, segment, keep what the output needs.
 
 use super::error::SegmentationError;
+use super::normals::{heart_figures, judged_by_normals};
 use super::order::{NamedReader, SegmentationOrder};
 use super::segment::{Segmentation, SegmentationParameters, segment};
 use super::templates::prepare;
 use crate::model::Organ;
+use crate::normals::Perfusion;
 use crate::parameters::FitParameters;
 use crate::progress::Monitor;
 use crate::volume::given_mask::{GivenMask, PlacedMask, read_mask};
@@ -19,6 +21,8 @@ pub struct SegmentedVolume {
     pub expert: Option<ExpertFacts>,
     /// The segmentation.
     pub segmentation: Segmentation,
+    /// The wall's uptake beside normal limits, if some were given.
+    pub perfusion: Option<Perfusion>,
     /// The parameters used.
     pub parameters: FitParameters,
 }
@@ -101,7 +105,14 @@ pub fn from_files(
     let (expert, mask) = expert.unzip();
     let mut segmentation = segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor)?;
     segmentation.refused.splice(0..0, refused);
+    let judged = |order| {
+        let figures = heart_figures(&segmentation);
+        let scan = reading.provenance.as_ref();
+        judged_by_normals(&segmentation, &figures, scan, &parameters, order)
+    };
+    let perfusion = order.normals.map(judged).transpose()?;
     Ok(SegmentedVolume {
+        perfusion,
         expert,
         reading,
         segmentation,

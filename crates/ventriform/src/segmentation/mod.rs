@@ -26,6 +26,7 @@ mod from_files;
 
 pub mod built_in;
 mod named_template;
+mod normals;
 mod templates;
 
 mod fitting;
@@ -45,10 +46,11 @@ mod error;
 pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
-pub(crate) use files::{json_file, json_line};
+pub(crate) use files::{json_file, json_line, perfusion_files};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
-pub use order::{NamedMesh, NamedReader, SegmentationOrder};
+pub use normals::{heart_figures, judged_by_normals};
+pub use order::{NamedMesh, NamedReader, NormalsOrder, SegmentationOrder};
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
 pub use templates::prepare;

@@ -5,8 +5,8 @@ use super::segment::Segmentation;
 use crate::parameters::Parameters;
 use crate::polar::PolarSummary;
 use crate::report::{
-    AgreementReport, AppliedReaderReport, CandidateReport, FileFacts, RefusedTemplateReport,
-    Resolution, SegmentationParts, SegmentationReport,
+    AgreementReport, AppliedReaderReport, CandidateReport, FileFacts, PerfusionReport,
+    RefusedTemplateReport, Resolution, SegmentationParts, SegmentationReport,
 };
 
 impl SegmentedVolume {
@@ -32,7 +32,8 @@ impl SegmentedVolume {
             }),
             measures: segmentation.agreement.as_ref().map(AgreementReport::of),
             polar: segmentation.polar.as_ref().map(PolarSummary::of),
-            perfusion: None,
+            perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
+                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
             parameters: self.parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),
             warnings: self.warnings(),

@@ -141,6 +141,7 @@ fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedErro
         gates: &files,
         auto: true,
         models: Vec::new(),
+        normals: None,
         parameters: &FitParameters::default(),
         choice,
     };
@@ -768,6 +769,7 @@ fn beat_of_file(name: &str, bytes: Vec<u8>) -> GatedHeart {
         gates: &[VolumeFile::in_memory(name, bytes)],
         auto: true,
         models: Vec::new(),
+        normals: None,
         parameters: &FitParameters::default(),
         choice: BeatChoice {
             rr_ms: Some(850.0),

@@ -42,6 +42,7 @@ fn compared(stress: &Volume, rest: &Volume) -> Result<ComparedHearts, Comparison
         rest: &rest,
         auto: true,
         models: Vec::new(),
+        normals: None,
         parameters: &ComparisonParameters::default(),
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())

@@ -87,6 +87,7 @@ fn segmented(file: VolumeFile) -> Vec<NamedFile> {
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &parameters,
     };
     let monitor = Monitor::silent();

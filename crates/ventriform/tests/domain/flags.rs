@@ -34,6 +34,7 @@ fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
         auto: true,
         models: Vec::new(),
         reader: None,
+        normals: None,
         parameters: &FitParameters::default(),
     };
     let segmented = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;

@@ -34,6 +34,7 @@ mod orientation;
 mod pipeline;
 mod quality;
 
+mod normals;
 mod reader;
 
 mod beat;

@@ -68,6 +68,7 @@ fn segmented(
             name: "one".into(),
             profile,
         }),
+        normals: None,
         parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())

@@ -243,7 +243,12 @@ impl<'a> Anatomy<'a> {
             (h.x * h.x + h.y * h.y) / (wide * wide) + z * z / (long * long) <= 1.0
         };
         match (inside(self.outer), inside(self.inner)) {
-            (true, false) => Tissue::Wall(self.segments[self.segment(&h) - 1]),
+            (true, false) => {
+                let turns = h.y.atan2(h.x) / TAU;
+                let along = (h.z / parameters.length_mm + 0.5).clamp(0.0, 1.0);
+                let natural = parameters.variation.at(along, turns);
+                Tissue::Wall(natural * self.segments[self.segment(&h) - 1])
+            }
             (true, true) => Tissue::Other(parameters.blood),
             (false, _) => Tissue::Other(
                 self.right_ventricle(&h, z)

@@ -17,12 +17,14 @@
 //! Guaranteed: the same parameters give the same voxels on any number of threads.
 
 mod anatomy;
+mod healthy;
 mod motion;
 mod parameters;
 mod poisson;
 
 pub use anatomy::HeartPose;
-pub use parameters::{PerfusionDefect, PhantomError, PhantomParameters};
+pub use healthy::{HealthyPerson, healthy_person};
+pub use parameters::{PerfusionDefect, PhantomError, PhantomParameters, UptakeVariation};
 
 use self::anatomy::Anatomy;
 use super::Volume;

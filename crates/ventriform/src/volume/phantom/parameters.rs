@@ -3,6 +3,7 @@
 use crate::geometry::Vec3;
 use crate::progress::Cancelled;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// Parameters of a phantom. Lengths are in millimetres, uptakes relative to the healthy wall.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,6 +28,8 @@ pub struct PhantomParameters {
     pub pose_spread_deg: f64,
     /// Largest random shift of the heart along each of x, y, z, 0..=30. Default 8.
     pub pose_spread_mm: f64,
+    /// How the uptake of a wall without defects differs from place to place. Default: not at all.
+    pub variation: UptakeVariation,
     /// Perfusion defects of the wall. Default none.
     pub defects: Vec<PerfusionDefect>,
     /// Uptake of the right ventricle's wall, 0..=3; 0 leaves it out. Default 0.3.
@@ -60,6 +63,39 @@ pub struct PhantomParameters {
     pub seed: u64,
 }
 
+/// How the uptake of a wall differs from place to place, as that of healthy people does: attenuation lowers it towards the base and on one side, and no heart takes
+/// up evenly.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct UptakeVariation {
+    /// Share that the base has less than the apex, 0..=0.5.
+    pub basal_fall: f64,
+    /// Share that one side has less at the base, 0..=0.4.
+    pub side_fall: f64,
+    /// Where that side is, turns from anterior towards septal.
+    pub side_turns: f64,
+    /// Amplitude of an uneven uptake, 0..=0.1.
+    pub unevenness: f64,
+    /// Its place about the axis, turns.
+    pub uneven_turns: f64,
+    /// Share that the apex has less, 0..=0.5.
+    pub apical_fall: f64,
+}
+
+impl UptakeVariation {
+    /// Uptake at a share of the way from apex (0) to base (1) and at an angle, turns from anterior towards septal, relative to an even wall.
+    pub(super) fn at(&self, along: f64, turns: f64) -> f64 {
+        let wave = |turns: f64| (TAU * turns).cos();
+        let side = 0.5 + 0.5 * wave(turns - self.side_turns);
+        let uneven = wave(2.0 * (turns - self.uneven_turns)) * (2.0 * TAU * along).sin();
+        let apical = self.apical_fall * (1.0 - along / APICAL_SHARE).max(0.0);
+        1.0 - self.basal_fall * along - self.side_fall * along * side + self.unevenness * uneven
+            - apical
+    }
+}
+
+/// Share of the length that the apex's own uptake reaches over.
+const APICAL_SHARE: f64 = 0.2;
+
 /// A segment of the wall with reduced uptake.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PerfusionDefect {
@@ -82,6 +118,7 @@ impl Default for PhantomParameters {
             apex_direction: [0.64, -0.60, -0.48],
             pose_spread_deg: 10.0,
             pose_spread_mm: 8.0,
+            variation: UptakeVariation::default(),
             defects: Vec::new(),
             right_ventricle: 0.3,
             blood: 0.12,
@@ -160,6 +197,13 @@ impl PhantomParameters {
         within("apex_direction (length)", length, 1e-3, 1e3)?;
         within("pose_spread_deg", self.pose_spread_deg, 0.0, 90.0)?;
         within("pose_spread_mm", self.pose_spread_mm, 0.0, 30.0)?;
+        let v = &self.variation;
+        within("variation.basal_fall", v.basal_fall, 0.0, 0.5)?;
+        within("variation.side_fall", v.side_fall, 0.0, 0.4)?;
+        within("variation.side_turns", v.side_turns, -1.0, 1.0)?;
+        within("variation.unevenness", v.unevenness, 0.0, 0.1)?;
+        within("variation.uneven_turns", v.uneven_turns, -1.0, 1.0)?;
+        within("variation.apical_fall", v.apical_fall, 0.0, 0.5)?;
         for defect in &self.defects {
             within("defects.segment", f64::from(defect.segment), 1.0, 17.0)?;
             within("defects.severity", defect.severity, 0.0, 1.0)?;

@@ -1,0 +1,303 @@
+//! Normal limits from a folder of healthy people's scans.
+//!
+//! In: a folder with `cohort.csv` ([`table`]) and the scans that it names. Out: [`NormalLimits`], one group for each sex, protocol, tracer and correction.
+//!
+//! 1. Every healthy case is fitted with the built-in hearts; of several gates the sum is fitted, and the beat.
+//! 2. A case is left out, with the reason, if it cannot be read or fitted, if its fit has a confidence below [`LEAST_CONFIDENCE`] or a flag that speaks against its uptake
+//!    or place ([`FLAGS_OF_NO_NORMAL`]), or if its orientation is unknown.
+//! 3. [`group_of`] builds the limits of each group, and leaves out who lies beyond the limits of the others.
+//! 4. Where a case names its scan at rest, the ratio of the cavities is a figure of its group, `tid`.
+//!
+//! Guaranteed: the same files, parameters and program give the same bytes, on any number of threads.
+//!
+//! Not guaranteed: that the people are healthy. Whoever fills in the table says so.
+
+pub mod table;
+
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::files::write_whole;
+use crate::gated::{self, GatedOrder, beat_figures};
+use crate::normals::{
+    ExcludedCase, GroupKind, GroupSex, HealthyScan, HeartFigure, NormalCase, NormalLimits,
+    NormalsError, ScanPlaces, group_of,
+};
+use crate::parameters::{BeatChoice, FitParameters, Parameters};
+use crate::progress::{Cancelled, Monitor};
+use crate::segmentation::{
+    self, Segmentation, SegmentationError, SegmentationOrder, heart_figures,
+};
+use crate::volume::{ReadLimits, VolumeError, VolumeFile};
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use table::{CohortRow, TableError};
+
+/// Confidence of a fit below which a case is left out.
+pub const LEAST_CONFIDENCE: f64 = 0.5;
+
+/// Flags of a fit that speak against its uptake or its place. Others, such as those of the septum's shape, are raised for one healthy heart in seven.
+const FLAGS_OF_NO_NORMAL: [&str; 8] = [
+    "uncertain_place",
+    "motion",
+    "label_map",
+    "dark_apex",
+    "folded",
+    "poor_contrast",
+    "touches_border",
+    "implausible_shape",
+];
+
+/// How limits are built.
+#[derive(Debug, Clone)]
+pub struct NormalsOptions {
+    /// The parameters of the fits.
+    pub parameters: FitParameters,
+    /// Whether men and women are one group.
+    pub mixed: bool,
+    /// The program's version, for the file.
+    pub program_version: String,
+    /// Limits of what is read.
+    pub limits: ReadLimits,
+}
+
+/// Why no limits can be built of a folder.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The table cannot be read.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A group has too few people.
+    #[error("{error}{}", reasons(.excluded))]
+    Normals {
+        /// Why.
+        error: NormalsError,
+        /// The cases that were left out.
+        excluded: Vec<ExcludedCase>,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] EvaluateError),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+fn reasons(excluded: &[ExcludedCase]) -> String {
+    excluded.iter().fold(String::new(), |mut text, case| {
+        write!(text, "\n  left out: {}: {}", case.case, case.reason)
+            .expect("a string takes any text");
+        text
+    })
+}
+
+/// A case that was fitted.
+struct FittedCase {
+    places: ScanPlaces,
+    figures: Vec<HeartFigure>,
+    sha256: String,
+    cavity_ml: f64,
+}
+
+/// The limits of the healthy cases in `folder`. `told` hears of every case as it is done.
+///
+/// # Errors
+/// [`BuildError`].
+pub fn build(
+    folder: &Path,
+    options: &NormalsOptions,
+    told: &(dyn Fn(&str, Result<(), &str>) + Sync),
+    monitor: &Monitor,
+) -> Result<NormalLimits, BuildError> {
+    let rows = table::read(folder)?;
+    let fitted: Vec<Result<FittedCase, String>> = (rows.par_iter())
+        .map(|row| {
+            let made = if row.healthy
+                || rows
+                    .iter()
+                    .any(|other| other.rest_case.as_ref() == Some(&row.case))
+            {
+                fitted_case(folder, row, options, monitor)?
+            } else {
+                Err("the table does not say that it is healthy".to_owned())
+            };
+            told(&row.case, made.as_ref().map(|_| ()).map_err(String::as_str));
+            Ok(made)
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let cavity_of = |case: &String| {
+        let at = rows.iter().position(|row| row.case == *case)?;
+        Some(fitted[at].as_ref().ok()?.cavity_ml)
+    };
+    let (mut kinds, mut excluded) = (BTreeMap::<GroupKind, Vec<HealthyScan>>::new(), Vec::new());
+    for (row, fitted) in rows.iter().zip(&fitted) {
+        let leave_out = |reason: &str| ExcludedCase {
+            case: row.case.clone(),
+            reason: reason.to_owned(),
+        };
+        if !row.healthy {
+            excluded.push(leave_out("the table does not say that it is healthy"));
+            continue;
+        }
+        let fitted = match fitted {
+            Ok(fitted) => fitted,
+            Err(reason) => {
+                excluded.push(leave_out(reason));
+                continue;
+            }
+        };
+        let kind = GroupKind {
+            sex: if options.mixed {
+                GroupSex::Mixed
+            } else {
+                row.sex.into()
+            },
+            protocol: row.protocol.clone(),
+            tracer: row.tracer.clone(),
+            attenuation_corrected: row.attenuation_corrected,
+        };
+        let mut figures = fitted.figures.clone();
+        let rest = row
+            .rest_case
+            .as_ref()
+            .and_then(cavity_of)
+            .filter(|ml| *ml > 0.0);
+        figures.extend(rest.map(|rest| HeartFigure {
+            figure: "tid",
+            segment: None,
+            value: fitted.cavity_ml / rest,
+        }));
+        kinds.entry(kind).or_default().push(HealthyScan {
+            case: NormalCase {
+                case: row.case.clone(),
+                sex: row.sex.into(),
+                sha256: fitted.sha256.clone(),
+            },
+            places: fitted.places.clone(),
+            figures,
+        });
+    }
+    let mut groups = Vec::new();
+    for (kind, people) in &kinds {
+        monitor.check()?;
+        match group_of(kind, people) {
+            Ok((group, odd)) => {
+                groups.push(group);
+                excluded.extend(odd);
+            }
+            Err(error) => return Err(BuildError::Normals { error, excluded }),
+        }
+    }
+    if groups.is_empty() {
+        let error = NormalsError::TooFewCases {
+            group: "the table".to_owned(),
+            cases: 0,
+        };
+        return Err(BuildError::Normals { error, excluded });
+    }
+    let simulated = rows.iter().any(CohortRow::is_simulated);
+    let parameters = options.parameters.to_json();
+    Ok(NormalLimits::new(
+        &options.program_version,
+        simulated,
+        groups,
+        excluded,
+        parameters,
+    ))
+}
+
+/// Writes limits to a file, whole or not at all.
+///
+/// # Errors
+/// [`BuildError::File`].
+pub fn write(limits: &NormalLimits, path: &Path) -> Result<(), BuildError> {
+    Ok(write_whole(path, limits.to_json().as_bytes())?)
+}
+
+/// A case's wall and figures, or why it is left out.
+fn fitted_case(
+    folder: &Path,
+    row: &CohortRow,
+    options: &NormalsOptions,
+    monitor: &Monitor,
+) -> Result<Result<FittedCase, String>, Cancelled> {
+    monitor.check()?;
+    let path = folder.join(&row.file);
+    let sha256 = match std::fs::read(&path) {
+        Ok(bytes) => hexadecimal(&Sha256::digest(bytes)),
+        Err(error) => return Ok(Err(format!("{}: {error}", row.file))),
+    };
+    let quiet = Monitor::silent();
+    let files = [VolumeFile::at(&path)];
+    let order = SegmentationOrder {
+        volume: &files,
+        expert: None,
+        auto: true,
+        models: Vec::new(),
+        reader: None,
+        normals: None,
+        parameters: &options.parameters,
+    };
+    let made = segmentation::from_files(&order, &options.limits, &quiet);
+    let (segmentation, figures) = match made {
+        Ok(made) => {
+            let figures = heart_figures(&made.segmentation);
+            (made.segmentation, figures)
+        }
+        Err(SegmentationError::Volume(VolumeError::FrameNeeded { .. })) => {
+            let order = GatedOrder {
+                gates: &files,
+                auto: true,
+                models: Vec::new(),
+                normals: None,
+                parameters: &options.parameters,
+                choice: BeatChoice {
+                    gated: true,
+                    ..BeatChoice::default()
+                },
+            };
+            match gated::from_files(&order, &options.limits, &quiet) {
+                Ok(made) => {
+                    let figures = beat_figures(&made.segmentation, &made.beat);
+                    (made.segmentation, figures)
+                }
+                Err(error) => return Ok(Err(error.to_string())),
+            }
+        }
+        Err(error) => return Ok(Err(error.to_string())),
+    };
+    Ok(usable(&segmentation).map(|(places, cavity_ml)| FittedCase {
+        places,
+        figures,
+        sha256,
+        cavity_ml,
+    }))
+}
+
+/// The wall and the cavity of a fit that limits can stand on, or why they cannot.
+fn usable(segmentation: &Segmentation) -> Result<(ScanPlaces, f64), String> {
+    let judgement = &segmentation.fit.judgement;
+    if judgement.confidence < LEAST_CONFIDENCE {
+        return Err(format!(
+            "the fit's confidence is {:.2}; {LEAST_CONFIDENCE} is needed",
+            judgement.confidence
+        ));
+    }
+    let raised = (judgement.flags.iter()).find(|flag| FLAGS_OF_NO_NORMAL.contains(&flag.code()));
+    if let Some(flag) = raised {
+        return Err(format!("the fit is flagged {}: {flag}", flag.code()));
+    }
+    let map = segmentation.polar.as_ref().filter(|map| map.is_oriented());
+    let map = map.ok_or("the orientation of the heart is unknown")?;
+    let surfaces = segmentation.fit.model.surfaces.as_ref();
+    let surfaces = surfaces.ok_or("the fit has no anatomical wall")?;
+    Ok((ScanPlaces::of(map), surfaces.anatomical.wall.cavity_ml))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("a string takes any text");
+        text
+    })
+}

@@ -1,0 +1,72 @@
+//! A segmentation beside normal limits.
+
+use super::error::SegmentationError;
+use super::order::NormalsOrder;
+use super::segment::Segmentation;
+use crate::normals::{HeartFigure, NormalsError, NormalsFlag, Perfusion, ScanKind, Sex, apply};
+use crate::parameters::FitParameters;
+use crate::parameters::Parameters;
+use crate::volume::Provenance;
+
+/// Parameters that the uptake of a map depends on.
+const PARAMETERS_OF_UPTAKE: [&str; 2] = ["polar_blur", "polar_extension"];
+
+/// Figures of the heart that limits may have: the cavity and the muscle of the anatomical wall.
+pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
+    let Some(surfaces) = &segmentation.fit.model.surfaces else {
+        return Vec::new();
+    };
+    let whole = |figure, value| HeartFigure {
+        figure,
+        segment: None,
+        value,
+    };
+    vec![
+        whole("cavity_ml", surfaces.anatomical.wall.cavity_ml),
+        whole("wall_ml", surfaces.anatomical.wall_ml),
+    ]
+}
+
+/// The segmentation of a scan, and `figures` of the same heart, beside the limits of `order`. The sex is that of the scan's header, if the order does not state it.
+///
+/// # Errors
+/// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit the scan.
+pub fn judged_by_normals(
+    segmentation: &Segmentation,
+    figures: &[HeartFigure],
+    scan: Option<&Provenance>,
+    parameters: &FitParameters,
+    order: &NormalsOrder,
+) -> Result<Perfusion, SegmentationError> {
+    let map = (segmentation.polar.as_ref()).ok_or(NormalsError::TooLittleWall { percent: 0.0 })?;
+    let header = scan.and_then(|scan| Sex::parse(scan.patient_sex.as_deref()?));
+    let stated = order.kind.sex;
+    if let (Some(header), Some(stated)) = (header, stated)
+        && header != stated
+    {
+        return Err(NormalsError::OtherSex { header, stated }.into());
+    }
+    let kind = ScanKind {
+        sex: stated.or(header),
+        attenuation_corrected: (order.kind.attenuation_corrected)
+            .or_else(|| scan?.attenuation_corrected()),
+        ..order.kind.clone()
+    };
+    let mut perfusion = apply(map, figures, &kind, &order.limits)?;
+    let own = parameters.to_json();
+    let built = &order.limits.parameters;
+    let other = |name: &&&str| {
+        built
+            .get(**name)
+            .is_some_and(|value| own.get(**name) != Some(value))
+    };
+    let names: Vec<String> = PARAMETERS_OF_UPTAKE
+        .iter()
+        .filter(other)
+        .map(|name| (*name).to_owned())
+        .collect();
+    if !names.is_empty() {
+        perfusion.flags.push(NormalsFlag::OtherParameters { names });
+    }
+    Ok(perfusion)
+}
