@@ -198,6 +198,11 @@ export interface components {
              */
             gated?: boolean;
             /**
+             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @example built-in usual
+             */
+            kept_model?: string;
+            /**
              * @description Final search range of the sensors, millimetres to either side
              * @default 6
              */
@@ -378,6 +383,7 @@ export interface components {
             parameters: {
                 [key: string]: unknown;
             };
+            perfusion?: components["schemas"]["Perfusion"] | null;
             /** @description Phases of the wall. */
             phase: components["schemas"]["PhaseReport"];
             posture?: components["schemas"]["Posture"] | null;
@@ -861,6 +867,53 @@ export interface components {
              */
             unroundness: number;
         };
+        /** @description A figure beside its limits. */
+        FigureBeside: {
+            /** @description Its name in the limits, with its unit. */
+            figure: string;
+            /**
+             * Format: double
+             * @description Quantile of 97.5 per cent.
+             */
+            high: number;
+            /**
+             * Format: double
+             * @description Quantile of 2.5 per cent.
+             */
+            low: number;
+            /**
+             * Format: double
+             * @description Normal mean.
+             */
+            mean: number;
+            /**
+             * Format: int64
+             * @description Number of people.
+             */
+            n: number;
+            /**
+             * Format: double
+             * @description Normal standard deviation.
+             */
+            sd: number;
+            /**
+             * Format: int64
+             * @description The segment, 1 to 17; null for the whole heart.
+             */
+            segment?: number | null;
+            /**
+             * Format: double
+             * @description This scan's.
+             */
+            value: number;
+            /** @description Whether it lies between `low` and `high`. */
+            within: boolean;
+            /**
+             * Format: double
+             * @description Standard deviations from the normal mean; null where people do not differ.
+             */
+            z?: number | null;
+        };
         /** @description The mean of a figure over a segment. */
         FigureSegment: {
             /**
@@ -1168,6 +1221,11 @@ export interface components {
              */
             rr_ms?: number | null;
         };
+        /**
+         * @description The people of a group of normal limits.
+         * @enum {string}
+         */
+        GroupSex: "F" | "M" | "mixed";
         /** @description The state of the service. */
         Health: {
             /**
@@ -2050,6 +2108,28 @@ export interface components {
              */
             stored_bytes?: number | null;
         };
+        /** @description The group of normal limits that a scan was compared with. */
+        NormalsUsed: {
+            /** @description Whether attenuation was corrected. */
+            attenuation_corrected: boolean;
+            /**
+             * Format: int64
+             * @description Number of people.
+             */
+            cases: number;
+            /** @description What the people are. */
+            people: string;
+            /** @description The protocol. */
+            protocol: string;
+            /** @description `M`, `F` or `mixed`. */
+            sex: components["schemas"]["GroupSex"];
+            /** @description SHA-256 of the limits, hexadecimal. */
+            sha256: string;
+            /** @description Whether the people are simulated. */
+            simulated: boolean;
+            /** @description The tracer. */
+            tracer: string;
+        };
         /** @description Why the service cannot accept work. */
         NotReady: components["schemas"]["Problem"] & {
             /** @description A part that the service depends on. */
@@ -2135,6 +2215,51 @@ export interface components {
              */
             sweeps: number;
         };
+        /** @description The wall's uptake beside normal limits. */
+        Perfusion: {
+            /**
+             * Format: double
+             * @description Deficit score: mean score of the wall, per cent of the greatest.
+             */
+            deficit_percent: number;
+            /**
+             * Format: double
+             * @description Share of the wall below the limit.
+             */
+            extent_percent: number;
+            /** @description Figures of the heart beside their limits; empty where the file has none. */
+            figures: components["schemas"]["FigureBeside"][];
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /** @description The limits. */
+            normals: components["schemas"]["NormalsUsed"];
+            /** @description What the figures are. */
+            note: string;
+            /** @description The 17 segments. */
+            segments: components["schemas"]["SegmentScore"][];
+            /**
+             * Format: double
+             * @description Mean of |z| there; null where nothing is below it.
+             */
+            severity?: number | null;
+            /**
+             * Format: double
+             * @description The same in per cent of 68.
+             */
+            summed_percent: number;
+            /**
+             * Format: int32
+             * @description Sum of the segments' scores, 0 to 68.
+             */
+            summed_score: number;
+            /** @description The walls of the three arteries. */
+            territories: components["schemas"]["TerritoryScore"][];
+            /**
+             * Format: double
+             * @description Standard deviations below the normal mean at which the limit lies.
+             */
+            z_limit: number;
+        };
         /** @description Phases of the wall: of the first harmonic of the thickness, weighted by area and amplitude. */
         PhaseReport: {
             /**
@@ -2167,6 +2292,11 @@ export interface components {
              */
             sd_degrees: number;
         };
+        /**
+         * @description What a ray meets.
+         * @enum {string}
+         */
+        PlaceState: "muscle" | "valve_plane" | "no_wall";
         /** @description A figure of the wall on a polar map, as it is written. */
         PolarFigure: {
             /**
@@ -2196,9 +2326,11 @@ export interface components {
             segment_of: number[][];
             /** @description The 17 segments. */
             segments: components["schemas"]["FigureSegment"][];
-            /** @description Its unit: `mm`, `%` or `degrees` of the cycle. */
+            /** @description What lies at each pixel, of figures of uptake: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. */
+            states?: components["schemas"]["PlaceState"][][] | null;
+            /** @description Its unit: `mm`, `%`, `degrees` of the cycle, `SD` or `score`. */
             unit: string;
-            /** @description The pixels; null where there is no wall, or none that moves. */
+            /** @description The pixels; null where there is no wall, none that moves, or nothing to compare. */
             values: (number | null)[][];
         };
         /** @description A polar map, as in `polar.json`. */
@@ -2252,14 +2384,19 @@ export interface components {
             rings?: number[] | null;
             /** @description The number of the segment to which each pixel belongs. */
             segment_of: number[][];
-            /** @description The pixels in per cent of the reference; null where there is no wall. */
+            /**
+             * @description What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. Absent from maps of older
+             *     versions, which have no valve plane.
+             */
+            states?: components["schemas"]["PlaceState"][][] | null;
+            /** @description The pixels in per cent of the reference; null where there is no muscle. */
             values_percent: (number | null)[][];
         };
         /** @description One segment of a polar map. */
         PolarSegment: {
             /**
              * Format: double
-             * @description Its area, mm².
+             * @description Area of its muscle, mm².
              */
             area_mm2: number;
             /**
@@ -2689,6 +2826,8 @@ export interface components {
             acquisition_time?: string | null;
             /** @description Convolution Kernel (0018,1210). */
             convolution_kernel?: string | null;
+            /** @description Corrected Image (0028,0051), values separated by backslashes: with `ATTN` attenuation was corrected. */
+            corrected_image?: string | null;
             /** @description Frame of Reference UID (0020,0052). */
             frame_of_reference_uid?: string | null;
             /** @description Image Type (0008,0008), values separated by backslashes. */
@@ -2711,6 +2850,8 @@ export interface components {
             patient_id?: string | null;
             /** @description Patient's Name (0010,0010), components separated by `^`. */
             patient_name?: string | null;
+            /** @description Patient Position (0018,5100), such as `HFS`, or the meaning of the Patient Orientation Modifier Code (0054,0412). */
+            patient_position?: string | null;
             /** @description Patient's Sex (0010,0040): `M`, `F` or `O`. */
             patient_sex?: string | null;
             /** @description Position Reference Indicator (0020,1040). */
@@ -2757,6 +2898,8 @@ export interface components {
              *     study, no DICOM object is made.
              */
             undecoded?: string[];
+            /** @description Units (0054,1001). */
+            units?: string | null;
         };
         /** @description Study, series and Frame of Reference of a scan. */
         ScanUids: {
@@ -2811,6 +2954,41 @@ export interface components {
              * @description Thickening, end diastole to end systole.
              */
             thickening_percent: number;
+        };
+        /** @description A segment beside its limits. */
+        SegmentScore: {
+            /**
+             * Format: double
+             * @description Share of its area that has limits and muscle.
+             */
+            compared_percent: number;
+            /**
+             * Format: double
+             * @description Mean score of its wall, per cent of the greatest.
+             */
+            deficit_percent: number;
+            /**
+             * Format: double
+             * @description Share of its wall below the limit.
+             */
+            extent_percent: number;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int32
+             * @description Score, 0 to 4.
+             */
+            score?: number | null;
+            /**
+             * Format: int64
+             * @description Its number, 1 to 17.
+             */
+            segment: number;
+            /**
+             * Format: double
+             * @description Mean of z: standard deviations from the normal mean, negative below; null where nothing can be compared.
+             */
+            z?: number | null;
         };
         /** @description A segmentation: a model fitted to a volume, with its main figures and its reliability. */
         Segmentation: {
@@ -2945,6 +3123,11 @@ export interface components {
             expert?: string;
             /** @description Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a heart beat are summed */
             frame?: number;
+            /**
+             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @example built-in usual
+             */
+            kept_model?: string;
             /**
              * @description Which structure of the expert's mask is meant, if the file holds several: the number of a label or segment, or the name or code of a segment. Default: the only one; of segments, the one coded as myocardium
              * @example 2, or the name of a DICOM segment
@@ -3107,6 +3290,7 @@ export interface components {
             measures?: components["schemas"]["Agreement"] | null;
             /** @description Every parameter, defaults written out. */
             parameters: components["schemas"]["SegmentationParameters"];
+            perfusion?: components["schemas"]["Perfusion"] | null;
             polar?: components["schemas"]["PolarSummary"] | null;
             posture?: components["schemas"]["Posture"] | null;
             reader?: components["schemas"]["AppliedReader"] | null;
@@ -3597,7 +3781,7 @@ export interface components {
         Territory: {
             /**
              * Format: double
-             * @description Its area, mm².
+             * @description Area of its muscle, mm².
              */
             area_mm2: number;
             /**
@@ -3612,6 +3796,26 @@ export interface components {
             mean_percent?: number | null;
             /** @description LAD, LCX or RCA. */
             name: string;
+        };
+        /** @description The wall of an artery beside its limits. */
+        TerritoryScore: {
+            /**
+             * Format: double
+             * @description Mean score of its wall, per cent of the greatest.
+             */
+            deficit_percent: number;
+            /**
+             * Format: double
+             * @description Share of its wall below the limit.
+             */
+            extent_percent: number;
+            /** @description LAD, LCX or RCA. */
+            name: string;
+            /**
+             * Format: int32
+             * @description Sum of its segments' scores.
+             */
+            summed_score: number;
         };
         /** @description Thickness of a wall, mm. */
         Thickness: {
@@ -3878,7 +4082,7 @@ export interface components {
          * @description A figure of the wall.
          * @enum {string}
          */
-        WallFigure: "motion" | "thickening" | "phase";
+        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
     };
     responses: never;
     parameters: never;
@@ -3911,6 +4115,7 @@ export type ErasedFile = components['schemas']['ErasedFile'];
 export type ErasedItem = components['schemas']['ErasedItem'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
+export type FigureBeside = components['schemas']['FigureBeside'];
 export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
 export type WebhookRequest = components['schemas']['WebhookRequest'];
@@ -3925,6 +4130,7 @@ export type FittedVolumes = components['schemas']['FittedVolumes'];
 export type Flag = components['schemas']['Flag'];
 export type GateReport = components['schemas']['GateReport'];
 export type Gates = components['schemas']['Gates'];
+export type GroupSex = components['schemas']['GroupSex'];
 export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
 export type Histograms = components['schemas']['Histograms'];
@@ -3957,10 +4163,13 @@ export type ModelParameters = components['schemas']['ModelParameters'];
 export type ModelReport = components['schemas']['ModelReport'];
 export type ModelSummary = components['schemas']['ModelSummary'];
 export type NewKey = components['schemas']['NewKey'];
+export type NormalsUsed = components['schemas']['NormalsUsed'];
 export type NotReady = components['schemas']['NotReady'];
 export type ObjectDelivery = components['schemas']['ObjectDelivery'];
 export type OptimiseReport = components['schemas']['OptimiseReport'];
+export type Perfusion = components['schemas']['Perfusion'];
 export type PhaseReport = components['schemas']['PhaseReport'];
+export type PlaceState = components['schemas']['PlaceState'];
 export type PolarFigure = components['schemas']['PolarFigure'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
@@ -3993,6 +4202,7 @@ export type Scan = components['schemas']['Scan'];
 export type ScanUids = components['schemas']['ScanUids'];
 export type Scope = components['schemas']['Scope'];
 export type SegmentMotionReport = components['schemas']['SegmentMotionReport'];
+export type SegmentScore = components['schemas']['SegmentScore'];
 export type Segmentation = components['schemas']['Segmentation'];
 export type Webhook = components['schemas']['Webhook'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
@@ -4019,6 +4229,7 @@ export type TemplateList = components['schemas']['TemplateList'];
 export type TemplatePatch = components['schemas']['TemplatePatch'];
 export type TemplateSummary = components['schemas']['TemplateSummary'];
 export type Territory = components['schemas']['Territory'];
+export type TerritoryScore = components['schemas']['TerritoryScore'];
 export type Thickness = components['schemas']['Thickness'];
 export type Thicknesses = components['schemas']['Thicknesses'];
 export type TimingReport = components['schemas']['TimingReport'];
