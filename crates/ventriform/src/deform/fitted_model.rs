@@ -8,7 +8,7 @@ use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::locate::cup::Cup;
 use crate::locate::localisation::Localisation;
-use crate::locate::patient_orientation::PatientOrientation;
+use crate::locate::patient_orientation::{PatientOrientation, Superior};
 use crate::mesh::TriMesh;
 use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
@@ -122,6 +122,42 @@ pub struct FittedModel {
 }
 
 impl FittedModel {
+    /// The same heart with its places counted from the wall on the side of `anterior`, LPS: names of places change,
+    /// and nothing else. As it is where that runs along the axis, and of other organs.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn counted_from(self, anterior: &Vec3, monitor: &Monitor) -> Result<Self, Cancelled> {
+        let axis = self.cup.as_ref().map(|cup| cup.axis);
+        let stated = axis
+            .and_then(|axis| PatientOrientation::stated(Superior::Body, Some(*anterior), &axis))
+            .filter(|stated| stated.source.is_stated());
+        let Some(stated) = stated else {
+            return Ok(self);
+        };
+        let counted = |mesh: &TriMesh, wall: &VentricleWall| {
+            wall.counted_from(mesh, &stated.superior, monitor)
+        };
+        let surface = |surface: WallSurface| {
+            let wall = counted(&surface.mesh, &surface.wall)?;
+            Ok(WallSurface { wall, ..surface })
+        };
+        let surfaces = |both: WallSurfaces| {
+            Ok(WallSurfaces {
+                apparent: surface(both.apparent)?,
+                anatomical: surface(both.anatomical)?,
+            })
+        };
+        Ok(Self {
+            patient_orientation: Some(stated),
+            wall: (self.wall.as_ref())
+                .map(|wall| counted(&self.mesh, wall))
+                .transpose()?,
+            surfaces: self.surfaces.map(surfaces).transpose()?,
+            ..self
+        })
+    }
+
     /// The model's surface as it looks in the image: of a ventricle, that of the apparent wall.
     pub fn apparent_mesh(&self) -> &TriMesh {
         let surfaces = self.surfaces.as_ref();

@@ -67,6 +67,7 @@ pub fn from_files(
             .map_err(crate::segmentation::SegmentationError::from)?,
         polar: parameters.polar,
         kept_model: parameters.kept_model.clone(),
+        segments_from: parameters.segments_from,
         reader: None,
     };
     let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;

@@ -179,19 +179,7 @@ impl VentricleWall {
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let frame = AxisFrame::new(mesh, cup, superior);
-        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
-        let ray = |index: usize| {
-            monitor.check()?;
-            let (start, direction) = frame.ray(index / RAY_COLUMNS, index % RAY_COLUMNS);
-            Ok(WallRay {
-                start,
-                direction,
-                wall: crossing(mesh, &tree, &start, &direction),
-            })
-        };
-        let rays = (0..RAY_ROWS * RAY_COLUMNS)
-            .map(ray)
-            .collect::<Result<Vec<_>, _>>()?;
+        let rays = frame.rays(mesh, monitor)?;
         let met: Vec<[f64; 2]> = rays.iter().filter_map(|r| r.wall).collect();
         let rays_met = met.len().max(1) as f64;
         let thickness = met.iter().map(|w| w[1] - w[0]).sum::<f64>() / rays_met;
@@ -204,14 +192,36 @@ impl VentricleWall {
             gaps: basal.iter().filter(|r| r.wall.is_none()).count() as f64 / basal.len() as f64,
             row_spacing: frame.row_spacing(),
             extent: [frame.rim, frame.apex],
-            rims: (0..RAY_COLUMNS)
-                .map(|column| {
-                    let turn = (column as f64 + 0.5) / RAY_COLUMNS as f64;
-                    rim_height(mesh, &frame.centre, &frame.half_plane(turn))
-                })
-                .collect(),
+            rims: frame.rims(mesh),
             rays,
             frame,
+        })
+    }
+
+    /// The same wall of `mesh` with its columns counted from the wall on the side of `anterior`, a direction across
+    /// the axis. Its marks on the axis and the figures of the whole wall stay, so that places change their names and
+    /// nothing else.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn counted_from(
+        &self,
+        mesh: &TriMesh,
+        anterior: &Vec3,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
+        let axis = self.frame.axis;
+        let anterior = self::anterior(&axis, anterior);
+        let frame = AxisFrame {
+            lateral: anterior.cross(&axis),
+            anterior,
+            ..self.frame.clone()
+        };
+        Ok(Self {
+            rays: frame.rays(mesh, monitor)?,
+            rims: frame.rims(mesh),
+            frame,
+            ..self.clone()
         })
     }
 
@@ -366,6 +376,30 @@ impl AxisFrame {
             focus: (apex - radius).max(rim),
             apex,
         }
+    }
+
+    /// Every ray through `mesh`, row by row.
+    fn rays(&self, mesh: &TriMesh, monitor: &Monitor) -> Result<Vec<WallRay>, Cancelled> {
+        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
+        let ray = |index: usize| {
+            monitor.check()?;
+            let (start, direction) = self.ray(index / RAY_COLUMNS, index % RAY_COLUMNS);
+            Ok(WallRay {
+                start,
+                direction,
+                wall: crossing(mesh, &tree, &start, &direction),
+            })
+        };
+        (0..RAY_ROWS * RAY_COLUMNS).map(ray).collect()
+    }
+
+    /// The rim's height in every column.
+    fn rims(&self, mesh: &TriMesh) -> Vec<Option<f64>> {
+        let rim = |column: usize| {
+            let turn = (column as f64 + 0.5) / RAY_COLUMNS as f64;
+            rim_height(mesh, &self.centre, &self.half_plane(turn))
+        };
+        (0..RAY_COLUMNS).map(rim).collect()
     }
 
     /// The half plane from the axis at an angle about it, turns.
@@ -561,6 +595,38 @@ mod tests {
             }
             assert!((position.direction - ray.direction).norm() < 1e-9);
         }
+    }
+
+    /// A quarter of a turn is a quarter of the columns; a turn between two rays keeps the figures of the whole wall.
+    #[test]
+    fn counting_from_another_side_moves_columns_and_no_figure() {
+        let mut mesh = shapes::cup(70.0, 31.0, 12.0, 24);
+        for vertex in &mut mesh.vertices {
+            vertex.z += 0.2 * vertex.x;
+        }
+        let cup = Cup {
+            centre: mesh.vertices.iter().sum::<Vec3>() / mesh.vertices.len() as f64,
+            axis: -Vec3::z(),
+            length: 70.0,
+            breadth: 1.0,
+        };
+        let monitor = Monitor::silent();
+        let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &monitor).unwrap();
+        let lateral = wall.coordinates().lateral;
+        let turned = wall.counted_from(&mesh, &lateral, &monitor).unwrap();
+        for (index, ray) in turned.rays.iter().enumerate() {
+            let (row, column) = (index / RAY_COLUMNS, index % RAY_COLUMNS);
+            let before = (column + RAY_COLUMNS * 3 / 4) % RAY_COLUMNS;
+            let same = &wall.rays[row * RAY_COLUMNS + before];
+            assert!((ray.direction - same.direction).norm() < 1e-9, "{index}");
+            assert!((ray.start - same.start).norm() < 1e-9, "{index}");
+        }
+        let aside = wall.coordinates().anterior + 0.04 * lateral;
+        let turned = wall.counted_from(&mesh, &aside, &monitor).unwrap();
+        assert_ne!(turned.rays, wall.rays);
+        assert_eq!(turned.cavity_ml, wall.cavity_ml);
+        assert_eq!(turned.thickness, wall.thickness);
+        assert_eq!(turned.extent, wall.extent);
     }
 
     #[test]

@@ -68,6 +68,7 @@ impl BesideFit for ComparisonChoice {
         ("seed_point", ONE_SCAN),
         ("box", ONE_SCAN),
         ("axis", ONE_SCAN),
+        ("segments_from", ONE_SCAN),
     ];
 }
 

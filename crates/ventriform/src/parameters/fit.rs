@@ -20,6 +20,9 @@ pub struct FitParameters {
     pub model: String,
     /// Name of the fitted model that is kept; `None` for that with the greatest confidence.
     pub kept_model: Option<String>,
+    /// Direction from the long axis to the wall that is called anterior once the fit is done, LPS, any length; `None`
+    /// for the orientation that the fit starts from.
+    pub segments_from: Option<Vec3>,
     /// Id of an expert's mask, if there is one.
     pub expert: Option<String>,
     /// Which structure of a mask's file is meant, and whether a mask on another grid is resampled.
@@ -55,6 +58,7 @@ impl Default for FitParameters {
             frame: None,
             model: FitParameters::AUTO_MODEL.into(),
             kept_model: None,
+            segments_from: None,
             expert: None,
             mask: MaskChoice::default(),
             reader: None,
@@ -226,6 +230,7 @@ mod tests {
             ],
             &[("superior", "0,-2,1e-1"), ("anterior", "0,-1,0")],
             &[("superior", "frame")],
+            &[("segments_from", "0.5,-2,1e-1")],
             &[("model", "auto,tpl_0123,mdl_4")],
             &[("label", "-2"), ("resample", "true")],
             &[("label", "Left Ventricle Myocardium")],
@@ -261,7 +266,7 @@ mod tests {
             assert_eq!(refusal(&[(name, "NaN")]).field, name);
             assert_eq!(refusal(&[(name, "-inf")]).field, name);
         }
-        for name in ["axis", "superior", "anterior"] {
+        for name in ["axis", "superior", "anterior", "segments_from"] {
             assert!(refusal(&[(name, "0,0,0")]).message.contains("length"));
         }
         for bad in ["up", "1,2", "1,2,inf", ""] {

@@ -282,6 +282,19 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         write: |p| json!(p.deform.anterior.map(|a| [a.x, a.y, a.z])),
     },
     ParameterSpec {
+        name: "segments_from",
+        kind: Kind::Numbers { count: 3 },
+        default: "",
+        summary: "Direction from the long axis to the wall that segments are counted from as the anterior one, x,y,z \
+                  in the LPS frame of the volume, once the fit is done: heart and wall stay, names of places change. \
+                  Default: the anterior wall by `superior` or `anterior`, which the fit starts from",
+        read: |d, v| {
+            d.segments_from = Some(direction(v.numbers())?);
+            Ok(())
+        },
+        write: |p| json!(p.segments_from.map(|a| [a.x, a.y, a.z])),
+    },
+    ParameterSpec {
         name: "base",
         kind: Kind::Numbers { count: 3 },
         default: "",

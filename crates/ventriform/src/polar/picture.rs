@@ -147,14 +147,15 @@ fn unknown_side(map: &PolarMap) -> &'static str {
 fn drawing(map: &PolarMap) -> Drawing {
     let rings = rings(map);
     let means = map.segments.iter().map(|segment| {
-        let mean = segment.mean_percent;
+        // The reference is a mean of the brightest wall, so a segment may lie a little above it.
+        let mean = segment.mean_percent.map(|mean| mean.min(100.0));
         let bright = mean.is_some_and(|mean| mean > 100.0 * BRIGHT_SHARE);
         label(segment.number, mean, 0, bright, &rings)
     });
     Drawing {
         title: format!(
-            "Polar map, per cent of {:.4}; extent below {:.0} %: {:.1} % of the wall; grey: no wall; hatched: valve plane{}",
-            map.reference,
+            "Polar map, per cent of {}; extent below {:.0} %: {:.1} % of the wall; grey: no wall; hatched: valve plane{}",
+            counts(map.reference),
             100.0 * map.threshold,
             map.extent_percent,
             unknown_side(map)
@@ -170,6 +171,15 @@ fn drawing(map: &PolarMap) -> Drawing {
             .chain(uptake_bar(map))
             .chain(sums(map))
             .collect(),
+    }
+}
+
+/// A value of the image: counts are whole; images of a scale below ten keep two digits.
+fn counts(value: f64) -> String {
+    if value < 10.0 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.0}")
     }
 }
 

@@ -98,6 +98,7 @@ pub fn from_files(
         deform: parameters.on(&reading.volume)?,
         polar: parameters.polar,
         kept_model: parameters.kept_model.clone(),
+        segments_from: parameters.segments_from,
         reader: order.reader.clone(),
     };
     check_reader(order)?;

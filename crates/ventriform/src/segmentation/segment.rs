@@ -7,6 +7,7 @@ use super::order::NamedReader;
 use super::slices::{self, Cut};
 use crate::deform::{DeformParameters, FittedModel, blur_correction};
 use crate::fit::Fit;
+use crate::geometry::Vec3;
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
@@ -23,6 +24,9 @@ pub struct SegmentationParameters {
     pub polar: PolarParameters,
     /// Name of the template whose fit is kept. Default: that with the greatest confidence.
     pub kept_model: Option<String>,
+    /// Direction from the long axis to the wall that is called anterior, LPS, any length. It is taken when the fit is
+    /// done, so that only names of places follow it. Default: by the orientation that the fit starts from.
+    pub segments_from: Option<Vec3>,
     /// The reader as whom to draw the wall. The profile must start from the wall that
     /// [`DeformParameters::edge`] asks for. Default: none.
     pub reader: Option<NamedReader>,
@@ -115,6 +119,13 @@ pub fn segment(
         ..
     } = trials;
     monitor.report(Stage::Polar, 0.0)?;
+    let fit = match &parameters.segments_from {
+        Some(anterior) => Fit {
+            model: fit.model.counted_from(anterior, monitor)?,
+            ..fit
+        },
+        None => fit,
+    };
     // Uptake is sampled through the wall as it looks, whichever wall is shown.
     let polar = fit.model.surfaces.as_ref().map(|surfaces| {
         let [wall, anatomical] = [&surfaces.apparent, &surfaces.anatomical].map(|s| &s.wall);
