@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { type Kind, type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
 import { fits, models, templates, volumes } from "./library";
 import { useWatched } from "./state";
-import { isLabelMap, moment, nameOf } from "./words";
+import { cut, isLabelMap, moment, nameOf } from "./words";
 
 interface Schema {
   type?: string | string[];
@@ -65,7 +65,7 @@ function read(operation?: Operation): Spec[] {
     if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
     const help = parameter.description ?? schema.description ?? "";
     const numeric = ["number", "integer", "array"].includes(String(schema.type));
-    const unit = numeric && name !== "axis" && name !== "anterior" ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "") : "";
+    const unit = numeric && !["axis", "anterior", "segments_from"].includes(name) ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "") : "";
     return [{ name, schema, help, unit }];
   });
 }
@@ -76,7 +76,7 @@ const FEW: Record<Kind, string[]> = {
   beat: ["model", "mass_g", "rr_ms", "gated"],
 };
 
-const PLACE = ["center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior"];
+const PLACE = ["center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior", "segments_from", "kept_model"];
 const EDGE = ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"];
 const SPRINGS = ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"];
 
@@ -350,7 +350,7 @@ function ExpertChoice({ common, text, onText, volume }: ChoiceProps) {
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
       <option value="">none</option>
-      {masks.map(mask => <option key={mask.id} value={mask.id}>{nameOf(mask)}</option>)}
+      {masks.map(mask => <option key={mask.id} value={mask.id}>{cut(nameOf(mask))}</option>)}
       {text && !masks.some(mask => mask.id === text) && <option value={text}>{text}</option>}
     </select>
   );

@@ -3,7 +3,7 @@
 
 import { type ComponentChildren, render } from "preact";
 import "./report.css";
-import { LUTS } from "./viewer/colours";
+import { LUTS, UPTAKE } from "./viewer/colours";
 import { type Mesh, withNormals } from "./viewer/mesh";
 import { Pictures } from "./viewer/pictures";
 import type { PolarMap } from "./generated/openapi";
@@ -107,7 +107,7 @@ function linkSegments(scene: Scene, frame: WallFrame, map: PolarMap): void {
 
 async function draw(embedded: Embedded): Promise<void> {
   const shown = shownOf(embedded);
-  const scene = new Scene(await voxelsOf(embedded.region), LUTS["Hot iron"]!, LUTS["Inferno"]!);
+  const scene = new Scene(await voxelsOf(embedded.region), LUTS["Hot iron"]!, LUTS[UPTAKE]!);
   const { mesh, heart, polar } = shown;
   scene.heart.value = heart;
   scene.cursor.value = shown.middle;

@@ -6,12 +6,28 @@ export function nameOf(volume: Volume): string {
   return volume.external_id || volume.labels["name"] || `Scan ${volume.id.slice(4, 12)}`;
 }
 
-/** Patient and study of a scan, as DICOM or the caller states them. */
-export function study({ dicom }: Volume): string {
+/** Most letters of an identifier in lists. */
+const LIST_LETTERS = 32;
+
+/** A name or identifier with its middle left out, where it is too long for a list. */
+export function cut(text: string): string {
+  if (text.length <= LIST_LETTERS) return text;
+  return `${text.slice(0, LIST_LETTERS - 12)}…${text.slice(-11)}`;
+}
+
+/** What a scan is called on its own view: an identifier of DICOM is said to be one. */
+export function titleOf(volume: Volume): string {
+  const name = nameOf(volume);
+  return /^[\d.]{20,}$/.test(name) ? `UID ${name}` : name;
+}
+
+/** Patient and study of a scan, as DICOM or the caller states them, identifiers with what they identify; `written` shortens them. */
+export function study({ dicom }: Volume, written: (text: string) => string = text => text): string {
   if (!dicom) return "";
   const patient = dicom["patient_name"]?.replaceAll("^", " ").trim();
   const date = dicom["study_date"]?.replace(/^(\d{4})(\d\d)(\d\d)$/, "$1-$2-$3");
-  const parts = [patient, dicom["patient_id"], date && `study of ${date}`, dicom["accession_number"]];
+  const [id, accession] = [dicom["patient_id"], dicom["accession_number"]];
+  const parts = [patient && written(patient), id && `patient ID ${written(id)}`, date && `study of ${date}`, accession && `accession ${written(accession)}`];
   return parts.filter(Boolean).join(" · ");
 }
 
@@ -36,6 +52,11 @@ export function moment(text: string): string {
 export function number(value: unknown, digits = 1, unit = ""): string {
   if (typeof value !== "number" || !Number.isFinite(value)) return "–";
   return value.toFixed(digits) + (unit ? `\u2009${unit}` : "");
+}
+
+/** A value of the image: counts are whole; images of a scale below ten keep two digits. */
+export function counts(value: number): string {
+  return Math.abs(value) < 10 && !Number.isInteger(value) ? value.toPrecision(2) : value.toFixed(0);
 }
 
 export function shape(volume: Volume): string {
@@ -94,7 +115,7 @@ export function kindOf(id: string): Kind {
 /** What distinguishes a result from others of the same scan. */
 export function resultName(result: Result): string {
   if (isFit(result.id) || isBeat(result.id)) {
-    const changed = ["center", "axis", "base", "roll"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
+    const changed = ["center", "axis", "base", "roll", "segments_from"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
     const model = result.parameters["model"];
     const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
     const what = isBeat(result.id) ? `beat of ${result.summary.gates} gates` : "fit";

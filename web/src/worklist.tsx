@@ -10,7 +10,7 @@ import { Picture } from "./picture";
 import { open, route } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
-import { bytes, isBeat, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study } from "./words";
+import { bytes, cut, isBeat, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study, titleOf } from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
@@ -106,7 +106,7 @@ function Uploads() {
           const underway = upload.state === "waiting" || upload.state === "sending" || upload.state === "reading";
           return (
             <li key={upload.id} class={upload.state}>
-              <span class="name">{upload.group.name}</span>
+              <span class="name" title={upload.group.name}>{cut(upload.group.name)}</span>
               <span class="quiet">{bytes(upload.bytes)}{upload.group.files.length > 1 && `, ${upload.group.files.length} files`}</span>
               {upload.state === "sending" && <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />}
               <span role="status" class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
@@ -259,14 +259,14 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
     <li class="scan">
       <a class="thumb" href={`#/scan/${volume.id}`} tabIndex={-1} aria-hidden="true"><Picture path={volume.links.preview} label="" /></a>
       <div class="what">
-        <a class="name" href={`#/scan/${volume.id}`}>{name}</a>
-        {study(volume) && <span>{study(volume)}</span>}
+        <a class="name" href={`#/scan/${volume.id}`} title={name}>{cut(titleOf(volume))}</a>
+        {study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
         <span class="quiet">
           {moment(volume.created_at)} · {bytes(volume.bytes)} · {volume.format} · {shape(volume)}
           {isLabelMap(volume) && " · label map"}
           {volume.legal_hold ? " · on legal hold" : ""}
         </span>
-        {labels.length > 0 && <span class="labels">{labels.map(([label, value]) => <span key={label}>{label}: {value}</span>)}</span>}
+        {labels.length > 0 && <span class="labels">{labels.map(([label, value]) => <span key={label} title={value}>{label}: {cut(value)}</span>)}</span>}
         {volume.warnings.length > 0 && <span class="warning">{volume.warnings.join(" ")}</span>}
       </div>
       <div class="results">

@@ -71,16 +71,16 @@ function image([nx, ny], steps) {
   ];
 }
 
-export function nm(nifti, patient) {
+export function nm(nifti, patient, id = "PH7") {
   const scan = scanOf(nifti);
-  return nmFile(scan, patient, "RECON TOMO", [
+  return nmFile({ ...scan, id }, patient, "RECON TOMO", [
     element(0x00280008, "IS", scan.shape[2]),
     element(0x00280009, "AT", 0x00540080),
   ], [element(0x00540080, "US", Array.from({ length: scan.shape[2] }, (_, n) => n + 1))]);
 }
 
 /** An NM file with the elements that say how its frames are counted, and those of each frame. */
-function nmFile({ shape, pixels, steps, origin }, patient, type, counted, vectors) {
+function nmFile({ shape, pixels, steps, origin, id = "PH7" }, patient, type, counted, vectors) {
   const kind = "1.2.840.10008.5.1.4.1.1.20";
   const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
   return Buffer.concat([
@@ -93,7 +93,7 @@ function nmFile({ shape, pixels, steps, origin }, patient, type, counted, vector
     element(0x00080050, "SH", "ACC7"),
     element(0x00080060, "CS", "NM"),
     element(0x00100010, "PN", patient),
-    element(0x00100020, "LO", "PH7"),
+    element(0x00100020, "LO", id),
     element(0x00180050, "DS", number(Math.abs(steps[2]))),
     element(0x00180088, "DS", number(steps[2] * Math.sign(steps[0] * steps[1]))),
     element(0x0020000d, "UI", `${ROOT}.7.1`),

@@ -54,9 +54,9 @@ async function service(...flags) {
 }
 
 /** A tab that fails the check if anything is wrong behind the view. */
-async function tab(browser, address, { width = 1280, dark = false, expected = [], script, scripts = true, ratio = 1, motion = true } = {}) {
+async function tab(browser, address, { width = 1280, height = width > 600 ? 800 : 850, dark = false, expected = [], script, scripts = true, ratio = 1, motion = true } = {}) {
   const context = await browser.newContext({
-    viewport: { width, height: width > 600 ? 800 : 850 },
+    viewport: { width, height },
     colorScheme: dark ? "dark" : "light",
     hasTouch: width < 600,
     acceptDownloads: true,
@@ -366,6 +366,125 @@ async function main() {
     });
   }
 
+  await check("a reader's view: words, one scale, report at hand, long identifiers", async () => {
+    const own = await service();
+    const file = join(SCREENSHOTS, "long.dcm");
+    const id = "1.2.840.113619.2.55.3.604688119.868.1459412345.123456";
+    writeFileSync(file, nm(readFileSync(SCAN), "Reader^Rita", id));
+    // Keeps what is written on a polar map, and where its cursor is.
+    const script = () => {
+      const { fillText, arc, clearRect } = CanvasRenderingContext2D.prototype;
+      Object.assign(CanvasRenderingContext2D.prototype, {
+        clearRect(...all) {
+          this.canvas.marks = { texts: [], ring: null };
+          return clearRect.apply(this, all);
+        },
+        fillText(text, x, y, ...rest) {
+          this.canvas.marks?.texts.push({ text, x, y, width: this.measureText(text).width, height: parseFloat(/([\d.]+)px/.exec(this.font)[1]) * 0.7 });
+          return fillText.call(this, text, x, y, ...rest);
+        },
+        arc(x, y, radius, ...rest) {
+          if (radius === 6 && this.canvas.marks) this.canvas.marks.ring = { x, y };
+          return arc.call(this, x, y, radius, ...rest);
+        },
+      });
+    };
+    for (const [width, dark] of [[1440, false], [1440, true], [400, false], [400, true]]) {
+      const name = `${width}-${dark ? "dark" : "light"}`;
+      const { page, faults, close } = await tab(browser, own.address, { width, height: 900, dark, script });
+      await page.waitForSelector(".drop");
+      await choose(page, file);
+      if (width === 1440 && !dark) await drawn(page);
+      else await page.goto(`${own.address}/#/`).then(() => page.locator(".scan .result").first().click()).then(() => drawn(page));
+      await page.waitForSelector(".wall canvas");
+      // Identifiers are said to be such, and whole on the view of the scan.
+      const head = await page.textContent(".side header");
+      assert.ok(head.includes(`patient ID ${id}`) && head.includes("accession ACC7"), head);
+      assert.ok(await page.evaluate(() => [...document.querySelectorAll(".side, .facts")].every(part => part.scrollWidth <= part.clientWidth)), "nothing sticks out");
+      if (width === 1440) {
+        for (const label of ["Report", "Print"]) {
+          const box = await page.locator(".facts .takeaways").getByText(label, { exact: true }).boundingBox();
+          assert.ok(box.y > 0 && box.y + box.height < 900, `${label} above the fold`);
+        }
+      }
+      assert.match(await page.textContent(".verdict > p"), /^(Very likely|Probably|Perhaps) a (good|poor) fit/);
+      assert.equal(await page.locator(".verdict details[open]").count(), 0, "figures are folded");
+      assert.equal(await page.locator(".facts meter:visible").count(), 0);
+      await page.locator(".verdict summary").click();
+      assert.match(await page.textContent(".verdict details"), /in 100 are good/);
+      await look(page, `reader-${name}`);
+      assert.equal(await page.getByLabel("Colours of polar map and wall").inputValue(), "Inferno");
+      for (const slice of await page.locator(".slice canvas").all()) assert.match(await slice.getAttribute("aria-valuetext"), /value (none|-?\d+|-?0?\.\d{1,3}|-?\d\.\d)$/);
+      // Wherever the cursor is, it covers no number, and nothing is above all.
+      const map = page.locator(".polar canvas").first();
+      await map.scrollIntoViewIfNeeded();
+      const marks = () => map.evaluate(canvas => canvas.marks);
+      const places = (await marks()).texts.filter(one => /^\d+$/.test(one.text));
+      assert.equal(places.length, 17);
+      for (const place of places) {
+        await map.click({ position: { x: place.x, y: place.y } });
+        await page.waitForTimeout(80);
+        const { texts, ring } = await marks();
+        assert.ok(ring && Math.hypot(ring.x - place.x, ring.y - place.y) < 25, "the cursor is where the press was");
+        for (const one of texts) assert.ok(Math.abs(one.x - ring.x) > 6 + one.width / 2 || Math.abs(one.y - ring.y) > 6 + one.height / 2, `${one.text} lies under the cursor`);
+        const [segment, here = 0] = [...(await page.textContent(".polar .at")).matchAll(/(\d+)\u2009%/g)].map(match => Number(match[1]));
+        assert.ok(segment <= 100 && here <= 100, `${segment} %, here ${here} %`);
+      }
+      await look(page, `reader-cursor-${name}`);
+      await page.goto(`${own.address}/#/`);
+      const line = page.locator(".scan .what span[title]").first();
+      assert.match(await line.textContent(), /patient ID 1\.2\.840\.113619\.2[.\d]*…/);
+      assert.ok((await line.getAttribute("title")).includes(id));
+      await look(page, `reader-list-${name}`);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
+  });
+
+  await check("a turn renames segments and nothing else; a correction keeps its heart", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address, { width: 1440, height: 900 });
+    await page.waitForSelector(".welcome");
+    await choose(page, SCAN);
+    await drawn(page);
+    const all = async kind => (await (await fetch(`${own.address}/v1/${kind}`)).json())[kind];
+    const read = async (result, name) => (await fetch(own.address + result.files.find(one => one.name === name).href)).json();
+    const [first] = await all("segmentations");
+    const correct = async (field, change) => {
+      const before = (await all("segmentations")).length;
+      if (!(await page.locator(".correction").count())) await page.getByRole("button", { name: "Correct by hand" }).click();
+      const input = page.locator(".correction label", { hasText: field }).locator("input");
+      await input.fill(String(Number(await input.inputValue()) + change));
+      await input.press("Tab");
+      await page.getByRole("button", { name: "Fit from here" }).click();
+      await page.waitForFunction(count => document.querySelectorAll(".choices li").length === count, before + 1);
+      await page.waitForFunction(() => /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent));
+      return (await all("segmentations"))[0];
+    };
+    const turned = await correct("Turn", 60);
+    assert.deepEqual((await read(turned, "mesh.json")).vertices, (await read(first, "mesh.json")).vertices, "the same wall");
+    const [old, now] = [await read(first, "report.json"), await read(turned, "report.json")];
+    assert.equal(now.template, old.template);
+    assert.equal(turned.parameters.kept_model, old.template);
+    assert.deepEqual(now.volumes_ml, old.volumes_ml);
+    assert.deepEqual(now.fit.confidence, old.fit.confidence);
+    assert.match(await page.textContent(".choices .current"), /by hand: turn/);
+    // What was the anterior wall is now called by its neighbour's name: six basal segments are 60 degrees each.
+    const means = async result => (await read(result, "polar.json")).segments.slice(0, 6).map(one => one.mean_percent);
+    const [was, is] = [await means(first), await means(turned)];
+    const apart = by => Math.max(...was.map((mean, n) => Math.abs(mean - is[(n + by) % 6])));
+    assert.ok(Math.min(apart(1), apart(5)) < 1.5, `${was} and ${is}`);
+    // Another base, too, keeps heart and names.
+    const based = await correct("Base", 4);
+    assert.equal((await read(based, "report.json")).template, old.template);
+    assert.deepEqual(based.parameters.segments_from, turned.parameters.segments_from);
+    await look(page, "turned-1440-light");
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
   await check("the documentation of the API", async () => {
     for (const [width, dark] of [[1280, false], [400, true]]) {
       const { page, faults, close } = await tab(browser, `${address}/docs`, { width, dark });
@@ -541,6 +660,8 @@ async function main() {
       await page.getByRole("button", { name: "Fit from here" }).click();
       await page.waitForSelector(".choices .other");
       assert.match(await page.textContent(".choices .current"), /Corrected beat of \d+ gates[^]*by hand: base; from the fit of/);
+      const again = await page.evaluate(async () => (await (await fetch("/v1/beats")).json()).beats[0].parameters.kept_model);
+      assert.equal(again, report.template, "the beat keeps its heart");
       await page.waitForFunction(() => document.querySelectorAll(".figures thead th").length >= 2);
       await played(page);
       await look(page, `beat-compare-${name}`);

@@ -271,6 +271,8 @@ export interface components {
             rr_ms?: number;
             /** @description Voxel i,j,k (counted from 0) in the cavity; use this or center */
             seed_point?: number[];
+            /** @description Direction from the long axis to the wall that segments are counted from as the anterior one, x,y,z in the LPS frame of the volume, once the fit is done: heart and wall stay, names of places change. Default: the anterior wall by `superior` or `anterior`, which the fit starts from */
+            segments_from?: number[];
             /**
              * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
              * @default half_maximum
@@ -3227,6 +3229,8 @@ export interface components {
             roll?: number;
             /** @description Voxel i,j,k (counted from 0) in the cavity; use this or center */
             seed_point?: number[];
+            /** @description Direction from the long axis to the wall that segments are counted from as the anterior one, x,y,z in the LPS frame of the volume, once the fit is done: heart and wall stay, names of places change. Default: the anterior wall by `superior` or `anterior`, which the fit starts from */
+            segments_from?: number[];
             /**
              * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
              * @default half_maximum

@@ -54,7 +54,7 @@ export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & 
           ))}
         </div>
         <div class="words">
-          <Verdict shown={shown} />
+          <Verdict shown={shown} open />
           <p class="quiet">
             {volume.format}, {shape(volume)}, <code>{volume.id}</code>; beat <code>{shown.result.id}</code>.{" "}
             {report.rr_ms ? `R-R interval ${number(report.rr_ms, 0, "ms")}. ` : ""}

@@ -52,6 +52,9 @@ export const DIVERGING = ramp([[0, "#2166ac"], [0.25, "#92c5de"], [0.5, "#f7f7f7
 /** Round the cycle of a beat. */
 export const CYCLE = ramp([...figures.cycle, figures.cycle[0]!].map((rgb, n): [number, string] => [n / figures.cycle.length, hex(rgb)]));
 
+/** More uptake at stress than at rest, as much, less. */
+export const DIFFERENCE = ramp(figures.difference.map((rgb, n): [number, string] => [n / 2, hex(rgb)]));
+
 /** A wall that moves outward, or gets thinner. */
 export const OUTWARD = figures.outward as [number, number, number];
 
@@ -70,9 +73,12 @@ const THRESHOLD = hex(uptake.threshold);
 /** The hatching of places beyond the muscle's end. */
 export const VALVE_PLANE = hex(uptake.valve_plane);
 
+/** The scale of the uptake in maps, on the wall, in reports and files. */
+export const UPTAKE = "Inferno";
+
 /** The line that is seen on a map of these colours: the service's own has one for itself. */
 export function thresholdOn(lut: Lut): string {
-  return lut === LUTS["Inferno"] ? THRESHOLD : "#fff";
+  return lut === LUTS[UPTAKE] ? THRESHOLD : "#fff";
 }
 
 /** Where the browser keeps the colours that were chosen for slices, and for polar map and wall. */

@@ -77,6 +77,9 @@ export function Correction({ scene, volume, shown }: Props) {
       const specs = (await parameterSpecs())[kind];
       const before = corrected ? valuesOf(draftOf(corrected.result.parameters, specs), specs) : {};
       const next: Record<string, ParameterValue> = { ...before, ...(kind === "beat" ? {} : { edge }) };
+      // Another heart may win from another place; the one that was looked at is kept.
+      const kept = corrected?.report?.template ?? corrected?.beat?.report.template;
+      if (kept) next["kept_model"] = kept;
       if (edit.changed.has("center")) {
         next["center"] = edit.center.map(value => Math.round(value * 100) / 100);
         delete next["seed_point"];
@@ -87,10 +90,9 @@ export function Correction({ scene, volume, shown }: Props) {
       if (reader) next["reader"] = reader;
       else delete next["reader"];
       if (edit.changed.has("roll") && scene.heart.value) {
-        // The wall that now stands on top is anterior, so that is where superior lies across the axis.
+        // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that it had.
         const { axis: way, anterior } = frameOf(scene.heart.value);
-        next["superior"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => value.toFixed(4)).join(",");
-        delete next["anterior"];
+        next["segments_from"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => Math.round(value * 1e4) / 1e4);
       }
       const changed = [...edit.changed, ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []), ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
       const labels: Record<string, string> = { changed: changed.join(" ") || "nothing" };
@@ -103,7 +105,7 @@ export function Correction({ scene, volume, shown }: Props) {
   };
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
-      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall. {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.</p>
+      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall: turning only renames segments. {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.</p>
       <Triple name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
       <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
       <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />

@@ -1,5 +1,6 @@
 // How a slice is drawn: the resampled voxels, what lies over them, and what a reader needs to know of the picture.
 
+import { counts } from "../words";
 import type { Lut } from "./colours";
 import { outline } from "./mesh";
 import { type Plane, letters, point } from "./plane";
@@ -179,7 +180,7 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
   }
   label(context, width < 260 ? plane.short : plane.name, 8, 12, "left", 12);
   const value = style.cursor ? scene.voxels.at(scene.cursor.value) : NaN;
-  label(context, Number.isNaN(value) ? "" : value.toPrecision(3), width - 8, 12, "right", 12);
+  label(context, Number.isNaN(value) ? "" : counts(value), width - 8, 12, "right", 12);
   // A bar of a round length, at most a third of the picture.
   const length = [100, 50, 20, 10, 5, 2, 1].find(mm => mm * factor < width / 3.2) ?? 1;
   const [from, to, y] = [10, 10 + length * factor, height - 12];

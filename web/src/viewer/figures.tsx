@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
-import type { Agreement, BeatReport, ModelSummary, SegmentationReport } from "../generated/openapi";
+import type { Agreement, BeatReport, Evidence, ModelSummary, SegmentationReport } from "../generated/openapi";
 import type { Loaded } from "./loaded";
 
 /** Name, figure, digits, unit; for some, the interval that holds the truth in nine of ten hearts. */
@@ -82,19 +82,48 @@ function between(interval: number[] | null | undefined, digits: number): string 
   return interval ? `${number(interval[0], digits)} to ${number(interval[1], digits)}` : "";
 }
 
-/** How likely the fit is good, and every reason to doubt it. */
-export function Verdict({ shown }: { shown: Loaded }) {
+/** What a chance of a good fit says to a reader, from the greatest down. */
+const CONFIDENCE_WORDS: [number, string][] = [
+  [0.9, "Very likely a good fit."],
+  [0.7, "Probably a good fit: look over its contours."],
+  [0.4, "Perhaps a poor fit: check its contours."],
+  [0, "Probably a poor fit: correct it by hand."],
+];
+
+const share = (value: number) => number(100 * value, 0, "%");
+
+/** Figures behind the confidence. */
+const EVIDENCE: [string, (evidence: Evidence) => string][] = [
+  ["Wall whose edge is seen", evidence => share(evidence.active_sensors)],
+  ["Wall that is dark", evidence => share(evidence.dark)],
+  ["Wall beside something brighter", evidence => share(evidence.beside)],
+  ["Brightness that the cavity lacks", evidence => share(evidence.hollowness)],
+  ["Chance that the patient moved", evidence => share(evidence.chance_of_motion)],
+];
+
+/** Whether the fit is good, in words; every reason to doubt it; and the figures behind both, which are `open` on paper. */
+export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean }) {
   const flags = shown.report?.flags ?? shown.beat?.report.flags ?? [];
   const confidence = shown.report?.fit.confidence ?? shown.beat?.report.confidence;
+  const evidence = shown.report?.evidence;
+  const heart = shown.report?.template ?? shown.beat?.report.template;
+  const known = typeof confidence === "number";
+  const words = known && CONFIDENCE_WORDS.find(([least]) => confidence >= least)?.[1];
   return (
     <div class={flags.length ? "verdict doubt" : "verdict"}>
-      {typeof confidence === "number" && (
-        <p>
-          <b>{confidence > 0.99 ? "> 99" : (100 * confidence).toFixed(0)} %</b> likely a good fit{shown.beat && " of the gates’ sum"}
-          <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
-        </p>
-      )}
+      {words && <p><b>{words}</b></p>}
       {flags.length > 0 ? <ul>{flags.map(flag => <li key={flag.code}>{flag.reason}</li>)}</ul> : <p class="quiet">No reason to doubt it was found.</p>}
+      {known && (
+        <details open={open}>
+          <summary>Figures behind it</summary>
+          <p>
+            Of fits judged like this one{shown.beat && ", to the sum of the gates"}, {confidence > 0.99 ? "more than 99" : (100 * confidence).toFixed(0)} in 100 are good.
+            <meter min={0} max={1} low={0.5} high={0.8} optimum={1} value={confidence} aria-label="Confidence" />
+          </p>
+          {evidence && <table><tbody>{EVIDENCE.map(([name, read]) => <tr key={name}><th scope="row">{name}</th><td>{read(evidence)}</td></tr>)}</tbody></table>}
+          {heart && <p class="quiet">Fitted heart: {heart}</p>}
+        </details>
+      )}
     </div>
   );
 }
@@ -103,7 +132,6 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
   const sections = ROWS[kindOf(shown.result.id)];
   const { report } = shown;
   const warnings = report?.warnings ?? shown.beat?.report.warnings ?? [];
-  const choice = report?.choice ?? (shown.beat && `started from ${shown.beat.report.template}`);
   const reason = shown.beat?.report.no_rates;
   return (
     <section class="figures" aria-label="Figures">
@@ -132,7 +160,26 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
         })}
       </table>
       {reason && <p class="quiet">No rates: {reason}.</p>}
-      <p class="quiet">{resultName(shown.result)} of {moment(shown.result.created_at)}{choice && `; ${choice}`}</p>
+      <p class="quiet">{resultName(shown.result)} of {moment(shown.result.created_at)}</p>
+    </section>
+  );
+}
+
+/** What is taken away most often, which stands first. */
+export function Takeaways({ result, volume }: { result: Result; volume: Volume }) {
+  const [state, setState] = useState("");
+  const failed = (error: unknown) => setState(words(error));
+  const page = result.links.page;
+  return (
+    <section class="downloads takeaways" aria-label="Report and print">
+      <div class="buttons">
+        {page && (key.value
+          ? <button type="button" onClick={() => void save(page, `${fileNameOf(volume)}_report.html`).catch(failed)}>Report</button>
+          : <a class="button" href={at(page)} target="_blank" rel="noopener">Report</a>)}
+        <button type="button" onClick={() => print()}>Print</button>
+        <button type="button" onClick={() => void saveResult(volume, result, setState).catch(failed)}>Everything as zip</button>
+      </div>
+      <p role="status" class="quiet">{state}</p>
     </section>
   );
 }
@@ -141,17 +188,9 @@ export function Downloads({ result, volume }: { result: Result; volume: Volume }
   const [state, setState] = useState("");
   const name = fileNameOf(volume);
   const failed = (error: unknown) => setState(words(error));
-  const page = result.links.page;
   const objects = objectsOf(volume, result);
   return (
-    <section class="downloads" aria-label="Downloads">
-      <div class="buttons">
-        <button type="button" onClick={() => void saveResult(volume, result, setState).catch(failed)}>Everything as zip</button>
-        <button type="button" onClick={() => print()}>Print</button>
-        {page && (key.value
-          ? <button type="button" onClick={() => void save(page, `${name}_report.html`).catch(failed)}>Report</button>
-          : <a class="button" href={at(page)} target="_blank" rel="noopener">Report</a>)}
-      </div>
+    <section class="downloads" aria-label="Files">
       <p role="status" class="quiet">{state}</p>
       <details>
         <summary>{result.files.length} files</summary>

@@ -3,6 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useWatched } from "../state";
+import { counts } from "../words";
 import { LUT, LUTS, keep } from "./colours";
 import { PATIENT, heartPlanes } from "./plane";
 import type { Layer, Scene, Tool } from "./scene";
@@ -104,7 +105,7 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
           </select>
         </label>
         <label class="inline brightness">
-          <ColourBar lut={lut} low={window_.low.toFixed(0)} high={window_.high.toFixed(0)} />
+          <ColourBar lut={lut} low={counts(window_.low)} high={counts(window_.high)} />
           <input type="range" aria-label="Brightest value" min={1} max={130} value={Math.round((100 * window_.high) / (range || 1))} onInput={event => (scene.window.value = { low: window_.low, high: (range * Number(event.currentTarget.value)) / 100 })} />
         </label>
         <span class="end">

@@ -1,7 +1,7 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
 import type { PolarFigure, PolarMap, WallFigure } from "../generated/openapi";
-import { CYCLE, LUTS, type Lut, NO_WALL, OUTWARD, VALVE_PLANE, colour, thresholdOn } from "./colours";
+import { CYCLE, DIFFERENCE, LUTS, type Lut, NO_WALL, OUTWARD, UPTAKE, VALVE_PLANE, colour, thresholdOn } from "./colours";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
@@ -30,30 +30,49 @@ export const FIGURES: Record<WallFigure, { name: string; unit: string }> = {
   motion: { name: "Motion inward", unit: "mm" },
   thickening: { name: "Thickening", unit: "%" },
   phase: { name: "Phase", unit: "°" },
+  difference: { name: "Less at stress than at rest", unit: "%" },
+  z: { name: "Against normal limits", unit: "SD" },
+  score: { name: "Score against normal limits", unit: "" },
 };
 
 export function figureLut(figure: WallFigure): Lut {
-  return figure === "phase" ? CYCLE : LUTS["Inferno"]!;
+  if (figure === "phase") return CYCLE;
+  return figure === "difference" ? DIFFERENCE : LUTS[UPTAKE]!;
 }
 
 export function figureMap(map: PolarFigure): DrawnMap {
   const cyclic = map.figure === "phase";
   const [least = 0, most = 1] = map.range;
   const segments = map.segments.map(({ number, name, mean }) => ({ number, name, mean: mean ?? null }));
-  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: cyclic ? null : OUTWARD, cyclic };
+  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null, cyclic };
+}
+
+/** An uptake as it is shown: the reference is a mean of the brightest wall, so that some places lie a little above it. */
+export function shown(percent: number | null | undefined): number | null {
+  return percent == null ? null : Math.min(100, percent);
 }
 
 export function uptakeMap(map: PolarMap): DrawnMap {
   return {
     ...map,
-    values: map.values_percent.map(row => row.map(value => value ?? null)),
-    segments: map.segments.map(({ number, name, mean_percent, territory }) => ({ number, name, mean: mean_percent ?? null, territory: territory ?? "" })),
+    values: map.values_percent.map(row => row.map(value => shown(value))),
+    segments: map.segments.map(({ number, name, mean_percent, territory }) => ({ number, name, mean: shown(mean_percent), territory: territory ?? "" })),
     threshold: map.threshold_percent,
     range: [0, 100],
     unit: "%",
     below: null,
     cyclic: false,
   };
+}
+
+/** Whether a map has places beyond the muscle's end. */
+export function hasValvePlane({ states }: Partial<Pick<PolarMap, "states">>): boolean {
+  return states?.some(row => row.includes("valve_plane")) ?? false;
+}
+
+/** Whether a place `rows` from the apex and `columns` from lateral lies beyond the muscle's end. */
+export function isInValvePlane(map: Laid, rows: number, columns: number): boolean {
+  return isValvePlane(map, Math.max(0, Math.min(map.rows - 1, Math.floor(rows))), columnAt(map, columns));
 }
 
 /** Whether a place lies beyond the muscle's end. */
@@ -352,9 +371,11 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   };
   // Small maps have the room for small figures only.
   const text = size < 180 ? 8 : Math.max(10, Math.min(14, size / 26));
-  for (const { number, mean } of map.segments) {
-    const [ring, turns] = labelPlace(map, number);
-    const [x, y] = at(ring, turns);
+  const cursor = style.cursor && cursorOn(map, style.cursor, at);
+  const places = map.segments.map(({ number }) => at(...labelPlace(map, number)));
+  for (const [n, { mean }] of map.segments.entries()) {
+    const others = places.filter((_, other) => other !== n);
+    const [x, y] = cursor ? besideRing(places[n]!, cursor, others, text) : places[n]!;
     write(mean === null ? "–" : mean.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
   }
   if (oriented) {
@@ -362,17 +383,34 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
       write(name, ...at(1.075, turns), `600 ${text}px system-ui, sans-serif`);
     }
   }
-  if (style.cursor) {
-    const [rows, columns] = style.cursor;
-    const [x, y] = at(Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))), columns / map.columns);
+  if (cursor) {
+    const [x, y] = cursor;
     for (const [width, stroke] of [[4, "#000"], [2, "#4de3ff"]] as const) {
       context.lineWidth = width;
       context.strokeStyle = stroke;
       context.beginPath();
-      context.arc(x, y, 6, 0, 2 * Math.PI);
+      context.arc(x, y, CURSOR_RADIUS, 0, 2 * Math.PI);
       context.stroke();
     }
   }
+}
+
+/** Radius of the cursor's ring, CSS pixels. */
+const CURSOR_RADIUS = 6;
+
+/** Where the cursor is drawn. */
+function cursorOn(map: Laid, [rows, columns]: [number, number], at: (radius: number, turns: number) => [number, number]): [number, number] {
+  return at(Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))), columns / map.columns);
+}
+
+/** The place of a number of this height, moved where the cursor's ring would cover it: to the side with the most room. */
+function besideRing(place: [number, number], [x, y]: [number, number], others: [number, number][], height: number): [number, number] {
+  const [aside, above] = [CURSOR_RADIUS + 4 + height, CURSOR_RADIUS + 2 + height / 2];
+  if (Math.abs(place[0] - x) >= aside || Math.abs(place[1] - y) >= above) return place;
+  const sides: [number, number][] = [[x + aside, y], [x - aside, y], [x, y - above], [x, y + above]];
+  // A number is about twice as wide as high.
+  const room = (side: [number, number]) => Math.min(...others.map(other => Math.max(Math.abs(other[0] - side[0]) / 2, Math.abs(other[1] - side[1]))));
+  return sides.reduce((best, side) => (room(side) > room(best) ? side : best));
 }
 
 /** The middle of a segment: rows from the apex, columns from lateral. */

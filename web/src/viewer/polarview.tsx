@@ -7,7 +7,7 @@ import { useCanvas } from "./canvas";
 import { LUTS, WALL_LUT, keep } from "./colours";
 import type { Mesh } from "./mesh";
 import type { PolarMap } from "../generated/openapi";
-import { WallFrame, drawPolar, placeOnMap, segmentAt, uptakeMap, valueAt } from "./polar";
+import { WallFrame, drawPolar, hasValvePlane, isInValvePlane, placeOnMap, segmentAt, shown, uptakeMap, valueAt } from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
 import { ColourBar } from "./wall";
@@ -62,7 +62,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
       />
       <figcaption>
         <p class="at">
-          {segment ? <><b>{segment.name}</b> {number(segment.mean_percent, 0, "%")}, here {number(valueAt(drawnMap, rows, columns), 0, "%")}</> : "Cursor off the wall"}
+          {segment ? <><b>{segment.name}</b> {number(shown(segment.mean_percent), 0, "%")}, here {isInValvePlane(map, rows, columns) ? "valve plane" : number(valueAt(drawnMap, rows, columns), 0, "%")}</> : "Cursor off the wall"}
         </p>
         <span class="inline">
           <ColourBar lut={lut} low="0" high="100 %" />
@@ -78,6 +78,7 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
           <label class="inline"><input type="checkbox" checked={segments} onChange={event => setSegments(event.currentTarget.checked)} /> segment means</label>
           {map.orientation !== "unknown" && <label class="inline"><input type="checkbox" checked={territories} onChange={event => setTerritories(event.currentTarget.checked)} /> territories</label>}
         </div>
+        {hasValvePlane(map) && <p class="quiet">Hatched: valve plane, in no figure.</p>}
         {territories && <p class="quiet">{map.territories.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(" · ")}</p>}
         {map.orientation === "unknown" && <p class="warning">Nothing tells which side is anterior: segments have no names.</p>}
       </figcaption>

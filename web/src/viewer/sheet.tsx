@@ -2,16 +2,16 @@
 
 import { type ComponentChildren, render } from "preact";
 import type { Volume } from "../api";
-import { isFit, moment, nameOf, number, resultName, shape, study } from "../words";
+import { counts, isFit, moment, nameOf, number, resultName, shape, study } from "../words";
 import { BeatSheet } from "./beatsheet";
 import { type Camera } from "./camera";
-import { DIVERGING, LUTS } from "./colours";
+import { DIVERGING, LUTS, UPTAKE } from "./colours";
 import { drawSlice } from "./drawing";
 import { Figures, Verdict, headlines } from "./figures";
 import { FlatView } from "./flatview";
 import type { Loaded } from "./loaded";
 import { PATIENT, frameOf, heartPlanes } from "./plane";
-import { drawPolar, uptakeMap } from "./polar";
+import { drawPolar, hasValvePlane, uptakeMap } from "./polar";
 import type { Scene } from "./scene";
 import { drawStack } from "./stack";
 import { add, scale, unit } from "./vector";
@@ -84,7 +84,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
                 if (context) drawPolar(context, uptakeMap(polar), 360, RATIO, { lut: scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
               }} />
               <figcaption>
-                <span>Uptake; the white line encloses what is below {number(polar.threshold_percent, 0, "%")}</span>
+                <span>Uptake; the line encloses what is below {number(polar.threshold_percent, 0, "%")}{hasValvePlane(polar) && "; hatched: valve plane, in no figure"}</span>
                 <ColourBar lut={scene.wallLut.value} low="0" high="100 %" />
               </figcaption>
             </figure>
@@ -93,7 +93,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
             <dl class="headlines">
               {headlines(shown).map(([name, value, interval]) => <div key={name}><dt>{name}</dt><dd>{value}{interval && <span class="interval">90 %: {interval}</span>}</dd></div>)}
             </dl>
-            {shown.report && <Verdict shown={shown} />}
+            {shown.report && <Verdict shown={shown} open />}
           </div>
         </div>
         <div class="three">
@@ -156,7 +156,7 @@ function Walls({ scene, shown }: { scene: Scene; shown: Loaded }) {
   const byDistance = shown.surface !== null;
   const paint = byDistance
     ? { lut: DIVERGING, range: [-2, 2] as [number, number] }
-    : { lut: scene.wallLut.value ?? LUTS["Perfusion"]!, range: [0, 100] as [number, number] };
+    : { lut: scene.wallLut.value ?? LUTS[UPTAKE]!, range: [0, 100] as [number, number] };
   const colours = coloursOf(shown.surface ?? uptakeOf(scene, shown), paint);
   const near = wallCamera(shown.mesh, heart);
   const far = { ...near, toward: scale(near.toward, -1) };
@@ -189,7 +189,7 @@ function Legend({ scene }: { scene: Scene }) {
   return (
     <p class="legend">
       {layers.map(layer => <span key={layer.name}><svg viewBox="0 0 18 6" aria-hidden="true"><line x1="1" y1="3" x2="17" y2="3" stroke={layer.colour} stroke-width="3" stroke-dasharray={layer.dashed ? "3 3" : undefined} /></svg> {layer.name}</span>)}
-      <ColourBar lut={scene.lut.value} low={low.toFixed(0)} high={high.toFixed(0)} />
+      <ColourBar lut={scene.lut.value} low={counts(low)} high={counts(high)} />
     </p>
   );
 }

@@ -5,6 +5,7 @@ import { useCanvas } from "./canvas";
 import { type SliceStyle, drawSlice, rollKnob, sliceOrigin } from "./drawing";
 import { handleEvents } from "./events";
 import { type Plane, letters, point } from "./plane";
+import { counts } from "../words";
 import type { Scene } from "./scene";
 import { type Vec, add, dot, norm, scale, sub, unit } from "./vector";
 
@@ -44,7 +45,7 @@ function describe(element: HTMLCanvasElement, scene: Scene, plane: Plane): void 
   set("aria-valuemin", low.toFixed(0));
   set("aria-valuemax", high.toFixed(0));
   set("aria-valuenow", now.toFixed(0));
-  set("aria-valuetext", `${now.toFixed(0)} mm towards ${letters(plane.normal)}, value ${Number.isNaN(value) ? "none" : value.toPrecision(3)}`);
+  set("aria-valuetext", `${now.toFixed(0)} mm towards ${letters(plane.normal)}, value ${Number.isNaN(value) ? "none" : counts(value)}`);
 }
 
 const STEP_OF_WHEEL = 40;

@@ -9,11 +9,11 @@ import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "..
 import { home, isAt, open, route } from "../route";
 import { useWatched } from "../state";
 import { file } from "../work";
-import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study } from "../words";
+import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study, titleOf } from "../words";
 import { BeatCharts, BeatMaps } from "./beatview";
-import { LUT, WALL_LUT, kept } from "./colours";
+import { LUT, UPTAKE, WALL_LUT, kept } from "./colours";
 import { Correction } from "./correction";
-import { Downloads, Figures } from "./figures";
+import { Downloads, Figures, Takeaways } from "./figures";
 import { type Loaded, loadLoaded, readGates, voxelsOf } from "./loaded";
 import { Pictures } from "./pictures";
 import { Player } from "./player";
@@ -77,7 +77,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
     let gone = false;
     setProblem("");
     voxelsOf(volume, typeof frame === "number" ? frame : null).then(
-      voxels => !gone && setScene(new Scene(voxels, kept(LUT, "Hot iron"), kept(WALL_LUT, "Perfusion"))),
+      voxels => !gone && setScene(new Scene(voxels, kept(LUT, "Hot iron"), kept(WALL_LUT, UPTAKE))),
       error => !gone && setProblem(words(error)),
     );
     return () => void (gone = true);
@@ -217,7 +217,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   return (
     <aside class="side" aria-label="Scan and work">
       <header>
-        <h1>{nameOf(volume)}</h1>
+        <h1>{titleOf(volume)}</h1>
         {study(volume) && <p>{study(volume)}</p>}
         <p class="quiet">{volume.format}, {shape(volume)}<br />{moment(volume.created_at)}</p>
         {volume.warnings.map(text => <p key={text} class="warning">{text}</p>)}
@@ -271,7 +271,7 @@ function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; r
   const labels = own.find(job => madeBy(job) === result.id && job.labels["changed"])?.labels;
   if (!labels) return null;
   const parent = results.find(other => other.id === labels["parent"]);
-  const names: Record<string, string> = { center: "centre", edge: "wall shown" };
+  const names: Record<string, string> = { center: "centre", edge: "wall shown", roll: "turn" };
   const changed = (labels["changed"] ?? "").split(" ").map(name => names[name] ?? name).join(", ");
   return <span class="quiet">by hand: {changed}{labels["parent"] && `; from ${parent ? `the fit of ${moment(parent.created_at)}` : "a fit that was erased"}`}</span>;
 }
@@ -279,6 +279,7 @@ function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; r
 function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; shown: Loaded; other: Loaded | null }) {
   return (
     <>
+      <Takeaways result={shown.result} volume={volume} />
       {shown.beat && <Figures shown={shown} other={other} />}
       {shown.beat && <BeatCharts scene={scene} report={shown.beat.report} />}
       {shown.polar && shown.heart && (

@@ -97,7 +97,7 @@ function paints({ scene, mesh, inner, other, polar, displacement, surface, figur
 export function coloursOf(values: Float32Array, { lut, range, below = null }: Pick<Paint, "lut" | "range" | "below">): Float32Array {
   const colours = new Float32Array(3 * values.length);
   values.forEach((value, at) => {
-    const rgb = Number.isNaN(value) ? [90, 96, 100] : colourOn({ range, below }, lut, value);
+    const rgb = colourOn({ range, below }, lut, value);
     colours.set(rgb.map(part => part / 255), 3 * at);
   });
   return colours;
