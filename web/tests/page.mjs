@@ -393,9 +393,9 @@ async function main() {
       const name = `${width}-${dark ? "dark" : "light"}`;
       const { page, faults, close } = await tab(browser, own.address, { width, height: 900, dark, script });
       await page.waitForSelector(".drop");
-      await choose(page, file);
-      if (width === 1440 && !dark) await drawn(page);
-      else await page.goto(`${own.address}/#/`).then(() => page.locator(".scan .result").first().click()).then(() => drawn(page));
+      if (width === 1440 && !dark) await choose(page, file);
+      else await page.locator(".scan .result").first().click();
+      await drawn(page);
       await page.waitForSelector(".wall canvas");
       // Identifiers are said to be such, and whole on the view of the scan.
       const head = await page.textContent(".side header");
