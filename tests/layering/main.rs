@@ -97,7 +97,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
         ],
     ),
-    ("normals", &["numeric", "polar"]),
+    ("normals", &["numeric", "model", "polar"]),
     (
         "reader",
         &["geometry", "mesh", "progress", "grid", "model", "deform"],
