@@ -98,6 +98,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
         ],
     ),
     ("normals", &["numeric", "model", "polar"]),
+    ("comparison", &["model", "polar", "normals"]),
     (
         "reader",
         &["geometry", "mesh", "progress", "grid", "model", "deform"],
@@ -138,6 +139,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "polar",
             "beat",
             "normals",
+            "comparison",
             "reader",
             "parameters",
         ],
@@ -205,6 +207,20 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "report",
             "parameters",
             "segmentation",
+        ],
+    ),
+    (
+        "rest_stress",
+        &[
+            "progress",
+            "volume",
+            "polar",
+            "normals",
+            "comparison",
+            "report",
+            "parameters",
+            "segmentation",
+            "gated",
         ],
     ),
     (
