@@ -56,7 +56,7 @@ def write():
         ("pub const DIFFERENCE_SD_POINTS", sd, 1,
          "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's reference."),
         ("pub(super) const SIGNIFICANT_TURN_GAIN", gain, 2, "Share by which a turn must lower the mean squared difference."),
-        ("pub(super) const MOST_MUSCLE_QUOTIENT", muscle, 2, "Quotient of the walls' volumes beyond which they are hardly of one heart."),
+        ("pub const MOST_MUSCLE_QUOTIENT", muscle, 2, "Quotient of the walls' volumes beyond which they are hardly of one heart."),
     ]
     text = HEADER
     for name, value, places, says in constants:

@@ -10,11 +10,11 @@ use super::{Bar, FitArgs, UnusableArgument};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::comparison::{ComparedHearts, ComparisonOrder, from_files};
 use ventriform::mesh_files::MeshStatement;
 use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
 use ventriform::progress::{CancelToken, Monitor, Plan};
 use ventriform::report::ComparisonReport;
+use ventriform::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
 use ventriform_service::work::problems::Explain;
 
 /// Compare rest and stress of one patient: where the wall lacks blood only under stress

@@ -6,10 +6,10 @@ use super::{FitArgs, UnusableArgument};
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use ventriform::comparison::ComparisonNormals;
 use ventriform::evaluate::normals::{self, NormalsOptions};
 use ventriform::normals::{FEW_CASES, NormalGroup, NormalLimits, Perfusion, ScanKind, Sex};
 use ventriform::progress::Monitor;
+use ventriform::rest_stress::ComparisonNormals;
 use ventriform::segmentation::NormalsOrder;
 use ventriform_service::work::problems::Explain;
 

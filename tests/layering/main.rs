@@ -97,7 +97,8 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
         ],
     ),
-    ("normals", &["numeric", "polar"]),
+    ("normals", &["numeric", "model", "polar"]),
+    ("comparison", &["model", "polar", "normals"]),
     (
         "reader",
         &["geometry", "mesh", "progress", "grid", "model", "deform"],
@@ -138,6 +139,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "polar",
             "beat",
             "normals",
+            "comparison",
             "reader",
             "parameters",
         ],
@@ -205,6 +207,20 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "report",
             "parameters",
             "segmentation",
+        ],
+    ),
+    (
+        "rest_stress",
+        &[
+            "progress",
+            "volume",
+            "polar",
+            "normals",
+            "comparison",
+            "report",
+            "parameters",
+            "segmentation",
+            "gated",
         ],
     ),
     (

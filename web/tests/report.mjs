@@ -43,11 +43,13 @@ export async function samePolarMap(page) {
     const rgb = hex => [1, 3, 5].map(n => parseInt(hex.slice(n, n + 2), 16));
     const apart = (a, b) => Math.max(...a.map((part, n) => Math.abs(part - b[n])));
     const paths = [...svg.querySelectorAll("path")].slice(0, map.rows * map.columns);
-    const tiles = paths.map(path => {
+    const isHatched = n => map.states[Math.floor(n / map.columns)][n % map.columns] === "valve_plane";
+    const middles = paths.map(path => {
       const corners = path.getAttribute("d").slice(1, -1).split("L").map(text => text.split(" ").map(Number));
-      const middle = [0, 1].map(n => corners.reduce((sum, corner) => sum + corner[n], 0) / corners.length);
-      return apart(at(place(middle)), rgb(path.getAttribute("fill")));
+      return place([0, 1].map(n => corners.reduce((sum, corner) => sum + corner[n], 0) / corners.length));
     });
+    const fills = paths.map((path, n) => apart(at(middles[n]), rgb(path.getAttribute("fill"))));
+    const tiles = fills.filter((_, n) => !isHatched(n));
     const cyan = [0, 220, 255];
     const lines = [...svg.querySelectorAll("line[stroke='#00dcff']")]
       .map(line => ["x1", "y1", "x2", "y2"].map(name => Number(line.getAttribute(name))))
@@ -57,6 +59,9 @@ export async function samePolarMap(page) {
       for (let dy = -reach; dy <= reach; dy++) for (let dx = -reach; dx <= reach; dx++) if (test([x + dx, y + dy])) return true;
       return false;
     };
+    const hatches = middles.filter((_, n) => isHatched(n));
+    const hatch = rgb([...svg.querySelectorAll("line")][0].getAttribute("stroke"));
+    const isHatch = place => apart(at(place), hatch) < 12;
     const isCyan = place => apart(at(place), cyan) < 40;
     let [drawn, stray] = [0, 0];
     for (let y = 0; y < size; y++) {
@@ -69,6 +74,8 @@ export async function samePolarMap(page) {
     const texts = [...svg.querySelectorAll("text")].slice(0, 17).map(text => text.textContent);
     return {
       tiles: tiles.sort((a, b) => a - b),
+      hatches: hatches.length,
+      hatched: hatches.filter(place => near(place, 2, isHatch)).length,
       lines: lines.length,
       covered: lines.filter(line => near(line, 2, isCyan)).length,
       drawn,
@@ -80,11 +87,13 @@ export async function samePolarMap(page) {
       names: map.segments.map(segment => segment.name),
     };
   });
-  const { tiles, lines, covered, drawn, stray } = found;
+  const { tiles, hatches, hatched, lines, covered, drawn, stray } = found;
   const quantile = share => tiles[Math.floor(share * tiles.length)];
   console.log(`  polar map: colours apart by ${quantile(0.5)} (half of the ${tiles.length} places), ${quantile(0.9)} (nine tenths); ${covered} of ${lines} parts of the contour, ${stray} of ${drawn} pixels beside it`);
   // A tenth lies under lines and numbers.
-  assert.ok(tiles.length === 1920 && quantile(0.5) <= 2 && quantile(0.9) <= 6, "the colours are those of the picture");
+  assert.ok(tiles.length + hatches === 1920 && quantile(0.5) <= 2 && quantile(0.9) <= 6, "the colours are those of the picture");
+  console.log(`  valve plane: ${hatched} of ${hatches} places hatched`);
+  assert.ok(hatches > 20 && hatched >= 0.9 * hatches, "the valve plane is hatched as in the picture");
   assert.ok(lines > 20 && covered >= 0.9 * lines && stray <= 0.02 * drawn, "the contour is that of the picture");
   assert.deepEqual(found.texts, found.means, "the segments have the numbers of the picture");
   assert.deepEqual(found.numbers, Array.from({ length: 17 }, (_, n) => n + 1));

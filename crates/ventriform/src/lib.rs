@@ -139,6 +139,8 @@ pub mod beat;
 
 pub mod normals;
 
+pub mod comparison;
+
 pub mod reader;
 
 pub mod parameters;
@@ -151,8 +153,9 @@ pub mod pipeline;
 
 pub mod segmentation;
 
-pub mod comparison;
 pub mod gated;
+
+pub mod rest_stress;
 
 pub mod evaluate;
 

@@ -11,9 +11,9 @@
 use anyhow::{Context, Result, anyhow};
 use serde_json::Value;
 use std::path::Path;
-use ventriform::comparison::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
 use ventriform::parameters::ComparisonParameters;
 use ventriform::progress::Monitor;
+use ventriform::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
 use ventriform::volume::{ReadLimits, VolumeFile};
 
 fn main() -> Result<()> {

@@ -6,24 +6,24 @@ use super::error_terms::ErrorTerms;
 
 /// Error of the ejection fraction, points.
 pub(super) const EF_ERROR: ErrorTerms = ErrorTerms {
-    bias: 0.487,
-    usual: 1.097,
-    dark: 23.275,
-    small: 6.72,
+    bias: 0.496,
+    usual: 1.262,
+    dark: 23.441,
+    small: 6.357,
 };
 
 /// Error of the end-diastolic volume, as a share of it.
 pub(super) const EDV_ERROR: ErrorTerms = ErrorTerms {
     bias: -0.025,
-    usual: 0.02,
-    dark: 0.216,
-    small: 0.107,
+    usual: 0.024,
+    dark: 0.225,
+    small: 0.104,
 };
 
 /// Error of the end-systolic volume, as a share of it.
 pub(super) const ESV_ERROR: ErrorTerms = ErrorTerms {
     bias: -0.026,
-    usual: 0.0,
+    usual: 0.007,
     dark: 0.0,
-    small: 0.202,
+    small: 0.197,
 };

@@ -9,4 +9,4 @@ pub const DIFFERENCE_SD_POINTS: f64 = 4.9;
 pub(super) const SIGNIFICANT_TURN_GAIN: f64 = 0.21;
 
 /// Quotient of the walls' volumes beyond which they are hardly of one heart.
-pub(super) const MOST_MUSCLE_QUOTIENT: f64 = 1.21;
+pub const MOST_MUSCLE_QUOTIENT: f64 = 1.21;

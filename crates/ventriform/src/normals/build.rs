@@ -10,8 +10,7 @@
 //! one whose wall lies beyond them by more than [`MOST_EXTENT_PERCENT`] is left out: a defect that nobody knew of.
 
 use super::document::{
-    ExcludedCase, FEWEST_CASES, GlobalLimit, LeftOut, LimitMap, NormalCase, NormalGroup,
-    Specificity,
+    ExcludedCase, GlobalLimit, LeftOut, LimitMap, NormalCase, NormalGroup, Specificity,
 };
 use super::error::NormalsError;
 use super::kind::GroupSex;
@@ -19,6 +18,7 @@ use super::matching::matched_places;
 use super::pattern::{Coefficients, TermMatrix, share_at};
 use super::perfusion::{HeartFigure, figures};
 use super::place_limits::{PlaceLimits, ScanPlaces};
+use super::sizes::FEWEST_CASES;
 use crate::numeric::order::quantile;
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use rayon::prelude::*;

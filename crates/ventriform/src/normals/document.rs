@@ -3,6 +3,7 @@
 use super::error::NormalsError;
 use super::kind::{GroupSex, ScanKind, yes_or_no};
 use super::pattern::TERMS;
+use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -11,17 +12,10 @@ use std::fmt::{self, Write as _};
 
 /// The file's statement of its format.
 const NORMALS_FORMAT: &str = "ventriform-normal-limits";
-/// The version of the JSON that is written and read.
-pub const NORMALS_SCHEMA_VERSION: u32 = 1;
 /// Longest JSON that is read, bytes.
 pub const MOST_NORMALS_BYTES: usize = 16 << 20;
 /// Most groups of a file.
 const MOST_GROUPS: usize = 64;
-/// Fewest healthy people of a group.
-pub const FEWEST_CASES: usize = 12;
-/// Number of healthy people below which a group is flagged.
-pub const FEW_CASES: usize = 30;
-
 /// Normal limits, as `ventriform normals build` writes them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]

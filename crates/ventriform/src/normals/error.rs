@@ -1,7 +1,7 @@
 //! Why limits cannot be read, built or applied.
 
-use super::document::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 use super::kind::{ScanKind, Sex};
+use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 
 /// Why limits cannot be read, built or applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

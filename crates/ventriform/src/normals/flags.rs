@@ -1,6 +1,6 @@
 //! Reasons to look closer at a comparison with normal limits.
 
-use super::document::FEW_CASES;
+use super::sizes::FEW_CASES;
 use std::fmt;
 
 /// A reason to look closer at a comparison with normal limits.

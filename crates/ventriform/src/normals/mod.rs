@@ -28,13 +28,14 @@ mod matching;
 mod pattern;
 mod perfusion;
 mod place_limits;
+mod sizes;
 #[cfg(test)]
 mod tests;
 
 pub use build::{GroupKind, HealthyScan, group_of, limits_of};
 pub use document::{
-    ExcludedCase, FEW_CASES, FEWEST_CASES, GlobalLimit, LeftOut, LimitMap, NORMALS_SCHEMA_VERSION,
-    NormalCase, NormalGroup, NormalLimits, Specificity,
+    ExcludedCase, GlobalLimit, LeftOut, LimitMap, NormalCase, NormalGroup, NormalLimits,
+    Specificity,
 };
 pub use error::NormalsError;
 pub use flags::NormalsFlag;
@@ -46,3 +47,4 @@ pub use perfusion::{
     TerritoryPerfusion, Z_LIMIT, apply, summed_percent,
 };
 pub use place_limits::{PlaceLimits, ScanPlaces};
+pub use sizes::{FEW_CASES, FEWEST_CASES, NORMALS_SCHEMA_VERSION};

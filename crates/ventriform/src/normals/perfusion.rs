@@ -1,12 +1,13 @@
 //! A scan's map against the limits of its group.
 
-use super::document::{FEW_CASES, NormalGroup, NormalLimits};
+use super::document::{NormalGroup, NormalLimits};
 use super::error::NormalsError;
 use super::flags::NormalsFlag;
 use super::kind::{GroupSex, ScanKind};
 use super::matching::matched_places;
 use super::pattern::Coefficients;
 use super::place_limits::{PlaceLimits, ScanPlaces};
+use super::sizes::FEW_CASES;
 use crate::polar::{ARTERY_NAMES, PolarMap, territory};
 
 /// Standard deviations below the mean at which the limit lies.

@@ -464,7 +464,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "polar_blur",
         polar.blur,
         0.0..=10.0,
-        "4.5",
+        "3",
         "Sigma of the Gaussian that smooths the image for the polar map, millimetres"
     ),
     choice!(

@@ -10,7 +10,7 @@
 //!    [`DEFECT_MM`] before it is dark, not short: a defect, which must show, so the muscle ends at the fit. In between it ends in between.
 //! 4. The ends are smoothed over neighbouring columns.
 //!
-//! Figures of 49 simulated hearts and 12 phantoms (in-sample) stand in docs/normals.md, with those of hearts that took no part.
+//! The three distances were chosen on simulated hearts and phantoms; docs/normals.md has their figures, and those of hearts that took no part.
 //!
 //! Not guaranteed: a defect of half the base or more moves the fit itself.
 

@@ -4,7 +4,7 @@ use crate::geometry::Vec3;
 use serde::{Deserialize, Deserializer};
 
 /// Rounds to 4 decimals.
-pub(super) fn round(x: f64) -> f64 {
+pub fn round(x: f64) -> f64 {
     (1e4 * x).round() / 1e4
 }
 

@@ -39,6 +39,8 @@ pub mod summary;
 mod whose;
 
 pub use beat_page::{BeatPage, beat_page};
+pub(crate) use json_number::round;
+
 pub use beat_report::{
     BeatParts, BeatReport, CurvePoint, GateReport, PhaseReport, RatesReport, SegmentMotionReport,
     TimingReport,

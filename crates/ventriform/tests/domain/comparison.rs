@@ -3,11 +3,10 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::comparison::{
-    ComparedHearts, ComparisonError, ComparisonOrder, REVERSIBLE_POINTS, from_files,
-};
+use ventriform::comparison::REVERSIBLE_POINTS;
 use ventriform::parameters::ComparisonParameters;
 use ventriform::progress::Monitor;
+use ventriform::rest_stress::{ComparedHearts, ComparisonError, ComparisonOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume, VolumeFile};

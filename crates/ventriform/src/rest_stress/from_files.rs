@@ -1,11 +1,11 @@
 //! A comparison from files: read, fit both hearts by one model, compare.
 
 use super::checks;
-use super::difference::{Change, Sides};
 use super::error::ComparisonError;
-use super::flags::WhichScan;
 use super::hearts::{ComparedHeart, ComparedHearts};
 use super::order::ComparisonOrder;
+use crate::comparison::WhichScan;
+use crate::comparison::{Change, Sides};
 use crate::gated::{self, GatedError, GatedOrder};
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::progress::Monitor;

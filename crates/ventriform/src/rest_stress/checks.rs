@@ -1,10 +1,10 @@
 //! Whether two scans can be compared: one patient, one at stress and one at rest, made alike.
 
-use super::calibration::MOST_MUSCLE_QUOTIENT;
-use super::difference::Change;
 use super::error::ComparisonError;
-use super::flags::{ComparisonFlag, Reason, WhichScan};
 use super::hearts::ComparedHeart;
+use crate::comparison::Change;
+use crate::comparison::MOST_MUSCLE_QUOTIENT;
+use crate::comparison::{ComparisonFlag, Reason, WhichScan};
 use crate::volume::Provenance;
 
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some

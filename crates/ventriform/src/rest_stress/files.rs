@@ -1,6 +1,7 @@
 //! The files of a comparison.
 
 use super::hearts::ComparedHearts;
+use super::report;
 use crate::parameters::ComparisonParameters;
 use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
 use crate::progress::{Monitor, Stage};
@@ -15,7 +16,7 @@ impl ComparedHearts {
             fit: self.parameters.clone(),
             choice: self.choice,
         };
-        ComparisonReport::of(self, parameters.to_json())
+        report::of(self, parameters.to_json())
     }
 
     /// `comparison.json`, `segments.csv` and polar maps as pictures and numbers: `polar_stress` and `polar_rest`, each by its own reference, and

@@ -1,6 +1,6 @@
 //! The input of a comparison.
 
-use super::flags::WhichScan;
+use crate::comparison::WhichScan;
 use crate::normals::ScanKind;
 use crate::parameters::ComparisonParameters;
 use crate::segmentation::{NamedMesh, NormalsOrder};

@@ -1,6 +1,6 @@
 //! Why there is no comparison.
 
-use super::flags::WhichScan;
+use crate::comparison::WhichScan;
 use crate::gated::GatedError;
 use crate::progress::Cancelled;
 use crate::segmentation::{SegmentationError, SegmentationFilesError};

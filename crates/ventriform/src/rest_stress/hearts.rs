@@ -1,7 +1,7 @@
 //! The two hearts of a comparison, each with the work that was made of its scan.
 
-use super::difference::{Change, Sides};
-use super::flags::{ComparisonFlag, WhichScan};
+use crate::comparison::{Change, Sides};
+use crate::comparison::{ComparisonFlag, WhichScan};
 use crate::gated::GatedHeart;
 use crate::normals::Perfusion;
 use crate::parameters::{ComparisonChoice, FitParameters};
