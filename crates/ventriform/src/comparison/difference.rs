@@ -1,24 +1,16 @@
 //! The difference of two polar maps of one heart, and what it says of places, segments and territories.
 
 use super::calibration::DIFFERENCE_SD_POINTS;
+use super::scale::{Sides, matched};
 use super::turn::{self, Turn};
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
-use crate::normals::{self, Matched, PlaceLimits, ScanPlaces, TermMatrix};
-use crate::polar::{ARTERY_NAMES, PolarMap, territory};
+use crate::normals::ScanPlaces;
+use crate::polar::{ARTERY_NAMES, territory};
 
 /// Loss of uptake at stress beyond which wall is reversible, per cent of the rest map's reference.
 pub const REVERSIBLE_POINTS: f64 = 2.5 * DIFFERENCE_SD_POINTS;
 /// Standard deviations of the smoothing of the difference, rows and columns.
 const SMOOTHING: [f64; 2] = [1.2, 2.4];
-
-/// Two scans of one heart.
-#[derive(Debug, Clone, Copy)]
-pub struct Sides<'a> {
-    /// The map at stress.
-    pub stress: &'a PolarMap,
-    /// The map at rest.
-    pub rest: &'a PolarMap,
-}
 
 /// The change from rest to stress.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,19 +187,6 @@ impl Change {
             }),
         })
     }
-}
-
-/// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the normal mean.
-pub(super) fn matched(stress: &ScanPlaces, rest: &ScanPlaces, reference: f64) -> Option<Matched> {
-    let as_limits = PlaceLimits {
-        mean: (rest.uptake.iter())
-            .map(|uptake| uptake.filter(|uptake| *uptake > 0.0))
-            .collect(),
-        sd: vec![Some(DIFFERENCE_SD_POINTS / 100.0 * reference); rest.uptake.len()],
-        // The pattern of one heart is the same in both scans.
-        covariance: TermMatrix::zeros(),
-    };
-    normals::matched(stress, &as_limits)
 }
 
 /// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and columns.

@@ -18,11 +18,11 @@
 mod calibration;
 mod difference;
 mod flags;
+mod scale;
 mod turn;
 
 pub use calibration::{DIFFERENCE_SD_POINTS, MOST_MUSCLE_QUOTIENT};
-pub use difference::{
-    Change, ComparedSegment, ComparedTerritory, PartFigures, REVERSIBLE_POINTS, Sides,
-};
+pub use difference::{Change, ComparedSegment, ComparedTerritory, PartFigures, REVERSIBLE_POINTS};
 pub use flags::{ComparisonFlag, Reason, WhichScan};
+pub use scale::Sides;
 pub use turn::Turn;

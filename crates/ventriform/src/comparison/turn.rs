@@ -5,7 +5,7 @@
 //! defect in one of them does not decide.
 
 use super::calibration::{DIFFERENCE_SD_POINTS, SIGNIFICANT_TURN_GAIN};
-use super::difference::{Sides, matched};
+use super::scale::{Sides, matched};
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
 use crate::normals::ScanPlaces;
 use crate::polar::{Pixel, PolarMap};
