@@ -6,11 +6,11 @@ use super::hearts::{ComparedHeart, ComparedHearts};
 use super::order::ComparisonOrder;
 use crate::comparison::WhichScan;
 use crate::comparison::{Change, Sides};
-use crate::gated::{self, GatedError, GatedOrder};
+use crate::gated::{self, GatedOrder};
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::progress::Monitor;
 use crate::segmentation::{self, RankedTemplate, SegmentationOrder};
-use crate::volume::{ReadLimits, VolumeError, VolumeFile};
+use crate::volume::{ReadLimits, VolumeFile, hold_gates};
 
 /// Compares the scans of `order`. Both are fitted as beats if both are gated, as images otherwise.
 ///
@@ -25,35 +25,29 @@ pub fn from_files(
         (WhichScan::Stress, order.stress),
         (WhichScan::Rest, order.rest),
     ];
-    let fit = |gated: bool, kept: Option<&str>, which: usize| {
+    let is_gated = |(scan, files): (WhichScan, &[VolumeFile])| {
+        let choice = order.parameters.choice;
+        hold_gates(files, choice.gated, limits, monitor)
+            .map_err(|error| ComparisonError::of_gated(scan, error.into()))
+    };
+    let gated = is_gated(scans[0])? && is_gated(scans[1])?;
+    let fit = |kept: Option<&str>, which: usize| {
         let (scan, files) = scans[which];
         let monitor = monitor.part(which, scans.len());
         if gated {
             beating(order, scan, files, kept, limits, &monitor)
         } else {
-            still(order, scan, files, kept, limits, &monitor).map(Some)
+            still(order, scan, files, kept, limits, &monitor)
         }
     };
-    let both = |gated: bool| -> Result<Option<[ComparedHeart; 2]>, ComparisonError> {
-        let (Some(stress), Some(rest)) = (fit(gated, None, 0)?, fit(gated, None, 1)?) else {
-            return Ok(None);
-        };
-        Ok(Some([stress, rest]))
-    };
-    let (gated, [mut stress, mut rest]) = match both(true)? {
-        Some(hearts) => (true, hearts),
-        None => {
-            let hearts = both(false)?;
-            (false, hearts.ok_or(ComparisonError::NothingInCommon)?)
-        }
-    };
+    let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
     checks::refuse(&stress, &rest, order.parameters.choice.same_patient)?;
     if let Some(common) = common_template(&stress, &rest) {
         let again = |heart: ComparedHeart, which: usize| {
             if heart.template() == common {
                 return Ok(heart);
             }
-            Ok::<_, ComparisonError>(fit(gated, Some(&common), which)?.unwrap_or(heart))
+            fit(Some(&common), which)
         };
         stress = again(stress, 0)?;
         rest = again(rest, 1)?;
@@ -130,7 +124,6 @@ fn still(
     Ok(ComparedHeart::Still(Box::new(made)))
 }
 
-/// `None` if the file has one volume, or several that are no gates.
 fn beating(
     order: &ComparisonOrder<'_>,
     scan: WhichScan,
@@ -138,7 +131,7 @@ fn beating(
     kept: Option<&str>,
     limits: &ReadLimits,
     monitor: &Monitor<'_>,
-) -> Result<Option<ComparedHeart>, ComparisonError> {
+) -> Result<ComparedHeart, ComparisonError> {
     let parameters = keeping(order, kept);
     let own = GatedOrder {
         gates: files,
@@ -151,11 +144,7 @@ fn beating(
             ..BeatChoice::default()
         },
     };
-    match gated::from_files(&own, limits, monitor) {
-        Ok(made) => Ok(Some(ComparedHeart::Beating(Box::new(made)))),
-        Err(GatedError::Volume(VolumeError::NotGated { .. } | VolumeError::FrameNeeded { .. })) => {
-            Ok(None)
-        }
-        Err(error) => Err(ComparisonError::of_gated(scan, error)),
-    }
+    let made = gated::from_files(&own, limits, monitor)
+        .map_err(|error| ComparisonError::of_gated(scan, error))?;
+    Ok(ComparedHeart::Beating(Box::new(made)))
 }

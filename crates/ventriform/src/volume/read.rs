@@ -102,6 +102,22 @@ pub fn read_gates(
     GatedReading::of(readings, timing)
 }
 
+/// Whether `files` are a volume of several frames that are the gates of a heart beat, by the header or because `gated` says so. Nothing is
+/// decoded.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn hold_gates(
+    files: &[VolumeFile],
+    gated: bool,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<bool, VolumeError> {
+    let opened = open(files, limits, monitor)?;
+    let header = opened.file.header();
+    Ok(header.frames > 1 && (header.gated || gated))
+}
+
 /// Gates that have together more voxels than a volume may.
 fn too_many_voxels(file: &str, asked: u64, limits: &ReadLimits) -> VolumeError {
     VolumeError::TooLarge {

@@ -1,7 +1,7 @@
 //! Unusual files made by code, and random damage.
 
 use super::super::{
-    AffineSource, ByteOrder, FileFormat, ReadOptions, Reading, Volume, VolumeFile,
+    AffineSource, ByteOrder, FileFormat, ReadOptions, Reading, Volume, VolumeFile, hold_gates,
     read as read_volume,
 };
 use super::*;
@@ -515,8 +515,13 @@ fn gates_are_summed_and_what_is_none_needs_a_frame() {
         (32, (0, 30.0, 0)),
         (2, (8, 0.0, 0)),
     ];
+    let held = |file: &File, stated: bool| {
+        let files = [VolumeFile::in_memory("test", &file.bytes[..])];
+        hold_gates(&files, stated, &ReadLimits::default(), &Monitor::silent()).unwrap()
+    };
     for (gates, time) in gated {
         let file = file(&[4, 3, 1, gates], time);
+        assert!(held(&file, false));
         let reading = file.read().unwrap();
         let value = |v: usize, gate: usize| ((v + 12 * gate) % 7) as f32;
         let sums: Vec<f32> = (0..12)
@@ -547,6 +552,7 @@ fn gates_are_summed_and_what_is_none_needs_a_frame() {
         (&[4, 3, 1, 4, 2], (0, 0.0, 0), "dim"),
     ];
     for (dim, time, word) in others {
+        assert!(!held(&file(dim, time), false) && held(&file(dim, time), true));
         let refused = file(dim, time).read().unwrap_err();
         assert!(
             matches!(refused, VolumeError::FrameNeeded { .. }),
