@@ -36,11 +36,12 @@ pub struct CompareArgs {
     /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "OUTDIR")]
     output: PathBuf,
-    /// Model to fit to both scans: a closed mesh, or auto for the built-in hearts (repeatable: the one in which both fits
-    /// together have the greatest confidence is kept)
+    /// Model to fit to both scans: a closed mesh, or auto for the built-in hearts (repeatable: the one in which both
+    /// fits together have the greatest confidence is kept)
     #[arg(long, value_name = "MODEL", default_value = MODEL_AUTO)]
     model: Vec<PathBuf>,
-    /// The protocol of the scan at stress, as the normal limits name it; by default the only one with the word stress in its name
+    /// The protocol of the scan at stress, as the normal limits name it; by default the only one with the word stress
+    /// in its name
     #[arg(long, value_name = "NAME", requires = "normals")]
     stress_protocol: Option<String>,
     /// The protocol of the scan at rest
@@ -59,8 +60,8 @@ pub struct CompareArgs {
 /// Runs the command.
 ///
 /// # Errors
-/// If a file cannot be read, a heart cannot be fitted, the scans cannot be compared, or a file cannot be written. Nothing is
-/// written unless the comparison is complete.
+/// If a file cannot be read, a heart cannot be fitted, the scans cannot be compared, or a file cannot be written.
+/// Nothing is written unless the comparison is complete.
 pub fn run(args: &CompareArgs) -> Result<()> {
     let pairs = args.choice.pairs().iter().chain(args.fit.pairs());
     let pairs = pairs.map(|(name, text)| (*name, text.as_str()));

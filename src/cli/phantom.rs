@@ -24,7 +24,8 @@ pub struct PhantomArgs {
     /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "DIR", default_value = "phantom")]
     output: PathBuf,
-    /// Simulated healthy hearts that differ as people do, with a cohort.csv for `normals build`: simulated, not patients
+    /// Simulated healthy hearts that differ as people do, with a cohort.csv for `normals build`: simulated, not
+    /// patients
     #[arg(long, conflicts_with_all = ["defect", "motion"])]
     normal: bool,
     /// Number of healthy hearts, with --normal [default: 30]

@@ -4,11 +4,11 @@
 //! cargo run --release --package ventriform-tools --bin beats -- [PRIOR=VALUE]... FOLDER...
 //! ```
 //!
-//! Every folder holds gated.nii.gz and params.json, as the simulator of gated hearts writes them: "result" with edv_ml,
-//! esv_ml, ef, and segments with motion_mm, thickening_percent and contraction (below .25: akinetic). Prints a row for
-//! each study, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and deviation of
-//! motion and thickening (also by counts) over all segments, and how well thickening finds the akinetic ones. PRIOR names a field of
-//! [`Priors`], or `resolution_more_mm`.
+//! Every folder holds gated.nii.gz and params.json, as the simulator of gated hearts writes them: "result" with
+//! edv_ml, esv_ml, ef, and segments with motion_mm, thickening_percent and contraction (below .25: akinetic). Prints
+//! a row for each study, then bias, deviation and worst case of EF (points), EDV and ESV (per cent), correlation and
+//! deviation of motion and thickening (also by counts) over all segments, and how well thickening finds the akinetic
+//! ones. PRIOR names a field of [`Priors`], or `resolution_more_mm`.
 
 use anyhow::{Context, Result, anyhow, bail};
 use serde_json::Value;

@@ -1,12 +1,12 @@
 //! Writes the table of features from which `scripts/calibrate.py` estimates the constants of
 //! `crates/ventriform/src/judge/calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin calibration_features -- FOLDER... > features.csv` segments `CASE/spect.nii.gz` of
-//! every case in the folders with the built-in hearts, once for each wall, and compares the apparent wall with
-//! `lv_expert_img.nii.gz`, the anatomical one with `lv_truth.nii.gz`. One row for each case: the folder's name, the
-//! case's, whether there is a heart and how far it moved (mm, by `params.json`), the Jaccard index of both walls, the
-//! figures of [`Evidence`], the confidence of the search, and the mean logarithm of the odds over the built-in hearts.
-//! A refused scan has only the three figures of its refusal.
+//! `cargo run --release -p ventriform-tools --bin calibration_features -- FOLDER... > features.csv` segments
+//! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall, and compares the
+//! apparent wall with `lv_expert_img.nii.gz`, the anatomical one with `lv_truth.nii.gz`. One row for each case: the
+//! folder's name, the case's, whether there is a heart and how far it moved (mm, by `params.json`), the Jaccard index
+//! of both walls, the figures of [`Evidence`], the confidence of the search, and the mean logarithm of the odds over
+//! the built-in hearts. A refused scan has only the three figures of its refusal.
 
 use std::error::Error;
 use std::fmt::Write as _;

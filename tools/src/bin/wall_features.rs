@@ -1,15 +1,16 @@
 //! Writes the tables of features from which `scripts/calibrate_walls.py` estimates the constants of
 //! `crates/ventriform/src/deform/calibration.rs` and `crates/ventriform/src/judge/uncertainty_calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of every
-//! case in the folders with the built-in hearts, once for each wall, and compares rims and anatomical walls with
-//! `lv_surface.ply`, apparent walls with `lv_expert_img.nii.gz`. Refused scans and those without a heart are left out.
-//! Into the folder TABLES it writes
+//! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of
+//! every case in the folders with the built-in hearts, once for each wall, and compares rims and anatomical walls
+//! with `lv_surface.ply`, apparent walls with `lv_expert_img.nii.gz`. Refused scans and those without a heart are
+//! left out. Into the folder TABLES it writes
 //!
-//! - `rims.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it, and of the
-//!   true rim, mm from the cup's centre towards the apex;
-//! - `rays.csv`, a row for every [`RAY_STRIDE`]th ray through the apparent wall that meets the true one: the numbers that
-//!   describe it, as far as they are not functions of others, and the distances by which the true surfaces lie farther out, mm;
+//! - `rims.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it, and of
+//!   the true rim, mm from the cup's centre towards the apex;
+//! - `rays.csv`, a row for every [`RAY_STRIDE`]th ray through the apparent wall that meets the true one: the numbers
+//!   that describe it, as far as they are not functions of others, and the distances by which the true surfaces lie
+//!   farther out, mm;
 //! - `nodes.csv`, a row for every [`NODE_STRIDE`]th node: the figures behind its uncertainty, and its distance from the
 //!   expert's mask and of its anatomical counterpart from the true wall, mm.
 

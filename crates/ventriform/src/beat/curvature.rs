@@ -6,8 +6,8 @@
 //! still through the beat, and each harmonic of the motion. Harmonics are orthogonal over the gates, so blocks hardly
 //! act on each other. The image changes as that of the wall in the mean of the beat.
 //!
-//! Guaranteed: what [`Curvature::solve`] multiplies by is symmetric and positive definite. Not guaranteed: the curvature
-//! far from the point it was taken at.
+//! Guaranteed: what [`Curvature::solve`] multiplies by is symmetric and positive definite. Not guaranteed: the
+//! curvature far from the point it was taken at.
 
 use std::ops::Range;
 
@@ -423,8 +423,8 @@ mod tests {
     use super::super::objective::tests::scene;
     use super::*;
 
-    /// Where the image is met, the function's second derivatives are the Gauss-Newton matrix: differences of its gradient
-    /// along a direction, of all unknowns of a block.
+    /// Where the image is met, the function's second derivatives are the Gauss-Newton matrix: differences of its
+    /// gradient along a direction, of all unknowns of a block.
     #[test]
     fn blocks_are_the_second_derivatives_where_the_image_is_met() {
         let (objective, mut unknowns) = scene();

@@ -5,9 +5,10 @@
 //!
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis.
 //! 2. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
-//! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's stretch,
-//!    activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which the motion
-//!    is a fifth too small after 60 steps, though the value has fallen by 95 per cent. It ends when EF is at rest.
+//! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
+//!    stretch, activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which
+//!    the motion is a fifth too small after 60 steps, though the value has fallen by 95 per cent. It ends when EF is
+//!    at rest.
 //! 4. The summed image's resolution holds the blur by the motion. Once the motion is nearly found, its part is taken
 //!    off.
 //!

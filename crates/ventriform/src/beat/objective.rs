@@ -348,8 +348,8 @@ impl Objective {
         value
     }
 
-    /// `weight` times the squares of the second differences of a field, along columns and about the axis; the gradient is
-    /// added.
+    /// `weight` times the squares of the second differences of a field, along columns and about the axis; the
+    /// gradient is added.
     pub fn roughness(&self, field: &[f64], weight: f64, gradient: &mut [f64]) -> f64 {
         let rows = self.layout.rows;
         let mut value = 0.0;

@@ -15,7 +15,7 @@ const SMOOTHING: [f64; 2] = [1.2, 2.4];
 /// The change from rest to stress.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// How the stress map is turned against the rest map.
+    /// Turn of the stress map against the rest map.
     pub turn: Turn,
     /// Counts of the stress scan that are one count of the rest scan where nothing changed.
     pub scale: f64,
@@ -23,8 +23,8 @@ pub struct Change {
     pub matched_percent: f64,
     /// Share of the wall with muscle in both maps, per cent.
     pub compared_percent: f64,
-    /// Uptake at stress, scaled to rest, per cent of the rest map's reference, on the places of the rest map: row by row from
-    /// apex to base; `None` without muscle in both.
+    /// Uptake at stress, scaled to rest, per cent of the rest map's reference, on the places of the rest map: row by
+    /// row from apex to base; `None` without muscle in both.
     pub stress_percent: Vec<Option<f64>>,
     /// Uptake at rest, per cent of the reference.
     pub rest_percent: Vec<Option<f64>>,
@@ -61,7 +61,8 @@ pub struct ComparedTerritory {
 /// Figures of a part of the wall: means over its area.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartFigures {
-    /// Uptake at stress, scaled to rest, per cent of the rest map's reference; `None` where nothing can be compared, as for the others.
+    /// Uptake at stress, scaled to rest, per cent of the rest map's reference; `None` where nothing can be compared,
+    /// as for the others.
     pub stress_percent: Option<f64>,
     /// Uptake at rest, per cent of the reference.
     pub rest_percent: Option<f64>,
@@ -189,7 +190,8 @@ impl Change {
     }
 }
 
-/// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and columns.
+/// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and
+/// columns.
 fn smoothed(values: &[Option<f64>], areas: &[f64]) -> Vec<Option<f64>> {
     let kernel = |sigma: f64| -> Vec<f64> {
         let reach = (3.0 * sigma).ceil() as i64;

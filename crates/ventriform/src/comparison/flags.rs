@@ -96,7 +96,7 @@ pub enum Reason {
     Role {
         /// The scan, as it was given.
         scan: WhichScan,
-        /// What the header says.
+        /// The scan that the header names.
         stated: WhichScan,
     },
     /// Other tracers.

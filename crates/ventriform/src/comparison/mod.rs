@@ -3,17 +3,17 @@
 //! In: the polar maps of two scans of one heart, of one model ([`Sides`]). Out: their [`Change`].
 //!
 //! 1. The stress map is turned about the long axis if the maps then agree significantly better ([`Turn`]).
-//! 2. Stress is scaled to rest by the places that did not change ([`matched`](crate::normals::matched) with the rest map in place of the
-//!    normal mean), never by each map's maximum.
-//! 3. The difference, rest less stress, is smoothed over the wall. Wall that loses more at stress than [`REVERSIBLE_POINTS`] is
-//!    reversible; wall below the threshold of the rest map in both is fixed.
+//! 2. Stress is scaled to rest by the places that did not change ([`matched`](crate::normals::matched) with the rest
+//!    map in place of the normal mean), never by each map's maximum.
+//! 3. The difference, rest less stress, is smoothed over the wall. Wall that loses more at stress than
+//!    [`REVERSIBLE_POINTS`] is reversible; wall below the threshold of the rest map in both is fixed.
 //!
 //! [`ComparisonFlag`] names what makes a comparison doubtful.
 //!
 //! Guaranteed: a scan multiplied by a factor gives the same figures.
 //!
-//! Not guaranteed: without normal limits it is not known what is normal: a defect at rest that fills under stress shows as a negative
-//! difference and counts as nothing. No category is derived.
+//! Not guaranteed: without normal limits it is not known what is normal: a defect at rest that fills under stress
+//! shows as a negative difference and counts as nothing. No category is derived.
 
 mod calibration;
 mod difference;

@@ -13,7 +13,8 @@ pub struct Sides<'a> {
     pub rest: &'a PolarMap,
 }
 
-/// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the normal mean.
+/// The scale of stress to rest. Where nothing changed, stress is rest but for noise: the rest map stands in for the
+/// normal mean.
 pub(super) fn matched(stress: &ScanPlaces, rest: &ScanPlaces, reference: f64) -> Option<Matched> {
     let as_limits = PlaceLimits {
         mean: (rest.uptake.iter())

@@ -1,8 +1,8 @@
 //! The turn of one polar map against another about the long axis.
 //!
-//! In: two maps. Out: the angle at which they differ least, or 0 where no other angle is significantly better: the posture that both were
-//! named by is the better guess as long as the images do not contradict it. A difference counts up to [`CAP_SD`] deviations, so that a
-//! defect in one of them does not decide.
+//! In: two maps. Out: the angle at which they differ least, or 0 where no other angle is significantly better: the
+//! posture that both were named by is the better guess as long as the images do not contradict it. A difference
+//! counts up to [`CAP_SD`] deviations, so that a defect in one of them does not decide.
 
 use super::calibration::{DIFFERENCE_SD_POINTS, SIGNIFICANT_TURN_GAIN};
 use super::scale::{Sides, matched};
@@ -17,7 +17,7 @@ const STEP_DEGREES: f64 = 1.5;
 /// Standard deviations of the difference up to which a difference counts.
 const CAP_SD: f64 = 2.5;
 
-/// How one map is turned against another.
+/// The turn of one map against another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     /// Counter-clockwise as the map is drawn, degrees; 0 where the maps do not ask for one.

@@ -5,11 +5,12 @@
 //! patient's superior direction; out comes the model with its rim moved along the long axis.
 //!
 //! 1. The rim's height in each of [`RIM_DIRECTIONS`] directions about the axis.
-//! 2. The shape of the rim that hearts have ([`RIM_SHAPE`], in three harmonics and shares of the heart's length) is fitted to them, robustly: a short stretch far from the rest hardly pulls it.
+//! 2. The shape of the rim that hearts have ([`RIM_SHAPE`], in three harmonics and shares of the heart's length) is
+//!    fitted to them, robustly: a short stretch far from the rest hardly pulls it.
 //! 3. The distance from that shape is the sum of what is true of this heart and what the signal took away
 //!    or added. A piecewise linear function ([`RIM_CORRECTION`]) says how much of it to take back.
-//! 4. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the wall
-//!    is stretched or compressed there.
+//! 4. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the
+//!    wall is stretched or compressed there.
 //!
 //! Shape and function are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
 //! estimates them again. On hearts that were
@@ -76,8 +77,8 @@ pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> Tr
 }
 
 /// `mesh` with its whole rim moved along the axis, so that its median height is that of `base`. It is moved less
-/// where the whole way is longer than [`RIM_SHIFT_RANGE_MM`] or would make the surface intersect itself; `None` without a
-/// rim in every direction, and where it cannot be moved at all.
+/// where the whole way is longer than [`RIM_SHIFT_RANGE_MM`] or would make the surface intersect itself; `None`
+/// without a rim in every direction, and where it cannot be moved at all.
 pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<TriMesh> {
     let frame = RimFrame::of(cup, superior);
     let rim = frame.heights(mesh)?;
@@ -89,8 +90,8 @@ pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<Tr
         .find(|moved| self_intersections(moved).is_empty())
 }
 
-/// Range of the distance by which a rim is moved, mm towards the base. Towards the apex, wall of the length [`STRETCHED_LENGTH_MM`] is pushed
-/// together, so it must stay below that.
+/// Range of the distance by which a rim is moved, mm towards the base. Towards the apex, wall of the length
+/// [`STRETCHED_LENGTH_MM`] is pushed together, so it must stay below that.
 const RIM_SHIFT_RANGE_MM: [f64; 2] = [-20.0, 40.0];
 
 /// The shape of a rim with these heights, mm, of a heart of this length.
@@ -175,8 +176,8 @@ impl RimFrame {
         moved
     }
 
-    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex. `None` if there is a direction without
-    /// any.
+    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex. `None` if
+    /// there is a direction without any.
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         (0..RIM_DIRECTIONS)
             .map(|direction| {

@@ -7,16 +7,16 @@
 //! 1. [`cohort`]: which cases are templates, which are patients, and their files.
 //! 2. [`models`]: the models of the templates, ours at every number of points and the reference
 //!    model.
-//! 3. [`fits`]: every model fitted to every patient by the functions of
-//!    [`crate::segmentation`], and the fit that `auto` keeps; results are kept in [`record`]s, so that a run that was stopped
-//!    continues where it ended.
+//! 3. [`fits`]: every model fitted to every patient by the functions of [`crate::segmentation`], and the fit that
+//!    `auto` keeps; results are kept in [`record`]s, so that a run that was stopped continues where it ended.
 //! 4. [`rows`]: the table of all fits, and means over it; [`findings`](mod@findings): what they say about
 //!    each of the paper's findings.
 //! 5. If asked for, [`leave_one_out`](mod@leave_one_out): model and reader's profile chosen for each case
 //!    without it.
 //! 6. [`pictures`], [`table`], [`cohort_page`]: slices, CSV and JSON, and one page with charts.
 //!
-//! [`normals`] stands beside this: limits from scans of healthy people. [`statistics`], too: mean shape and principal modes of fits of one model.
+//! [`normals`] stands beside this: limits from scans of healthy people. [`statistics`], too: mean shape and principal
+//! modes of fits of one model.
 //!
 //! Guaranteed: the same cohort, parameters and program give the same bytes, on any number of
 //! threads and however often the run was stopped.

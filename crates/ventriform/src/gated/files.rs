@@ -28,9 +28,10 @@ use std::fmt::Write as _;
 const UNKNOWN_CYCLE_S: f64 = 1.0;
 
 impl GatedHeart {
-    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, polar maps (`polar.svg` and `polar.json`, also
-    /// `polar_ed`, `polar_es`, `polar_motion`, `polar_thickening` and `polar_phase`), the meshes of end diastole and end systole and
-    /// of every gate in `formats`, `mesh.glb` (the beat as an animation), and every gate's labels (wall 1, cavity 2) on the grid of the gates.
+    /// `beat.json`, `curve.svg`, `phase.svg`, `gates.csv`, `segments.csv`, polar maps (`polar.svg` and `polar.json`,
+    /// also `polar_ed`, `polar_es`, `polar_motion`, `polar_thickening` and `polar_phase`), the meshes of end diastole
+    /// and end systole and of every gate in `formats`, `mesh.glb` (the beat as an animation), and every gate's labels
+    /// (wall 1, cavity 2) on the grid of the gates.
     ///
     /// # Errors
     /// [`SegmentationFilesError`].
@@ -90,8 +91,8 @@ impl GatedHeart {
         Ok(files)
     }
 
-    /// Polar maps as pictures and as numbers: the uptake of all gates, of end diastole and of end systole, each in per cent
-    /// of its own brightest quarter, and motion, thickening and phase.
+    /// Polar maps as pictures and as numbers: the uptake of all gates, of end diastole and of end systole, each in
+    /// per cent of its own brightest quarter, and motion, thickening and phase.
     fn maps(&self, monitor: &Monitor<'_>) -> Result<Vec<NamedFile>, SegmentationFilesError> {
         let Some(map) = &self.segmentation.polar else {
             return Ok(Vec::new());

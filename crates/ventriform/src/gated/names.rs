@@ -2,8 +2,8 @@
 
 use crate::export::dicom::BeatEnd;
 
-/// The files that every beat has beside the meshes of its gates: report, its page, pictures, tables, polar maps, and the
-/// beat as an animation.
+/// The files that every beat has beside the meshes of its gates: report, its page, pictures, tables, polar maps, and
+/// the beat as an animation.
 pub const FILE_NAMES: &[&str] = &[
     "beat.json",
     "report.html",
@@ -26,7 +26,8 @@ pub const FILE_NAMES: &[&str] = &[
     "mesh.glb",
 ];
 
-/// The names of the files of one gate, counted from 01, as a regular expression: its mesh in each format, and its labels.
+/// The names of the files of one gate, counted from 01, as a regular expression: its mesh in each format, and its
+/// labels.
 pub const GATE_FILE_PATTERN: &str =
     r"^(mesh_gate[0-9]{2}\.(glb|gltf|stl|ply|obj|vtk|vtp|json)|labels_gate[0-9]{2}\.nii\.gz)$";
 

@@ -88,8 +88,8 @@ pub struct VentricleWall {
     pub thickness_spread: f64,
     /// Share of the basal half's rays that find no wall.
     pub gaps: f64,
-    /// Axis position of the rim in the direction of every column, mm from the cup's centre; `None` where the mesh has no
-    /// part in that direction.
+    /// Axis position of the rim in the direction of every column, mm from the cup's centre; `None` where the mesh has
+    /// no part in that direction.
     pub rims: Vec<Option<f64>>,
     frame: AxisFrame,
 }
@@ -156,8 +156,8 @@ impl RayCoordinates {
     }
 }
 
-/// The vector of the area that a point of a surface of [`RAY_ROWS`] × [`RAY_COLUMNS`] points stands for, mm². `at` gives the
-/// point of a row and a column.
+/// The vector of the area that a point of a surface of [`RAY_ROWS`] × [`RAY_COLUMNS`] points stands for, mm². `at`
+/// gives the point of a row and a column.
 pub fn area_vector<'a>(at: impl Fn(usize, usize) -> &'a Vec3, row: usize, column: usize) -> Vec3 {
     let (up, down) = (row.saturating_sub(1), (row + 1).min(RAY_ROWS - 1));
     let along = (at(down, column) - at(up, column)) / (down - up) as f64;
@@ -492,8 +492,8 @@ pub struct HalfPlane {
     pub aside: Vec3,
 }
 
-/// The height at which `mesh` begins in a half plane whose axis runs through `centre`, mm from there towards the apex: the
-/// most basal crossing of its edges with it. `None` without any.
+/// The height at which `mesh` begins in a half plane whose axis runs through `centre`, mm from there towards the
+/// apex: the most basal crossing of its edges with it. `None` without any.
 pub fn rim_height(mesh: &TriMesh, centre: &Vec3, plane: &HalfPlane) -> Option<f64> {
     let mut height = f64::INFINITY;
     for triangle in 0..mesh.triangles.len() {

@@ -1,13 +1,14 @@
 //! Limits from the maps of healthy people.
 //!
 //! 1. Every scan starts with the scale of its own median; mean and standard deviation follow from the scaled scans.
-//! 2. Scale and pattern of every scan are matched to them ([`matched_places`]), and mean, deviation and the patterns' covariance follow from what is left, in
-//!    [`ROUNDS`] rounds.
-//! 3. The relative variance is smoothed over neighbouring places, because a dozen or two people tell that of one place badly, and is at least that of [`LEAST_RELATIVE_SD`].
-//!    It grows by 1/n, the variance of the mean.
+//! 2. Scale and pattern of every scan are matched to them ([`matched_places`]), and mean, deviation and the patterns'
+//!    covariance follow from what is left, in [`ROUNDS`] rounds.
+//! 3. The relative variance is smoothed over neighbouring places, because a dozen or two people tell that of one
+//!    place badly, and is at least that of [`LEAST_RELATIVE_SD`]. It grows by 1/n, the variance of the mean.
 //!
-//! A place has limits if half of the people, and at least [`FEWEST_AT_A_PLACE`], have muscle there. Each person is then judged by the limits of the others, and
-//! one whose wall lies beyond them by more than [`MOST_EXTENT_PERCENT`] is left out: a defect that nobody knew of.
+//! A place has limits if half of the people, and at least [`FEWEST_AT_A_PLACE`], have muscle there. Each person is
+//! then judged by the limits of the others, and one whose wall lies beyond them by more than [`MOST_EXTENT_PERCENT`]
+//! is left out: a defect that nobody knew of.
 
 use super::document::{
     ExcludedCase, GlobalLimit, LeftOut, LimitMap, NormalCase, NormalGroup, Specificity,
@@ -230,7 +231,7 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
     }
 }
 
-/// What a matched scan has of the mean at every place, its pattern taken off, and the pattern.
+/// The shares of the mean that a matched scan has at every place, its pattern taken off, and the pattern.
 fn shares_of(
     scan: &ScanPlaces,
     limits: &PlaceLimits,

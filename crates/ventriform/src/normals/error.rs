@@ -19,9 +19,9 @@ pub enum NormalsError {
         "the normal limits were edited: their content has the SHA-256 {found}, and the file states {stated}"
     )]
     Edited {
-        /// What the file states.
+        /// The SHA-256 that the file states.
         stated: String,
-        /// What its content has.
+        /// That of its content.
         found: String,
     },
     /// A field holds something that no limits can hold.

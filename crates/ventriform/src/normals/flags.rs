@@ -10,7 +10,7 @@ pub enum NormalsFlag {
     Simulated,
     /// The limits are of few people.
     FewCases {
-        /// How many.
+        /// Number of people.
         cases: usize,
     },
     /// The limits are of men and women together.

@@ -5,7 +5,8 @@ use super::place_limits::{ComparedPlace, PlaceLimits, ScanPlaces};
 
 /// Standard deviations from the mean up to which a place looks normal, on either side.
 pub const MATCHED_Z: f64 = 2.0;
-/// Share of the wall that has a smaller ratio to the mean than the scale of the first round: high, because a defect may fill most of the wall.
+/// Share of the wall that has a smaller ratio to the mean than the scale of the first round: high, because a defect
+/// may fill most of the wall.
 const FIRST_SCALE_SHARE: f64 = 0.75;
 /// Most rounds.
 const MOST_ROUNDS: usize = 30;
@@ -23,7 +24,8 @@ pub struct Matched {
     pub share: f64,
 }
 
-/// The scale and the pattern that put the normal-looking wall of a scan on the normal mean; `None` if too few places can be compared, or the wall has no uptake.
+/// The scale and the pattern that put the normal-looking wall of a scan on the normal mean; `None` if too few places
+/// can be compared, or the wall has no uptake.
 pub fn matched(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Matched> {
     matched_places(&limits.compared(scan), &limits.precision())
 }

@@ -1,8 +1,9 @@
-//! How healthy hearts differ from their mean as a whole: attenuation, the apex's own uptake, the position in the chest.
+//! The patterns in which healthy hearts differ from their mean as a whole: attenuation, the apex's own uptake, the position in the chest.
 //!
-//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`TERMS`] smooth functions of the place, with coefficients that vary from person to
-//! person. Their covariance among the healthy is part of the limits. It is the prior of a scan's own coefficients, so that what healthy people vary in
-//! is taken off before a place is called low, while a defect, which no healthy person has, hardly is.
+//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`TERMS`] smooth functions of the place, with
+//! coefficients that vary from person to person. Their covariance among the healthy is part of the limits. It is the
+//! prior of a scan's own coefficients, so that what healthy people vary in is taken off before a place is called low,
+//! while a defect, which no healthy person has, hardly is.
 
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use nalgebra::{SMatrix, SVector};
@@ -20,8 +21,8 @@ pub type Coefficients = SVector<f64, TERMS>;
 /// A matrix over the functions.
 pub type TermMatrix = SMatrix<f64, TERMS, TERMS>;
 
-/// The functions at a place. With the way r from apex (0) to base (1) and the angle a from lateral over anterior: 2 r - 1, r cos a, r sin a, (2 r - 1)² - 1/3,
-/// r cos 2a, r sin 2a.
+/// The functions at a place. With the way r from apex (0) to base (1) and the angle a from lateral over anterior: 2 r
+/// - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a, r sin 2a.
 pub(super) fn terms_at(index: usize) -> Coefficients {
     let way = ((index / RAY_COLUMNS) as f64 + 0.5) / RAY_ROWS as f64;
     let angle = TAU * ((index % RAY_COLUMNS) as f64 + 0.5) / RAY_COLUMNS as f64;
@@ -49,7 +50,8 @@ pub(super) struct RatioAt {
     pub relative_sd: f64,
 }
 
-/// Level and coefficients of these ratios, about `precision`, the inverse of the coefficients' covariance; `None` without places, or if the level is not above 0.
+/// Level and coefficients of these ratios, about `precision`, the inverse of the coefficients' covariance; `None`
+/// without places, or if the level is not above 0.
 pub(super) fn fitted(ratios: &[RatioAt], precision: &TermMatrix) -> Option<(f64, Coefficients)> {
     const ALL: usize = TERMS + 1;
     let mut system = SMatrix::<f64, ALL, ALL>::zeros();

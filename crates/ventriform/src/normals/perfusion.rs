@@ -25,14 +25,15 @@ const FLAGGED_BASE_PERCENT: f64 = 60.0;
 /// Share of the wall that sets the scale below which a scan is flagged.
 const FLAGGED_MATCHED_SHARE: f64 = 0.4;
 
-/// How far a scan lies below normal.
+/// A scan beside the limits of its group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Perfusion {
     /// The group that the scan was compared with.
     pub group: GroupUsed,
     /// The counts that a normal mean of 1 has in this scan.
     pub scale: f64,
-    /// Standard deviations from the normal mean at every place, row by row from apex to base; `None` where nothing can be compared.
+    /// Standard deviations from the normal mean at every place, row by row from apex to base; `None` where nothing
+    /// can be compared.
     pub z: Vec<Option<f64>>,
     /// Score of every place, 0 to 4.
     pub scores: Vec<Option<f64>>,
@@ -63,7 +64,7 @@ pub struct GroupUsed {
     pub sha256: String,
     /// Whether the people are simulated.
     pub simulated: bool,
-    /// What the people are, in words.
+    /// Description of the people, in words.
     pub people: String,
     /// `M`, `F` or `mixed`.
     pub sex: GroupSex,
@@ -212,7 +213,8 @@ pub fn summed_percent(score: u32) -> f64 {
     100.0 * f64::from(score) / FULL_SUMMED_SCORE
 }
 
-/// The score of a place: 0 at the limit, 4 at [`DEFICIT_OF_FULL_SCORE`] below the mean. `relative_sd` is the standard deviation as a share of the mean.
+/// The score of a place: 0 at the limit, 4 at [`DEFICIT_OF_FULL_SCORE`] below the mean. `relative_sd` is the standard
+/// deviation as a share of the mean.
 pub fn score_of(deficit: f64, relative_sd: f64) -> f64 {
     let limit = Z_LIMIT * relative_sd;
     if deficit <= limit {

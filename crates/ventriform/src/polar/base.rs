@@ -1,16 +1,20 @@
 //! Where the muscle ends at the base, in the direction of every column.
 //!
-//! In: the largest values along the rays, and the rim of the anatomical wall. Out: the distance from the apex, in rows, at which the muscle ends.
+//! In: the largest values along the rays, and the rim of the anatomical wall. Out: the distance from the apex, in
+//! rows, at which the muscle ends.
 //!
-//! 1. The image's end of a column: where its values fall below [`END_SHARE`] of the column's own level (its largest value in
-//!    [`LEVEL_ROWS`]), seen from the base. A wall's end, blurred, has half of its height there, whatever the blur.
-//! 2. The image's ends less the rim: a robust fit of a level and a tilt ([`TERMS`] numbers; columns far from it hardly count, [`OUTLIER_MM`]) says by how much
-//!    the whole rim is off.
-//! 3. A column whose image ends beyond the fit, or up to [`FOLLOWED_MM`] before it, ends where its image does. One that ends more than
-//!    [`DEFECT_MM`] before it is dark, not short: a defect, which must show, so the muscle ends at the fit. In between it ends in between.
+//! 1. The image's end of a column: where its values fall below [`END_SHARE`] of the column's own level (its largest
+//!    value in [`LEVEL_ROWS`]), seen from the base. A wall's end, blurred, has half of its height there, whatever the
+//!    blur.
+//! 2. The image's ends less the rim: a robust fit of a level and a tilt ([`TERMS`] numbers; columns far from it
+//!    hardly count, [`OUTLIER_MM`]) says by how much the whole rim is off.
+//! 3. A column whose image ends beyond the fit, or up to [`FOLLOWED_MM`] before it, ends where its image does. One
+//!    that ends more than [`DEFECT_MM`] before it is dark, not short: a defect, which must show, so the muscle ends
+//!    at the fit. In between it ends in between.
 //! 4. The ends are smoothed over neighbouring columns.
 //!
-//! The three distances were chosen on simulated hearts and phantoms; docs/normals.md has their figures, and those of hearts that took no part.
+//! The three distances were chosen on simulated hearts and phantoms; docs/normals.md has their figures, and those of
+//! hearts that took no part.
 //!
 //! Not guaranteed: a defect of half the base or more moves the fit itself.
 
@@ -36,8 +40,8 @@ const DEFECT_MM: f64 = 5.0;
 /// Standard deviation of the smoothing, columns.
 const SMOOTHING_COLUMNS: f64 = 1.0;
 
-/// The distance from the apex, in rows of `wall`, at which the muscle ends in every column. `largest` are the largest values along its rays, row
-/// by row; `anatomical` is the anatomical wall of the same fit.
+/// The distance from the apex, in rows of `wall`, at which the muscle ends in every column. `largest` are the largest
+/// values along its rays, row by row; `anatomical` is the anatomical wall of the same fit.
 pub(super) fn muscle_ends(
     largest: &[f64],
     wall: &VentricleWall,
@@ -67,8 +71,8 @@ pub(super) fn muscle_ends(
     })
 }
 
-/// The distance from the apex, rows, at which a column's values fall below the share of its level, linear between the rows; [`RAY_ROWS`] if the last row
-/// does not.
+/// The distance from the apex, rows, at which a column's values fall below the share of its level, linear between the
+/// rows; [`RAY_ROWS`] if the last row does not.
 fn image_end(largest: &[f64], column: usize) -> f64 {
     let value = |row: usize| largest[row * RAY_COLUMNS + column];
     let level = LEVEL_ROWS.map(value).fold(f64::MIN, f64::max);

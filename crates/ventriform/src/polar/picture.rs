@@ -45,7 +45,8 @@ static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
 struct FigurePalette {
     /// A wall that moves outward, or gets thinner.
     outward: Rgb,
-    /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has them).
+    /// Round the cycle from 0 degrees on: 12 hues of one lightness and chroma (CIELAB 70 and 46, as far as sRGB has
+    /// them).
     cycle: [[f64; 3]; 12],
     /// More uptake at stress, as much, less.
     difference: [[f64; 3]; 3],
@@ -65,8 +66,8 @@ const BLACK_RGB: Rgb = [0; 3];
 /// The four letters round the map: anterior, septal, inferior, lateral, in turns from lateral.
 const SIDE_LETTERS: [(char, f64); 4] = [('A', 0.25), ('S', 0.5), ('I', 0.75), ('L', 0.0)];
 
-/// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about
-/// the wall below the threshold, a colour bar with the threshold marked. Grey is outside of the wall, hatched the valve plane.
+/// The map as SVG: uptake, borders of segments and territories, the means of both in per cent, a line about the wall
+/// below the threshold, a colour bar with the threshold marked. Grey is outside of the wall, hatched the valve plane.
 /// Without orientation, "ORIENTATION UNKNOWN" instead of sides and territories.
 pub fn svg(map: &PolarMap) -> String {
     drawing(map).svg()

@@ -36,7 +36,8 @@ pub(super) fn refuse(
     Ok(())
 }
 
-/// The fields by which the headers name two patients. The name decides only where no number does: it changes by marriage and by spelling.
+/// The fields by which the headers name two patients. The name decides only where no number does: it changes by
+/// marriage and by spelling.
 fn other_patient(a: &Provenance, b: &Provenance) -> Vec<&'static str> {
     let plain = |text: &Option<String>| {
         let text = text.as_deref()?.trim_matches(['^', ' ']).to_uppercase();

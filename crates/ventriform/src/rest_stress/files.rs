@@ -19,8 +19,8 @@ impl ComparedHearts {
         report::of(self, parameters.to_json())
     }
 
-    /// `comparison.json`, `segments.csv` and polar maps as pictures and numbers: `polar_stress` and `polar_rest`, each by its own reference, and
-    /// `polar_difference`.
+    /// `comparison.json`, `segments.csv` and polar maps as pictures and numbers: `polar_stress` and `polar_rest`,
+    /// each by its own reference, and `polar_difference`.
     ///
     /// # Errors
     /// [`SegmentationFilesError`].

@@ -77,7 +77,8 @@ pub fn from_files(
     })
 }
 
-/// The model in which both fits together have the greatest confidence, if they chose different ones and both can have it.
+/// The model in which both fits together have the greatest confidence, if they chose different ones and both can have
+/// it.
 fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<String> {
     if stress.template() == rest.template() {
         return None;

@@ -36,8 +36,8 @@ pub struct ComparisonNormals {
 }
 
 impl ComparisonNormals {
-    /// The limits of `order` for both scans. `protocols` are those of stress and rest; where one is not stated, it is the only protocol of the
-    /// limits whose name has the word `stress` or `rest` in it.
+    /// The limits of `order` for both scans. `protocols` are those of stress and rest; where one is not stated, it is
+    /// the only protocol of the limits whose name has the word `stress` or `rest` in it.
     pub fn new(order: &NormalsOrder, protocols: [Option<String>; 2]) -> Self {
         let [stress, rest] = protocols;
         let of = |scan: WhichScan, stated: Option<String>| NormalsOrder {

@@ -66,8 +66,9 @@ pub enum SegmentationFilesError {
 }
 
 impl SegmentedVolume {
-    /// Mask and labels on the input's grid, or at right angles if the parameters say so, the mesh in `formats`, the report, slices, the scan about the organ
-    /// in 256 steps and, of a ventricle, the polar map. `volume_id` names the volume in the mesh files.
+    /// Mask and labels on the input's grid, or at right angles if the parameters say so, the mesh in `formats`, the
+    /// report, slices, the scan about the organ in 256 steps and, of a ventricle, the polar map. `volume_id` names
+    /// the volume in the mesh files.
     ///
     /// # Errors
     /// See [`SegmentationFilesError`].

@@ -77,7 +77,8 @@ impl OrganSearch {
 pub struct RankedTemplate {
     /// The template's name.
     pub name: String,
-    /// The figure that templates are ranked by ([`Judgement::confidence`](crate::judge::Judgement::confidence)), by this fit alone.
+    /// The figure that templates are ranked by ([`Judgement::confidence`](crate::judge::Judgement::confidence)), by
+    /// this fit alone.
     pub confidence: f64,
     /// Figure that decides between equals ([`Fit::merit`]).
     pub merit: f64,
@@ -116,8 +117,9 @@ impl Trials {
         }
     }
 
-    /// The fit of the template with the name `kept`, or else the fit with the greatest confidence, of equals the one with the
-    /// greatest merit, of those the first, as the built-in hearts' fits judge it, and its place; `None` without such a fit.
+    /// The fit of the template with the name `kept`, or else the fit with the greatest confidence, of equals the one
+    /// with the greatest merit, of those the first, as the built-in hearts' fits judge it, and its place; `None`
+    /// without such a fit.
     pub fn best(&self, kept: Option<&str>, edge: WallEdge) -> Option<(usize, Fit)> {
         let may_be = |n: &usize| kept.is_none_or(|name| self.candidates[*n].name == name);
         let rank = |n: usize| (self.candidates[n].confidence, self.candidates[n].merit);

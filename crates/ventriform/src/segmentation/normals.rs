@@ -27,10 +27,12 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     ]
 }
 
-/// The segmentation of a scan, and `figures` of the same heart, beside the limits of `order`. The sex is that of the scan's header, if the order does not state it.
+/// The segmentation of a scan, and `figures` of the same heart, beside the limits of `order`. The sex is that of the
+/// scan's header, if the order does not state it.
 ///
 /// # Errors
-/// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit the scan.
+/// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit
+/// the scan.
 pub fn judged_by_normals(
     segmentation: &Segmentation,
     figures: &[HeartFigure],

@@ -36,8 +36,8 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Refuses what can be described, and of which no model can be made: a single slice, and a surface whose unit nobody
-    /// stated and whose size is not that of an organ.
+    /// Refuses what can be described, and of which no model can be made: a single slice, and a surface whose unit
+    /// nobody stated and whose size is not that of an organ.
     ///
     /// # Errors
     /// [`VolumeError::SingleSlice`] or [`VolumeError::Mesh`].

@@ -42,7 +42,8 @@ pub fn read(
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
-/// order of the numbers in their names ([`order_by_numbers`]), or else in the order given. Volumes whose header says that they are no gates are refused unless `gated` says that they are.
+/// order of the numbers in their names ([`order_by_numbers`]), or else in the order given. Volumes whose header says
+/// that they are no gates are refused unless `gated` says that they are.
 ///
 /// # Errors
 /// [`VolumeError`], also for a single volume, and for gates that have together more voxels than a volume may.
@@ -102,8 +103,8 @@ pub fn read_gates(
     GatedReading::of(readings, timing)
 }
 
-/// Whether `files` are a volume of several frames that are the gates of a heart beat, by the header or because `gated` says so. Nothing is
-/// decoded.
+/// Whether `files` are a volume of several frames that are the gates of a heart beat, by the header or because
+/// `gated` says so. Nothing is decoded.
 ///
 /// # Errors
 /// [`VolumeError`].
@@ -219,7 +220,8 @@ pub fn read_segment(
     open::read(&mut *file, ReadOptions::default(), monitor)
 }
 
-/// The closed surface in `files`, LPS mm, as `stated`, and the volume that is read of it; `None` if the files are no mesh.
+/// The closed surface in `files`, LPS mm, as `stated`, and the volume that is read of it; `None` if the files are no
+/// mesh.
 ///
 /// # Errors
 /// [`VolumeError`], also for a surface whose unit nobody states and whose size is not that of an organ.

@@ -31,7 +31,8 @@ const RESOLUTION_MM: f64 = 13.0;
 const SPACING_MM: f64 = 4.5;
 const GATES: usize = 8;
 
-/// Semi-axes of the cavity across and along the axis, mm, at a share of the contraction (0 end diastole, 1 end systole).
+/// Semi-axes of the cavity across and along the axis, mm, at a share of the contraction (0 end diastole, 1 end
+/// systole).
 fn cavity_axes(contraction: f64) -> [f64; 2] {
     [24.0 - 7.5 * contraction, 50.0 - 4.0 * contraction]
 }
@@ -403,8 +404,9 @@ fn a_known_mass_is_met() {
     assert!((found / mass_g - 1.0).abs() < 0.05, "{found} of {mass_g}");
 }
 
-/// Meshes of all gates: the same triangles, closed without meeting themselves, as much muscle as the fit keeps.
-/// Sides are named by the direction to the head, which views of the beat need; with no body about the heart, it is the frame's.
+/// Meshes of all gates: the same triangles, closed without meeting themselves, as much muscle as the fit keeps. Sides
+/// are named by the direction to the head, which views of the beat need; with no body about the heart, it is the
+/// frame's.
 #[test]
 fn the_report_says_which_way_is_up() {
     let posture = whole().report().posture.unwrap();

@@ -1,10 +1,12 @@
 //! Normal limits from a folder of healthy people's scans.
 //!
-//! In: a folder with `cohort.csv` ([`table`]) and the scans that it names. Out: [`NormalLimits`], one group for each sex, protocol, tracer and correction.
+//! In: a folder with `cohort.csv` ([`table`]) and the scans that it names. Out: [`NormalLimits`], one group for each
+//! sex, protocol, tracer and correction.
 //!
 //! 1. Every healthy case is fitted with the built-in hearts; of several gates the sum is fitted, and the beat.
-//! 2. A case is left out, with the reason, if it cannot be read or fitted, if its fit has a confidence below [`LEAST_CONFIDENCE`] or a flag that speaks against its uptake
-//!    or place ([`FLAGS_OF_NO_NORMAL`]), or if its orientation is unknown.
+//! 2. A case is left out, with the reason, if it cannot be read or fitted, if its fit has a confidence below
+//!    [`LEAST_CONFIDENCE`] or a flag that speaks against its uptake or place ([`FLAGS_OF_NO_NORMAL`]), or if its
+//!    orientation is unknown.
 //! 3. [`group_of`] builds the limits of each group, and leaves out who lies beyond the limits of the others.
 //! 4. Where a case names its scan at rest, the ratio of the cavities is a figure of its group, `tid`.
 //!
@@ -37,7 +39,8 @@ use table::{CohortRow, TableError};
 /// Confidence of a fit below which a case is left out.
 pub const LEAST_CONFIDENCE: f64 = 0.5;
 
-/// Flags of a fit that speak against its uptake or its place. Others, such as those of the septum's shape, are raised for one healthy heart in seven.
+/// Flags of a fit that speak against its uptake or its place. Others, such as those of the septum's shape, are raised
+/// for one healthy heart in seven.
 const FLAGS_OF_NO_NORMAL: [&str; 8] = [
     "uncertain_place",
     "motion",
@@ -49,7 +52,7 @@ const FLAGS_OF_NO_NORMAL: [&str; 8] = [
     "implausible_shape",
 ];
 
-/// How limits are built.
+/// Options of [`build`].
 #[derive(Debug, Clone)]
 pub struct NormalsOptions {
     /// The parameters of the fits.

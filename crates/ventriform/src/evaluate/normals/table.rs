@@ -84,7 +84,7 @@ pub enum TableError {
         column: &'static str,
         /// The value.
         value: String,
-        /// What to write instead.
+        /// The advice.
         needed: &'static str,
     },
     /// There are too many lines.

@@ -1,5 +1,5 @@
-//! What structured reports of measurements have in common: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID 1500
-//! of PS3.16.
+//! What structured reports of measurements have in common: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID
+//! 1500 of PS3.16.
 //!
 //! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
 //! source images, and the evidence. [`Figure`] is one figure of a report and how it is coded.

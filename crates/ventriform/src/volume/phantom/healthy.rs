@@ -1,7 +1,8 @@
 //! Healthy hearts as different as people are, for tests of normal limits: simulated, not patients.
 //!
-//! Size, thickness, place, attenuation and evenness of the uptake are drawn from the seed. Men have larger hearts, and lose uptake on the inferior side;
-//! women lose it on the anterior side. The figures are those of no study: they make limits that a program can be tested with.
+//! Size, thickness, place, attenuation and evenness of the uptake are drawn from the seed. Men have larger hearts,
+//! and lose uptake on the inferior side; women lose it on the anterior side. The figures are those of no study: they
+//! make limits that a program can be tested with.
 
 use super::parameters::{PhantomParameters, UptakeVariation};
 use crate::geometry::random::{Purpose, stream, uniform};

@@ -63,8 +63,8 @@ pub struct PhantomParameters {
     pub seed: u64,
 }
 
-/// How the uptake of a wall differs from place to place, as that of healthy people does: attenuation lowers it towards the base and on one side, and no heart takes
-/// up evenly.
+/// How the uptake of a wall differs from place to place, as that of healthy people does: attenuation lowers it
+/// towards the base and on one side, and no heart takes up evenly.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct UptakeVariation {
     /// Share that the base has less than the apex, 0..=0.5.
@@ -82,7 +82,8 @@ pub struct UptakeVariation {
 }
 
 impl UptakeVariation {
-    /// Uptake at a share of the way from apex (0) to base (1) and at an angle, turns from anterior towards septal, relative to an even wall.
+    /// Uptake at a share of the way from apex (0) to base (1) and at an angle, turns from anterior towards septal,
+    /// relative to an even wall.
     pub(super) fn at(&self, along: f64, turns: f64) -> f64 {
         let wave = |turns: f64| (TAU * turns).cos();
         let side = 0.5 + 0.5 * wave(turns - self.side_turns);
