@@ -236,7 +236,7 @@ export interface components {
             narrowing?: number;
             /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
-             * @default 4.5
+             * @default 3
              */
             polar_blur?: number;
             /**
@@ -3189,7 +3189,7 @@ export interface components {
             organ?: "left_ventricle" | "liver" | "kidney" | "generic";
             /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
-             * @default 4.5
+             * @default 3
              */
             polar_blur?: number;
             /**
