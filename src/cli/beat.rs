@@ -4,17 +4,17 @@ use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
 use super::normals::{NormalLimitArgs, normals_line};
 use super::output::note;
-use super::parameter_args::TableArgs;
+use super::parameter_args::{TableArgs, with_fit};
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
 use super::volume_args::volume_files;
-use super::{Bar, FitArgs, UnusableArgument};
+use super::{Bar, FitArgs};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
 use ventriform::export::Format;
 use ventriform::gated::{GatedHeart, GatedOrder, from_files};
 use ventriform::mesh_files::MeshStatement;
-use ventriform::parameters::{BeatChoice, GatedParameters};
+use ventriform::parameters::BeatChoice;
 use ventriform::progress::{CancelToken, Monitor, Plan};
 use ventriform_service::work::problems::Explain;
 
@@ -69,9 +69,7 @@ pub struct BeatArgs {
 /// If a file cannot be read, the gates are no beat, or a file cannot be written. Nothing is written unless the fit is
 /// complete.
 pub fn run(args: &BeatArgs) -> Result<()> {
-    let pairs = args.choice.pairs().iter().chain(args.fit.pairs());
-    let pairs = pairs.map(|(name, text)| (*name, text.as_str()));
-    let parameters = GatedParameters::from_pairs(pairs).map_err(UnusableArgument::from)?;
+    let parameters = with_fit(&args.choice, &args.fit)?;
     let limits = args.limits.limits()?;
     let gates = volume_files(&args.input, &limits)?;
     let dicom = args.dicom.order_of_gates(&gates, &limits)?;

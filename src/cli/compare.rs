@@ -3,15 +3,15 @@
 use super::limit_args::LimitArgs;
 use super::normals::NormalLimitArgs;
 use super::output::note;
-use super::parameter_args::TableArgs;
+use super::parameter_args::{TableArgs, with_fit};
 use super::segment::{MODEL_AUTO, chosen_models, write_all};
 use super::volume_args::volume_files;
-use super::{Bar, FitArgs, UnusableArgument};
+use super::{Bar, FitArgs};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
 use ventriform::mesh_files::MeshStatement;
-use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
+use ventriform::parameters::ComparisonChoice;
 use ventriform::progress::{CancelToken, Monitor, Plan};
 use ventriform::report::ComparisonReport;
 use ventriform::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
@@ -63,9 +63,7 @@ pub struct CompareArgs {
 /// If a file cannot be read, a heart cannot be fitted, the scans cannot be compared, or a file cannot be written.
 /// Nothing is written unless the comparison is complete.
 pub fn run(args: &CompareArgs) -> Result<()> {
-    let pairs = args.choice.pairs().iter().chain(args.fit.pairs());
-    let pairs = pairs.map(|(name, text)| (*name, text.as_str()));
-    let parameters = ComparisonParameters::from_pairs(pairs).map_err(UnusableArgument::from)?;
+    let parameters = with_fit(&args.choice, &args.fit)?;
     let limits = args.limits.limits()?;
     let stress = volume_files(&args.stress, &limits)?;
     let rest = volume_files(&args.rest, &limits)?;

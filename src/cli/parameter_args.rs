@@ -3,7 +3,8 @@
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
 use ventriform::parameters::{
-    FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
+    BesideFit, FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
+    WithFit,
 };
 use ventriform_service::work::problems::Explain;
 
@@ -47,6 +48,20 @@ impl<P: Parameters> TableArgs<P> {
     pub fn pairs(&self) -> &[(&'static str, String)] {
         &self.0
     }
+}
+
+/// The parameters of work that fits models, from its own flags and those of its fits.
+///
+/// # Errors
+/// The first flag that cannot be used.
+pub fn with_fit<C: BesideFit>(
+    own: &TableArgs<C>,
+    fit: &FitArgs,
+) -> Result<WithFit<C>, UnusableArgument> {
+    let pairs = own.pairs().iter().chain(fit.pairs());
+    Ok(WithFit::from_pairs(
+        pairs.map(|(name, text)| (*name, text.as_str())),
+    )?)
 }
 
 /// The parameters that are flags: all but those that are ids of what a service stores.

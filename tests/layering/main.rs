@@ -97,11 +97,13 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
         ],
     ),
-    ("normals", &["numeric", "model", "polar"]),
+    ("normals", &["text", "numeric", "model", "polar"]),
     ("comparison", &["model", "polar", "normals"]),
     (
         "reader",
-        &["geometry", "mesh", "progress", "grid", "model", "deform"],
+        &[
+            "text", "geometry", "mesh", "progress", "grid", "model", "deform",
+        ],
     ),
     (
         "parameters",
@@ -147,7 +149,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
     (
         "export",
         &[
-            "text", "geometry", "mesh", "progress", "grid", "volume", "polar", "report",
+            "text", "geometry", "numeric", "mesh", "progress", "grid", "volume", "polar", "report",
         ],
     ),
     (
@@ -212,6 +214,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
     (
         "rest_stress",
         &[
+            "numeric",
             "progress",
             "volume",
             "polar",
@@ -226,6 +229,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
     (
         "evaluate",
         &[
+            "text",
             "geometry",
             "mesh",
             "mesh_files",

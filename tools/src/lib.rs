@@ -1,5 +1,7 @@
 //! What the instruments share.
 
+pub mod statistics;
+
 use std::io;
 use std::path::{Path, PathBuf};
 

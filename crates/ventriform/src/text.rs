@@ -3,9 +3,18 @@
 //! A terminal obeys control characters, a log ends its line at others, and controls of writing
 //! direction show a text in an order in which it is not stored (Unicode Technical Report 36, 3.1).
 //! Names that are taken have none of them ([`is_printable`]); whatever is printed has them escaped
-//! ([`escaped`], [`escaped_lines`]).
+//! ([`escaped`], [`escaped_lines`]). Digests are printed by [`hex`].
 
 use std::borrow::Cow;
+use std::fmt::Write as _;
+
+/// The bytes as lower-case hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("a string takes any text");
+        text
+    })
+}
 
 /// Whether a name may have `c`: no control character (C0, DEL, C1), separator of lines or paragraphs,
 /// control of writing direction (embedding, override, isolate), mark of byte order, or sign that

@@ -18,6 +18,7 @@ use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::segmentation::{SegmentationParameters, built_in, segment};
 use ventriform::volume::{ReadLimits, VolumeFile, read_gates};
+use ventriform_tools::statistics;
 
 /// Contraction of a segment, as a share of a whole one's, below which it counts as akinetic.
 const AKINETIC_CONTRACTION: f64 = 0.25;
@@ -202,11 +203,8 @@ impl Table {
             own.map(|(thickening, _)| *thickening).collect()
         };
         let (dead, live) = (of(true), of(false));
-        let lower = |a: f64, b: f64| f64::from(u8::from(a < b)) + 0.5 * f64::from(u8::from(a == b));
-        let pairs = dead
-            .iter()
-            .flat_map(|a| live.iter().map(move |b| lower(*a, *b)));
-        let area = pairs.sum::<f64>() / (dead.len() * live.len()) as f64;
+        // Akinetic walls thicken less.
+        let area = statistics::area_under_curve(&live, &dead);
         let within = self.within.iter().sum::<f64>() / self.within.len() as f64;
         println!(
             "akinetic segments: AUC {area:.2}; r of thickening within the {} hearts that have them {within:.2}",
@@ -226,14 +224,6 @@ fn off(values: impl Iterator<Item = f64>) -> (f64, f64, f64) {
 }
 
 fn correlation(pairs: &[(f64, f64)]) -> f64 {
-    let count = pairs.len() as f64;
-    let (x, y) = pairs.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
-    let (x, y) = (x / count, y / count);
-    let (mut both, mut of_x, mut of_y) = (0.0, 0.0, 0.0);
-    for (a, b) in pairs {
-        both += (a - x) * (b - y);
-        of_x += (a - x).powi(2);
-        of_y += (b - y).powi(2);
-    }
-    both / (of_x * of_y).sqrt()
+    let (found, known): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    statistics::correlation(&found, &known)
 }

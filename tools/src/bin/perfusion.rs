@@ -22,6 +22,7 @@ use ventriform::parameters::{FitParameters, Parameters};
 use ventriform::progress::Monitor;
 use ventriform::segmentation::{NormalsOrder, SegmentationOrder, from_files};
 use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform_tools::statistics::{area_under_curve, correlation, mean};
 
 /// Share below normal at which a true score begins, as the simulator has it.
 const TRUE_LIMIT: f64 = 0.15;
@@ -219,35 +220,4 @@ fn summary(rows: &[Row]) {
         within(&dark),
         dark.len()
     );
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (mean_a, mean_b) = (mean(a), mean(b));
-    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| of(a - mean_a, b - mean_b))
-            .sum()
-    };
-    sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt()
-}
-
-/// The chance that a figure of `ill` is greater than one of `well`; equal ones count half.
-fn area_under_curve(ill: &[f64], well: &[f64]) -> f64 {
-    let greater = ill.iter().flat_map(|ill| {
-        well.iter().map(move |well| {
-            if ill > well {
-                1.0
-            } else if ill < well {
-                0.0
-            } else {
-                0.5
-            }
-        })
-    });
-    greater.sum::<f64>() / (ill.len() * well.len()).max(1) as f64
 }

@@ -2,6 +2,7 @@
 
 use super::{FileRecord, Resource};
 use sha2::{Digest, Sha256};
+pub use ventriform::text::hex;
 
 /// `prefix` followed by the first 128 bits of the SHA-256 of `parts`, as 32 hexadecimal digits.
 /// Each part is hashed with its length, so `["ab", "c"]` and `["a", "bc"]` give different ids.
@@ -42,15 +43,6 @@ pub fn random_key() -> [u8; 32] {
         hash.update(uuid::Uuid::new_v4().as_bytes());
     }
     hash.finalize().into()
-}
-
-/// The bytes as lower-case hexadecimal digits.
-pub fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

@@ -56,26 +56,16 @@ pub(super) const BEAT_FILES: &[&str] = &[
     END_MESHES[1],
     "curve.svg",
     "phase.svg",
-    BEAT_MAPS[0],
-    BEAT_MAPS[1],
-    BEAT_MAPS[2],
-    BEAT_MAPS[3],
-    BEAT_MAPS[4],
-    BEAT_MAPS[5],
+    BeatPage::MAPS[0].0,
+    BeatPage::MAPS[1].0,
+    BeatPage::MAPS[2].0,
+    BeatPage::MAPS[3].0,
+    BeatPage::MAPS[4].0,
+    BeatPage::MAPS[5].0,
 ];
 
 /// The wall at end diastole and at end systole.
 const END_MESHES: [&str; 2] = ["mesh_ed.json", "mesh_es.json"];
-
-/// The pictures of [`BeatPage::MAPS`].
-const BEAT_MAPS: [&str; 6] = [
-    "polar.svg",
-    "polar_ed.svg",
-    "polar_es.svg",
-    "polar_motion.svg",
-    "polar_thickening.svg",
-    "polar_phase.svg",
-];
 
 /// The mesh of the wall by the other edge: one of these, of a ventricle.
 const OTHER_WALLS: [&str; 2] = ["mesh_anatomical.json", "mesh_apparent.json"];
@@ -156,8 +146,8 @@ pub(super) fn beat_page(
     let curve = optional(read, "curve.svg")?;
     let phase = optional(read, "phase.svg")?;
     let mut maps = Vec::new();
-    for ((name, _), file) in BeatPage::MAPS.into_iter().zip(BEAT_MAPS) {
-        maps.extend(optional(read, file)?.map(|svg| (name, svg)));
+    for (name, _) in BeatPage::MAPS {
+        maps.extend(optional(read, name)?.map(|svg| (name, svg)));
     }
     let maps: Vec<(&'static str, &[u8])> = (maps.iter())
         .map(|(name, svg)| (*name, svg.as_slice()))

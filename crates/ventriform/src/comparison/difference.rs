@@ -3,14 +3,15 @@
 use super::calibration::DIFFERENCE_SD_POINTS;
 use super::scale::{Sides, matched};
 use super::turn::{self, Turn};
-use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
 use crate::normals::ScanPlaces;
-use crate::polar::{ARTERY_NAMES, territory};
+use crate::polar::{ARTERY_NAMES, MapGaussian, segments_of};
 
 /// Loss of uptake at stress beyond which wall is reversible, per cent of the rest map's reference.
 pub const REVERSIBLE_POINTS: f64 = 2.5 * DIFFERENCE_SD_POINTS;
 /// Standard deviations of the smoothing of the difference, rows and columns.
-const SMOOTHING: [f64; 2] = [1.2, 2.4];
+const SMOOTHING_PLACES: [f64; 2] = [1.2, 2.4];
+/// Rows and columns on either side that it takes in.
+const SMOOTHING_REACH: [usize; 2] = [4, 8];
 
 /// The change from rest to stress.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,12 +24,8 @@ pub struct Change {
     pub matched_percent: f64,
     /// Share of the wall with muscle in both maps, per cent.
     pub compared_percent: f64,
-    /// Uptake at stress, scaled to rest, per cent of the rest map's reference, on the places of the rest map: row by
-    /// row from apex to base; `None` without muscle in both.
-    pub stress_percent: Vec<Option<f64>>,
-    /// Uptake at rest, per cent of the reference.
-    pub rest_percent: Vec<Option<f64>>,
-    /// Rest less stress, smoothed, points: positive where stress lacks uptake.
+    /// Rest less stress, smoothed, per cent of the rest map's reference, on its places: row by row from apex to base,
+    /// positive where stress lacks uptake; `None` without muscle in both.
     pub difference_points: Vec<Option<f64>>,
     /// Share of the compared wall that loses more than [`REVERSIBLE_POINTS`], per cent.
     pub reversible_percent: f64,
@@ -121,29 +118,21 @@ impl Change {
         };
         let reference = sides.rest.reference;
         let matched = matched(&stress, &rest, reference)?;
-        let percent = |uptake: Option<f64>, other: Option<f64>, unit: f64| {
-            other?;
-            Some(100.0 * uptake? / unit)
-        };
-        let pairs = || rest.uptake.iter().zip(&stress.uptake);
-        let rest_percent: Vec<Option<f64>> = pairs()
-            .map(|(rest, stress)| percent(*rest, *stress, reference))
+        // Uptake at stress and at rest, per cent of the rest map's reference.
+        let percents: Vec<Option<[f64; 2]>> = (stress.uptake.iter().zip(&rest.uptake))
+            .map(|(stress, rest)| {
+                let stress = 100.0 * (*stress)? / (reference * matched.counts);
+                Some([stress, 100.0 * (*rest)? / reference])
+            })
             .collect();
-        let stress_percent: Vec<Option<f64>> = pairs()
-            .map(|(rest, stress)| percent(*stress, *rest, reference * matched.counts))
-            .collect();
-        let raw: Vec<Option<f64>> = (rest_percent.iter().zip(&stress_percent))
-            .map(|(rest, stress)| Some((*rest)? - (*stress)?))
+        let raw: Vec<Option<f64>> = (percents.iter())
+            .map(|both| both.map(|[stress, rest]| rest - stress))
             .collect();
         let difference_points = smoothed(&raw, &rest.area);
         let threshold = 100.0 * sides.rest.threshold;
         let mut of_segment = [Sums::default(); 17];
-        for index in 0..raw.len() {
-            let (Some(stress), Some(at_rest), Some(difference)) = (
-                stress_percent[index],
-                rest_percent[index],
-                difference_points[index],
-            ) else {
+        for (index, (both, difference)) in percents.iter().zip(&difference_points).enumerate() {
+            let (Some([stress, at_rest]), Some(difference)) = (*both, *difference) else {
                 continue;
             };
             let area = rest.area[index];
@@ -167,8 +156,6 @@ impl Change {
             scale: matched.counts,
             matched_percent: 100.0 * matched.share,
             compared_percent: 100.0 * all.area / wall,
-            stress_percent,
-            rest_percent,
             difference_points,
             reversible_percent: whole.reversible_percent,
             fixed_percent: whole.fixed_percent,
@@ -177,8 +164,7 @@ impl Change {
                 figures: of_segment[index].figures(),
             }),
             territories: ARTERY_NAMES.map(|name| {
-                let own = (1..=17).filter(|segment| territory(*segment) == name);
-                let sums = own.fold(Sums::default(), |sum, segment| {
+                let sums = segments_of(name).fold(Sums::default(), |sum, segment| {
                     sum.add(of_segment[segment - 1])
                 });
                 ComparedTerritory {
@@ -190,35 +176,14 @@ impl Change {
     }
 }
 
-/// The weighted means of the values about every place that has one, each by its area and a Gaussian over rows and
-/// columns.
-fn smoothed(values: &[Option<f64>], areas: &[f64]) -> Vec<Option<f64>> {
-    let kernel = |sigma: f64| -> Vec<f64> {
-        let reach = (3.0 * sigma).ceil() as i64;
-        (-reach..=reach)
-            .map(|away| (-0.5 * (away as f64 / sigma).powi(2)).exp())
-            .collect()
-    };
-    let [of_rows, of_columns] = SMOOTHING.map(kernel);
-    let [row_reach, column_reach] = [&of_rows, &of_columns].map(|kernel| kernel.len() as i64 / 2);
-    let about = |index: usize| {
-        values[index]?;
-        let (row, column) = ((index / RAY_COLUMNS) as i64, (index % RAY_COLUMNS) as i64);
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (r, of_row) in (row - row_reach..).zip(&of_rows) {
-            if !(0..RAY_ROWS as i64).contains(&r) {
-                continue;
-            }
-            for (c, of_column) in (column - column_reach..).zip(&of_columns) {
-                let at = r as usize * RAY_COLUMNS + c.rem_euclid(RAY_COLUMNS as i64) as usize;
-                if let Some(value) = values[at] {
-                    let own = of_row * of_column * areas[at];
-                    sum += own * value;
-                    weight += own;
-                }
-            }
-        }
-        (weight > 0.0).then(|| sum / weight)
-    };
-    (0..values.len()).map(about).collect()
+/// The differences in the mean over neighbouring places that have one, each by its area and a Gaussian.
+fn smoothed(differences: &[Option<f64>], areas: &[f64]) -> Vec<Option<f64>> {
+    let values: Vec<f64> = differences.iter().map(|own| own.unwrap_or(0.0)).collect();
+    let weights: Vec<f64> = (differences.iter().zip(areas))
+        .map(|(own, area)| own.map_or(0.0, |_| *area))
+        .collect();
+    let means = MapGaussian::new(SMOOTHING_PLACES, SMOOTHING_REACH).means(&values, &weights);
+    (means.into_iter().zip(&weights))
+        .map(|(mean, weight)| (*weight > 0.0).then_some(mean))
+        .collect()
 }

@@ -10,6 +10,7 @@
 //! Guaranteed: the same files give the same profile and figures, on any number of threads.
 
 use super::cohort::{case_file, mask_file, mask_on};
+use super::files::sha256;
 use super::paired::PairedDifference;
 use super::sample::Sample;
 use crate::deform::FittedModel;
@@ -22,7 +23,6 @@ use crate::reader::{self, LearntOn, ReaderOffset, ReaderOffsets, ReaderProfile};
 use crate::segmentation::{SegmentationOrder, from_files};
 use crate::volume::{ReadLimits, VolumeFile};
 use rayon::prelude::*;
-use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -242,8 +242,8 @@ impl ReadCase {
         let measured = reader::measure(&fit, &made.segmentation.mask, &drawn, &frame)
             .ok_or("its mask and the fitted wall have too little in common")?;
         let learnt_on = LearntOn {
-            scan: sha256(&case.scan)?,
-            mask: sha256(&case.mask)?,
+            scan: sha256(&case.scan).map_err(|error| error.to_string())?,
+            mask: sha256(&case.mask).map_err(|error| error.to_string())?,
         };
         Ok(Self {
             reader_ml: drawn.count() as f64 * frame.voxel_volume() / 1000.0,
@@ -271,10 +271,4 @@ impl ReadCase {
             cavity_ml: fit.wall.map_or(f64::NAN, |wall| wall.cavity_ml),
         }
     }
-}
-
-fn sha256(path: &Path) -> Result<String, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    let digest = Sha256::digest(bytes);
-    Ok(digest.iter().map(|byte| format!("{byte:02x}")).collect())
 }

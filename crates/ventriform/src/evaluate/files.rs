@@ -1,6 +1,9 @@
-//! Files that are written whole or not at all.
+//! Files that are written whole or not at all, and the digests of files that are read.
 
 use super::error::EvaluateError;
+use crate::text::hex;
+use sha2::{Digest, Sha256};
+use std::io;
 use std::path::Path;
 
 /// Writes `bytes` to a file beside `path` and renames it, so that a run that is killed leaves no
@@ -28,4 +31,12 @@ pub fn make_folder(path: &Path) -> Result<(), EvaluateError> {
         path: path.to_path_buf(),
         error,
     })
+}
+
+/// The SHA-256 of a file, hexadecimal.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn sha256(path: &Path) -> io::Result<String> {
+    Ok(hex(&Sha256::digest(std::fs::read(path)?)))
 }

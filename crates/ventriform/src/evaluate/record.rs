@@ -9,6 +9,7 @@ use super::files::write_whole;
 use super::rows::{Agreed, FitOutcome};
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
+use crate::text::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -82,8 +83,7 @@ impl Key {
 
     /// The key as text.
     pub fn text(self) -> String {
-        let digest = self.0.finalize();
-        digest.iter().map(|byte| format!("{byte:02x}")).collect()
+        hex(&self.0.finalize())
     }
 }
 

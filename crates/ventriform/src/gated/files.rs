@@ -17,7 +17,7 @@ use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, Wal
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, BeatPage, BeatReport};
 use crate::segmentation::{
-    NamedFile, SegmentationFilesError, json_file, json_line, perfusion_files,
+    NamedFile, SegmentationFilesError, csv_file, json_file, json_line, perfusion_files, svg_file,
 };
 use crate::volume::Provenance;
 use crate::volume::nifti::{self, LabelEntry};
@@ -46,12 +46,8 @@ impl GatedHeart {
             json_file("beat.json", &report),
             svg_file("curve.svg", pictures::curve(&report)),
             svg_file("phase.svg", pictures::phase(&report)),
-            text_file("gates.csv", "text/csv; charset=utf-8", gates_csv(&report)),
-            text_file(
-                "segments.csv",
-                "text/csv; charset=utf-8",
-                segments_csv(&report),
-            ),
+            csv_file("gates.csv", gates_csv(&report)),
+            csv_file("segments.csv", segments_csv(&report)),
         ];
         files.extend(self.maps(monitor)?);
         let meshes = &self.meshes;
@@ -164,7 +160,7 @@ impl GatedHeart {
             let found = files.iter().find(|file| file.name == name);
             found.map(|file| file.bytes.as_slice())
         };
-        let picture = |(name, _)| Some((name, bytes(&format!("{name}.svg"))?));
+        let picture = |(name, _)| Some((name, bytes(name)?));
         let maps: Vec<(&str, &[u8])> = BeatPage::MAPS.into_iter().filter_map(picture).collect();
         let page = report::beat_page(&BeatPage {
             report: &self.report(),
@@ -308,18 +304,6 @@ impl GatedHeart {
         let cup: &Cup = cup;
         let seen = VentricleWall::new(mesh, cup, &orientation.superior, monitor)?;
         seen.cavity(wall, &self.reading.gates[gate].frame, monitor)
-    }
-}
-
-fn svg_file(name: &str, text: String) -> NamedFile {
-    text_file(name, "image/svg+xml", text)
-}
-
-fn text_file(name: &str, media_type: &'static str, text: String) -> NamedFile {
-    NamedFile {
-        name: name.to_owned(),
-        media_type,
-        bytes: text.into_bytes(),
     }
 }
 

@@ -115,11 +115,7 @@ pub fn from_files(
 
 /// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat.
 pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure> {
-    let whole = |figure, value| HeartFigure {
-        figure,
-        segment: None,
-        value,
-    };
+    let whole = HeartFigure::whole;
     let mut figures = heart_figures(segmentation);
     figures.extend(beat.ef_percent.map(|ef| whole("ef_percent", ef)));
     figures.extend([
@@ -129,11 +125,7 @@ pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure
         whole("phase_bandwidth_degrees", beat.phases.bandwidth_degrees),
     ]);
     for segment in &beat.segments {
-        let own = |figure, value| HeartFigure {
-            figure,
-            segment: Some(segment.segment),
-            value,
-        };
+        let own = |figure, value| HeartFigure::of_segment(figure, segment.segment, value);
         figures.extend([
             own("motion_mm", segment.motion_mm),
             own("thickening_percent", segment.thickening_percent),

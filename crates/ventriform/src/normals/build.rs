@@ -20,8 +20,9 @@ use super::pattern::{Coefficients, TermMatrix, share_at};
 use super::perfusion::{HeartFigure, figures};
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use super::sizes::FEWEST_CASES;
+use crate::numeric::decimals::round;
 use crate::numeric::order::quantile;
-use crate::polar::{RAY_COLUMNS, RAY_ROWS};
+use crate::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
 use rayon::prelude::*;
 
 /// Rounds of matching.
@@ -32,6 +33,8 @@ const LEAST_RELATIVE_SD: f64 = 0.03;
 const FIRST_RELATIVE_SD: f64 = 0.08;
 /// Standard deviation of the smoothing of the variance, rows and columns: 25 mm.
 const SMOOTHING_PLACES: [f64; 2] = [8.0, 9.5];
+/// Rows and columns on either side that it takes in.
+const SMOOTHING_REACH: [usize; 2] = [RAY_ROWS / 2, RAY_COLUMNS / 3];
 /// Fewest people with muscle at a place that has limits.
 const FEWEST_AT_A_PLACE: usize = 6;
 /// Share of the wall beyond the others' limits from which a person is left out, per cent.
@@ -151,11 +154,6 @@ fn specificity(cases: Vec<LeftOut>) -> Specificity {
     }
 }
 
-/// Rounds to 4 decimals.
-fn round(x: f64) -> f64 {
-    (1e4 * x).round() / 1e4
-}
-
 /// Mean, standard deviation and patterns of these scans. The mean's own mean over the places is 1.
 pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
     let places = RAY_ROWS * RAY_COLUMNS;
@@ -174,6 +172,10 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
             .map(|index| known[index].then(|| value(index)))
             .collect()
     };
+    let smoothing = MapGaussian::new(SMOOTHING_PLACES, SMOOTHING_REACH);
+    let weights: Vec<f64> = (known.iter())
+        .map(|known| f64::from(u8::from(*known)))
+        .collect();
     let medians: Vec<f64> = scans.iter().map(|scan| median_uptake(scan)).collect();
     let mean = mean_at(places, |index| {
         (scans.iter().zip(&medians))
@@ -195,7 +197,7 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
         let variance: Vec<f64> = (0..places)
             .map(|index| variance(at(index).collect()))
             .collect();
-        let variance = smoothed(&variance, &known);
+        let variance = smoothing.means(&variance, &weights);
         let patterns: Vec<&Coefficients> = matched
             .iter()
             .filter_map(|(_, pattern)| pattern.as_ref())
@@ -292,50 +294,6 @@ fn median_uptake(scan: &ScanPlaces) -> f64 {
         .map(|(value, _)| *value)
         .filter(|value| *value > 0.0)
         .unwrap_or(1.0)
-}
-
-/// `values` in the mean over neighbouring places that are known, weights falling as a Gaussian.
-fn smoothed(values: &[f64], known: &[bool]) -> Vec<f64> {
-    let weights = |sigma: f64, reach: usize| -> Vec<f64> {
-        (0..=reach)
-            .map(|step| (-0.5 * (step as f64 / sigma).powi(2)).exp())
-            .collect()
-    };
-    let rows = weights(SMOOTHING_PLACES[0], RAY_ROWS / 2);
-    let columns = weights(SMOOTHING_PLACES[1], RAY_COLUMNS / 3);
-    let blurred = |values: &[f64]| -> Vec<f64> {
-        let along: Vec<f64> = (0..values.len())
-            .map(|index| {
-                let (row, column) = (index / RAY_COLUMNS, index % RAY_COLUMNS);
-                let reach = rows.len() - 1;
-                let near = row.saturating_sub(reach)..(row + reach + 1).min(RAY_ROWS);
-                near.map(|other| rows[other.abs_diff(row)] * values[other * RAY_COLUMNS + column])
-                    .sum()
-            })
-            .collect();
-        (0..values.len())
-            .map(|index| {
-                let (row, column) = (index / RAY_COLUMNS, index % RAY_COLUMNS);
-                let at = |column: usize| along[row * RAY_COLUMNS + column % RAY_COLUMNS];
-                let beside = (1..columns.len()).map(|step| {
-                    columns[step] * (at(column + step) + at(column + RAY_COLUMNS - step))
-                });
-                at(column) + beside.sum::<f64>()
-            })
-            .collect()
-    };
-    let weight: Vec<f64> = known
-        .iter()
-        .map(|known| f64::from(u8::from(*known)))
-        .collect();
-    let weighted: Vec<f64> = values
-        .iter()
-        .zip(&weight)
-        .map(|(value, weight)| value * weight)
-        .collect();
-    let sums = blurred(&weighted).into_iter().zip(blurred(&weight));
-    sums.map(|(sum, weight)| if weight > 0.0 { sum / weight } else { 0.0 })
-        .collect()
 }
 
 /// Limits of every figure that enough people have, in the order of their first appearance.

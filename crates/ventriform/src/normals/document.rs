@@ -5,10 +5,11 @@ use super::kind::{GroupSex, ScanKind, yes_or_no};
 use super::pattern::TERMS;
 use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
+use crate::text::hex;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
-use std::fmt::{self, Write as _};
+use std::fmt;
 
 /// The file's statement of its format.
 const NORMALS_FORMAT: &str = "ventriform-normal-limits";
@@ -243,11 +244,7 @@ impl NormalLimits {
             sha256: String::new(),
             ..self.clone()
         };
-        let digest = Sha256::digest(content.to_json());
-        digest.iter().fold(String::new(), |mut text, byte| {
-            write!(text, "{byte:02x}").expect("a string takes any text");
-            text
-        })
+        hex(&Sha256::digest(content.to_json()))
     }
 
     /// Checks sizes and numbers.

@@ -49,7 +49,7 @@ pub use kind::{GroupSex, ScanKind, Sex};
 pub use matching::{MATCHED_Z, Matched, matched};
 pub use pattern::{Coefficients, TERMS, TermMatrix};
 pub use perfusion::{
-    ComparedFigure, DEFICIT_OF_FULL_SCORE, HeartFigure, Perfusion, SegmentPerfusion,
+    DEFICIT_OF_FULL_SCORE, FigureBeside, HeartFigure, NormalsUsed, Perfusion, SegmentPerfusion,
     TerritoryPerfusion, Z_LIMIT, apply, summed_percent,
 };
 pub use place_limits::{PlaceLimits, ScanPlaces};

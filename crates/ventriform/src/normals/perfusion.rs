@@ -8,7 +8,9 @@ use super::matching::matched_places;
 use super::pattern::Coefficients;
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use super::sizes::FEW_CASES;
-use crate::polar::{ARTERY_NAMES, PolarMap, territory};
+use crate::numeric::decimals::round;
+use crate::polar::{ARTERY_NAMES, PolarMap, segments_of};
+use serde::{Deserialize, Serialize};
 
 /// Standard deviations below the mean at which the limit lies.
 pub const Z_LIMIT: f64 = 2.5;
@@ -29,7 +31,7 @@ const FLAGGED_MATCHED_SHARE: f64 = 0.4;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Perfusion {
     /// The group that the scan was compared with.
-    pub group: GroupUsed,
+    pub group: NormalsUsed,
     /// The counts that a normal mean of 1 has in this scan.
     pub scale: f64,
     /// Standard deviations from the normal mean at every place, row by row from apex to base; `None` where nothing
@@ -52,19 +54,20 @@ pub struct Perfusion {
     /// The territories LAD, LCX and RCA.
     pub territories: [TerritoryPerfusion; 3],
     /// The heart's figures that have limits.
-    pub figures: Vec<ComparedFigure>,
+    pub figures: Vec<FigureBeside>,
     /// Reasons to look closer.
     pub flags: Vec<NormalsFlag>,
 }
 
-/// The group of limits that a scan was compared with.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct GroupUsed {
+/// The group of normal limits that a scan was compared with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct NormalsUsed {
     /// SHA-256 of the limits, hexadecimal.
     pub sha256: String,
     /// Whether the people are simulated.
     pub simulated: bool,
-    /// Description of the people, in words.
+    /// What the people are.
     pub people: String,
     /// `M`, `F` or `mixed`.
     pub sex: GroupSex,
@@ -119,18 +122,39 @@ pub struct HeartFigure {
     pub value: f64,
 }
 
-/// A figure of the whole heart or of a segment beside its limits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ComparedFigure {
-    /// Its name in the limits.
+impl HeartFigure {
+    /// Of the whole heart.
+    pub fn whole(figure: &'static str, value: f64) -> Self {
+        Self {
+            figure,
+            segment: None,
+            value,
+        }
+    }
+
+    /// Of a segment, 1 to 17.
+    pub fn of_segment(figure: &'static str, segment: usize, value: f64) -> Self {
+        Self {
+            figure,
+            segment: Some(segment),
+            value,
+        }
+    }
+}
+
+/// A figure beside its limits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct FigureBeside {
+    /// Its name in the limits, with its unit.
     pub figure: String,
-    /// The segment, 1 to 17; `None` for the whole heart.
+    /// The segment, 1 to 17; null for the whole heart.
     pub segment: Option<usize>,
-    /// This scan's value.
+    /// This scan's.
     pub value: f64,
-    /// Standard deviations from the normal mean; `None` where people do not differ.
+    /// Standard deviations from the normal mean; null where people do not differ.
     pub z: Option<f64>,
-    /// Whether it lies within the 2.5 and 97.5 per cent quantiles.
+    /// Whether it lies between `low` and `high`.
     pub within: bool,
     /// Number of people.
     pub n: usize,
@@ -142,6 +166,22 @@ pub struct ComparedFigure {
     pub low: f64,
     /// Quantile of 97.5 per cent.
     pub high: f64,
+}
+
+impl FigureBeside {
+    /// The same with its numbers rounded, as reports have them.
+    #[must_use]
+    pub fn rounded(&self) -> Self {
+        Self {
+            value: round(self.value),
+            z: self.z.map(round),
+            mean: round(self.mean),
+            sd: round(self.sd),
+            low: round(self.low),
+            high: round(self.high),
+            ..self.clone()
+        }
+    }
 }
 
 /// Sums over places.
@@ -267,17 +307,15 @@ pub(super) fn figures(scan: &ScanPlaces, limits: &PlaceLimits) -> Option<Figures
         }
     });
     let territories = ARTERY_NAMES.map(|name| {
-        let own = |segment: &usize| territory(*segment) == name;
-        let numbers: Vec<usize> = (1..=17).filter(own).collect();
-        let sums = (numbers.iter()).fold(Sums::default(), |sum, number| {
-            sum.add(of_segment[number - 1])
+        let sums = segments_of(name).fold(Sums::default(), |sum, segment| {
+            sum.add(of_segment[segment - 1])
         });
         TerritoryPerfusion {
             name,
             extent_percent: sums.extent_percent(),
             deficit_percent: sums.deficit_percent(),
-            summed_score: (numbers.iter())
-                .filter_map(|number| segments[number - 1].score)
+            summed_score: segments_of(name)
+                .filter_map(|segment| segments[segment - 1].score)
                 .map(u32::from)
                 .sum(),
         }
@@ -321,7 +359,7 @@ pub fn apply(
     let summed_score = found.summed_score();
     Ok(Perfusion {
         flags: flags(&found, kind, limits, group),
-        group: GroupUsed {
+        group: NormalsUsed {
             sha256: limits.sha256.clone(),
             simulated: limits.simulated,
             people: limits.people.clone(),
@@ -387,10 +425,10 @@ fn flags(
 
 impl NormalGroup {
     /// A figure beside its limits; `None` without any.
-    fn beside(&self, own: &HeartFigure) -> Option<ComparedFigure> {
+    fn beside(&self, own: &HeartFigure) -> Option<FigureBeside> {
         let limit = (self.figures.iter())
             .find(|limit| limit.figure == own.figure && limit.segment == own.segment)?;
-        Some(ComparedFigure {
+        Some(FigureBeside {
             figure: limit.figure.clone(),
             segment: limit.segment,
             value: own.value,

@@ -2,6 +2,7 @@
 //!
 //! - [`conjugate_gradient`]: the solver of sparse symmetric positive definite systems;
 //! - [`block_matrix`]: such systems of 3×3 blocks;
+//! - [`decimals`]: rounding of figures that are written;
 //! - [`disjoint_sets`]: union-find on a list of parents;
 //! - [`lbfgs`]: the minimum of a smooth function within bounds;
 //! - [`order`]: order statistics;
@@ -9,6 +10,7 @@
 
 pub mod block_matrix;
 pub mod conjugate_gradient;
+pub mod decimals;
 pub mod disjoint_sets;
 pub mod lbfgs;
 pub mod order;

@@ -40,6 +40,7 @@ mod document;
 mod figure;
 mod levels;
 mod picture;
+mod smoothing;
 
 pub use document::{
     FigureDocument, FigureSegment, PolarDocument, PolarSegment, PolarSummary, PolarTerritory,
@@ -47,6 +48,7 @@ pub use document::{
 pub use figure::{FigureMap, WallFigure};
 pub use levels::{Level, Levels};
 pub use picture::{colour_of, figure_png, figure_svg, png, svg};
+pub use smoothing::MapGaussian;
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
@@ -215,6 +217,11 @@ pub fn territory(segment: usize) -> &'static str {
 /// The names of the arteries of [`territory`].
 pub const ARTERY_NAMES: [&str; 3] = ["LAD", "LCX", "RCA"];
 
+/// The segments that the artery with this name usually supplies, 1..=17.
+pub fn segments_of(artery: &str) -> impl Iterator<Item = usize> {
+    (1..=17).filter(move |segment| territory(*segment) == artery)
+}
+
 /// The segment of a `level` at `angle` degrees counter-clockwise from lateral.
 pub fn segment_at(level: Level, angle: f64) -> usize {
     // Sixths are centred on anterior (90°), quarters likewise.
@@ -253,7 +260,7 @@ impl PolarMap {
             summarise(s + 1, own.map(|(_, p)| p), reference, limit)
         });
         let territories = ARTERY_NAMES.map(|name| {
-            let own = segments.iter().filter(|s| territory(s.number) == name);
+            let own = segments_of(name).map(|segment| &segments[segment - 1]);
             let (mean_percent, extent_percent, area) = together(own);
             Territory {
                 name,

@@ -1,9 +1,9 @@
 //! A reader's profile and its JSON.
 
 use crate::deform::WallEdge;
+use crate::text::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fmt::Write as _;
 
 /// Distances of a reader's wall from the fitted one, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -165,11 +165,7 @@ impl ReaderProfile {
     /// SHA-256 of [`ReaderProfile::to_json`], hexadecimal: the same for the same profile, however
     /// its file is spaced.
     pub fn sha256(&self) -> String {
-        let digest = Sha256::digest(self.to_json());
-        digest.iter().fold(String::new(), |mut text, byte| {
-            write!(text, "{byte:02x}").expect("a string takes any text");
-            text
-        })
+        hex(&Sha256::digest(self.to_json()))
     }
 
     /// Reads and checks the JSON.

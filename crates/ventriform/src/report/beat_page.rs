@@ -1,9 +1,9 @@
 //! The page of a beat: flags, figures with their intervals, curves, polar maps, segments, gates, the wall at both ends.
 
 use maud::{Markup, html};
-use serde_json::{Map, Value};
 
 use super::beat_report::{BeatReport, SegmentMotionReport};
+use super::page_parts::{flags_headline, short, volume_line};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -22,7 +22,7 @@ pub struct BeatPage<'a> {
     pub curve: Option<&'a [u8]>,
     /// The histogram of phases.
     pub phase: Option<&'a [u8]>,
-    /// The polar maps: file name without extension, and picture.
+    /// The polar maps: file name and picture.
     pub maps: &'a [(&'static str, &'a [u8])],
     /// The wall at end diastole and at end systole.
     pub meshes: [&'a TriMesh; 2],
@@ -31,14 +31,14 @@ pub struct BeatPage<'a> {
 }
 
 impl BeatPage<'_> {
-    /// The polar maps of a beat, by file name without extension, in their order, each with its title.
+    /// The polar maps of a beat, by file name, in their order, each with its title.
     pub const MAPS: [(&'static str, &'static str); 6] = [
-        ("polar", "Uptake, all gates"),
-        ("polar_ed", "Uptake, end diastole"),
-        ("polar_es", "Uptake, end systole"),
-        ("polar_motion", "Motion inward"),
-        ("polar_thickening", "Thickening"),
-        ("polar_phase", "Phase"),
+        ("polar.svg", "Uptake, all gates"),
+        ("polar_ed.svg", "Uptake, end diastole"),
+        ("polar_es.svg", "Uptake, end systole"),
+        ("polar_motion.svg", "Motion inward"),
+        ("polar_thickening.svg", "Thickening"),
+        ("polar_phase.svg", "Phase"),
     ];
 }
 
@@ -74,20 +74,16 @@ pub fn beat_page(page: &BeatPage) -> String {
 
 /// One line on where the beat comes from.
 fn origin(report: &BeatReport) -> String {
-    let input = &report.input;
-    let times = |numbers: [f64; 3], decimals| numbers.map(|x| number(x, decimals)).join(" × ");
     let parts = [
         Some(format!("{} gates", report.gates.len())),
         (report.rr_ms).map(|rr| format!("R-R interval {} ms", number(rr, 0))),
         Some(format!("model {}", report.template)),
-        Some(format!("volume: {}", input.format)),
-        Some(format!(
-            "{} voxels",
-            times(input.shape.map(|n| n as f64), 0)
-        )),
-        Some(format!("{} mm", times(input.spacing_mm, 2))),
     ];
-    parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
+    let parts = parts
+        .into_iter()
+        .flatten()
+        .chain(volume_line(&report.input));
+    parts.collect::<Vec<_>>().join(" · ")
 }
 
 /// The things that could be flagged, each with whether it is in order.
@@ -119,17 +115,12 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
 }
 
 fn verdict(report: &BeatReport) -> Markup {
-    let (sign, headline) = match (report.ef_percent, report.flags.len()) {
-        (None, _) => (
+    let (sign, headline) = match report.ef_percent {
+        None => (
             Sign::Bad,
             "The gates show no beat: there is no ejection fraction.".to_owned(),
         ),
-        (_, 0) => (
-            Sign::Good,
-            "Nothing gives reason to doubt this beat.".to_owned(),
-        ),
-        (_, 1) => (Sign::Flag, "There is one reason to look closer.".to_owned()),
-        (_, n) => (Sign::Flag, format!("There are {n} reasons to look closer.")),
+        Some(_) => flags_headline(report.flags.len(), "beat"),
     };
     document::verdict(sign, &headline, &checks(report))
 }
@@ -356,13 +347,6 @@ fn gates(report: &BeatReport) -> Markup {
 
 /// Everything else, by its name in the report, without long lists.
 fn particulars(report: &BeatReport) -> Markup {
-    let short = |mut object: Map<String, Value>| {
-        object.retain(|name, value| {
-            let long = value.as_array().is_some_and(|list| list.len() > 4);
-            !long && !name.starts_with("affine")
-        });
-        Value::Object(object)
-    };
     let mut beat = object(report);
     for told in ["parameters", "input", "timing", "phase", "rates", "flags"] {
         beat.remove(told);

@@ -1,12 +1,8 @@
 //! Numbers of reports: how they are rounded, and those that JSON cannot express.
 
 use crate::geometry::Vec3;
+pub(super) use crate::numeric::decimals::round;
 use serde::{Deserialize, Deserializer};
-
-/// Rounds to 4 decimals.
-pub fn round(x: f64) -> f64 {
-    (1e4 * x).round() / 1e4
-}
 
 /// A point or a direction, rounded to 4 decimals.
 pub(super) fn point(p: &Vec3) -> [f64; 3] {

@@ -28,6 +28,7 @@ mod json_number;
 pub mod measure;
 mod model_page;
 mod model_report;
+mod page_parts;
 mod perfusion_report;
 mod raised_flag;
 mod sections;
@@ -39,8 +40,6 @@ pub mod summary;
 mod whose;
 
 pub use beat_page::{BeatPage, beat_page};
-pub(crate) use json_number::round;
-
 pub use beat_report::{
     BeatParts, BeatReport, CurvePoint, GateReport, PhaseReport, RatesReport, SegmentMotionReport,
     TimingReport,
@@ -59,9 +58,7 @@ pub use input::{FileFacts, IntensityFacts, Scaling};
 pub use measure::{MeasureParameters, Measures, measure};
 pub use model_page::model_page;
 pub use model_report::{ModelReport, ReportInput};
-pub use perfusion_report::{
-    FigureBeside, NormalsUsed, PerfusionReport, SegmentScore, TerritoryScore,
-};
+pub use perfusion_report::{PerfusionReport, SegmentScore, TerritoryScore};
 pub use raised_flag::RaisedFlag;
 pub use sections::{
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms,

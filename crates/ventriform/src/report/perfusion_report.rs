@@ -2,7 +2,7 @@
 
 use super::json_number::round;
 use super::raised_flag::RaisedFlag;
-use crate::normals::{ComparedFigure, GroupSex, NormalsFlag, Perfusion, Z_LIMIT};
+use crate::normals::{FigureBeside, NormalsFlag, NormalsUsed, Perfusion, Z_LIMIT};
 use crate::polar::PolarMap;
 use serde::{Deserialize, Serialize};
 
@@ -40,28 +40,6 @@ pub struct PerfusionReport {
     pub flags: Vec<RaisedFlag>,
 }
 
-/// The group of normal limits that a scan was compared with.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-pub struct NormalsUsed {
-    /// SHA-256 of the limits, hexadecimal.
-    pub sha256: String,
-    /// Whether the people are simulated.
-    pub simulated: bool,
-    /// What the people are.
-    pub people: String,
-    /// `M`, `F` or `mixed`.
-    pub sex: GroupSex,
-    /// The protocol.
-    pub protocol: String,
-    /// The tracer.
-    pub tracer: String,
-    /// Whether attenuation was corrected.
-    pub attenuation_corrected: bool,
-    /// Number of people.
-    pub cases: usize,
-}
-
 /// A segment beside its limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
@@ -96,48 +74,12 @@ pub struct TerritoryScore {
     pub summed_score: u32,
 }
 
-/// A figure beside its limits.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
-pub struct FigureBeside {
-    /// Its name in the limits, with its unit.
-    pub figure: String,
-    /// The segment, 1 to 17; null for the whole heart.
-    pub segment: Option<usize>,
-    /// This scan's.
-    pub value: f64,
-    /// Standard deviations from the normal mean; null where people do not differ.
-    pub z: Option<f64>,
-    /// Whether it lies between `low` and `high`.
-    pub within: bool,
-    /// Number of people.
-    pub n: usize,
-    /// Normal mean.
-    pub mean: f64,
-    /// Normal standard deviation.
-    pub sd: f64,
-    /// Quantile of 2.5 per cent.
-    pub low: f64,
-    /// Quantile of 97.5 per cent.
-    pub high: f64,
-}
-
 impl PerfusionReport {
     /// The figures of `perfusion`, whose segments `map` names.
     pub fn of(perfusion: &Perfusion, map: &PolarMap) -> Self {
-        let group = &perfusion.group;
         let flag = |flag: &NormalsFlag| RaisedFlag::new(flag.code(), flag);
         Self {
-            normals: NormalsUsed {
-                sha256: group.sha256.clone(),
-                simulated: group.simulated,
-                people: group.people.clone(),
-                sex: group.sex,
-                protocol: group.protocol.clone(),
-                tracer: group.tracer.clone(),
-                attenuation_corrected: group.attenuation_corrected,
-                cases: group.cases,
-            },
+            normals: perfusion.group.clone(),
             note: DEFICIT_NOTE.to_owned(),
             z_limit: Z_LIMIT,
             deficit_percent: round(perfusion.deficit_percent),
@@ -164,25 +106,12 @@ impl PerfusionReport {
                     summed_score: territory.summed_score,
                 })
                 .collect(),
-            figures: perfusion.figures.iter().map(FigureBeside::of).collect(),
+            figures: perfusion
+                .figures
+                .iter()
+                .map(FigureBeside::rounded)
+                .collect(),
             flags: perfusion.flags.iter().map(flag).collect(),
-        }
-    }
-}
-
-impl FigureBeside {
-    fn of(figure: &ComparedFigure) -> Self {
-        Self {
-            figure: figure.figure.clone(),
-            segment: figure.segment,
-            value: round(figure.value),
-            z: figure.z.map(round),
-            within: figure.within,
-            n: figure.n,
-            mean: round(figure.mean),
-            sd: round(figure.sd),
-            low: round(figure.low),
-            high: round(figure.high),
         }
     }
 }

@@ -1,14 +1,15 @@
 //! The page of a segmentation: flags, figures, slices, polar map, agreement, the fitted model.
 
 use maud::{Markup, html};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::embedded::Embedded;
+use super::page_parts::{flags_headline, short, volume_line};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
 use super::whose;
-use crate::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
+use crate::draw::document::{self, HeadlineFigure, HtmlDocument};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
@@ -105,19 +106,10 @@ fn organ(report: &SegmentationReport) -> String {
 
 /// One line on where the segmentation comes from.
 fn origin(report: &SegmentationReport) -> String {
-    let input = &report.input;
-    let times = |numbers: [f64; 3], decimals| numbers.map(|x| number(x, decimals)).join(" × ");
-    let parts = [
-        Some(format!("Model {}", report.template)),
-        Some(format!("volume: {}", input.format)),
-        Some(format!(
-            "{} voxels",
-            times(input.shape.map(|n| n as f64), 0)
-        )),
-        Some(format!("{} mm", times(input.spacing_mm, 2))),
-        report.reader.as_ref().map(drawn_by),
-    ];
-    parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
+    let model = format!("Model {}", report.template);
+    let parts = [model].into_iter().chain(volume_line(&report.input));
+    let parts = parts.chain(report.reader.as_ref().map(drawn_by));
+    parts.collect::<Vec<_>>().join(" · ")
 }
 
 /// By which reader's profile the wall was drawn.
@@ -204,14 +196,7 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
 }
 
 fn verdict(report: &SegmentationReport) -> Markup {
-    let (sign, headline) = match report.flags.len() {
-        0 => (
-            Sign::Good,
-            "Nothing gives reason to doubt this segmentation.".to_owned(),
-        ),
-        1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
-        n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
-    };
+    let (sign, headline) = flags_headline(report.flags.len(), "segmentation");
     document::verdict(sign, &headline, &checks(report))
 }
 
@@ -542,13 +527,6 @@ fn candidates(report: &SegmentationReport) -> Markup {
 
 /// Everything else, by its name in the report, without lists of an entry for each node or step.
 fn particulars(report: &SegmentationReport) -> Markup {
-    let short = |mut object: Map<String, Value>| {
-        object.retain(|name, value| {
-            let long = value.as_array().is_some_and(|list| list.len() > 4);
-            !long && !name.starts_with("affine")
-        });
-        Value::Object(object)
-    };
     let place = report.localisation.as_ref().map(object);
     document::particulars(&[
         ("Parameters", short(report.parameters.clone())),

@@ -3,10 +3,12 @@
 use super::hearts::ComparedHearts;
 use super::report;
 use crate::parameters::ComparisonParameters;
-use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, WallFigure};
+use crate::polar::{self, FigureDocument, FigureMap, PolarMap, WallFigure};
 use crate::progress::{Monitor, Stage};
 use crate::report::ComparisonReport;
-use crate::segmentation::{NamedFile, SegmentationFilesError, json_file};
+use crate::segmentation::{
+    NamedFile, SegmentationFilesError, csv_file, json_file, svg_file, uptake_files,
+};
 use std::fmt::Write as _;
 
 impl ComparedHearts {
@@ -29,44 +31,21 @@ impl ComparedHearts {
         let report = self.report();
         let mut files = vec![
             json_file("comparison.json", &report),
-            NamedFile {
-                name: "segments.csv".into(),
-                media_type: "text/csv; charset=utf-8",
-                bytes: segments_csv(&report).into_bytes(),
-            },
+            csv_file("segments.csv", segments_csv(&report)),
         ];
         let maps = [
             ("polar_stress", self.stress.map()),
             ("polar_rest", self.rest.map()),
         ];
-        for (name, map) in maps
-            .into_iter()
-            .filter_map(|(name, map)| Some((name, map?)))
-        {
+        for (name, map) in maps {
             monitor.check()?;
-            files.push(NamedFile {
-                name: format!("{name}.svg"),
-                media_type: "image/svg+xml",
-                bytes: polar::svg(map).into_bytes(),
-            });
-            files.push(NamedFile {
-                name: format!("{name}.png"),
-                media_type: "image/png",
-                bytes: polar::png(map),
-            });
-            files.push(json_file(&format!("{name}.json"), &PolarDocument::of(map)));
+            files.extend(map.into_iter().flat_map(|map| uptake_files(name, map)));
         }
         if let Some(map) = self.rest.map() {
             let figure = self.difference(map);
-            files.push(NamedFile {
-                name: "polar_difference.svg".into(),
-                media_type: "image/svg+xml",
-                bytes: polar::figure_svg(&figure).into_bytes(),
-            });
-            files.push(json_file(
-                "polar_difference.json",
-                &FigureDocument::of(&figure),
-            ));
+            let document = FigureDocument::of(&figure);
+            files.push(svg_file("polar_difference.svg", polar::figure_svg(&figure)));
+            files.push(json_file("polar_difference.json", &document));
         }
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)

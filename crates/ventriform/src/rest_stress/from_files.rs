@@ -6,7 +6,7 @@ use super::hearts::{ComparedHeart, ComparedHearts};
 use super::order::ComparisonOrder;
 use crate::comparison::WhichScan;
 use crate::comparison::{Change, Sides};
-use crate::gated::{self, GatedOrder};
+use crate::gated::GatedOrder;
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::progress::Monitor;
 use crate::segmentation::{self, RankedTemplate, SegmentationOrder};
@@ -32,13 +32,8 @@ pub fn from_files(
     };
     let gated = is_gated(scans[0])? && is_gated(scans[1])?;
     let fit = |kept: Option<&str>, which: usize| {
-        let (scan, files) = scans[which];
         let monitor = monitor.part(which, scans.len());
-        if gated {
-            beating(order, scan, files, kept, limits, &monitor)
-        } else {
-            still(order, scan, files, kept, limits, &monitor)
-        }
+        fitted(order, scans[which], (gated, kept), limits, &monitor)
     };
     let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
     checks::refuse(&stress, &rest, order.parameters.choice.same_patient)?;
@@ -52,19 +47,10 @@ pub fn from_files(
         stress = again(stress, 0)?;
         rest = again(rest, 1)?;
     }
-    let map = |heart: &ComparedHeart, scan: WhichScan| {
-        heart
-            .map()
-            .cloned()
-            .ok_or(ComparisonError::NoVentricle { scan })
-    };
-    let (at_stress, at_rest) = (
-        map(&stress, WhichScan::Stress)?,
-        map(&rest, WhichScan::Rest)?,
-    );
+    let none = |scan: WhichScan| ComparisonError::NoVentricle { scan };
     let sides = Sides {
-        stress: &at_stress,
-        rest: &at_rest,
+        stress: stress.map().ok_or(none(WhichScan::Stress))?,
+        rest: rest.map().ok_or(none(WhichScan::Rest))?,
     };
     let change = Change::between(&sides).ok_or(ComparisonError::NothingInCommon)?;
     Ok(ComparedHearts {
@@ -93,59 +79,47 @@ fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<Strin
     best.map(|(_, name)| name)
 }
 
-/// The parameters of both fits, and the model to keep.
-fn keeping(order: &ComparisonOrder<'_>, kept: Option<&str>) -> FitParameters {
-    let own = order.parameters.fit.clone();
-    FitParameters {
-        kept_model: kept.map(str::to_owned).or(own.kept_model),
-        ..own
-    }
-}
-
-fn still(
+/// The heart of a scan, a beat if it is `gated`, by the model `kept` or else that with the greatest confidence.
+fn fitted(
     order: &ComparisonOrder<'_>,
-    scan: WhichScan,
-    files: &[VolumeFile],
-    kept: Option<&str>,
+    (scan, files): (WhichScan, &[VolumeFile]),
+    (gated, kept): (bool, Option<&str>),
     limits: &ReadLimits,
     monitor: &Monitor<'_>,
 ) -> Result<ComparedHeart, ComparisonError> {
-    let parameters = keeping(order, kept);
+    let own = order.parameters.fit.clone();
+    let parameters = FitParameters {
+        kept_model: kept.map(str::to_owned).or(own.kept_model),
+        ..own
+    };
+    let (auto, models) = (order.auto, order.models.clone());
+    let normals = order.normals.as_ref().map(|normals| normals.of(scan));
+    if gated {
+        let own = GatedOrder {
+            gates: files,
+            auto,
+            models,
+            normals,
+            parameters: &parameters,
+            choice: BeatChoice {
+                gated: order.parameters.choice.gated,
+                ..BeatChoice::default()
+            },
+        };
+        let made = crate::gated::from_files(&own, limits, monitor)
+            .map_err(|error| ComparisonError::of_gated(scan, error))?;
+        return Ok(ComparedHeart::Beating(Box::new(made)));
+    }
     let own = SegmentationOrder {
         volume: files,
         expert: None,
-        auto: order.auto,
-        models: order.models.clone(),
+        auto,
+        models,
         reader: None,
-        normals: order.normals.as_ref().map(|normals| normals.of(scan)),
+        normals,
         parameters: &parameters,
     };
     let made = segmentation::from_files(&own, limits, monitor)
         .map_err(|error| ComparisonError::of_segmentation(scan, error))?;
     Ok(ComparedHeart::Still(Box::new(made)))
-}
-
-fn beating(
-    order: &ComparisonOrder<'_>,
-    scan: WhichScan,
-    files: &[VolumeFile],
-    kept: Option<&str>,
-    limits: &ReadLimits,
-    monitor: &Monitor<'_>,
-) -> Result<ComparedHeart, ComparisonError> {
-    let parameters = keeping(order, kept);
-    let own = GatedOrder {
-        gates: files,
-        normals: order.normals.as_ref().map(|normals| normals.of(scan)),
-        auto: order.auto,
-        models: order.models.clone(),
-        parameters: &parameters,
-        choice: BeatChoice {
-            gated: order.parameters.choice.gated,
-            ..BeatChoice::default()
-        },
-    };
-    let made = gated::from_files(&own, limits, monitor)
-        .map_err(|error| ComparisonError::of_gated(scan, error))?;
-    Ok(ComparedHeart::Beating(Box::new(made)))
 }

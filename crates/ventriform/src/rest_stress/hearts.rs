@@ -1,7 +1,6 @@
 //! The two hearts of a comparison, each with the work that was made of its scan.
 
-use crate::comparison::{Change, Sides};
-use crate::comparison::{ComparisonFlag, WhichScan};
+use crate::comparison::{Change, ComparisonFlag, WhichScan};
 use crate::gated::GatedHeart;
 use crate::normals::Perfusion;
 use crate::parameters::{ComparisonChoice, FitParameters};
@@ -127,14 +126,6 @@ pub struct ComparedHearts {
 }
 
 impl ComparedHearts {
-    /// Both maps.
-    pub fn sides(&self) -> Option<Sides<'_>> {
-        Some(Sides {
-            stress: self.stress.map()?,
-            rest: self.rest.map()?,
-        })
-    }
-
     /// The ratio of the cavities, stress to rest (transient ischaemic dilation).
     pub fn tid(&self) -> f64 {
         self.stress.cavity_ml() / self.rest.cavity_ml()

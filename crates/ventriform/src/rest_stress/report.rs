@@ -3,11 +3,11 @@
 use super::hearts::{ComparedHeart, ComparedHearts};
 use crate::comparison::REVERSIBLE_POINTS;
 use crate::normals::{Perfusion, summed_percent};
+use crate::numeric::decimals::round;
 use crate::polar::{PolarMap, PolarSummary};
 use crate::report::{
     BeatChange, BeatReport, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport,
     ComparisonReport, FileFacts, PerfusionReport, Posture, RaisedFlag, Resolution, UptakeChange,
-    round,
 };
 use serde_json::{Map, Value};
 

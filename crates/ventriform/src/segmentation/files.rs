@@ -349,24 +349,22 @@ impl SegmentedVolume {
         let Some(map) = &self.segmentation.polar else {
             return Ok(Vec::new());
         };
-        let svg = NamedFile {
-            name: "polar.svg".into(),
-            media_type: "image/svg+xml",
-            bytes: polar::svg(map).into_bytes(),
-        };
-        monitor.check()?;
-        let png = NamedFile {
-            name: "polar.png".into(),
-            media_type: "image/png",
-            bytes: polar::png(map),
-        };
-        let mut files = vec![json_file("polar.json", &PolarDocument::of(map)), svg, png];
+        let mut files = uptake_files("polar", map);
         if let Some(perfusion) = &self.perfusion {
             monitor.check()?;
             files.extend(perfusion_files(perfusion, map));
         }
         Ok(files)
     }
+}
+
+/// A map of uptake as JSON, SVG and PNG.
+pub(crate) fn uptake_files(name: &str, map: &PolarMap) -> Vec<NamedFile> {
+    vec![
+        json_file(&format!("{name}.json"), &PolarDocument::of(map)),
+        svg_file(&format!("{name}.svg"), polar::svg(map)),
+        png_file(&format!("{name}.png"), polar::png(map)),
+    ]
 }
 
 /// The maps of a wall beside normal limits: `polar_z` and `polar_score`, each as JSON, SVG and PNG.
@@ -391,16 +389,8 @@ pub(crate) fn perfusion_files(perfusion: &Perfusion, map: &PolarMap) -> Vec<Name
         let name = format!("polar_{}", figure.as_str());
         [
             json_file(&format!("{name}.json"), &FigureDocument::of(&map)),
-            NamedFile {
-                name: format!("{name}.svg"),
-                media_type: "image/svg+xml",
-                bytes: polar::figure_svg(&map).into_bytes(),
-            },
-            NamedFile {
-                name: format!("{name}.png"),
-                media_type: "image/png",
-                bytes: polar::figure_png(&map),
-            },
+            svg_file(&format!("{name}.svg"), polar::figure_svg(&map)),
+            png_file(&format!("{name}.png"), polar::figure_png(&map)),
         ]
     });
     files.into_iter().flatten().collect()
@@ -465,6 +455,30 @@ pub(crate) fn json_file(name: &str, document: &impl Serialize) -> NamedFile {
         name: name.into(),
         media_type: "application/json",
         bytes: format!("{text}\n").into_bytes(),
+    }
+}
+
+pub(crate) fn svg_file(name: &str, text: String) -> NamedFile {
+    text_file(name, "image/svg+xml", text)
+}
+
+pub(crate) fn csv_file(name: &str, text: String) -> NamedFile {
+    text_file(name, "text/csv; charset=utf-8", text)
+}
+
+fn text_file(name: &str, media_type: &'static str, text: String) -> NamedFile {
+    NamedFile {
+        name: name.to_owned(),
+        media_type,
+        bytes: text.into_bytes(),
+    }
+}
+
+fn png_file(name: &str, bytes: Vec<u8>) -> NamedFile {
+    NamedFile {
+        name: name.to_owned(),
+        media_type: "image/png",
+        bytes,
     }
 }
 

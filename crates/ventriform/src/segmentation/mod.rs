@@ -46,7 +46,7 @@ mod error;
 pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
-pub(crate) use files::{json_file, json_line, perfusion_files};
+pub(crate) use files::{csv_file, json_file, json_line, perfusion_files, svg_file, uptake_files};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};

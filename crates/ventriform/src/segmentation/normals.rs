@@ -16,14 +16,9 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     let Some(surfaces) = &segmentation.fit.model.surfaces else {
         return Vec::new();
     };
-    let whole = |figure, value| HeartFigure {
-        figure,
-        segment: None,
-        value,
-    };
     vec![
-        whole("cavity_ml", surfaces.anatomical.wall.cavity_ml),
-        whole("wall_ml", surfaces.anatomical.wall_ml),
+        HeartFigure::whole("cavity_ml", surfaces.anatomical.wall.cavity_ml),
+        HeartFigure::whole("wall_ml", surfaces.anatomical.wall_ml),
     ]
 }
 

@@ -34,8 +34,7 @@ impl GateFiles {
     /// headers gives.
     pub(super) fn open(files: &[&VolumeFile], limits: &ReadLimits) -> Result<Self, VolumeError> {
         let names: Vec<&str> = files.iter().map(|file| file.name()).collect();
-        let given: Vec<usize> = (0..files.len()).collect();
-        let order = order_by_numbers(&names).unwrap_or_else(|| given.clone());
+        let order = order_of(&names);
         let sorted: Vec<VolumeFile> = order.iter().map(|&at| files[at].clone()).collect();
         let (first, others) = sorted.split_first().ok_or(VolumeError::NoFile)?;
         let first = NiftiFile::open(first, first, limits)?;
@@ -55,7 +54,7 @@ impl GateFiles {
             });
         }
         let mut warnings = first.header().warnings.to_vec();
-        let by = match order == given {
+        let by = match order.is_sorted() {
             true => "in the order in which they were given",
             false => "in the order of the numbers in their names",
         };
@@ -160,6 +159,11 @@ impl OpenVolume for GateFiles {
         }
         Ok((tally, warnings))
     }
+}
+
+/// The order of files by the numbers in their `names`, or else as they are given, as indices.
+pub(super) fn order_of(names: &[&str]) -> Vec<usize> {
+    order_by_numbers(names).unwrap_or_else(|| (0..names.len()).collect())
 }
 
 /// The order of files by the numbers in their `names`, as indices; `None` unless the names are the same but for one

@@ -1,7 +1,7 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
 use super::dicom::DicomFile;
-use super::gate_files::{GateFiles, order_by_numbers};
+use super::gate_files::{GateFiles, order_of};
 use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
@@ -42,7 +42,7 @@ pub fn read(
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
-/// order of the numbers in their names ([`order_by_numbers`]), or else in the order given. Volumes whose header says
+/// order of the numbers in their names ([`order_by_numbers`](super::order_by_numbers)), or else in the order given. Volumes whose header says
 /// that they are no gates are refused unless `gated` says that they are.
 ///
 /// # Errors
@@ -67,8 +67,9 @@ pub fn read_gates(
         };
     if apart {
         let names: Vec<&str> = files.iter().map(VolumeFile::name).collect();
-        let order = order_by_numbers(&names).unwrap_or_else(|| (0..files.len()).collect());
-        let files: Vec<VolumeFile> = order.into_iter().map(|at| files[at].clone()).collect();
+        let files: Vec<VolumeFile> = (order_of(&names).into_iter())
+            .map(|at| files[at].clone())
+            .collect();
         return match one_by_one(&files, limits, monitor) {
             // What the files are together says more than that one of them is no volume.
             Err(error) if !matches!(error, VolumeError::Cancelled(_)) => {

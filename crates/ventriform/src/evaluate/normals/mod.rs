@@ -17,7 +17,7 @@
 pub mod table;
 
 use crate::evaluate::error::EvaluateError;
-use crate::evaluate::files::write_whole;
+use crate::evaluate::files::{sha256, write_whole};
 use crate::gated::{self, GatedOrder, beat_figures};
 use crate::normals::{
     ExcludedCase, GroupKind, GroupSex, HealthyScan, HeartFigure, NormalCase, NormalLimits,
@@ -30,7 +30,6 @@ use crate::segmentation::{
 };
 use crate::volume::{ReadLimits, VolumeError, VolumeFile};
 use rayon::prelude::*;
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -51,6 +50,9 @@ const FLAGS_OF_NO_NORMAL: [&str; 8] = [
     "touches_border",
     "implausible_shape",
 ];
+
+/// Reason why a case without a place in the limits is left out.
+const NOT_HEALTHY: &str = "the table does not say that it is healthy";
 
 /// Options of [`build`].
 #[derive(Debug, Clone)]
@@ -123,7 +125,7 @@ pub fn build(
             {
                 fitted_case(folder, row, options, monitor)?
             } else {
-                Err("the table does not say that it is healthy".to_owned())
+                Err(NOT_HEALTHY.to_owned())
             };
             told(&row.case, made.as_ref().map(|_| ()).map_err(String::as_str));
             Ok(made)
@@ -140,7 +142,7 @@ pub fn build(
             reason: reason.to_owned(),
         };
         if !row.healthy {
-            excluded.push(leave_out("the table does not say that it is healthy"));
+            excluded.push(leave_out(NOT_HEALTHY));
             continue;
         }
         let fitted = match fitted {
@@ -166,11 +168,7 @@ pub fn build(
             .as_ref()
             .and_then(cavity_of)
             .filter(|ml| *ml > 0.0);
-        figures.extend(rest.map(|rest| HeartFigure {
-            figure: "tid",
-            segment: None,
-            value: fitted.cavity_ml / rest,
-        }));
+        figures.extend(rest.map(|rest| HeartFigure::whole("tid", fitted.cavity_ml / rest)));
         kinds.entry(kind).or_default().push(HealthyScan {
             case: NormalCase {
                 case: row.case.clone(),
@@ -227,8 +225,8 @@ fn fitted_case(
 ) -> Result<Result<FittedCase, String>, Cancelled> {
     monitor.check()?;
     let path = folder.join(&row.file);
-    let sha256 = match std::fs::read(&path) {
-        Ok(bytes) => hexadecimal(&Sha256::digest(bytes)),
+    let sha256 = match sha256(&path) {
+        Ok(sha256) => sha256,
         Err(error) => return Ok(Err(format!("{}: {error}", row.file))),
     };
     let quiet = Monitor::silent();
@@ -296,11 +294,4 @@ fn usable(segmentation: &Segmentation) -> Result<(ScanPlaces, f64), String> {
     let surfaces = segmentation.fit.model.surfaces.as_ref();
     let surfaces = surfaces.ok_or("the fit has no anatomical wall")?;
     Ok((ScanPlaces::of(map), surfaces.anatomical.wall.cavity_ml))
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").expect("a string takes any text");
-        text
-    })
 }

@@ -7,6 +7,7 @@
 use super::codes::{Code, OWN_SCHEME, dcm, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::{SourceScan, Structure};
+use crate::numeric::decimals::round;
 use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 
@@ -226,9 +227,7 @@ pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
         let interval = figure.interval.and_then(|interval| interval(source));
         let ends = interval.into_iter().flat_map(|[low, high]| {
             let ends = [(BELOW, value - low), (ABOVE, high - value)];
-            // As many decimals as the figures of a report have.
-            let rounded = |range: f64| (1e4 * range).round() / 1e4;
-            ends.map(|(name, range)| number("HAS PROPERTIES", name, rounded(range), figure.unit))
+            ends.map(|(name, range)| number("HAS PROPERTIES", name, round(range), figure.unit))
         });
         let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();
         if !properties.is_empty() {
