@@ -76,7 +76,7 @@ pub fn run(args: &BeatArgs) -> Result<()> {
     let whose = args.dicom.whose_of_gates(&gates, &limits)?;
     let stated = MeshStatement::default();
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
-    let normals = args.normals.order()?;
+    let normals = args.normals.limits(&parameters.fit)?;
     let order = GatedOrder {
         gates: &gates,
         auto,

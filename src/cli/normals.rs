@@ -2,15 +2,15 @@
 
 use super::limit_args::LimitArgs;
 use super::output::note;
+use super::parameter_args::{TableArgs, with_fit};
 use super::{FitArgs, UnusableArgument};
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use ventriform::evaluate::normals::{self, NormalsOptions};
-use ventriform::normals::{FEW_CASES, NormalGroup, NormalLimits, Perfusion, ScanKind, Sex};
+use ventriform::normals::{FEW_CASES, NormalGroup, NormalLimits, Perfusion, ScanKind};
+use ventriform::parameters::{FitParameters, NormalsChoice};
 use ventriform::progress::Monitor;
-use ventriform::rest_stress::ComparisonNormals;
-use ventriform::segmentation::NormalsOrder;
 use ventriform_service::work::problems::Explain;
 
 /// Build normal limits from scans of healthy people
@@ -40,81 +40,42 @@ struct BuildArgs {
     /// File to write
     #[arg(short, long = "output", value_name = "FILE")]
     output: PathBuf,
-    /// Make men and women one group, where there are too few of each
-    #[arg(long)]
-    mixed: bool,
+    #[command(flatten)]
+    choice: TableArgs<NormalsChoice>,
     #[command(flatten)]
     fit: FitArgs,
     #[command(flatten)]
     limits: LimitArgs,
 }
 
-/// Which normal limits a scan is compared with, and what is known of it.
+/// The normal limits that a scan is compared with.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Normal limits")]
 pub struct NormalLimitArgs {
     /// Compare the wall's uptake with these normal limits (`ventriform normals build` writes them)
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
-    /// The patient's sex: M or F; by default that of a DICOM header
-    #[arg(long, value_name = "SEX", requires = "normals", value_parser = parse_sex)]
-    sex: Option<Sex>,
-    /// The scan's protocol, as the limits name it
-    #[arg(long, value_name = "NAME", requires = "normals")]
-    protocol: Option<String>,
-    /// The scan's tracer, as the limits name it
-    #[arg(long, value_name = "NAME", requires = "normals")]
-    tracer: Option<String>,
-    /// Whether the scan's attenuation was corrected: yes or no
-    #[arg(long, value_name = "WORD", requires = "normals", value_parser = parse_yes)]
-    attenuation_corrected: Option<bool>,
-}
-
-fn parse_sex(text: &str) -> Result<Sex, String> {
-    Sex::parse(text).ok_or_else(|| "give M or F".into())
-}
-
-fn parse_yes(text: &str) -> Result<bool, String> {
-    match text {
-        "yes" => Ok(true),
-        "no" => Ok(false),
-        _ => Err("give yes or no".into()),
-    }
 }
 
 impl NormalLimitArgs {
-    /// The limits for a scan at stress and one at rest, each by its protocol; `protocol` is that of both.
+    /// The limits, read and checked.
     ///
     /// # Errors
-    /// As [`NormalLimitArgs::order`].
-    pub fn of_pair(&self, protocols: [Option<String>; 2]) -> Result<Option<ComparisonNormals>> {
-        let order = self.order()?;
-        let protocols = protocols.map(|own| own.or_else(|| self.protocol.clone()));
-        Ok(order.map(|order| ComparisonNormals::new(&order, protocols)))
-    }
-
-    /// The limits, read and checked, and what is said of the scan.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or was edited.
-    pub fn order(&self) -> Result<Option<NormalsOrder>> {
+    /// If the file cannot be read, was edited, or is not given although `parameters` state the kind of the scan.
+    pub fn limits(&self, parameters: &FitParameters) -> Result<Option<NormalLimits>> {
         let Some(path) = &self.normals else {
-            return Ok(None);
+            if parameters.scan == ScanKind::default() {
+                return Ok(None);
+            }
+            let without = "--sex, --protocol, --tracer and --attenuation-corrected choose a group of normal limits; give \
+                           --normals FILE too, or leave them out";
+            return Err(UnusableArgument::new(without.to_owned()).into());
         };
         let context = || format!("{}", path.display());
         let bytes = std::fs::read(path).with_context(context)?;
         let limits = NormalLimits::from_json(&bytes)
             .map_err(|error| anyhow!(error.with_advice()))
             .with_context(context)?;
-        Ok(Some(NormalsOrder {
-            limits,
-            kind: ScanKind {
-                sex: self.sex,
-                protocol: self.protocol.clone(),
-                tracer: self.tracer.clone(),
-                attenuation_corrected: self.attenuation_corrected,
-            },
-        }))
+        Ok(Some(limits))
     }
 }
 
@@ -130,8 +91,7 @@ pub fn run(args: &NormalsArgs) -> Result<()> {
 
 fn build(args: &BuildArgs) -> Result<()> {
     let options = NormalsOptions {
-        parameters: args.fit.parameters().map_err(UnusableArgument::from)?,
-        mixed: args.mixed,
+        parameters: with_fit(&args.choice, &args.fit)?,
         program_version: env!("CARGO_PKG_VERSION").to_owned(),
         limits: args.limits.limits()?,
     };

@@ -19,6 +19,13 @@ pub type FitArgs = TableArgs<FitParameters>;
 #[error("{0}")]
 pub struct UnusableArgument(String);
 
+impl UnusableArgument {
+    /// With that reason.
+    pub fn new(reason: String) -> Self {
+        Self(reason)
+    }
+}
+
 impl From<ParameterError> for UnusableArgument {
     fn from(error: ParameterError) -> Self {
         Self(error.with_advice())

@@ -96,7 +96,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     let stated = parameters.mask.mesh;
     let expert = args.expert.as_ref().map(VolumeFile::with_other_half);
     let (auto, models) = chosen_models(&args.model, &stated, &limits)?;
-    let normals = args.normals.order()?;
+    let normals = args.normals.limits(&parameters)?;
     let order = SegmentationOrder {
         volume: &volume,
         expert: expert.as_ref().map(|files| &files[..]),

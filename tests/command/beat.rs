@@ -59,7 +59,10 @@ fn a_gated_study_becomes_the_same_files_on_any_number_of_threads() {
     let one = made(here, "gated.nii --format stl --format json", "one", 1);
     let four = made(here, "gated.nii --format stl --format json", "four", 4);
     assert!(one == four, "threads changed the results");
-    let mut wanted: Vec<String> = FILE_NAMES.iter().map(|name| (*name).to_owned()).collect();
+    // Maps of z and scores are of beats with normal limits.
+    let of_normals = |name: &&&str| name.starts_with("polar_z") || name.starts_with("polar_score");
+    let names = FILE_NAMES.iter().filter(|name| !of_normals(name));
+    let mut wanted: Vec<String> = names.map(|name| (*name).to_owned()).collect();
     let gates = (1..=8).map(|gate| format!("gate{gate:02}"));
     let moments: Vec<String> = gates.clone().chain(["ed".into(), "es".into()]).collect();
     for extension in ["stl", "json"] {

@@ -128,6 +128,15 @@ impl Plan {
     ]);
 }
 
+impl Plan {
+    /// Normal limits: every scan of a cohort fitted, and the limits of what they show.
+    pub const NORMALS: Plan = Plan(&[
+        (Stage::Deform, 0.97),
+        (Stage::Report, 0.02),
+        (Stage::Export, 0.01),
+    ]);
+}
+
 /// The completed fraction of a [`Plan`]. It never decreases, although stages may be repeated: when
 /// several models are fitted one after the other, each goes through the same stages.
 #[derive(Debug)]
@@ -297,7 +306,13 @@ mod tests {
 
     #[test]
     fn the_completed_fraction_grows_from_zero_to_one() {
-        for plan in [Plan::GENERATION, Plan::SEGMENTATION, Plan::BEAT] {
+        for plan in [
+            Plan::GENERATION,
+            Plan::SEGMENTATION,
+            Plan::BEAT,
+            Plan::COMPARISON,
+            Plan::NORMALS,
+        ] {
             let total = TotalProgress::new(plan);
             let mut last = 0.0;
             for (stage, _) in plan.0 {

@@ -18,9 +18,9 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use ventriform::evaluate::normals::table::{self, CohortRow};
 use ventriform::normals::{DEFICIT_OF_FULL_SCORE, NormalLimits, ScanKind};
-use ventriform::parameters::{FitParameters, Parameters};
+use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{NormalsOrder, SegmentationOrder, from_files};
+use ventriform::segmentation::{SegmentationOrder, from_files};
 use ventriform::volume::{ReadLimits, VolumeFile};
 use ventriform_tools::statistics::{area_under_curve, correlation, mean};
 
@@ -81,15 +81,14 @@ fn main() -> Result<()> {
 
 fn row(folder: &Path, case: &CohortRow, limits: &NormalLimits) -> Result<Row> {
     let file = folder.join(&case.file);
-    let parameters = FitParameters::from_pairs([("model", "auto")])?;
-    let normals = NormalsOrder {
-        limits: limits.clone(),
-        kind: ScanKind {
+    let parameters = FitParameters {
+        scan: ScanKind {
             sex: Some(case.sex),
             protocol: Some(case.protocol.clone()),
             tracer: Some(case.tracer.clone()),
             attenuation_corrected: Some(case.attenuation_corrected),
         },
+        ..FitParameters::default()
     };
     let order = SegmentationOrder {
         volume: &[VolumeFile::at(&file)],
@@ -97,7 +96,7 @@ fn row(folder: &Path, case: &CohortRow, limits: &NormalLimits) -> Result<Row> {
         auto: true,
         models: Vec::new(),
         reader: None,
-        normals: Some(&normals),
+        normals: Some(limits),
         parameters: &parameters,
     };
     let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;

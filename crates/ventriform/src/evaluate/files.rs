@@ -38,5 +38,17 @@ pub fn make_folder(path: &Path) -> Result<(), EvaluateError> {
 /// # Errors
 /// If it cannot be read.
 pub fn sha256(path: &Path) -> io::Result<String> {
-    Ok(hex(&Sha256::digest(std::fs::read(path)?)))
+    sha256_of(&[path])
+}
+
+/// The SHA-256 of files one after the other, hexadecimal.
+///
+/// # Errors
+/// If one cannot be read.
+pub fn sha256_of(paths: &[impl AsRef<Path>]) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    for path in paths {
+        hash.update(std::fs::read(path)?);
+    }
+    Ok(hex(&hash.finalize()))
 }

@@ -16,7 +16,7 @@ use crate::report::{
 use crate::segmentation::{
     Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare, segment,
 };
-use crate::volume::{GatedReading, ReadLimits, read_gates};
+use crate::volume::{GatedReading, ReadLimits, Volume, read_gates};
 
 /// The beat of a study with what it was made from.
 #[derive(Debug)]
@@ -29,6 +29,8 @@ pub struct GatedHeart {
     pub wall: WallSurface,
     /// The beat.
     pub beat: Beat,
+    /// The sum of the gates, each scaled to equal counts.
+    pub sum: Volume,
     /// The wall of every gate, in the mean over its width, LPS mm.
     pub meshes: Vec<TriMesh>,
     /// The parameters of the fit to the gates' sum.
@@ -94,15 +96,16 @@ pub fn from_files(
     let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
     let beat = Beat::of(fitted, &study, map, rr_ms);
     reading.gates = study.gates;
-    let judged = |order| {
+    let judged = |limits| {
         let figures = beat_figures(&segmentation, &beat);
         let scan = reading.provenance();
-        judged_by_normals(&segmentation, &figures, scan, &parameters, order)
+        judged_by_normals(&segmentation, &figures, scan, &parameters, limits)
     };
     let perfusion = order.normals.map(judged).transpose()?;
     Ok(GatedHeart {
         meshes: beat.fit.carried(&wall.mesh, &wall.wall),
         perfusion,
+        sum: study.sum,
         reading,
         wall,
         beat,

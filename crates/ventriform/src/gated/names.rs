@@ -2,8 +2,8 @@
 
 use crate::export::dicom::BeatEnd;
 
-/// The files that every beat has beside the meshes of its gates: report, its page, pictures, tables, polar maps, and
-/// the beat as an animation.
+/// The files that a beat has beside the meshes of its gates: report, its page, pictures, tables, polar maps, and
+/// the beat as an animation; z and scores only with normal limits.
 pub const FILE_NAMES: &[&str] = &[
     "beat.json",
     "report.html",
@@ -23,6 +23,12 @@ pub const FILE_NAMES: &[&str] = &[
     "polar_thickening.json",
     "polar_phase.svg",
     "polar_phase.json",
+    "polar_z.svg",
+    "polar_z.png",
+    "polar_z.json",
+    "polar_score.svg",
+    "polar_score.png",
+    "polar_score.json",
     "mesh.glb",
 ];
 

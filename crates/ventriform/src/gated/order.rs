@@ -1,7 +1,8 @@
 //! The input of a beat.
 
+use crate::normals::NormalLimits;
 use crate::parameters::{BeatChoice, FitParameters};
-use crate::segmentation::{NamedMesh, NormalsOrder};
+use crate::segmentation::NamedMesh;
 use crate::volume::VolumeFile;
 
 /// The files, models and parameters of a beat.
@@ -14,7 +15,7 @@ pub struct GatedOrder<'a> {
     /// Further models to fit.
     pub models: Vec<NamedMesh>,
     /// The normal limits to compare the beat with.
-    pub normals: Option<&'a NormalsOrder>,
+    pub normals: Option<&'a NormalLimits>,
     /// The parameters of the fit to the gates' sum.
     pub parameters: &'a FitParameters,
     /// The parameters of the beat.

@@ -104,6 +104,6 @@ impl fmt::Display for ScanKind {
 }
 
 /// `yes` or `no`.
-pub(super) fn yes_or_no(is: bool) -> &'static str {
+pub fn yes_or_no(is: bool) -> &'static str {
     if is { "yes" } else { "no" }
 }

@@ -40,12 +40,12 @@ mod tests;
 
 pub use build::{GroupKind, HealthyScan, group_of, limits_of};
 pub use document::{
-    ExcludedCase, GlobalLimit, LeftOut, LimitMap, NormalCase, NormalGroup, NormalLimits,
-    Specificity,
+    ExcludedCase, GlobalLimit, LeftOut, LimitMap, MOST_NORMALS_BYTES, NormalCase, NormalGroup,
+    NormalLimits, Specificity,
 };
 pub use error::NormalsError;
 pub use flags::NormalsFlag;
-pub use kind::{GroupSex, ScanKind, Sex};
+pub use kind::{GroupSex, ScanKind, Sex, yes_or_no};
 pub use matching::{MATCHED_Z, Matched, matched};
 pub use pattern::{Coefficients, TERMS, TermMatrix};
 pub use perfusion::{

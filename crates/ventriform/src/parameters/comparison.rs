@@ -1,12 +1,20 @@
 //! The parameters of a comparison: its own, and those of the fits to both scans.
 
+use super::fit_specs::{NAME_PATTERN, scan_name};
 use super::with_fit::{BesideFit, WithFit};
 use super::{Kind, ParameterError, ParameterSpec, Parameters};
 use serde_json::json;
 
 /// The parameters of a comparison beside those of the fits to both scans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ComparisonChoice {
+    /// Id of the volume with the scan at rest, where a service stores it.
+    pub rest: Option<String>,
+    /// The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word `stress`
+    /// in its name.
+    pub stress_protocol: Option<String>,
+    /// The protocol of the scan at rest. Default: the only one with the word `rest`.
+    pub rest_protocol: Option<String>,
     /// Whether the volumes of the files are gates although the files do not say so. Default `false`.
     pub gated: bool,
     /// Whether the scans are of one patient although the headers say otherwise. Default `false`.
@@ -25,6 +33,50 @@ impl Parameters for ComparisonChoice {
 
 /// Every parameter that only a comparison has.
 pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
+    ParameterSpec {
+        name: "rest",
+        kind: Kind::Stored {
+            prefixes: &["vol_"],
+            word: "",
+            more: 0,
+        },
+        default: "",
+        summary: "Id of the volume with the scan at rest",
+        read: |d, v| {
+            d.rest = Some(v.text().into());
+            Ok(())
+        },
+        write: |p| json!(p.rest),
+    },
+    ParameterSpec {
+        name: "stress_protocol",
+        kind: Kind::Text {
+            pattern: NAME_PATTERN,
+            example: "stress",
+        },
+        default: "",
+        summary: "The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word \
+                  stress in its name",
+        read: |d, v| {
+            d.stress_protocol = Some(scan_name(v.text())?);
+            Ok(())
+        },
+        write: |p| json!(p.stress_protocol),
+    },
+    ParameterSpec {
+        name: "rest_protocol",
+        kind: Kind::Text {
+            pattern: NAME_PATTERN,
+            example: "rest",
+        },
+        default: "",
+        summary: "The protocol of the scan at rest. Default: the only one with the word rest in its name",
+        read: |d, v| {
+            d.rest_protocol = Some(scan_name(v.text())?);
+            Ok(())
+        },
+        write: |p| json!(p.rest_protocol),
+    },
     ParameterSpec {
         name: "gated",
         kind: Kind::Switch,
@@ -69,6 +121,10 @@ impl BesideFit for ComparisonChoice {
         ("box", ONE_SCAN),
         ("axis", ONE_SCAN),
         ("segments_from", ONE_SCAN),
+        (
+            "protocol",
+            "each scan has its own: `stress_protocol`, `rest_protocol`",
+        ),
     ];
 }
 
@@ -85,6 +141,8 @@ mod tests {
         checks::read_back_unchanged::<ComparisonChoice>(&[
             &[],
             &[("gated", "true"), ("same_patient", "true")],
+            &[("rest", "vol_0123"), ("rest_protocol", "rest 2 d")],
+            &[("stress_protocol", "stress")],
         ]);
         checks::table_states_defaults::<ComparisonChoice>();
         let given = [("same_patient", "true"), ("superior", "0,0,1")];

@@ -6,6 +6,7 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::locate::Hints;
 use crate::model::Organ;
+use crate::normals::ScanKind;
 use crate::polar::PolarParameters;
 use crate::volume::Volume;
 use crate::volume::given_mask::MaskChoice;
@@ -29,6 +30,10 @@ pub struct FitParameters {
     pub mask: MaskChoice,
     /// Id of the reader's profile to draw the wall by, if there is one.
     pub reader: Option<String>,
+    /// Id of the normal limits to compare the wall's uptake with, if there are some.
+    pub normals: Option<String>,
+    /// What the caller says of the scan, by which the group of the normal limits is chosen.
+    pub scan: ScanKind,
     /// The organ that the model shows.
     pub organ: Organ,
     /// Known position of the organ.
@@ -62,6 +67,8 @@ impl Default for FitParameters {
             expert: None,
             mask: MaskChoice::default(),
             reader: None,
+            normals: None,
+            scan: ScanKind::default(),
             organ: Organ::LeftVentricle,
             position: KnownPosition::default(),
             deform: DeformParameters::default(),
@@ -234,6 +241,13 @@ mod tests {
             &[("model", "auto,tpl_0123,mdl_4")],
             &[("label", "-2"), ("resample", "true")],
             &[("label", "Left Ventricle Myocardium")],
+            &[
+                ("normals", "nrm_0123"),
+                ("sex", "F"),
+                ("protocol", "rest, 1 day"),
+                ("tracer", "Tc-99m tetrofosmin"),
+                ("attenuation_corrected", "no"),
+            ],
         ]);
     }
 

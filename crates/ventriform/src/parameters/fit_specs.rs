@@ -8,6 +8,7 @@ use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
 use crate::mesh_files::{MeshFrame, MeshUnit};
 use crate::model::Organ;
+use crate::normals::{Sex, yes_or_no};
 use crate::polar::Projection;
 use crate::volume::given_mask::MaskLabel;
 use serde_json::{Value, json};
@@ -23,6 +24,26 @@ impl Parameters for FitParameters {
     fn finish(parameters: Self) -> Result<Self, ParameterError> {
         Self::settle(parameters)
     }
+}
+
+/// A name of the scan's kind, as a table of healthy people has it.
+macro_rules! scan_name {
+    ($name:literal, $field:ident, $example:literal, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Text {
+                pattern: NAME_PATTERN,
+                example: $example,
+            },
+            default: "",
+            summary: $summary,
+            read: |d, v| {
+                d.scan.$field = Some(scan_name(v.text())?);
+                Ok(())
+            },
+            write: |p| json!(p.scan.$field),
+        }
+    };
 }
 
 /// Every parameter of a fit, in the order in which the stages use them.
@@ -166,6 +187,56 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             Ok(())
         },
         write: |p| json!(p.reader),
+    },
+    ParameterSpec {
+        name: "normals",
+        kind: Kind::Stored {
+            prefixes: &["nrm_"],
+            word: "",
+            more: 0,
+        },
+        default: "",
+        summary: "Id of normal limits to compare the wall's uptake with",
+        read: |d, v| {
+            d.normals = Some(v.text().into());
+            Ok(())
+        },
+        write: |p| json!(p.normals),
+    },
+    ParameterSpec {
+        name: "sex",
+        kind: Kind::Choice(&["F", "M"]),
+        default: "",
+        summary: "The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header",
+        read: |d, v| {
+            d.scan.sex = Sex::parse(v.text());
+            Ok(())
+        },
+        write: |p| json!(p.scan.sex.map(Sex::as_str)),
+    },
+    scan_name!(
+        "protocol",
+        protocol,
+        "rest",
+        "The scan's protocol, as the normal limits name it. Default: the only one that they have"
+    ),
+    scan_name!(
+        "tracer",
+        tracer,
+        "Tc-99m tetrofosmin",
+        "The scan's tracer, as the normal limits name it. Default: the only one that they have"
+    ),
+    ParameterSpec {
+        name: "attenuation_corrected",
+        kind: Kind::Choice(&["yes", "no"]),
+        default: "",
+        summary: "Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: \
+                  what a DICOM header says",
+        read: |d, v| {
+            d.scan.attenuation_corrected = Some(v.text() == "yes");
+            Ok(())
+        },
+        write: |p| json!(p.scan.attenuation_corrected.map(yes_or_no)),
     },
     optional!(
         Integer usize,
@@ -477,6 +548,18 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "area" => Projection::Area,
     ),
 ];
+
+/// The form of the names of protocols and tracers.
+pub(super) const NAME_PATTERN: &str = "^[^\\x00-\\x1f]{1,200}$";
+
+/// A protocol's or a tracer's name.
+pub(super) fn scan_name(text: &str) -> Result<String, String> {
+    let name = text.trim();
+    if name.is_empty() || name.len() > 200 || name.chars().any(char::is_control) {
+        return Err("a name has 1 to 200 bytes that are printable".into());
+    }
+    Ok(name.to_owned())
+}
 
 fn direction(list: &[f64]) -> Result<Vec3, String> {
     let direction = point(list);

@@ -1,7 +1,8 @@
-//! The parameters of a model, of a fit, of a beat and of a comparison, by the names that users give them.
+//! The parameters of a model, of a fit, of a beat, of a comparison and of normal limits, by the names that users give
+//! them.
 //!
-//! Tables, [`SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`] and [`COMPARISON_SPECS`], define names, types, ranges, defaults
-//! and help texts for the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
+//! Tables, [`SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`] and [`NORMALS_SPECS`], define names, types,
+//! ranges, defaults and help texts for the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
 //! in; [`ModelParameters`], [`FitParameters`] or [`WithFit`] come out, with every value of the right type and in its
 //! range, or a [`ParameterError`] with the name of the first invalid parameter.
 
@@ -14,6 +15,7 @@ mod fit_specs;
 mod input;
 mod kind;
 mod model;
+mod normals;
 #[cfg(feature = "schema")]
 mod schema;
 mod specs;
@@ -27,6 +29,7 @@ pub use fit_specs::FIT_SPECS;
 pub use input::RawValue;
 pub use kind::Kind;
 pub use model::ModelParameters;
+pub use normals::{CohortCase, NORMALS_SPECS, NormalsChoice, NormalsParameters};
 #[cfg(feature = "schema")]
 pub use schema::schema_of;
 pub use specs::SPECS;

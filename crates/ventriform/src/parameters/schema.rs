@@ -2,7 +2,7 @@
 
 use super::{
     BeatChoice, BesideFit, ComparisonChoice, ComparisonParameters, FitParameters, GatedParameters,
-    Kind, ModelParameters, ParameterSpec, Parameters, WithFit,
+    Kind, ModelParameters, NormalsChoice, NormalsParameters, ParameterSpec, Parameters, WithFit,
 };
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -57,6 +57,18 @@ impl ToSchema for ComparisonParameters {
 impl PartialSchema for ComparisonParameters {
     fn schema() -> RefOr<Schema> {
         with_fit::<ComparisonChoice>()
+    }
+}
+
+impl ToSchema for NormalsParameters {
+    fn name() -> Cow<'static, str> {
+        "NormalsFitParameters".into()
+    }
+}
+
+impl PartialSchema for NormalsParameters {
+    fn schema() -> RefOr<Schema> {
+        with_fit::<NormalsChoice>()
     }
 }
 

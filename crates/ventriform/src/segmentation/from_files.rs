@@ -106,10 +106,10 @@ pub fn from_files(
     let (expert, mask) = expert.unzip();
     let mut segmentation = segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor)?;
     segmentation.refused.splice(0..0, refused);
-    let judged = |order| {
+    let judged = |limits| {
         let figures = heart_figures(&segmentation);
         let scan = reading.provenance.as_ref();
-        judged_by_normals(&segmentation, &figures, scan, &parameters, order)
+        judged_by_normals(&segmentation, &figures, scan, &parameters, limits)
     };
     let perfusion = order.normals.map(judged).transpose()?;
     Ok(SegmentedVolume {

@@ -1,9 +1,10 @@
 //! A segmentation beside normal limits.
 
 use super::error::SegmentationError;
-use super::order::NormalsOrder;
 use super::segment::Segmentation;
-use crate::normals::{HeartFigure, NormalsError, NormalsFlag, Perfusion, ScanKind, Sex, apply};
+use crate::normals::{
+    HeartFigure, NormalLimits, NormalsError, NormalsFlag, Perfusion, ScanKind, Sex, apply,
+};
 use crate::parameters::FitParameters;
 use crate::parameters::Parameters;
 use crate::volume::Provenance;
@@ -22,8 +23,8 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     ]
 }
 
-/// The segmentation of a scan, and `figures` of the same heart, beside the limits of `order`. The sex is that of the
-/// scan's header, if the order does not state it.
+/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex and correction are those of the
+/// scan's header, if the parameters do not state them.
 ///
 /// # Errors
 /// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit
@@ -33,11 +34,11 @@ pub fn judged_by_normals(
     figures: &[HeartFigure],
     scan: Option<&Provenance>,
     parameters: &FitParameters,
-    order: &NormalsOrder,
+    limits: &NormalLimits,
 ) -> Result<Perfusion, SegmentationError> {
     let map = (segmentation.polar.as_ref()).ok_or(NormalsError::TooLittleWall { percent: 0.0 })?;
     let header = scan.and_then(|scan| Sex::parse(scan.patient_sex.as_deref()?));
-    let stated = order.kind.sex;
+    let stated = parameters.scan.sex;
     if let (Some(header), Some(stated)) = (header, stated)
         && header != stated
     {
@@ -45,13 +46,13 @@ pub fn judged_by_normals(
     }
     let kind = ScanKind {
         sex: stated.or(header),
-        attenuation_corrected: (order.kind.attenuation_corrected)
+        attenuation_corrected: (parameters.scan.attenuation_corrected)
             .or_else(|| scan?.attenuation_corrected()),
-        ..order.kind.clone()
+        ..parameters.scan.clone()
     };
-    let mut perfusion = apply(map, figures, &kind, &order.limits)?;
+    let mut perfusion = apply(map, figures, &kind, limits)?;
     let own = parameters.to_json();
-    let built = &order.limits.parameters;
+    let built = &limits.parameters;
     let other = |name: &&&str| {
         built
             .get(**name)

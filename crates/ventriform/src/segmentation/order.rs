@@ -1,7 +1,7 @@
 //! The input of a segmentation.
 
 use crate::mesh::TriMesh;
-use crate::normals::{NormalLimits, ScanKind};
+use crate::normals::NormalLimits;
 use crate::parameters::FitParameters;
 use crate::reader::ReaderProfile;
 use crate::volume::VolumeFile;
@@ -20,18 +20,9 @@ pub struct SegmentationOrder<'a> {
     /// The reader as whom to draw the wall.
     pub reader: Option<NamedReader>,
     /// The normal limits to compare the wall's uptake with.
-    pub normals: Option<&'a NormalsOrder>,
+    pub normals: Option<&'a NormalLimits>,
     /// The parameters.
     pub parameters: &'a FitParameters,
-}
-
-/// Normal limits, and what is said of the scan that is compared with them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NormalsOrder {
-    /// The limits.
-    pub limits: NormalLimits,
-    /// The kind of the scan as far as the caller states it. The sex may come from the file's header.
-    pub kind: ScanKind,
 }
 
 /// A reader's profile with its name in the report.

@@ -7,12 +7,10 @@ use std::fs;
 use std::sync::LazyLock;
 use ventriform::evaluate::normals::{NormalsOptions, build};
 use ventriform::normals::{NormalLimits, NormalsError, ScanKind, Sex};
-use ventriform::parameters::FitParameters;
+use ventriform::parameters::{FitParameters, NormalsChoice, NormalsParameters};
 use ventriform::polar::PlaceState;
 use ventriform::progress::Monitor;
-use ventriform::segmentation::{
-    NormalsOrder, SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
-};
+use ventriform::segmentation::{SegmentationError, SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_person, phantom};
 use ventriform::volume::{ReadLimits, VolumeFile};
@@ -35,8 +33,10 @@ fn scan(seed: u64, defects: &[PerfusionDefect]) -> Vec<u8> {
 
 fn options() -> NormalsOptions {
     NormalsOptions {
-        parameters: FitParameters::default(),
-        mixed: true,
+        parameters: NormalsParameters {
+            choice: NormalsChoice { mixed: true },
+            ..NormalsParameters::default()
+        },
         program_version: "0.0.0".to_owned(),
         limits: ReadLimits::default(),
     }
@@ -58,9 +58,9 @@ static LIMITS: LazyLock<NormalLimits> = LazyLock::new(|| {
 });
 
 fn judged(bytes: Vec<u8>, kind: &ScanKind) -> Result<SegmentedVolume, SegmentationError> {
-    let normals = NormalsOrder {
-        limits: LIMITS.clone(),
-        kind: kind.clone(),
+    let parameters = FitParameters {
+        scan: kind.clone(),
+        ..FitParameters::default()
     };
     let order = SegmentationOrder {
         volume: &[VolumeFile::in_memory("scan.nii", bytes)],
@@ -68,8 +68,8 @@ fn judged(bytes: Vec<u8>, kind: &ScanKind) -> Result<SegmentedVolume, Segmentati
         auto: true,
         models: Vec::new(),
         reader: None,
-        normals: Some(&normals),
-        parameters: &FitParameters::default(),
+        normals: Some(&LIMITS),
+        parameters: &parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }

@@ -17,14 +17,14 @@
 pub mod table;
 
 use crate::evaluate::error::EvaluateError;
-use crate::evaluate::files::{sha256, write_whole};
+use crate::evaluate::files::{sha256_of, write_whole};
 use crate::gated::{self, GatedOrder, beat_figures};
 use crate::normals::{
     ExcludedCase, GroupKind, GroupSex, HealthyScan, HeartFigure, NormalCase, NormalLimits,
     NormalsError, ScanPlaces, group_of,
 };
-use crate::parameters::{BeatChoice, FitParameters, Parameters};
-use crate::progress::{Cancelled, Monitor};
+use crate::parameters::{BeatChoice, NormalsParameters};
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::segmentation::{
     self, Segmentation, SegmentationError, SegmentationOrder, heart_figures,
 };
@@ -32,8 +32,10 @@ use crate::volume::{ReadLimits, VolumeError, VolumeFile};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::Path;
-use table::{CohortRow, TableError};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+pub use table::CohortRow;
+use table::TableError;
 
 /// Confidence of a fit below which a case is left out.
 pub const LEAST_CONFIDENCE: f64 = 0.5;
@@ -54,13 +56,20 @@ const FLAGS_OF_NO_NORMAL: [&str; 8] = [
 /// Reason why a case without a place in the limits is left out.
 const NOT_HEALTHY: &str = "the table does not say that it is healthy";
 
+/// A scan of a cohort.
+#[derive(Debug, Clone)]
+pub struct CohortScan {
+    /// Whose it is, and how it was made.
+    pub row: CohortRow,
+    /// Its files.
+    pub paths: Vec<PathBuf>,
+}
+
 /// Options of [`build`].
 #[derive(Debug, Clone)]
 pub struct NormalsOptions {
-    /// The parameters of the fits.
-    pub parameters: FitParameters,
-    /// Whether men and women are one group.
-    pub mixed: bool,
+    /// The parameters.
+    pub parameters: NormalsParameters,
     /// The program's version, for the file.
     pub program_version: String,
     /// Limits of what is read.
@@ -115,19 +124,38 @@ pub fn build(
     told: &(dyn Fn(&str, Result<(), &str>) + Sync),
     monitor: &Monitor,
 ) -> Result<NormalLimits, BuildError> {
-    let rows = table::read(folder)?;
-    let fitted: Vec<Result<FittedCase, String>> = (rows.par_iter())
-        .map(|row| {
-            let made = if row.healthy
-                || rows
-                    .iter()
-                    .any(|other| other.rest_case.as_ref() == Some(&row.case))
-            {
-                fitted_case(folder, row, options, monitor)?
+    let rows = table::read(folder)?.into_iter();
+    let scans = rows.map(|row| CohortScan {
+        paths: vec![folder.join(&row.file)],
+        row,
+    });
+    of_scans(&scans.collect::<Vec<_>>(), options, told, monitor)
+}
+
+/// The limits of the healthy cases among `scans`. `told` hears of every case as it is done.
+///
+/// # Errors
+/// [`BuildError`].
+pub fn of_scans(
+    scans: &[CohortScan],
+    options: &NormalsOptions,
+    told: &(dyn Fn(&str, Result<(), &str>) + Sync),
+    monitor: &Monitor,
+) -> Result<NormalLimits, BuildError> {
+    let rows: Vec<&CohortRow> = scans.iter().map(|scan| &scan.row).collect();
+    let done = AtomicUsize::new(0);
+    let fitted: Vec<Result<FittedCase, String>> = (scans.par_iter())
+        .map(|scan| {
+            let row = &scan.row;
+            let is_rest = |other: &&CohortRow| other.rest_case.as_ref() == Some(&row.case);
+            let made = if row.healthy || rows.iter().any(is_rest) {
+                fitted_case(scan, options, monitor)?
             } else {
                 Err(NOT_HEALTHY.to_owned())
             };
             told(&row.case, made.as_ref().map(|_| ()).map_err(String::as_str));
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            monitor.report(Stage::Deform, done as f64 / scans.len() as f64)?;
             Ok(made)
         })
         .collect::<Result<_, Cancelled>>()?;
@@ -153,7 +181,7 @@ pub fn build(
             }
         };
         let kind = GroupKind {
-            sex: if options.mixed {
+            sex: if options.parameters.choice.mixed {
                 GroupSex::Mixed
             } else {
                 row.sex.into()
@@ -180,8 +208,8 @@ pub fn build(
         });
     }
     let mut groups = Vec::new();
-    for (kind, people) in &kinds {
-        monitor.check()?;
+    for (number, (kind, people)) in kinds.iter().enumerate() {
+        monitor.report(Stage::Report, number as f64 / kinds.len() as f64)?;
         match group_of(kind, people) {
             Ok((group, odd)) => {
                 groups.push(group);
@@ -197,7 +225,7 @@ pub fn build(
         };
         return Err(BuildError::Normals { error, excluded });
     }
-    let simulated = rows.iter().any(CohortRow::is_simulated);
+    let simulated = rows.iter().any(|row| row.is_simulated());
     let parameters = options.parameters.to_json();
     Ok(NormalLimits::new(
         &options.program_version,
@@ -218,19 +246,18 @@ pub fn write(limits: &NormalLimits, path: &Path) -> Result<(), BuildError> {
 
 /// A case's wall and figures, or why it is left out.
 fn fitted_case(
-    folder: &Path,
-    row: &CohortRow,
+    scan: &CohortScan,
     options: &NormalsOptions,
     monitor: &Monitor,
 ) -> Result<Result<FittedCase, String>, Cancelled> {
     monitor.check()?;
-    let path = folder.join(&row.file);
-    let sha256 = match sha256(&path) {
+    let sha256 = match sha256_of(&scan.paths) {
         Ok(sha256) => sha256,
-        Err(error) => return Ok(Err(format!("{}: {error}", row.file))),
+        Err(error) => return Ok(Err(format!("{}: {error}", scan.row.file))),
     };
-    let quiet = Monitor::silent();
-    let files = [VolumeFile::at(&path)];
+    let quiet = monitor.without_observer();
+    let files: Vec<VolumeFile> = scan.paths.iter().map(VolumeFile::at).collect();
+    let parameters = &options.parameters.fit;
     let order = SegmentationOrder {
         volume: &files,
         expert: None,
@@ -238,7 +265,7 @@ fn fitted_case(
         models: Vec::new(),
         reader: None,
         normals: None,
-        parameters: &options.parameters,
+        parameters,
     };
     let made = segmentation::from_files(&order, &options.limits, &quiet);
     let (segmentation, figures) = match made {
@@ -252,7 +279,7 @@ fn fitted_case(
                 auto: true,
                 models: Vec::new(),
                 normals: None,
-                parameters: &options.parameters,
+                parameters,
                 choice: BeatChoice {
                     gated: true,
                     ..BeatChoice::default()
@@ -263,10 +290,16 @@ fn fitted_case(
                     let figures = beat_figures(&made.segmentation, &made.beat);
                     (made.segmentation, figures)
                 }
-                Err(error) => return Ok(Err(error.to_string())),
+                Err(error) => {
+                    monitor.check()?;
+                    return Ok(Err(error.to_string()));
+                }
             }
         }
-        Err(error) => return Ok(Err(error.to_string())),
+        Err(error) => {
+            monitor.check()?;
+            return Ok(Err(error.to_string()));
+        }
     };
     Ok(usable(&segmentation).map(|(places, cavity_ml)| FittedCase {
         places,
