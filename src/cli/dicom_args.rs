@@ -9,6 +9,7 @@ use ventriform::export::dicom::{
 };
 use ventriform::gated::GatedHeart;
 use ventriform::progress::Monitor;
+use ventriform::rest_stress::ComparedHeart;
 use ventriform::segmentation::SegmentedVolume;
 use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
@@ -138,6 +139,44 @@ impl DicomArgs {
         }
     }
 
+    /// As [`DicomArgs::order`], of two scans of one patient, gated or not. Both are freed of the identity by one secret.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn order_of_pair(
+        &self,
+        scans: [&[VolumeFile]; 2],
+        limits: &ReadLimits,
+    ) -> Result<Option<[DicomOrder; 2]>> {
+        let of = |files: &[VolumeFile]| {
+            let gates = || self.order_of_gates(files, limits);
+            self.order(files, None, limits)
+                .or_else(|error| gates().map_err(|_| error))
+        };
+        let [first, second] = scans.map(of);
+        let (Some(first), Some(mut second)) = (first?, second?) else {
+            return Ok(None);
+        };
+        if let (Some((how, _)), Some((own, _))) = (&first.deidentify, &mut second.deidentify) {
+            own.clone_from(how);
+        }
+        Ok(Some([first, second]))
+    }
+
+    /// As [`DicomArgs::whose`], of a scan that may be gated.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn whose_of_either(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<Provenance>> {
+        let gates = || self.whose_of_gates(files, limits);
+        self.whose(files, None, limits)
+            .or_else(|error| gates().map_err(|_| error))
+    }
+
     /// As [`DicomArgs::whose`], of the gates of one beat.
     ///
     /// # Errors
@@ -224,6 +263,12 @@ impl DicomOrder {
     pub(super) fn of_beat(self, made: &GatedHeart) -> [SourceScan; 2] {
         let scans = made.scans(&self.identity, &self.made);
         scans.map(|scan| Self::anonymous(scan, self.deidentify.as_ref()))
+    }
+
+    /// The scan that the objects of `heart` belong to.
+    pub(super) fn of_compared(self, heart: &ComparedHeart) -> SourceScan {
+        let scan = heart.scan(self.identity, self.made);
+        Self::anonymous(scan, self.deidentify.as_ref())
     }
 
     /// The scan, without the patient's identity if that is asked for.

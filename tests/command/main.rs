@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod beat;
+mod compare;
 /// Files of scans, which the tests of the service make too.
 #[allow(dead_code)]
 #[path = "../api/dicom.rs"]

@@ -157,7 +157,8 @@ impl VectorShape {
         }
     }
 
-    fn paint(&self, image: &mut Image<3>) {
+    /// Draws it over the pixels.
+    pub(crate) fn paint(&self, image: &mut Image<3>) {
         match self {
             Self::Polygon { corners, fill } => paint_polygon(image, corners, *fill),
             Self::Line {

@@ -117,7 +117,7 @@ impl GatedHeart {
         }
         if let Some(perfusion) = &self.perfusion {
             monitor.check()?;
-            files.extend(perfusion_files(perfusion, map));
+            files.extend(perfusion_files(perfusion, map, ""));
         }
         Ok(files)
     }

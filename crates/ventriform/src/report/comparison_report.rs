@@ -2,7 +2,7 @@
 //!
 //! Segments are counted from 1. Uptake is in per cent of the rest scan's reference, stress scaled to rest.
 
-use super::fit_report::Posture;
+use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
 use super::json_number::round;
 use super::perfusion_report::PerfusionReport;
@@ -141,6 +141,8 @@ pub struct ComparedScan {
     pub muscle_ml: f64,
     /// Full width at half maximum of the image's point response.
     pub resolution_mm: Option<Resolution>,
+    /// The ventricle's long axis.
+    pub long_axis: Option<LongAxis>,
     /// Which way is up in the patient.
     pub posture: Option<Posture>,
     /// Series Description, if the header has one.

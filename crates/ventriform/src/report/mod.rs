@@ -1,11 +1,12 @@
-//! Figures about a mesh, the report of a model, and the pages of a model, a segmentation and a beat.
+//! Figures about a mesh, the report of a model, and the pages of a model, a segmentation, a beat and a comparison.
 //!
 //! [`measure`](measure::measure) takes any mesh and its reference surface S and gives counts and
 //! topology (self-intersections found exactly), shape (radius ratios, angles, edge lengths,
 //! valences), smoothness (dihedral angles) and closeness (two-sided distances, volume, area).
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
-//! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`].
+//! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of a
+//! [`ComparisonReport`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
 //! with the feature `schema`, what the OpenAPI document describes.
@@ -17,6 +18,7 @@
 mod beat_page;
 mod beat_report;
 pub mod closeness;
+mod comparison_page;
 mod comparison_report;
 pub mod distance;
 mod distance_pictures;
@@ -45,6 +47,7 @@ pub use beat_report::{
     TimingReport,
 };
 pub use closeness::{Closeness, MeasuredSurface};
+pub use comparison_page::{ComparisonPage, comparison_page};
 pub use comparison_report::{
     BeatChange, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
     UptakeChange,
@@ -70,5 +73,6 @@ pub use segmentation_report::{
     SegmentationParts, SegmentationReport,
 };
 pub use summaries::{
-    BeatSummary, ModelSummary, ReaderSummary, SegmentationSummary, TemplateSummary, object,
+    BeatSummary, ComparisonSummary, ModelSummary, NormalGroupSummary, NormalsSummary,
+    ReaderSummary, SegmentationSummary, TemplateSummary, object,
 };

@@ -1,9 +1,11 @@
 //! The main figures of what jobs make, for lists: the reports have all.
 
 use super::beat_report::BeatReport;
+use super::comparison_report::ComparisonReport;
 use super::fit_report::FittedVolumes;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
+use crate::normals::{GroupSex, NormalGroup, NormalLimits};
 use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -118,6 +120,105 @@ pub struct ReaderSummary {
     pub masks: usize,
     /// The distances that are applied, mm.
     pub offsets_mm: ReaderOffsets,
+}
+
+/// The main figures of a comparison of rest and stress; the report has all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ComparisonSummary {
+    /// Ratio of the cavities, stress to rest (transient ischaemic dilation).
+    pub tid: f64,
+    /// Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
+    pub sss: Option<u32>,
+    /// Summed rest score.
+    pub srs: Option<u32>,
+    /// Summed difference score.
+    pub sds: Option<u32>,
+    /// Share of the wall that loses uptake at stress.
+    pub reversible_percent: f64,
+    /// Share of the wall below the threshold in both scans.
+    pub fixed_percent: f64,
+    /// Change of the ejection fraction from rest to stress, points; `null` unless both scans are gated.
+    pub ef_change_points: Option<f64>,
+    /// The lesser confidence of both fits, 0 to 1.
+    pub confidence: f64,
+    /// Reasons to look closer.
+    pub flags: Vec<RaisedFlag>,
+}
+
+/// The content of normal limits; the file has all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct NormalsSummary {
+    /// Whether the people are simulated. Such limits are for tests, not for patients.
+    pub simulated: bool,
+    /// What the people are, in words.
+    pub people: String,
+    /// SHA-256 of the limits, as reports name it.
+    pub sha256: String,
+    /// The version of the program that built them.
+    pub program_version: String,
+    /// One group for each kind of scan.
+    pub groups: Vec<NormalGroupSummary>,
+    /// Cases that are in no group.
+    pub excluded: usize,
+}
+
+/// A group of normal limits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct NormalGroupSummary {
+    /// `M`, `F` or `mixed`.
+    pub sex: GroupSex,
+    /// The protocol.
+    pub protocol: String,
+    /// The tracer.
+    pub tracer: String,
+    /// Whether attenuation was corrected.
+    pub attenuation_corrected: bool,
+    /// Number of people.
+    pub cases: usize,
+    /// Share of the wall below the limits of the others, mean over the people, per cent.
+    pub mean_extent_percent: f64,
+}
+
+impl ComparisonSummary {
+    /// The main figures of `report`.
+    pub fn of(report: ComparisonReport) -> Self {
+        Self {
+            tid: report.tid,
+            sss: report.sss,
+            srs: report.srs,
+            sds: report.sds,
+            reversible_percent: report.reversible_percent,
+            fixed_percent: report.fixed_percent,
+            ef_change_points: report.beat.and_then(|beat| beat.ef_change_points),
+            confidence: report.stress.confidence.min(report.rest.confidence),
+            flags: report.flags,
+        }
+    }
+}
+
+impl NormalsSummary {
+    /// The content of `limits`.
+    pub fn of(limits: &NormalLimits) -> Self {
+        let group = |group: &NormalGroup| NormalGroupSummary {
+            sex: group.sex,
+            protocol: group.protocol.clone(),
+            tracer: group.tracer.clone(),
+            attenuation_corrected: group.attenuation_corrected,
+            cases: group.cases.len(),
+            mean_extent_percent: group.leave_one_out.mean_extent_percent,
+        };
+        Self {
+            simulated: limits.simulated,
+            people: limits.people.clone(),
+            sha256: limits.sha256.clone(),
+            program_version: limits.program_version.clone(),
+            groups: limits.groups.iter().map(group).collect(),
+            excluded: limits.excluded.len(),
+        }
+    }
 }
 
 impl SegmentationSummary {

@@ -7,6 +7,7 @@ use super::order::ComparisonOrder;
 use crate::comparison::WhichScan;
 use crate::comparison::{Change, Sides};
 use crate::gated::GatedOrder;
+use crate::normals::ScanKind;
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::progress::Monitor;
 use crate::segmentation::{self, RankedTemplate, SegmentationOrder};
@@ -26,7 +27,7 @@ pub fn from_files(
         (WhichScan::Rest, order.rest),
     ];
     let is_gated = |(scan, files): (WhichScan, &[VolumeFile])| {
-        let choice = order.parameters.choice;
+        let choice = &order.parameters.choice;
         hold_gates(files, choice.gated, limits, monitor)
             .map_err(|error| ComparisonError::of_gated(scan, error.into()))
     };
@@ -59,7 +60,7 @@ pub fn from_files(
         rest,
         change,
         parameters: order.parameters.fit.clone(),
-        choice: order.parameters.choice,
+        choice: order.parameters.choice.clone(),
     })
 }
 
@@ -90,16 +91,19 @@ fn fitted(
     let own = order.parameters.fit.clone();
     let parameters = FitParameters {
         kept_model: kept.map(str::to_owned).or(own.kept_model),
+        scan: ScanKind {
+            protocol: order.protocol(scan),
+            ..own.scan
+        },
         ..own
     };
     let (auto, models) = (order.auto, order.models.clone());
-    let normals = order.normals.as_ref().map(|normals| normals.of(scan));
     if gated {
         let own = GatedOrder {
             gates: files,
             auto,
             models,
-            normals,
+            normals: order.normals,
             parameters: &parameters,
             choice: BeatChoice {
                 gated: order.parameters.choice.gated,
@@ -116,7 +120,7 @@ fn fitted(
         auto,
         models,
         reader: None,
-        normals,
+        normals: order.normals,
         parameters: &parameters,
     };
     let made = segmentation::from_files(&own, limits, monitor)

@@ -1,12 +1,16 @@
 //! The two hearts of a comparison, each with the work that was made of its scan.
 
 use crate::comparison::{Change, ComparisonFlag, WhichScan};
+use crate::export::Metadata;
+use crate::export::dicom::{Moment, SourceScan};
 use crate::gated::GatedHeart;
+use crate::mesh::TriMesh;
 use crate::normals::Perfusion;
 use crate::parameters::{ComparisonChoice, FitParameters};
 use crate::polar::PolarMap;
+use crate::progress::{Cancelled, Monitor};
 use crate::segmentation::{Segmentation, SegmentedVolume};
-use crate::volume::{Provenance, VolumeFacts};
+use crate::volume::{Provenance, Volume, VolumeFacts};
 
 /// A heart of a comparison.
 #[derive(Debug)]
@@ -87,6 +91,42 @@ impl ComparedHeart {
             "rest" => Some(WhichScan::Rest),
             _ => None,
         }
+    }
+
+    /// The wall that was fitted, LPS mm.
+    pub fn mesh(&self) -> &TriMesh {
+        &self.segmentation().fit.model.mesh
+    }
+
+    /// The image that was fitted: the scan, or the sum of its gates.
+    pub fn image(&self) -> &Volume {
+        match self {
+            Self::Still(made) => &made.reading.volume,
+            Self::Beating(made) => &made.sum,
+        }
+    }
+
+    /// The scan that DICOM objects of the comparison belong to, with the given identity.
+    pub fn scan(&self, identity: Provenance, made: Moment) -> SourceScan {
+        let image = self.image();
+        let placed = self.facts().affine_source.is_placed();
+        SourceScan::new(identity, image.frame.clone(), image.shape, placed, made)
+    }
+
+    /// What files of the mesh hold beside it.
+    pub(super) fn metadata(
+        &self,
+        which: WhichScan,
+        monitor: &Monitor<'_>,
+    ) -> Result<Metadata, Cancelled> {
+        let (segmentation, mesh) = (self.segmentation(), self.mesh());
+        let scan = self.provenance();
+        Ok(Metadata {
+            frame_of_reference_uid: scan.and_then(|scan| scan.frame_of_reference_uid.clone()),
+            parts: segmentation.parts(mesh, monitor)?,
+            field: segmentation.uptake(mesh),
+            ..Metadata::new(format!("Left ventricle at {}", which.as_str()))
+        })
     }
 
     /// The name of the model that was fitted.

@@ -16,10 +16,13 @@ mod error;
 mod files;
 mod from_files;
 mod hearts;
+mod names;
 mod order;
 mod report;
+mod slices;
 
 pub use error::ComparisonError;
 pub use from_files::from_files;
 pub use hearts::{ComparedHeart, ComparedHearts};
-pub use order::{ComparisonNormals, ComparisonOrder, ScanOrder};
+pub use names::{FILE_NAMES, mesh as mesh_of};
+pub use order::{ComparisonOrder, ScanOrder};

@@ -1,9 +1,9 @@
 //! The input of a comparison.
 
 use crate::comparison::WhichScan;
-use crate::normals::ScanKind;
+use crate::normals::NormalLimits;
 use crate::parameters::ComparisonParameters;
-use crate::segmentation::{NamedMesh, NormalsOrder};
+use crate::segmentation::NamedMesh;
 use crate::volume::VolumeFile;
 
 /// The files, models and parameters of a comparison.
@@ -18,7 +18,7 @@ pub struct ComparisonOrder<'a> {
     /// Further models to fit.
     pub models: Vec<NamedMesh>,
     /// Normal limits to score both scans by.
-    pub normals: Option<ComparisonNormals>,
+    pub normals: Option<&'a NormalLimits>,
     /// The parameters.
     pub parameters: &'a ComparisonParameters,
 }
@@ -26,48 +26,29 @@ pub struct ComparisonOrder<'a> {
 /// The files of one scan: a volume, or gates.
 pub type ScanOrder<'a> = &'a [VolumeFile];
 
-/// Normal limits for a pair of scans.
-#[derive(Debug, Clone)]
-pub struct ComparisonNormals {
-    /// For the scan at stress.
-    pub stress: NormalsOrder,
-    /// For the scan at rest.
-    pub rest: NormalsOrder,
-}
-
-impl ComparisonNormals {
-    /// The limits of `order` for both scans. `protocols` are those of stress and rest; where one is not stated, it is
-    /// the only protocol of the limits whose name has the word `stress` or `rest` in it.
-    pub fn new(order: &NormalsOrder, protocols: [Option<String>; 2]) -> Self {
-        let [stress, rest] = protocols;
-        let of = |scan: WhichScan, stated: Option<String>| NormalsOrder {
-            limits: order.limits.clone(),
-            kind: ScanKind {
-                protocol: stated.or_else(|| only_protocol(order, scan)),
-                ..order.kind.clone()
-            },
+impl ComparisonOrder<'_> {
+    /// The protocol of a scan: as the parameters state it, or else the only one of the limits whose name has the word
+    /// `stress` or `rest` in it.
+    pub(super) fn protocol(&self, scan: WhichScan) -> Option<String> {
+        let choice = &self.parameters.choice;
+        let stated = match scan {
+            WhichScan::Stress => &choice.stress_protocol,
+            WhichScan::Rest => &choice.rest_protocol,
         };
-        Self {
-            stress: of(WhichScan::Stress, stress),
-            rest: of(WhichScan::Rest, rest),
-        }
-    }
-
-    pub(super) fn of(&self, scan: WhichScan) -> &NormalsOrder {
-        match scan {
-            WhichScan::Stress => &self.stress,
-            WhichScan::Rest => &self.rest,
-        }
+        stated
+            .clone()
+            .or_else(|| only_protocol(self.normals?, scan))
     }
 }
 
-fn only_protocol(order: &NormalsOrder, scan: WhichScan) -> Option<String> {
+fn only_protocol(limits: &NormalLimits, scan: WhichScan) -> Option<String> {
     let names_role = |protocol: &&String| {
         let mut words = protocol.split(|c: char| !c.is_alphanumeric());
         words.any(|word| word.eq_ignore_ascii_case(scan.as_str()))
     };
-    let groups = order.limits.groups.iter().map(|group| &group.protocol);
+    let groups = limits.groups.iter().map(|group| &group.protocol);
     let mut named: Vec<&String> = groups.filter(names_role).collect();
+    named.sort();
     named.dedup();
     match named[..] {
         [only] => Some(only.clone()),

@@ -7,7 +7,8 @@ use crate::numeric::decimals::round;
 use crate::polar::{PolarMap, PolarSummary};
 use crate::report::{
     BeatChange, BeatReport, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport,
-    ComparisonReport, FileFacts, PerfusionReport, Posture, RaisedFlag, Resolution, UptakeChange,
+    ComparisonReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
+    UptakeChange,
 };
 use serde_json::{Map, Value};
 
@@ -29,6 +30,7 @@ fn scan_report(heart: &ComparedHeart) -> ComparedScan {
         resolution_mm: segmentation
             .resolution
             .map(|r| Resolution::new(r.value, r.given)),
+        long_axis: model.cup.as_ref().map(LongAxis::of),
         posture: model.patient_orientation.as_ref().map(Posture::of),
         series_description: scan.and_then(|scan| scan.series_description.clone()),
         attenuation_corrected: scan.and_then(|scan| scan.attenuation_corrected()),

@@ -18,8 +18,8 @@ use crate::polar::{self, FigureDocument, FigureMap, PolarDocument, PolarMap, Wal
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::report::{self, SegmentationPage, SegmentationSummary};
 use crate::volume::Provenance;
-use crate::volume::Reading;
 use crate::volume::nifti::{self, LabelEntry, MaskError, StoredType};
+use crate::volume::{Reading, Volume};
 use serde::Serialize;
 
 /// The mask of the wall that was asked for.
@@ -121,13 +121,12 @@ impl SegmentedVolume {
             media_type: "image/png",
             bytes: self.segmentation.slices.clone(),
         });
-        let region = region(&self.reading.volume, &fit.model.mesh, monitor)?;
-        let region = nifti::write(&region, StoredType::Scaled8, true);
-        files.push(NamedFile {
-            name: REGION_FILE.into(),
-            media_type: "application/gzip",
-            bytes: region.map_err(|error| other(REGION_FILE, &error))?,
-        });
+        files.push(region_file(
+            REGION_FILE,
+            &self.reading.volume,
+            &fit.model.mesh,
+            monitor,
+        )?);
         files.extend(self.polar(monitor)?);
         monitor.report(Stage::Export, 1.0)?;
         Ok(files)
@@ -352,7 +351,7 @@ impl SegmentedVolume {
         let mut files = uptake_files("polar", map);
         if let Some(perfusion) = &self.perfusion {
             monitor.check()?;
-            files.extend(perfusion_files(perfusion, map));
+            files.extend(perfusion_files(perfusion, map, ""));
         }
         Ok(files)
     }
@@ -367,8 +366,13 @@ pub(crate) fn uptake_files(name: &str, map: &PolarMap) -> Vec<NamedFile> {
     ]
 }
 
-/// The maps of a wall beside normal limits: `polar_z` and `polar_score`, each as JSON, SVG and PNG.
-pub(crate) fn perfusion_files(perfusion: &Perfusion, map: &PolarMap) -> Vec<NamedFile> {
+/// The maps of a wall beside normal limits: `polar_z` and `polar_score` with `of_scan` after their names, each as
+/// JSON, SVG and PNG.
+pub(crate) fn perfusion_files(
+    perfusion: &Perfusion,
+    map: &PolarMap,
+    of_scan: &str,
+) -> Vec<NamedFile> {
     let figures = [WallFigure::Z, WallFigure::Score];
     let files = figures.map(|figure| {
         let of_segment = |segment: &SegmentPerfusion| match figure {
@@ -386,14 +390,33 @@ pub(crate) fn perfusion_files(perfusion: &Perfusion, map: &PolarMap) -> Vec<Name
             values: values.clone(),
             segments: perfusion.segments.each_ref().map(of_segment),
         };
-        let name = format!("polar_{}", figure.as_str());
-        [
-            json_file(&format!("{name}.json"), &FigureDocument::of(&map)),
-            svg_file(&format!("{name}.svg"), polar::figure_svg(&map)),
-            png_file(&format!("{name}.png"), polar::figure_png(&map)),
-        ]
+        figure_files(&format!("polar_{}{of_scan}", figure.as_str()), &map)
     });
     files.into_iter().flatten().collect()
+}
+
+/// A polar map of another figure than uptake, as numbers and pictures.
+pub(crate) fn figure_files(name: &str, map: &FigureMap<'_>) -> [NamedFile; 3] {
+    [
+        json_file(&format!("{name}.json"), &FigureDocument::of(map)),
+        svg_file(&format!("{name}.svg"), polar::figure_svg(map)),
+        png_file(&format!("{name}.png"), polar::figure_png(map)),
+    ]
+}
+
+/// The image about a heart in 256 steps, which pages show.
+pub(crate) fn region_file(
+    name: &str,
+    image: &Volume,
+    heart: &TriMesh,
+    monitor: &Monitor<'_>,
+) -> Result<NamedFile, SegmentationFilesError> {
+    let region = nifti::write(&region(image, heart, monitor)?, StoredType::Scaled8, true);
+    Ok(NamedFile {
+        name: name.to_owned(),
+        media_type: "application/gzip",
+        bytes: region.map_err(|error| other(REGION_FILE, &error))?,
+    })
 }
 
 impl Segmentation {
@@ -474,7 +497,7 @@ fn text_file(name: &str, media_type: &'static str, text: String) -> NamedFile {
     }
 }
 
-fn png_file(name: &str, bytes: Vec<u8>) -> NamedFile {
+pub(crate) fn png_file(name: &str, bytes: Vec<u8>) -> NamedFile {
     NamedFile {
         name: name.to_owned(),
         media_type: "image/png",

@@ -46,11 +46,14 @@ mod error;
 pub use cavity::cavity;
 pub use error::SegmentationError;
 pub use files::{NamedFile, SegmentationFilesError};
-pub(crate) use files::{csv_file, json_file, json_line, perfusion_files, svg_file, uptake_files};
+pub(crate) use files::{
+    csv_file, figure_files, json_file, json_line, perfusion_files, png_file, region_file, svg_file,
+    uptake_files,
+};
 pub use fitting::{OrganSearch, RankedTemplate, fit_built_in};
 pub use from_files::{ExpertFacts, SegmentedVolume, from_files};
 pub use named_template::{NamedTemplate, RefusedTemplate};
 pub use normals::{heart_figures, judged_by_normals};
-pub use order::{NamedMesh, NamedReader, NormalsOrder, SegmentationOrder};
+pub use order::{NamedMesh, NamedReader, SegmentationOrder};
 pub use segment::{AppliedReader, ImageResolution, Segmentation, SegmentationParameters, segment};
 pub use templates::prepare;

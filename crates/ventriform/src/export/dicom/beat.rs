@@ -9,7 +9,7 @@
 //! segments. A figure that the report lacks is left out. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
-use super::codes::{Code, MILLIMETRE, dcm, own, sct, ucum};
+use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::structured_report::{
     self as sr, Figure, GRAM, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site,
@@ -327,12 +327,3 @@ const SEGMENT_FIGURES: &[Figure<SegmentMotionReport>] = &[
         DEGREE,
     ),
 ];
-
-/// A code of LOINC.
-const fn loinc(value: &'static str, meaning: &'static str) -> Code {
-    Code {
-        value,
-        scheme: "LN",
-        meaning,
-    }
-}

@@ -1,28 +1,29 @@
 //! A picture as Secondary Capture Image Storage (PS3.3 A.8.1), in colour.
 
 use super::data_set::DataSet;
-use super::{DicomError, DicomResults};
+use super::{DicomError, SourceScan, Structure};
 use dicom_dictionary_std::tags;
 use std::io::Cursor;
 
-/// Puts everything that is particular to this object; `name` names it in errors, `png` is the picture.
+/// Puts everything that is particular to this object of `scan`; `name` names it in errors, `png` is the picture.
 pub(super) fn put(
-    results: &DicomResults<'_>,
+    scan: &SourceScan,
+    structure: Structure,
     name: &'static str,
     png: &[u8],
     set: &mut DataSet,
 ) -> Result<(), DicomError> {
     let picture = Picture::decode(png).map_err(|reason| DicomError::Picture { name, reason })?;
-    results.scan.put_made(set);
+    scan.put_made(set);
     set.text(tags::IMAGE_TYPE, "DERIVED\\SECONDARY");
     set.text(tags::CONVERSION_TYPE, "SYN");
-    set.text(tags::DERIVATION_DESCRIPTION, results.structure.label);
-    set.known(tags::BODY_PART_EXAMINED, Some(results.structure.body_part));
+    set.text(tags::DERIVATION_DESCRIPTION, structure.label);
+    set.known(tags::BODY_PART_EXAMINED, Some(structure.body_part));
     set.empty(tags::PATIENT_ORIENTATION);
     // The pictures show the organ and numbers of segments, nothing about the patient.
     set.text(tags::BURNED_IN_ANNOTATION, "NO");
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
-    if let Some(images) = results.scan.images() {
+    if let Some(images) = scan.images() {
         set.items(tags::SOURCE_IMAGE_SEQUENCE, images.processed());
     }
     set.short(tags::SAMPLES_PER_PIXEL, 3);

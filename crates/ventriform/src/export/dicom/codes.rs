@@ -31,6 +31,11 @@ pub(super) const fn ucum(value: &'static str, meaning: &'static str) -> Code {
     code(value, "UCUM", meaning)
 }
 
+/// A code of LOINC.
+pub(super) const fn loinc(value: &'static str, meaning: &'static str) -> Code {
+    code(value, "LN", meaning)
+}
+
 /// A code of this software.
 pub(super) const fn own(value: &'static str, meaning: &'static str) -> Code {
     assert!(value.len() <= 16, "a Code Value has at most 16 characters");
@@ -38,6 +43,10 @@ pub(super) const fn own(value: &'static str, meaning: &'static str) -> Code {
 }
 
 const fn code(value: &'static str, scheme: &'static str, meaning: &'static str) -> Code {
+    assert!(
+        meaning.len() <= 64,
+        "a Code Meaning has at most 64 characters"
+    );
     Code {
         value,
         scheme,

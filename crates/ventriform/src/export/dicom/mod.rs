@@ -8,7 +8,8 @@
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
 //!    `measurements`, `capture`).
-//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report.
+//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest and
+//!    stress: a report and pictures.
 //!
 //! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
 //! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
@@ -25,6 +26,7 @@
 mod beat;
 mod capture;
 mod codes;
+mod comparison;
 mod data_set;
 mod measurements;
 mod segmentation;
@@ -40,6 +42,7 @@ mod tests;
 
 pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
+pub use comparison::{ComparisonObject, DicomComparison};
 pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 pub use uid::is_uid;
@@ -345,7 +348,7 @@ impl<'a> DicomResults<'a> {
                     _ => self.slices,
                 };
                 let png = picture.unwrap_or_default();
-                capture::put(self, object.file_name(), png, &mut set)?;
+                capture::put(self.scan, self.structure, object.file_name(), png, &mut set)?;
             }
         }
         let facts = object.facts();

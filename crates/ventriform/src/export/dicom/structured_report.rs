@@ -101,7 +101,8 @@ pub(super) struct SeriesReference {
     pub instance: String,
 }
 
-/// Puts everything that is particular to a report on `scans`, of one study, with these measurement groups.
+/// Puts everything that is particular to a report on `scans` with these measurement groups. The report and `others`
+/// belong to the study of the first.
 pub(super) fn put(
     scans: &[&SourceScan],
     structure: Structure,
@@ -118,11 +119,20 @@ pub(super) fn put(
     set.text(tags::PRELIMINARY_FLAG, "PRELIMINARY");
     set.text(tags::COMPLETION_FLAG, "COMPLETE");
     set.text(tags::VERIFICATION_FLAG, "UNVERIFIED");
-    if let Some(evidence) = evidence(scans, others) {
-        set.item(
-            tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE,
-            evidence,
-        );
+    let mut own = Vec::new();
+    let mut of_other_studies = Vec::new();
+    for (study, evidence) in evidence(scans, others) {
+        if study == scans[0].study() {
+            own.push(evidence);
+        } else {
+            of_other_studies.push(evidence);
+        }
+    }
+    if !own.is_empty() {
+        set.items(tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE, own);
+    }
+    if !of_other_studies.is_empty() {
+        set.items(tags::PERTINENT_OTHER_EVIDENCE_SEQUENCE, of_other_studies);
     }
     let mut scheme = DataSet::new();
     scheme.text(tags::CODING_SCHEME_DESIGNATOR, OWN_SCHEME);
@@ -188,7 +198,7 @@ fn context(structure: Structure) -> Vec<DataSet> {
 /// The source images, as TID 1600 lists them; nothing without DICOM images.
 fn image_library(scans: &[&SourceScan]) -> Option<DataSet> {
     let all: Vec<DataSet> = (series_of(scans).into_iter())
-        .flat_map(|(_, instances)| instances)
+        .flat_map(|(_, _, instances)| instances)
         .map(|(class, uid)| image("CONTAINS", None, reference(class, uid)))
         .collect();
     if all.is_empty() {
@@ -198,16 +208,24 @@ fn image_library(scans: &[&SourceScan]) -> Option<DataSet> {
     Some(container(dcm("111028", "Image Library"), vec![group]))
 }
 
-/// The series of the scans' images, each once, with class and UID of its instances, each once.
-fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<(&'a str, Vec<(&'a str, &'a str)>)> {
-    let mut all: Vec<(&str, Vec<(&str, &str)>)> = Vec::new();
-    for images in scans.iter().filter_map(|scan| scan.images()) {
-        let at = all.iter().position(|(series, _)| *series == images.series);
+/// A series of a study, with class and UID of its instances.
+type SourceSeries<'a> = (&'a str, &'a str, Vec<(&'a str, &'a str)>);
+
+/// The series of the scans' images, each once, with its study and its instances, each once.
+fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<SourceSeries<'a>> {
+    let mut all: Vec<SourceSeries<'_>> = Vec::new();
+    for scan in scans {
+        let Some(images) = scan.images() else {
+            continue;
+        };
+        let at = all
+            .iter()
+            .position(|(_, series, _)| *series == images.series);
         let at = at.unwrap_or_else(|| {
-            all.push((images.series, Vec::new()));
+            all.push((scan.study(), images.series, Vec::new()));
             all.len() - 1
         });
-        let known = &mut all[at].1;
+        let known = &mut all[at].2;
         for instance in images.instances() {
             if !known.contains(&instance) {
                 known.push(instance);
@@ -327,31 +345,32 @@ pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet)
     item
 }
 
-/// The study with every instance that the content refers to; `None` if it refers to none.
-fn evidence(scans: &[&SourceScan], others: &[SeriesReference]) -> Option<DataSet> {
-    let mut all = Vec::new();
-    let mut add = |uid: &str, instances: Vec<DataSet>| {
-        let mut series = DataSet::new();
-        series.items(tags::REFERENCED_SOP_SEQUENCE, instances);
-        series.text(tags::SERIES_INSTANCE_UID, uid);
-        all.push(series);
+/// Every study with the instances in it that the content refers to; none if it refers to none.
+fn evidence<'a>(scans: &[&'a SourceScan], others: &[SeriesReference]) -> Vec<(&'a str, DataSet)> {
+    let mut studies: Vec<(&str, Vec<DataSet>)> = Vec::new();
+    let mut add = |study: &'a str, series: &str, instances: Vec<DataSet>| {
+        let mut item = DataSet::new();
+        item.items(tags::REFERENCED_SOP_SEQUENCE, instances);
+        item.text(tags::SERIES_INSTANCE_UID, series);
+        match studies.iter_mut().find(|(known, _)| *known == study) {
+            Some((_, all)) => all.push(item),
+            None => studies.push((study, vec![item])),
+        }
     };
-    for (series, instances) in series_of(scans) {
-        let all = instances.into_iter();
-        add(
-            series,
-            all.map(|(class, uid)| reference(class, uid)).collect(),
-        );
+    for (study, series, instances) in series_of(scans) {
+        let instances = instances.into_iter();
+        let references = instances.map(|(class, uid)| reference(class, uid));
+        add(study, series, references.collect());
     }
     for other in others {
         let instance = reference(other.class, &other.instance);
-        add(&other.series, vec![instance]);
+        add(scans[0].study(), &other.series, vec![instance]);
     }
-    if all.is_empty() {
-        return None;
-    }
-    let mut study = DataSet::new();
-    study.items(tags::REFERENCED_SERIES_SEQUENCE, all);
-    study.text(tags::STUDY_INSTANCE_UID, scans[0].study());
-    Some(study)
+    let studies = studies.into_iter().map(|(study, series)| {
+        let mut item = DataSet::new();
+        item.items(tags::REFERENCED_SERIES_SEQUENCE, series);
+        item.text(tags::STUDY_INSTANCE_UID, study);
+        (study, item)
+    });
+    studies.collect()
 }

@@ -1,0 +1,349 @@
+//! A comparison of rest and stress as DICOM objects: its figures as a structured report, its pictures as Secondary
+//! Captures.
+//!
+//! In: the report of a comparison, both scans with their images, and the pictures. Out: the bytes of
+//! [`ComparisonObject`]s. All belong to the patient and the study of the scan at stress; the report refers to the images
+//! of both scans, each in its own study.
+//!
+//! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one of
+//! each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17 segments
+//! in each state, and one of each segment's change. A figure that the report lacks is left out: without normal limits there are no scores.
+
+use super::codes::{Code, dcm, loinc, own, sct, ucum};
+use super::data_set::DataSet;
+use super::structured_report::{
+    self as sr, Figure, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group,
+    measured, text, tracking,
+};
+use super::uid::Uids;
+use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
+use crate::comparison::WhichScan;
+use crate::report::{
+    ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
+};
+use dicom_dictionary_std::uids;
+
+/// An object of a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ComparisonObject {
+    /// The figures: Comprehensive 3D SR Storage.
+    Measurements,
+    /// Slices of stress above those of rest: Secondary Capture.
+    Slices,
+    /// The polar map of a scan: Secondary Capture.
+    Polar(WhichScan),
+    /// The difference of both maps: Secondary Capture.
+    Difference,
+}
+
+impl ComparisonObject {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Measurements,
+        Self::Slices,
+        Self::Polar(WhichScan::Stress),
+        Self::Polar(WhichScan::Rest),
+        Self::Difference,
+    ];
+
+    /// The name of the file.
+    pub fn file_name(self) -> &'static str {
+        self.facts().name
+    }
+
+    /// The file of the comparison with the picture that the object shows, a PNG; `None` for the figures.
+    pub fn picture(self) -> Option<&'static str> {
+        match self {
+            Self::Measurements => None,
+            Self::Slices => Some("slices.png"),
+            Self::Polar(WhichScan::Stress) => Some("polar_stress.png"),
+            Self::Polar(WhichScan::Rest) => Some("polar_rest.png"),
+            Self::Difference => Some("polar_difference.png"),
+        }
+    }
+
+    fn facts(self) -> ObjectFacts {
+        let picture = |name, series, description| ObjectFacts {
+            name,
+            class: uids::SECONDARY_CAPTURE_IMAGE_STORAGE,
+            modality: "OT",
+            series,
+            description,
+        };
+        match self {
+            Self::Measurements => DicomObject::Measurements.facts(),
+            Self::Slices => picture("page.dcm", 9107, "slices, stress above rest"),
+            Self::Polar(WhichScan::Stress) => {
+                picture("polar_stress.dcm", 9108, "polar map at stress")
+            }
+            Self::Polar(WhichScan::Rest) => picture("polar_rest.dcm", 9109, "polar map at rest"),
+            Self::Difference => {
+                picture("polar_difference.dcm", 9110, "polar map, rest less stress")
+            }
+        }
+    }
+}
+
+/// The results of a comparison.
+pub struct DicomComparison<'a> {
+    structure: Structure,
+    /// The scan at stress and the scan at rest.
+    scans: &'a [SourceScan; 2],
+    report: &'a ComparisonReport,
+    uids: Uids,
+}
+
+impl<'a> DicomComparison<'a> {
+    /// The results of a comparison of `structure`. `scans` are the scan at stress and the scan at rest; `text` is the report
+    /// as JSON in one line, from which UIDs are derived.
+    pub fn new(
+        structure: Structure,
+        scans: &'a [SourceScan; 2],
+        report: &'a ComparisonReport,
+        text: &str,
+    ) -> Self {
+        let uids = Uids::over_all(|add| {
+            add(env!("CARGO_PKG_VERSION").as_bytes());
+            add(b"comparison");
+            scans.iter().for_each(|scan| scan.add_to(add));
+            add(text.as_bytes());
+        });
+        Self {
+            structure,
+            scans,
+            report,
+            uids,
+        }
+    }
+
+    /// The bytes of [`ComparisonObject::Measurements`].
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn measurements(&self) -> Result<Vec<u8>, DicomError> {
+        self.check()?;
+        let mut set = DataSet::new();
+        let scans = self.scans.each_ref();
+        sr::put(&scans, self.structure, self.groups(), &[], &mut set);
+        let name = ComparisonObject::Measurements.file_name();
+        self.put(
+            ComparisonObject::Measurements,
+            self.uids.uid(name),
+            &mut set,
+        );
+        set.file()
+    }
+
+    /// The bytes of an object that shows a picture, from that picture as a PNG.
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn picture(&self, object: ComparisonObject, png: &[u8]) -> Result<Vec<u8>, DicomError> {
+        self.check()?;
+        let mut set = DataSet::new();
+        let scan = match object {
+            ComparisonObject::Polar(WhichScan::Rest) if self.is_one_study() => &self.scans[1],
+            _ => &self.scans[0],
+        };
+        let name = object.file_name();
+        capture::put(scan, self.structure, name, png, &mut set)?;
+        self.put(object, self.uids.over(name, png), &mut set);
+        set.file()
+    }
+
+    fn check(&self) -> Result<(), DicomError> {
+        self.scans.iter().try_for_each(SourceScan::check)
+    }
+
+    fn is_one_study(&self) -> bool {
+        self.scans[0].study() == self.scans[1].study()
+    }
+
+    fn put(&self, object: ComparisonObject, instance: String, set: &mut DataSet) {
+        let facts = object.facts();
+        let series = self.uids.uid(&format!("series of {}", facts.name));
+        let what = match object {
+            ComparisonObject::Measurements => "measurements of rest and stress",
+            _ => facts.description,
+        };
+        let description = format!("{}: {what}", self.structure.label);
+        put_facts(&self.scans[0], &facts, [instance, series], description, set);
+    }
+
+    fn groups(&self) -> Vec<DataSet> {
+        let (report, label) = (self.report, self.structure.label);
+        let site = self.structure.site;
+        let mut content = self.beginning(&format!("{label}, rest and stress"), None, site);
+        content.extend(measured(report, COMPARISON_FIGURES));
+        let flags = report.flags.iter();
+        content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
+        let mut groups = vec![group("1501", content)];
+        for (scan, own, summed) in [
+            (WhichScan::Stress, &report.stress, STRESS_SCORE),
+            (WhichScan::Rest, &report.rest, REST_SCORE),
+        ] {
+            let name = format!("{label} at {scan}");
+            let mut content = self.beginning(&name, Some(scan), site);
+            content.extend(measured(own, SCAN_FIGURES));
+            content.extend(measured(report, summed));
+            if let Some(perfusion) = &own.perfusion {
+                content.push(text("CONTAINS", dcm("121106", "Comment"), &perfusion.note));
+            }
+            groups.push(group("1501", content));
+        }
+        for territory in &report.territories {
+            let name = format!("Territory of {}", territory.name);
+            let mut content = self.beginning(&name, None, site);
+            content.extend(measured(territory, TERRITORY_FIGURES));
+            groups.push(group("1501", content));
+        }
+        for segment in &report.segments {
+            let number = segment.segment;
+            let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
+            let Some(site) = site else { continue };
+            for (state, figures) in [
+                (Some(WhichScan::Stress), SEGMENT_AT_STRESS),
+                (Some(WhichScan::Rest), SEGMENT_AT_REST),
+                (None, SEGMENT_CHANGE),
+            ] {
+                let figures = measured(segment, figures);
+                if figures.is_empty() {
+                    continue;
+                }
+                let of = state.map_or("change".to_owned(), |scan| scan.to_string());
+                let name = format!("Segment {number}, {of}");
+                let mut content = self.beginning(&name, state, *site);
+                content.extend(figures);
+                groups.push(group("1501", content));
+            }
+        }
+        groups
+    }
+
+    /// Tracking, finding, the patient's state and the site of a group.
+    fn beginning(&self, name: &str, state: Option<WhichScan>, site: Code) -> Vec<DataSet> {
+        let mut content = tracking(name, &self.uids.uid(name));
+        let finding = dcm("121071", "Finding");
+        content.push(concept("CONTAINS", finding, self.structure.kind));
+        content.extend(state.map(|scan| {
+            let state = match scan {
+                WhichScan::Stress => sct("432655005", "Cardiac Stress State"),
+                WhichScan::Rest => sct("128975004", "Resting State"),
+            };
+            concept("HAS CONCEPT MOD", dcm("109054", "Patient State"), state)
+        }));
+        content.push(finding_site(site));
+        content
+    }
+}
+
+const RATIO: Code = ucum("1", "no units");
+const SCORE: Code = ucum("{score}", "score");
+const DEFECT: Code = sct(
+    "427751006",
+    "Extent of cardiac perfusion defect (observable entity)",
+);
+const PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
+const VOLUME: Code = sct("118565006", "Volume");
+const REVERSIBLE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
+const FIXED: Code = own("FIXED", "Share below the threshold in both scans");
+const SEGMENT_SCORE: Code = own("SCORE", "Perfusion score, 0 normal to 4 absent");
+
+/// Measurements of both scans together.
+const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(
+        |r| Some(r.tid),
+        sct(
+            "428832008",
+            "Transient ischemic dilatation ratio of left ventricular cavity",
+        ),
+        RATIO,
+    ),
+    figure(|r| Some(r.reversible_percent), REVERSIBLE, PERCENT),
+    figure(|r| Some(r.fixed_percent), FIXED, PERCENT),
+    figure(
+        |r| r.sds.map(f64::from),
+        loinc("82644-6", "Summed difference score"),
+        SCORE,
+    ),
+    figure(
+        |r| r.beat.as_ref()?.ef_change_points,
+        own("EF-CHANGE", "Ejection fraction at stress less that at rest"),
+        PERCENT,
+    ),
+];
+
+const STRESS_SCORE: &[Figure<ComparisonReport>] = &[
+    figure(
+        |r| r.sss.map(f64::from),
+        loinc("82648-7", "Summed stress score"),
+        SCORE,
+    ),
+    figure(|r| r.beat.as_ref()?.stress_ef_percent, EJECTION, PERCENT),
+];
+
+const REST_SCORE: &[Figure<ComparisonReport>] = &[
+    figure(
+        |r| r.srs.map(f64::from),
+        own("SRS", "Summed rest score"),
+        SCORE,
+    ),
+    figure(|r| r.beat.as_ref()?.rest_ef_percent, EJECTION, PERCENT),
+];
+
+const EJECTION: Code = sct("70822001", "Cardiac ejection fraction");
+
+/// Measurements of one scan.
+const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
+    figure(
+        |s| Some(s.cavity_ml),
+        own("CAVITY", "Volume of the cavity, all gates"),
+        MILLILITRE,
+    ),
+    figure(|s| Some(s.muscle_ml), VOLUME, MILLILITRE),
+    figure(
+        |s| match &s.perfusion {
+            Some(perfusion) => Some(perfusion.extent_percent),
+            None => Some(s.polar.as_ref()?.extent_percent),
+        },
+        DEFECT,
+        PERCENT,
+    ),
+    figure(
+        |s| Some(s.perfusion.as_ref()?.deficit_percent),
+        own("DEFICIT", "Deficit score against normal limits"),
+        PERCENT,
+    ),
+];
+
+const TERRITORY_FIGURES: &[Figure<ComparedTerritoryReport>] = &[
+    figure(|t| Some(t.uptake.reversible_percent), REVERSIBLE, PERCENT),
+    figure(|t| Some(t.uptake.fixed_percent), FIXED, PERCENT),
+];
+
+const SEGMENT_AT_STRESS: &[Figure<ComparedSegmentReport>] = &[
+    sr::mean(|s| s.uptake.stress_percent, PERFUSION, PERCENT),
+    figure(|s| s.stress_score.map(f64::from), SEGMENT_SCORE, SCORE),
+];
+
+const SEGMENT_AT_REST: &[Figure<ComparedSegmentReport>] = &[
+    sr::mean(|s| s.uptake.rest_percent, PERFUSION, PERCENT),
+    figure(|s| s.rest_score.map(f64::from), SEGMENT_SCORE, SCORE),
+];
+
+const SEGMENT_CHANGE: &[Figure<ComparedSegmentReport>] = &[
+    figure(
+        |s| s.uptake.difference_points,
+        own("DIFFERENCE", "Uptake at rest less that at stress"),
+        PERCENT,
+    ),
+    figure(
+        |s| {
+            s.uptake
+                .difference_points
+                .map(|_| s.uptake.reversible_percent)
+        },
+        REVERSIBLE,
+        PERCENT,
+    ),
+];

@@ -1,0 +1,414 @@
+//! The page of a comparison: flags, figures, slices, polar maps side by side, territories and segments, both scans.
+
+use maud::{Markup, html};
+
+use super::comparison_report::{
+    ComparedScan, ComparedSegmentReport, ComparisonReport, UptakeChange,
+};
+use super::page_parts::{flags_headline, short};
+use super::sections::Program;
+use super::summaries::object;
+use super::whose;
+use crate::draw::document::{self, HeadlineFigure, HtmlDocument};
+use crate::draw::text::{data_uri, number, signed};
+use crate::volume::Provenance;
+
+/// A comparison's report with its pictures.
+#[derive(Debug, Clone, Copy)]
+pub struct ComparisonPage<'a> {
+    /// The report.
+    pub report: &'a ComparisonReport,
+    /// Slices of stress above those of rest, a PNG.
+    pub slices: Option<&'a [u8]>,
+    /// The polar maps: file name and picture, SVG.
+    pub maps: &'a [(&'static str, &'a [u8])],
+    /// Whose scan that at stress is, as far as the page is to name it.
+    pub scan: Option<&'a Provenance>,
+}
+
+impl ComparisonPage<'_> {
+    /// The polar maps of a comparison, by file name, in their order, each with its title.
+    pub const MAPS: [(&'static str, &'static str); 7] = [
+        ("polar_stress.svg", "Stress"),
+        ("polar_rest.svg", "Rest"),
+        ("polar_difference.svg", "Rest less stress"),
+        ("polar_z_stress.svg", "Stress against normal limits, z"),
+        ("polar_z_rest.svg", "Rest against normal limits, z"),
+        ("polar_score_stress.svg", "Scores at stress"),
+        ("polar_score_rest.svg", "Scores at rest"),
+    ];
+}
+
+/// The page as HTML. What the report does not contain is left out.
+pub fn comparison_page(page: &ComparisonPage) -> String {
+    let report = page.report;
+    let reasons = report.flags.iter().map(|flag| flag.reason.as_str());
+    let warnings = [&report.stress, &report.rest];
+    let warnings = warnings.into_iter().flat_map(|scan| &scan.warnings);
+    let (sign, headline) = flags_headline(report.flags.len(), "comparison");
+    HtmlDocument {
+        title: "Left ventricle: rest and stress",
+        subtitle: &origin(report),
+        body: html! {
+            (whose::section(page.scan))
+            (document::verdict(sign, &headline, &checks(report)))
+            (figures(report))
+            (document::notes("Reasons to look closer", reasons))
+            (document::notes("Please note", warnings.map(String::as_str)))
+            (slices(page))
+            (maps(page))
+            section {
+                h2 { "Territories and segments" }
+                (territories(report))
+                (segments(report))
+            }
+            (scans(report))
+            (particulars(report))
+        },
+        data: None,
+        footer: &Program::this().footer(),
+    }
+    .html()
+}
+
+/// One line on what both scans are.
+fn origin(report: &ComparisonReport) -> String {
+    let described = |name: &str, scan: &ComparedScan| {
+        let parts = [
+            scan.series_description.clone(),
+            scan.radiopharmaceutical.clone(),
+            scan.injected_dose
+                .as_ref()
+                .map(|dose| format!("{dose} MBq")),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        match parts.is_empty() {
+            true => format!("{name}: {}", scan.input.format),
+            false => format!("{name}: {}", parts.join(", ")),
+        }
+    };
+    [
+        described("stress", &report.stress),
+        described("rest", &report.rest),
+        format!("model {}", report.stress.template),
+    ]
+    .join(" · ")
+}
+
+/// The things that could be flagged, each with whether it is in order.
+fn checks(report: &ComparisonReport) -> Vec<(bool, String)> {
+    let raised = |code: &str| report.flags.iter().any(|flag| flag.code == code);
+    let mut checks: Vec<(bool, String)> = [
+        ("not_comparable", "Both scans were made alike"),
+        (
+            "role_not_stated",
+            "The headers say which scan is at stress and which at rest",
+        ),
+        (
+            "made_otherwise",
+            "Camera, unit, position and reconstruction are the same",
+        ),
+        (
+            "tid_uncertain",
+            "No large defect blurs the ratio of the cavities",
+        ),
+        (
+            "scale_uncertain",
+            "Enough of the wall is alike in both scans",
+        ),
+    ]
+    .map(|(code, text)| (!raised(code), text.to_owned()))
+    .into();
+    for (name, scan) in [("stress", &report.stress), ("rest", &report.rest)] {
+        checks.push((
+            scan.confidence >= 0.5,
+            format!(
+                "Confidence of the fit at {name}: {} %",
+                number(100.0 * scan.confidence, 0)
+            ),
+        ));
+    }
+    checks
+}
+
+fn figures(report: &ComparisonReport) -> Markup {
+    let figure = |value: Option<f64>, decimals, unit, label: &str| {
+        Some(HeadlineFigure {
+            value: number(value?, decimals),
+            unit,
+            label: label.to_owned(),
+        })
+    };
+    let percent = |at: usize| {
+        let share = report.summed_percent.map(|percents| percents[at]);
+        share.map_or(String::new(), |share| format!(" ({} %)", number(share, 0)))
+    };
+    let score = |value: Option<u32>, at: usize, label: &str| {
+        let label = format!("{label}{}", percent(at));
+        figure(value.map(f64::from), 0, "of 68", &label)
+    };
+    let beat = report.beat.as_ref();
+    let all = [
+        figure(
+            Some(report.tid),
+            2,
+            "",
+            "TID: cavity at stress over that at rest, all gates",
+        ),
+        figure(
+            Some(report.reversible_percent),
+            0,
+            "%",
+            "of the wall reversible",
+        ),
+        figure(Some(report.fixed_percent), 0, "%", "of the wall fixed"),
+        score(report.sss, 0, "SSS, summed stress score"),
+        score(report.srs, 1, "SRS, summed rest score"),
+        score(report.sds, 2, "SDS, summed difference score"),
+        figure(
+            beat.and_then(|beat| beat.stress_ef_percent),
+            0,
+            "%",
+            "ejection fraction at stress",
+        ),
+        figure(
+            beat.and_then(|beat| beat.rest_ef_percent),
+            0,
+            "%",
+            "ejection fraction at rest",
+        ),
+    ];
+    let all: Vec<HeadlineFigure> = all.into_iter().flatten().collect();
+    html! {
+        (document::figures(&all))
+        @if report.sss.is_none() {
+            p.hint { "No scores and no z: the scans were compared with no normal limits." }
+        }
+    }
+}
+
+fn slices(page: &ComparisonPage) -> Markup {
+    html! {
+        @if let Some(png) = page.slices {
+            section {
+                h2 { "Slices" }
+                p.hint {
+                    "Stress above rest at the same levels, each by the greatest uptake of its own wall. Short axis from apex to "
+                    "base, vertical long axis from septum to lateral wall, horizontal long axis from inferior to anterior wall."
+                }
+                figure.paper.wide {
+                    img src=(data_uri("image/png", png)) alt="Slices of the heart at stress above those at rest";
+                }
+            }
+        }
+    }
+}
+
+fn maps(page: &ComparisonPage) -> Markup {
+    let titled = ComparisonPage::MAPS
+        .into_iter()
+        .filter_map(|(name, title)| {
+            let found = page.maps.iter().find(|(known, _)| *known == name)?;
+            Some((title, found.1))
+        });
+    let mut titled = titled.peekable();
+    html! {
+        @if titled.peek().is_some() {
+            section {
+                h2 { "Maps of the wall" }
+                p.hint {
+                    "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; "
+                    "differences in points, stress scaled to rest where nothing changed; z in standard deviations from the normal "
+                    "mean; scores from 0 (normal) to 4 (none)."
+                }
+                div.row {
+                    @for (title, svg) in titled {
+                        figure.paper {
+                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
+                            figcaption { (title) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn uptake(uptake: &UptakeChange) -> [String; 5] {
+    let known = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 0);
+    [
+        known(uptake.stress_percent),
+        known(uptake.rest_percent),
+        signed(uptake.difference_points.unwrap_or(f64::NAN), 0),
+        number(uptake.reversible_percent, 0),
+        number(uptake.fixed_percent, 0),
+    ]
+}
+
+const UPTAKE_COLUMNS: [&str; 5] = [
+    "stress, %",
+    "rest, %",
+    "rest less stress, points",
+    "reversible, %",
+    "fixed, %",
+];
+
+fn territories(report: &ComparisonReport) -> Markup {
+    html! {
+        @if !report.territories.is_empty() {
+            div.scroll tabindex="0" role="group" aria-label="Table of territories, scrollable" {
+                table {
+                    thead {
+                        tr {
+                            th scope="col" { "Territory" }
+                            @for column in UPTAKE_COLUMNS { th.n scope="col" { (column) } }
+                        }
+                    }
+                    tbody {
+                        @for territory in &report.territories {
+                            tr {
+                                th scope="row" { (territory.name) }
+                                @for cell in uptake(&territory.uptake) { td.n { (cell) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn segments(report: &ComparisonReport) -> Markup {
+    let scored = report.sss.is_some();
+    let beating = report.beat.is_some();
+    let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
+    let known = |value: Option<f64>, decimals| signed(value.unwrap_or(f64::NAN), decimals);
+    let more = |segment: &ComparedSegmentReport| {
+        let mut cells = Vec::new();
+        if scored {
+            cells.extend([score(segment.stress_score), score(segment.rest_score)]);
+        }
+        if beating {
+            cells.extend([
+                known(segment.motion_change_mm, 1),
+                known(segment.thickening_change_points, 0),
+            ]);
+        }
+        cells
+    };
+    html! {
+        div.scroll tabindex="0" role="group" aria-label="Table of segments, scrollable" {
+            table {
+                thead {
+                    tr {
+                        th.n scope="col" { "No." }
+                        th scope="col" { "Segment" }
+                        @for column in UPTAKE_COLUMNS { th.n scope="col" { (column) } }
+                        @if scored {
+                            th.n scope="col" { "score at stress" }
+                            th.n scope="col" { "score at rest" }
+                        }
+                        @if beating {
+                            th.n scope="col" { "motion, change, mm" }
+                            th.n scope="col" { "thickening, change, points" }
+                        }
+                    }
+                }
+                tbody {
+                    @for segment in &report.segments {
+                        tr {
+                            td.n { (segment.segment) }
+                            th scope="row" { (segment.name) }
+                            @for cell in uptake(&segment.uptake) { td.n { (cell) } }
+                            @for cell in more(segment) { td.n { (cell) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is known of both scans, side by side.
+fn scans(report: &ComparisonReport) -> Markup {
+    let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "not stated".to_owned());
+    let both = [&report.stress, &report.rest];
+    let row = |name: &'static str, of: &dyn Fn(&ComparedScan) -> String| (name, both.map(of));
+    let rows = [
+        row("series", &|scan| text(&scan.series_description)),
+        row("tracer", &|scan| text(&scan.radiopharmaceutical)),
+        row("total dose, as the header has it", &|scan| {
+            text(&scan.injected_dose)
+        }),
+        row(
+            "attenuation corrected",
+            &|scan| match scan.attenuation_corrected {
+                None => "not stated".to_owned(),
+                Some(true) => "yes".to_owned(),
+                Some(false) => "no".to_owned(),
+            },
+        ),
+        row("resolution, mm", &|scan| {
+            let known = scan.resolution_mm.as_ref();
+            known.map_or("–".to_owned(), |r| {
+                format!("{} ({})", number(r.value, 1), r.source)
+            })
+        }),
+        row("cavity, ml", &|scan| number(scan.cavity_ml, 0)),
+        row("muscle, ml", &|scan| number(scan.muscle_ml, 0)),
+        row("confidence of the fit, %", &|scan| {
+            number(100.0 * scan.confidence, 0)
+        }),
+        row("normal limits", &|scan| match &scan.perfusion {
+            None => "none".to_owned(),
+            Some(perfusion) => {
+                let used = &perfusion.normals;
+                format!(
+                    "{} {}people, sex {}, {}, {}",
+                    used.cases,
+                    if used.simulated { "simulated " } else { "" },
+                    used.sex.as_str(),
+                    used.protocol,
+                    used.tracer
+                )
+            }
+        }),
+        row("deficit score, %", &|scan| {
+            let known = scan.perfusion.as_ref();
+            known.map_or("–".to_owned(), |perfusion| {
+                number(perfusion.deficit_percent, 1)
+            })
+        }),
+    ];
+    html! {
+        section {
+            h2 { "Both scans" }
+            div.scroll tabindex="0" role="group" aria-label="Table of both scans, scrollable" {
+                table {
+                    thead {
+                        tr { th scope="col" { "" } th scope="col" { "Stress" } th scope="col" { "Rest" } }
+                    }
+                    tbody {
+                        @for (name, [stress, rest]) in rows {
+                            tr { th scope="row" { (name) } td { (stress) } td { (rest) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Everything else, by its name in the report, without long lists.
+fn particulars(report: &ComparisonReport) -> Markup {
+    let mut comparison = object(report);
+    for told in ["parameters", "stress", "rest", "flags", "beat"] {
+        comparison.remove(told);
+    }
+    document::particulars(&[
+        ("Parameters", short(report.parameters.clone())),
+        ("Comparison", short(comparison)),
+        ("File at stress", short(object(&report.stress.input))),
+        ("File at rest", short(object(&report.rest.input))),
+    ])
+}
