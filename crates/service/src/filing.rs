@@ -148,6 +148,7 @@ impl Service {
         order: JobOrder,
         _counting: &Counting,
     ) -> Result<Job, ServiceError> {
+        work.check_order(volume.as_deref(), &parameters)?;
         let job = order.into_job(work, volume, parameters);
         let filed = self.queue.file(&job).await?;
         self.accepted(&job.tenant, filed).await
@@ -253,9 +254,10 @@ impl Service {
     ) -> Result<ServiceError, ServiceError> {
         let resource = Resource::of(id).unwrap_or(match field {
             "model" => Resource::Model,
+            "normals" => Resource::Normals,
             _ => Resource::Volume,
         });
-        let (noun, short) = (resource.noun(), shorten(id));
+        let (noun, short) = (resource.label(), shorten(id));
         let detail = match self.items().catalogue().erased_at(tenant, id).await? {
             Some(at) => format!("The {noun} `{short}` was erased at {}.", rfc3339(at)),
             None => format!("There is no {noun} `{short}`."),
@@ -313,6 +315,7 @@ impl Service {
     pub async fn file_unattended(&self, job: UnattendedJob<'_>) -> Result<String, ServiceError> {
         let work = self.work_of(job.kind)?;
         let parameters = work.parameters_from_json(job.parameters)?;
+        work.check_order(job.volume, &parameters)?;
         let send =
             self.listed_send_order(job.tenant, job.kind, job.send, job.to, job.source.as_ref())?;
         let quota = self.quotas.general;

@@ -22,6 +22,7 @@ pub mod items;
 pub mod jobs;
 pub mod library;
 pub mod memory;
+mod pairs;
 pub mod pem;
 mod procedures;
 pub mod quotas;

@@ -1,4 +1,4 @@
-//! Templates and readers' profiles, added by a tenant.
+//! Templates, readers' profiles and normal limits, added by a tenant.
 //!
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets the
 //! same limits; here they are refused before the body is read, and read under the budget of decoding.
@@ -16,6 +16,8 @@ use ventriform::progress::Monitor;
 
 /// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;
+/// Memory for a byte of normal limits: numbers as text, parsed twice, and as the file and the text that is hashed.
+const LIMITS_MEMORY_PER_BYTE: u64 = 8;
 
 /// A product with its owner's record, and whether it is new.
 pub type Added = (Owned<Product>, bool);
@@ -70,10 +72,32 @@ impl Service {
         let check = move |_: &Monitor<'_>| reader.profile(&profile);
         let output = self.decoding.run(LITTLE_MEMORY, check).await??;
         let room = self.product_room(Resource::Reader, quota);
-        Ok(self.items().add_reader(tenant, name, output, room).await?)
+        let made = (tenant, Resource::Reader);
+        Ok(self.items().add_named(made, name, output, room).await?)
     }
 
-    /// Refuses another template or reader where the tenant has as many as it may have, before it is sent.
+    /// Adds normal limits.
+    ///
+    /// # Errors
+    /// As [`Service::add_template`].
+    pub async fn add_normals(
+        &self,
+        tenant: &Tenant,
+        name: &str,
+        limits: Bytes,
+        quota: Quota,
+        _counting: &Counting,
+    ) -> Result<Added, ServiceError> {
+        let memory = LITTLE_MEMORY + LIMITS_MEMORY_PER_BYTE * limits.len() as u64;
+        let reader = self.engine.reader.clone();
+        let check = move |_: &Monitor<'_>| reader.normals(&limits);
+        let output = self.decoding.run(memory, check).await??;
+        let room = self.product_room(Resource::Normals, quota);
+        let made = (tenant, Resource::Normals);
+        Ok(self.items().add_named(made, name, output, room).await?)
+    }
+
+    /// Refuses another template, reader or set of normal limits where the tenant has as many as it may have, before it is sent.
     ///
     /// # Errors
     /// `library-full`.
@@ -100,6 +124,7 @@ impl Service {
         ProductRoom {
             count: match kind {
                 Resource::Reader => self.settings.reader_limit,
+                Resource::Normals => self.settings.normals_limit,
                 _ => self.settings.template_limit,
             },
             bytes: quota.bytes,

@@ -5,7 +5,8 @@ use crate::client::ClientAddress;
 use crate::error::ServiceError;
 use crate::filing::UnattendedJob;
 use crate::intake::{IntakeGroup, MakeError, Rule, VolumeMaker};
-use crate::records::{LocalFile, Priority, Tags, Tenant};
+use crate::pairs::{PairError, pair_of};
+use crate::records::{Failure, Fault, LocalFile, Priority, Resource, Tags, Tenant};
 use crate::service::Service;
 use crate::uploads::VolumeUpload;
 use async_trait::async_trait;
@@ -43,11 +44,10 @@ impl VolumeMaker for Service {
         rule: &Rule,
         volume: &str,
         key: String,
-    ) -> Result<String, MakeError> {
-        let tenant = &group.origin.tenant;
-        let job = UnattendedJob {
+    ) -> Result<Option<String>, MakeError> {
+        let mut job = UnattendedJob {
             ordered_by: "rule",
-            tenant,
+            tenant: &group.origin.tenant,
             kind: &rule.kind,
             priority: Priority::default(),
             parameters: &rule.parameters,
@@ -57,7 +57,33 @@ impl VolumeMaker for Service {
             to: rule.to.as_deref(),
             key,
         };
-        Ok(self.file_unattended(job).await?)
+        if rule.kind != Resource::Comparison.noun() {
+            return Ok(Some(self.file_unattended(job).await?));
+        }
+        let of_study = (group.study.as_str(), volume);
+        let pair = pair_of(self.items().catalogue(), job.tenant, of_study, rule).await;
+        let Some(pair) = pair.map_err(of_pair)? else {
+            return Ok(None);
+        };
+        let mut parameters = rule.parameters.clone();
+        parameters.insert("rest".into(), pair.rest.clone().into());
+        job.key = format!("pair-{}-{}", pair.stress, pair.rest);
+        job.parameters = &parameters;
+        job.volume = Some(&pair.stress);
+        Ok(Some(self.file_unattended(job).await?))
+    }
+}
+
+fn of_pair(error: PairError) -> MakeError {
+    match error {
+        PairError::Store(error) => error.into(),
+        PairError::NoRole => {
+            let failure = Failure::new(Fault::Content, "rest-or-stress", error.to_string());
+            MakeError::Never(failure.fix(
+                "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or compare the \
+                 volumes by POST /v1/comparisons.",
+            ))
+        }
     }
 }
 
@@ -81,6 +107,18 @@ impl Service {
                 rule.to.as_deref(),
             )
             .map_err(|reason| format!("rule {}: {reason}", number + 1))?;
+            let is_pair = rule.kind == Resource::Comparison.noun();
+            if !is_pair && (rule.stress.is_some() || rule.rest.is_some()) {
+                let number = number + 1;
+                return Err(format!(
+                    "rule {number}: `stress` and `rest` tell both scans of a comparison, and its kind is `{}`",
+                    rule.kind
+                ));
+            }
+            if rule.kind == Resource::Normals.noun() {
+                let number = number + 1;
+                return Err(format!("rule {number}: a series makes no normal limits"));
+            }
         }
         for (number, procedure) in self.settings.procedures.0.iter().enumerate() {
             let wrong = |reason: String| format!("procedure {}: {reason}", number + 1);
@@ -90,6 +128,15 @@ impl Service {
                 let name = &procedure.archive;
                 return Err(wrong(format!(
                     "the tenant has no archive `{name}` with `dicomweb`"
+                )));
+            }
+            if [Resource::Comparison, Resource::Normals]
+                .iter()
+                .any(|kind| procedure.kind == kind.noun())
+            {
+                let kind = &procedure.kind;
+                return Err(wrong(format!(
+                    "a work item has one series, and a job of kind `{kind}` needs more; let a rule order it"
                 )));
             }
             let to = if procedure.send.is_empty() {

@@ -10,7 +10,7 @@
 //!   quarantine/DAY/   files that were found without a record
 //!   received/         objects that came by C-STORE or STOW-RS and are not volumes yet
 //!   volumes/vol_.../  files of a volume
-//!   models/mdl_.../   files of a model; likewise segmentations/, beats/, templates/
+//!   models/mdl_.../   files of a model; likewise segmentations/, beats/, comparisons/, normals/, templates/
 //! ```
 //!
 //! Files are published before their record is committed, and deleted after it, so the files of a

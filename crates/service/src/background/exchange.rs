@@ -141,7 +141,7 @@ impl ExchangeHost for Service {
             .result(tenant, result, |product| object.source_files(product))
             .await?;
         let result = result.ok_or_else(|| gone("The result or its volume was erased."))?;
-        let shape = UploadFacts::of(&result.volume)?.shape;
+        let shape = UploadFacts::of(&result.source.volume)?.shape;
         let limits = self.engine.limits;
         let make = move |_: &Monitor<'_>| dicom::object(&result, object, None, &limits);
         let made = self.decoding.run(dicom::object_memory(shape), make).await;

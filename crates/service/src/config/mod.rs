@@ -314,7 +314,7 @@ settings! {
     decoding_time: Span = "10s";
     /// Bytes of an upload for which decoding_time grows by one second
     decoding_rate: Size = "1MiB";
-    /// Memory for answers about volumes, models, segmentations, beats, templates and ended jobs, which are
+    /// Memory for answers about volumes, models, segmentations, beats, comparisons, templates and ended jobs, which are
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
     /// Memory that bodies of requests and answers take together, shared out between clients: one alone has
@@ -330,6 +330,8 @@ settings! {
     template_limit: u32 = "50";
     /// Largest number of readers' profiles
     reader_limit: u32 = "200";
+    /// Largest number of sets of normal limits
+    normals_limit: u32 = "50";
     /// Largest number of labels of one volume or job
     label_limit: usize = "16";
 
@@ -377,7 +379,8 @@ settings! {
     intake_keep: Retention = "7d";
     /// The jobs that received volumes start: tables `[[rules]]` with `modality`, `image_type`,
     /// `calling_ae`, `study_description` (what is absent matches anything), `kind`, `parameters`,
-    /// `send` and `to`. The first rule that matches counts
+    /// `send` and `to`; of kind `comparison` also `stress` and `rest`, parts of the Series Description that tell both
+    /// scans of a study. The first rule that matches counts
     rules: Tables<Rule> = "[]";
     /// The work items (UPS) that the service performs itself: tables `[[procedures]]` with `code` and
     /// `scheme` of the Scheduled Workitem Code, `archive`, `kind`, `parameters`, `send`, `to` and `tenant`
@@ -390,7 +393,7 @@ settings! {
     /// Age at which volumes are erased, counted from their last upload or use; `off` keeps them,
     /// `retention` is the value of that setting
     volume_retention: OwnRetention = "retention";
-    /// Age at which models, segmentations and beats are erased, counted from their last computation;
+    /// Age at which models, segmentations, beats and comparisons are erased, counted from their last computation;
     /// `off` keeps them, `retention` is the value of that setting. Templates are kept
     result_retention: OwnRetention = "retention";
     /// Age at which the records of finished jobs are erased (not their results); `off` keeps them,

@@ -137,15 +137,15 @@ pub trait VolumeMaker: Send + Sync + 'static {
     /// the same id.
     async fn make(&self, group: &IntakeGroup, files: &[LocalFile]) -> Result<String, MakeError>;
 
-    /// Files the job of `rule` on the volume of `group`. Returns its id. Done again with the same `key`,
-    /// it gives the same job.
+    /// Files the job of `rule` on the volume of `group`. Returns its id; `None` if the job needs another volume, which
+    /// has not come. Done again with the same `key`, it gives the same job.
     async fn file(
         &self,
         group: &IntakeGroup,
         rule: &Rule,
         volume: &str,
         key: String,
-    ) -> Result<String, MakeError>;
+    ) -> Result<Option<String>, MakeError>;
 }
 
 /// Settings for complete groups.
@@ -364,7 +364,7 @@ impl Gatherer {
             Some(rule) => {
                 let key = format!("{}-{volume}", group.id);
                 match self.maker.file(group, rule, volume, key).await {
-                    Ok(job) => (Some(job), None),
+                    Ok(job) => (job, None),
                     Err(MakeError::Later(reason)) => return Err(reason),
                     Err(MakeError::Never(failure)) => {
                         tracing::warn!(

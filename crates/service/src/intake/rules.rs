@@ -21,8 +21,14 @@ pub struct Rule {
     /// A part of the Study Description; capital and small letters are alike.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study_description: Option<String>,
-    /// The kind of job: `model`, `segmentation` or `beat`.
+    /// The kind of job: `model`, `segmentation`, `beat`, or `comparison` of a scan at stress with its scan at rest.
     pub kind: String,
+    /// For comparisons: a part of the Series Description of scans at stress, where headers do not tell them from those at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress: Option<String>,
+    /// For comparisons: a part of the Series Description of scans at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rest: Option<String>,
     /// The job's parameters.
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub parameters: Map<String, Value>,

@@ -100,14 +100,14 @@ impl Items {
         self.add_product(template, source, output, room).await
     }
 
-    /// Adds a reader's profile, durably. Returns the record, and whether it is new: the same profile is
-    /// the same reader, whatever its name.
+    /// Adds what a tenant brings in one file, a reader's profile or normal limits, durably. Returns the record, and
+    /// whether it is new: the same content is the same item, whatever its name.
     ///
     /// # Errors
     /// As [`Items::add_template`].
-    pub async fn add_reader(
+    pub async fn add_named(
         self: &Arc<Self>,
-        tenant: &Tenant,
+        (tenant, made): (&Tenant, Resource),
         name: &str,
         output: WorkOutput,
         room: ProductRoom,
@@ -117,15 +117,14 @@ impl Items {
         let parameters = [("name".to_owned(), Value::from(name))]
             .into_iter()
             .collect();
-        let made = (tenant, Resource::Reader);
-        let reader = self.product(made, &[], None, parameters, &output);
+        let named = self.product((tenant, made), &[], None, parameters, &output);
         let source = TemplateSource {
             tenant,
             name,
             volume: None,
             library: None,
         };
-        self.add_product(reader, source, output, room).await
+        self.add_product(named, source, output, room).await
     }
 
     /// Adds a product that no job made.
@@ -309,10 +308,10 @@ impl Items {
     }
 }
 
-/// Longest name of a template or a reader, characters.
+/// Longest name of a template, a reader or normal limits, characters.
 const NAME_LENGTH: usize = 80;
 
-/// Why a template or a reader was not added.
+/// Why a template, a reader or normal limits were not added.
 #[derive(Debug)]
 pub enum NotAdded {
     /// It may not be: what is wrong, and what to do.
@@ -333,12 +332,14 @@ impl From<StoreError> for NotAdded {
 
 impl NotAdded {
     pub(crate) fn too_many(kind: Resource, limit: u32) -> Self {
-        let (noun, plural) = (kind.noun(), kind.plural());
-        let detail =
-            format!("There are {limit} {plural} already, the most that this service allows.");
+        let (noun, label) = (kind.noun(), kind.label());
+        let detail = format!(
+            "There are {limit} {} already, the most that this service allows.",
+            kind.plural()
+        );
         let failure = Failure::new(Fault::Request, "library-full", detail);
         Self::TooMany(failure.fix(format!(
-            "DELETE a {noun} first, or ask the operator to raise `{noun}_limit`."
+            "DELETE a {label} first, or ask the operator to raise `{noun}_limit`."
         )))
     }
 

@@ -53,17 +53,26 @@ impl StoredItem {
     }
 }
 
-/// A stored result beside the volume that it was made of.
+/// A stored result beside what it was made of.
 #[derive(Debug, Clone)]
 pub struct StoredResult {
     /// When the tenant first had it.
     pub made_at: Timestamp,
     /// The result, with the requested files.
     pub files: StoredItem,
+    /// The volume that it was made of; of a comparison that at stress.
+    pub source: StoredSource,
+    /// Of a comparison, the volume at rest.
+    pub rest: Option<StoredSource>,
+}
+
+/// A volume that a result was made of.
+#[derive(Debug, Clone)]
+pub struct StoredSource {
     /// The volume.
     pub volume: StoredVolume,
-    /// The volume's files.
-    pub volume_files: Vec<LocalFile>,
-    /// Whose scan the volume is.
+    /// Its files.
+    pub files: Vec<LocalFile>,
+    /// Whose scan it is.
     pub scan: ScanIdentity,
 }

@@ -34,7 +34,7 @@ const COPIES_BATCH: usize = 500;
 pub struct RetentionAges {
     /// Of volumes, counted from their last upload or use.
     pub volumes: Option<Duration>,
-    /// Of models, segmentations and beats, counted from when they were last computed.
+    /// Of models, segmentations, beats and comparisons, counted from when they were last computed.
     pub results: Option<Duration>,
     /// Of the records of finished jobs, counted from their end.
     pub jobs: Option<Duration>,
@@ -52,9 +52,11 @@ impl RetentionAges {
     pub(crate) fn of(&self, kind: Resource) -> Option<Duration> {
         match kind {
             Resource::Volume => self.volumes,
-            Resource::Model | Resource::Segmentation | Resource::Beat => self.results,
+            Resource::Model | Resource::Segmentation | Resource::Beat | Resource::Comparison => {
+                self.results
+            }
             Resource::Job => self.jobs,
-            Resource::Template | Resource::Reader => None,
+            Resource::Template | Resource::Reader | Resource::Normals => None,
         }
     }
 }

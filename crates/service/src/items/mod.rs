@@ -22,7 +22,7 @@ mod read;
 mod sweep;
 
 pub use add::{NotAdded, TemplateSource, check_name};
-pub use content::{OutputFile, StoredItem, StoredResult, WorkOutput};
+pub use content::{OutputFile, StoredItem, StoredResult, StoredSource, WorkOutput};
 pub use erase::RetentionAges;
 pub(crate) use erase::{ExpiredPages, milliseconds};
 pub use pins::Pin;

@@ -1,11 +1,11 @@
 //! Reading items: records with local copies of their files, every file verified.
 
-use super::{Items, StoredItem, StoredResult};
+use super::{Items, StoredItem, StoredResult, StoredSource};
 use crate::records::{
     BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, Resource,
     StoreError, StoreFault, Tenant,
 };
-use serde_json::Map;
+use serde_json::{Map, Value};
 use std::ops::Range;
 
 /// Templates read from the catalogue at a time.
@@ -116,8 +116,8 @@ impl Items {
         })
     }
 
-    /// A tenant's product with those of its files that `wanted` names, and the volume that it was made
-    /// of with its files. `None` if the tenant has one of the two no more, or the product was made of
+    /// A tenant's product with those of its files that `wanted` names, and the volumes that it was made
+    /// of with their files. `None` if the tenant has one of them no more, or the product was made of
     /// no volume.
     ///
     /// # Errors
@@ -131,23 +131,46 @@ impl Items {
         let Some(product) = self.catalogue.product(tenant, id).await? else {
             return Ok(None);
         };
-        let Some(source) = product.volume.clone() else {
+        let Some(source) = self.source(tenant, product.volume.as_deref()).await? else {
             return Ok(None);
         };
-        let Some(volume) = self.catalogue.volume(tenant, &source).await? else {
-            return Ok(None);
-        };
-        let Some(volume_files) = self.volume_files(&source, &volume.files).await? else {
-            return Ok(None);
+        let rest = if product.resource() == Resource::Comparison {
+            let id = product.parameters.get("rest").and_then(Value::as_str);
+            let rest = self.source(tenant, id).await?;
+            if rest.is_none() {
+                return Ok(None);
+            }
+            rest
+        } else {
+            None
         };
         let wanted = wanted(&product.item);
         let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
         Ok(Some(StoredResult {
             made_at: product.ownership.created_at,
             files: self.with_files(product.item, &wanted).await?,
+            source,
+            rest,
+        }))
+    }
+
+    /// A tenant's volume with its files; `None` if the tenant has it no more, or there is none.
+    async fn source(
+        &self,
+        tenant: &Tenant,
+        id: Option<&str>,
+    ) -> Result<Option<StoredSource>, StoreError> {
+        let Some(id) = id else {
+            return Ok(None);
+        };
+        let Some(volume) = self.catalogue.volume(tenant, id).await? else {
+            return Ok(None);
+        };
+        let files = self.volume_files(id, &volume.files).await?;
+        Ok(files.map(|files| StoredSource {
+            files,
             scan: volume.ownership.scan,
             volume: volume.item,
-            volume_files,
         }))
     }
 

@@ -44,6 +44,19 @@ pub trait Work: Send + Sync + 'static {
         self.check_parameters(GivenParameters::Json(object))
     }
 
+    /// Refuses an order that lacks what the parameters alone need not have, before it is filed. `volume` is that of the
+    /// job; `None` if it is yet to be fetched.
+    ///
+    /// # Errors
+    /// What is missing.
+    fn check_order(
+        &self,
+        _volume: Option<&str>,
+        _parameters: &Map<String, Value>,
+    ) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// The needs of the work besides the volume, given these parameters. Nothing by default.
     fn needs(&self, _parameters: &Map<String, Value>) -> Needs {
         Needs::default()
@@ -66,7 +79,7 @@ pub trait Work: Send + Sync + 'static {
     /// # Errors
     /// If a file is missing, cannot be read or cannot be parsed, or if there is no page.
     fn page(&self, _product: &StoredItem, _scan: &Map<String, Value>) -> Result<String, Failure> {
-        let detail = format!("A {} has no page.", self.makes().noun());
+        let detail = format!("A {} has no page.", self.makes().label());
         Err(Failure::new(Fault::Request, "not-found", detail).fix("Read its report instead."))
     }
 }

@@ -120,7 +120,7 @@ pub trait Catalogue: Custody + Scans {
         hold: Option<&LegalHold>,
     ) -> StoreResult<bool>;
 
-    /// The products of a volume: models, segmentations, beats, templates.
+    /// The products of a volume: models, segmentations, beats, comparisons, templates.
     async fn made_of(&self, tenant: &Tenant, volume: &str) -> StoreResult<Vec<String>>;
 
     /// Erases an item that no unfinished job needs and no legal hold keeps. The record of its

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub enum ItemRecord {
     /// An upload.
     Volume(StoredVolume),
-    /// A model, a segmentation, a beat, a template or a reader.
+    /// A model, a segmentation, a beat, a comparison, normal limits, a template or a reader.
     Product(Product),
 }
 

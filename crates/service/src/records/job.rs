@@ -65,7 +65,7 @@ pub struct Job {
     pub sequence: i64,
     /// The tenant's names for it.
     pub tags: Tags,
-    /// The kind of work: `model`, `segmentation`, `beat`.
+    /// The kind of work: `model`, `segmentation`, `beat`, `comparison`, `normals`.
     pub kind: String,
     /// How urgent it is.
     pub priority: Priority,

@@ -1,4 +1,4 @@
-//! The record of a product: a model, a segmentation, a beat, a template or a reader.
+//! The record of a product: a model, a segmentation, a beat, a comparison, normal limits, a template or a reader.
 
 use super::FileRecord;
 use super::{Resource, Timestamp};
@@ -14,7 +14,8 @@ pub struct Product {
     pub sequence: i64,
     /// When it was made.
     pub created_at: Timestamp,
-    /// Id of the volume it was made from; `None` for a template.
+    /// Id of the volume it was made from; of a comparison that of the scan at stress. `None` for what was not made of a
+    /// volume: templates, readers, normal limits.
     pub volume: Option<String>,
     /// The parameters used, with every default written out.
     pub parameters: Map<String, Value>,

@@ -11,6 +11,10 @@ pub enum Resource {
     Segmentation,
     /// One wall in motion, fitted to the gates of a volume.
     Beat,
+    /// Rest and stress of one patient, compared.
+    Comparison,
+    /// Normal limits: the uptake of healthy people.
+    Normals,
     /// A model of the library, tried by `model=auto`.
     Template,
     /// A reader's profile.
@@ -21,22 +25,26 @@ pub enum Resource {
 
 impl Resource {
     /// Every kind.
-    pub const ALL: [Resource; 7] = [
+    pub const ALL: [Resource; 9] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
+        Resource::Comparison,
+        Resource::Normals,
         Resource::Template,
         Resource::Reader,
         Resource::Job,
     ];
 
     /// The kinds that have files.
-    pub const WITH_FILES: [Resource; 6] = [
+    pub const WITH_FILES: [Resource; 8] = [
         Resource::Volume,
         Resource::Model,
         Resource::Segmentation,
         Resource::Beat,
+        Resource::Comparison,
+        Resource::Normals,
         Resource::Template,
         Resource::Reader,
     ];
@@ -48,6 +56,8 @@ impl Resource {
             Resource::Model => "mdl_",
             Resource::Segmentation => "seg_",
             Resource::Beat => "bea_",
+            Resource::Comparison => "cmp_",
+            Resource::Normals => "nrm_",
             Resource::Template => "tpl_",
             Resource::Reader => "rdr_",
             Resource::Job => "job_",
@@ -61,6 +71,8 @@ impl Resource {
             Resource::Model => "model",
             Resource::Segmentation => "segmentation",
             Resource::Beat => "beat",
+            Resource::Comparison => "comparison",
+            Resource::Normals => "normals",
             Resource::Template => "template",
             Resource::Reader => "reader",
             Resource::Job => "job",
@@ -74,10 +86,26 @@ impl Resource {
             Resource::Model => "models",
             Resource::Segmentation => "segmentations",
             Resource::Beat => "beats",
+            Resource::Comparison => "comparisons",
+            Resource::Normals => "normals",
             Resource::Template => "templates",
             Resource::Reader => "readers",
             Resource::Job => "jobs",
         }
+    }
+
+    /// Its name for readers, singular, where [`Resource::noun`] is a plural.
+    pub fn label(self) -> &'static str {
+        match self {
+            Resource::Normals => "set of normal limits",
+            other => other.noun(),
+        }
+    }
+
+    /// Whether one of its kind belongs to the volume of the job that made it, and goes with it: normal limits are
+    /// statistics over a cohort.
+    pub fn belongs_to_volume(self) -> bool {
+        self != Resource::Normals
     }
 
     /// The kind of item that `id` names, by its prefix.

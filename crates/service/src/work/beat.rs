@@ -1,6 +1,7 @@
 //! Jobs of kind `beat`: [`ventriform::gated::from_files`] over a stored volume with gates and stored models.
 
 use super::files::volume_files;
+use super::limits;
 use super::models::{MESH_FILE, named_models, stored_models};
 use super::page;
 use super::problems::{Explain, not_exportable, work_error};
@@ -29,11 +30,13 @@ impl Work for BeatWork {
     }
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
-        let (items, library) = named_models(parameters);
+        let (mut items, library) = named_models(parameters);
+        let normals = parameters.get(limits::NORMALS).and_then(Value::as_str);
+        items.extend(normals.map(|id| (limits::NORMALS.to_owned(), id.to_owned())));
         Needs {
             items,
             library,
-            files: &[MESH_FILE],
+            files: &[MESH_FILE, limits::NORMALS_FILE],
         }
     }
 
@@ -57,9 +60,10 @@ impl Work for BeatWork {
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
         let parameters =
             GatedParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
+        let normals = limits::of_input(input)?;
         let order = GatedOrder {
             gates: &volume_files(&input.files),
-            normals: None,
+            normals: normals.as_ref(),
             auto: parameters.fit.is_auto(),
             models: stored_models(input, &parameters.fit)?,
             parameters: &parameters.fit,

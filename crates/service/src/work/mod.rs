@@ -5,22 +5,28 @@
 //! | `model` | jobs of kind `model`: a volume's files to a surface model |
 //! | `segmentation` | jobs of kind `segmentation`: a stored model fitted to a volume |
 //! | `beat` | jobs of kind `beat`: one wall in motion fitted to the gates of a volume |
-//! | `models` | the models that both fit |
+//! | `comparison` | jobs of kind `comparison`: rest and stress of one patient |
+//! | `normals` | jobs of kind `normals`: normal limits of a cohort of stored volumes |
+//! | `models` | the models that jobs fit |
+//! | `limits` | normal limits, as uploaded and as jobs need them |
 //! | `template` | a mesh to a template of the library |
 //! | `profile` | a reader's profile, checked |
 //! | `upload` | validating and previewing an uploaded volume |
 //! | [`dicom`] | DICOM objects of a stored result |
-//! | `page` | the HTML page of a stored model or segmentation |
+//! | `page` | the HTML page of a stored result |
 //! | `problems` | errors of the domain to failures with status class, code, field and advice |
 //!
 //! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
 //! reads local files and returns bytes; it neither stores anything nor sees the queue.
 
 mod beat;
+mod comparison;
 pub mod dicom;
 mod files;
+mod limits;
 mod model;
 mod models;
+mod normals;
 mod page;
 mod parameters;
 pub mod part;
@@ -31,7 +37,9 @@ mod template;
 mod upload;
 
 pub use beat::BeatWork;
+pub use comparison::ComparisonWork;
 pub use model::ModelWork;
+pub use normals::{MOST_CASES, NormalsWork, first_volume};
 pub use page::PageError;
 pub use segmentation::SegmentationWork;
 pub use template::TEMPLATE_BYTES;
@@ -58,10 +66,12 @@ pub struct Engine {
 impl Engine {
     /// The engine of the product; `limits` bound the volumes it reads.
     pub fn new(limits: ReadLimits) -> Self {
-        let works: [Arc<dyn Work>; 3] = [
+        let works: [Arc<dyn Work>; 5] = [
             Arc::new(ModelWork { limits }),
             Arc::new(SegmentationWork { limits }),
             Arc::new(BeatWork { limits }),
+            Arc::new(ComparisonWork { limits }),
+            Arc::new(NormalsWork { limits }),
         ];
         Self {
             reader: Arc::new(DomainReader { limits }),

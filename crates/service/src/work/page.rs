@@ -1,4 +1,4 @@
-//! HTML pages of stored models, segmentations and beats.
+//! HTML pages of stored models, segmentations, beats and comparisons.
 //!
 //! A page consists mostly of pictures: it is ten times as large as the other files together and
 //! takes as long to make as the model, and few are ever looked at. Pages are therefore not stored.
@@ -10,7 +10,8 @@ use serde_json::{Map, Value};
 use std::io;
 use ventriform::export::read_json::{self, ReadMeshError};
 use ventriform::report::{
-    self, BeatPage, BeatReport, Closeness, ModelReport, SegmentationPage, SegmentationReport,
+    self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
+    SegmentationPage, SegmentationReport,
 };
 use ventriform::volume::Provenance;
 
@@ -62,6 +63,22 @@ pub(super) const BEAT_FILES: &[&str] = &[
     BeatPage::MAPS[3].0,
     BeatPage::MAPS[4].0,
     BeatPage::MAPS[5].0,
+];
+
+/// The slices of a comparison, stress above rest.
+const COMPARISON_SLICES: &str = "slices.png";
+
+/// The files that [`comparison_page`] reads.
+pub(super) const COMPARISON_FILES: &[&str] = &[
+    "comparison.json",
+    COMPARISON_SLICES,
+    ComparisonPage::MAPS[0].0,
+    ComparisonPage::MAPS[1].0,
+    ComparisonPage::MAPS[2].0,
+    ComparisonPage::MAPS[3].0,
+    ComparisonPage::MAPS[4].0,
+    ComparisonPage::MAPS[5].0,
+    ComparisonPage::MAPS[6].0,
 ];
 
 /// The wall at end diastole and at end systole.
@@ -145,21 +162,55 @@ pub(super) fn beat_page(
     let systole = read_json::decode(&required(read, END_MESHES[1])?)?;
     let curve = optional(read, "curve.svg")?;
     let phase = optional(read, "phase.svg")?;
-    let mut maps = Vec::new();
-    for (name, _) in BeatPage::MAPS {
-        maps.extend(optional(read, name)?.map(|svg| (name, svg)));
-    }
-    let maps: Vec<(&'static str, &[u8])> = (maps.iter())
-        .map(|(name, svg)| (*name, svg.as_slice()))
-        .collect();
+    let maps = maps(read, &BeatPage::MAPS)?;
     Ok(report::beat_page(&BeatPage {
         report: &report,
         curve: curve.as_deref(),
         phase: phase.as_deref(),
-        maps: &maps,
+        maps: &borrowed(&maps),
         meshes: [&diastole, &systole],
         scan: Some(&provenance(scan)),
     }))
+}
+
+/// The page of a comparison, made of `comparison.json` and those of [`COMPARISON_FILES`] that exist.
+///
+/// # Errors
+/// [`PageError`].
+pub(super) fn comparison_page(
+    read: &ReadFile<'_>,
+    scan: &Map<String, Value>,
+) -> Result<String, PageError> {
+    let report = required(read, "comparison.json")?;
+    let report: ComparisonReport = from_json("comparison.json", &report)?;
+    let slices = optional(read, COMPARISON_SLICES)?;
+    let maps = maps(read, &ComparisonPage::MAPS)?;
+    Ok(report::comparison_page(&ComparisonPage {
+        report: &report,
+        slices: slices.as_deref(),
+        maps: &borrowed(&maps),
+        scan: Some(&provenance(scan)),
+    }))
+}
+
+/// Polar maps with their names.
+type NamedMaps = Vec<(&'static str, Vec<u8>)>;
+
+/// Those of the `known` polar maps that exist.
+fn maps(
+    read: &ReadFile<'_>,
+    known: &[(&'static str, &'static str)],
+) -> Result<NamedMaps, PageError> {
+    let mut maps = Vec::new();
+    for (name, _) in known {
+        maps.extend(optional(read, name)?.map(|svg| (*name, svg)));
+    }
+    Ok(maps)
+}
+
+fn borrowed(maps: &NamedMaps) -> Vec<(&'static str, &[u8])> {
+    let maps = maps.iter();
+    maps.map(|(name, svg)| (*name, svg.as_slice())).collect()
 }
 
 /// Fields of a scan that are named; fields of another type are left out.

@@ -751,6 +751,28 @@ pub(super) fn profile_missing(id: &str) -> Failure {
     .fix("Choose another reader; GET /v1/readers lists them.")
 }
 
+/// Normal limits that were chosen for a job and have no file any more.
+pub(super) fn normals_missing(id: &str) -> Failure {
+    Failure::new(
+        Fault::Request,
+        "invalid-field",
+        format!("The normal limits `{id}` have no file any more."),
+    )
+    .at("normals")
+    .fix("Choose other limits; GET /v1/normals lists them.")
+}
+
+/// A volume that a job needs beside its own and that is not there any more.
+pub(super) fn volume_missing(field: &str) -> Failure {
+    Failure::new(
+        Fault::Request,
+        "invalid-field",
+        "The volume does not exist any more.",
+    )
+    .at(field)
+    .fix("Upload the volume again, then start the job again.")
+}
+
 /// A stored model whose file cannot be read.
 pub(super) fn unreadable_model(error: &std::io::Error) -> Failure {
     Failure::new(

@@ -1,6 +1,7 @@
 //! Jobs of kind `segmentation`: [`ventriform::segmentation::from_files`] over stored models.
 
 use super::files::volume_files;
+use super::limits;
 use super::models::{MESH_FILE, name_of, named_models, stored_models};
 use super::page;
 use super::parameters;
@@ -40,10 +41,11 @@ impl Work for SegmentationWork {
         let (mut items, library) = named_models(parameters);
         items.extend(named("expert"));
         items.extend(named("reader"));
+        items.extend(named(limits::NORMALS));
         Needs {
             items,
             library,
-            files: &[MESH_FILE, PROFILE_FILE],
+            files: &[MESH_FILE, PROFILE_FILE, limits::NORMALS_FILE],
         }
     }
 
@@ -60,10 +62,11 @@ impl Work for SegmentationWork {
             FitParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
         let expert = input.items.get("expert");
         let expert = expert.map(|expert| volume_files(&expert.files));
+        let normals = limits::of_input(input)?;
         let order = SegmentationOrder {
             volume: &volume_files(&input.files),
             expert: expert.as_deref(),
-            normals: None,
+            normals: normals.as_ref(),
             auto: parameters.is_auto(),
             models: stored_models(input, &parameters)?,
             reader: reader(input)?,

@@ -2,7 +2,7 @@
 
 use super::files::volume_files;
 use super::problems::Explain;
-use super::{profile, template};
+use super::{limits, profile, template};
 use crate::items::WorkOutput;
 use crate::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use serde::{Deserialize, Serialize};
@@ -105,6 +105,12 @@ pub trait UploadReader: Send + Sync + 'static {
     /// # Errors
     /// Why the profile cannot be used.
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure>;
+
+    /// Reads and validates normal limits. Returns their content and their file.
+    ///
+    /// # Errors
+    /// Why the limits cannot be used.
+    fn normals(&self, limits: &[u8]) -> Result<WorkOutput, Failure>;
 }
 
 /// Facts about a volume that was read. Stored as JSON in [`StoredVolume::facts`].
@@ -265,6 +271,10 @@ impl UploadReader for DomainReader {
 
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
         profile::make(profile)
+    }
+
+    fn normals(&self, limits: &[u8]) -> Result<WorkOutput, Failure> {
+        limits::make(limits)
     }
 }
 

@@ -517,6 +517,9 @@ pub(crate) async fn insert_content(to: &mut Transaction<'_>, product: &Product) 
     Ok(())
 }
 
+/// The parameters that name further volumes which a product is made of.
+const OTHER_VOLUMES: [&str; 2] = ["expert", "rest"];
+
 /// Adds a product within a transaction, unless it is stored already, and gives it to a tenant.
 /// Returns whether it is new for the tenant.
 pub(super) async fn insert_product(
@@ -527,9 +530,10 @@ pub(super) async fn insert_product(
     insert_content(to, product).await?;
     let tags = Tags::default();
     let new = hold(to, tenant, &product.id, &tags, product.created_at).await?;
-    let expert = product.parameters.get("expert").and_then(|id| id.as_str());
-    let expert = expert.filter(|id| Resource::of(id) == Some(Resource::Volume));
-    for volume in product.volume.as_deref().into_iter().chain(expert) {
+    let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
+    let others = others.into_iter().flatten();
+    let others = others.filter(|id| Resource::of(id) == Some(Resource::Volume));
+    for volume in product.volume.as_deref().into_iter().chain(others) {
         add_source(to, tenant, &product.id, volume).await?;
     }
     Ok(new)

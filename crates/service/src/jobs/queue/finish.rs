@@ -25,7 +25,7 @@ impl Queue {
         let product = self.items.product(
             (&job.tenant, made),
             &[volume.unwrap_or_default(), &parameters],
-            volume,
+            volume.filter(|_| made.belongs_to_volume()),
             job.parameters.clone(),
             output,
         );

@@ -42,7 +42,7 @@ pub fn object(
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Vec<u8>, Failure> {
-    let facts = UploadFacts::of(&result.volume).map_err(|error| broken_result(&error))?;
+    let facts = UploadFacts::of(&result.source.volume).map_err(|error| broken_result(&error))?;
     let bytes = stored::required(&result.files, REPORT_FILE)?;
     let report: BeatReport = stored::report(&bytes)?;
     let text = stored::report_text(&bytes)?;
@@ -50,7 +50,13 @@ pub fn object(
         let number = end.gate(&report);
         let gate = report.gates.iter().find(|gate| gate.gate == number);
         let gate = gate.ok_or_else(|| broken_result(&format!("there is no gate {number}")))?;
-        scan::source(result, &facts, Some(gate.frame), secret, limits)
+        scan::source(
+            (&result.source, result.made_at),
+            &facts,
+            Some(gate.frame),
+            secret,
+            limits,
+        )
     };
     let scans = [scan(BeatEnd::Diastole)?, scan(BeatEnd::Systole)?];
     let beat = DicomBeat::new(Structure::of("left_ventricle"), &scans, &report, &text);

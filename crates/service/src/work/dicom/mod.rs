@@ -10,12 +10,14 @@
 //! | `stored` | the stored files of a result |
 //! | `still` | objects of a segmentation or a model |
 //! | `beat` | objects of a beat |
+//! | `comparison` | objects of a comparison |
 //!
 //! Objects are not stored: the same result, scan and secret give the same bytes, UIDs included.
 //! Slices and instances of the source are read from the kept upload. What a tenant has erased of the
 //! scan's identity is not read again.
 
 mod beat;
+mod comparison;
 mod scan;
 mod still;
 mod stored;
@@ -24,7 +26,8 @@ pub use scan::check_stated;
 
 use crate::items::{OutputFile, StoredResult};
 use crate::records::{Failure, Product, Resource};
-use ventriform::export::dicom::{BeatEnd, BeatObject, DicomObject};
+use ventriform::comparison::WhichScan;
+use ventriform::export::dicom::{BeatEnd, BeatObject, ComparisonObject, DicomObject};
 use ventriform::volume::ReadLimits;
 
 /// A DICOM object of a stored result.
@@ -34,6 +37,8 @@ pub enum ResultObject {
     Still(DicomObject),
     /// Of a beat.
     Beat(BeatObject),
+    /// Of a comparison.
+    Comparison(ComparisonObject),
 }
 
 /// Of a segmentation without polar map there is no [`DicomObject::Polar`].
@@ -60,18 +65,32 @@ const BEAT_OBJECTS: &[ResultObject] = &[
     ResultObject::Beat(BeatObject::Measurements),
 ];
 
+const COMPARISON_OBJECTS: &[ResultObject] = &[
+    ResultObject::Comparison(ComparisonObject::Measurements),
+    ResultObject::Comparison(ComparisonObject::Slices),
+    ResultObject::Comparison(ComparisonObject::Polar(WhichScan::Stress)),
+    ResultObject::Comparison(ComparisonObject::Polar(WhichScan::Rest)),
+    ResultObject::Comparison(ComparisonObject::Difference),
+];
+
 impl ResultObject {
     /// The name of the file.
     pub fn file_name(self) -> &'static str {
         match self {
             Self::Still(object) => object.file_name(),
             Self::Beat(object) => object.file_name(),
+            Self::Comparison(object) => object.file_name(),
         }
     }
 
     /// Whether `product` has what the object shows: a polar map is of a ventricle only.
     pub fn is_of(self, product: &Product) -> bool {
-        self != Self::Still(DicomObject::Polar) || product.file(still::POLAR_FILE).is_some()
+        let picture = match self {
+            Self::Still(DicomObject::Polar) => Some(still::POLAR_FILE),
+            Self::Comparison(object) => object.picture(),
+            _ => None,
+        };
+        picture.is_none_or(|name| product.file(name).is_some())
     }
 
     /// The names of the files of `product` of which the object is made; those that it lacks are not needed.
@@ -79,6 +98,7 @@ impl ResultObject {
         match self {
             Self::Still(_) => still::SOURCE_FILES.map(str::to_owned).to_vec(),
             Self::Beat(object) => beat::source_files(object, product),
+            Self::Comparison(object) => comparison::source_files(object),
         }
     }
 }
@@ -89,6 +109,7 @@ pub fn objects(kind: Resource) -> &'static [ResultObject] {
         Resource::Segmentation => SEGMENTATION_OBJECTS,
         Resource::Model => MODEL_OBJECTS,
         Resource::Beat => BEAT_OBJECTS,
+        Resource::Comparison => COMPARISON_OBJECTS,
         _ => &[],
     }
 }
@@ -133,6 +154,7 @@ pub fn object(
     let bytes = match object {
         ResultObject::Still(object) => still::object(result, object, secret, limits)?,
         ResultObject::Beat(object) => Some(beat::object(result, object, secret, limits)?),
+        ResultObject::Comparison(object) => comparison::object(result, object, secret, limits)?,
     };
     Ok(bytes.map(|bytes| OutputFile {
         name: object.file_name().into(),

@@ -5,7 +5,7 @@ use super::super::problems::{
     Explain, broken_result, identity_needed, malformed_identity, unknown_identity,
 };
 use super::super::upload::UploadFacts;
-use crate::items::StoredResult;
+use crate::items::StoredSource;
 use crate::records::{Failure, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use nalgebra::Matrix3;
 use serde_json::{Map, Value};
@@ -43,38 +43,39 @@ fn provenance(fields: &ScanFields) -> Provenance {
     serde_json::from_value(fields.0.clone().into()).unwrap_or_default()
 }
 
-/// The scan that the objects of a result belong to: of the volume with the number `frame`, or of all where it is `None`.
+/// The scan that the objects of a result belong to, which was made at that moment: of the volume with the number `frame`,
+/// or of all where it is `None`.
 /// With a `secret` it is freed of the patient's identity.
 ///
 /// # Errors
 /// `identity-needed` if patient or study are unknown, or were erased; or if the upload cannot be read.
 pub fn source(
-    result: &StoredResult,
+    (source, made_at): (&StoredSource, Timestamp),
     facts: &UploadFacts,
     frame: Option<usize>,
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<SourceScan, Failure> {
-    let found = match &result.scan.found {
+    let found = match &source.scan.found {
         Some(_) => {
-            let files = volume_files(&result.volume_files);
+            let files = volume_files(&source.files);
             volume::provenance(&files, &ReadOptions { frame }, limits, &Monitor::silent())
                 .map_err(|error| error.explain())?
         }
         None => None,
     };
-    let stated = match &result.scan.stated {
+    let stated = match &source.scan.stated {
         Some(fields) => serde_json::from_value(fields.0.clone().into()).unwrap_or_default(),
         None => StatedIdentity::default(),
     };
     let known = identity(found.as_ref(), &stated).map_err(|error| match error {
-        DicomError::NoIdentity { .. } => identity_needed(&error, &result.volume.id),
+        DicomError::NoIdentity { .. } => identity_needed(&error, &source.volume.id),
         other => other.explain(),
     })?;
     let placed = !AffineSource::ASSUMED
         .iter()
         .any(|a| a.as_str() == facts.affine_source);
-    let made = moment(result.made_at);
+    let made = moment(made_at);
     let scan = SourceScan::new(known, voxel_to_patient(facts)?, facts.shape, placed, made);
     Ok(match secret {
         Some(secret) => {

@@ -34,12 +34,18 @@ pub fn object(
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<u8>>, Failure> {
-    let facts = UploadFacts::of(&result.volume).map_err(|error| broken_result(&error))?;
+    let facts = UploadFacts::of(&result.source.volume).map_err(|error| broken_result(&error))?;
     let frame = scan::voxel_to_patient(&facts)?;
     let item = &result.files;
     let number = item.parameters.get("frame").and_then(Value::as_u64);
     let number = number.and_then(|number| usize::try_from(number).ok());
-    let scan = scan::source(result, &facts, number, secret, limits)?;
+    let scan = scan::source(
+        (&result.source, result.made_at),
+        &facts,
+        number,
+        secret,
+        limits,
+    )?;
     let mesh = stored::mesh(item, MESH_FILE)?;
     let mask = match Resource::of(&item.id) {
         // A mask that is stored on another grid than the scan's.

@@ -1,0 +1,113 @@
+//! Jobs of kind `comparison`: [`ventriform::rest_stress::from_files`] over two stored volumes, that of the job at
+//! stress and that of its parameter `rest` at rest.
+
+use super::files::volume_files;
+use super::limits;
+use super::models::{MESH_FILE, named_models, stored_models};
+use super::page;
+use super::problems::{Explain, not_exportable, volume_missing, work_error};
+use crate::items::{OutputFile, StoredItem, WorkOutput};
+use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
+use crate::records::{Failure, Fault, Resource};
+use serde_json::{Map, Value};
+use ventriform::export::Format;
+use ventriform::parameters::ComparisonParameters;
+use ventriform::progress::{Monitor, Plan};
+use ventriform::report::{ComparisonSummary, object};
+use ventriform::rest_stress::{ComparisonOrder, from_files};
+use ventriform::segmentation::SegmentationFilesError;
+use ventriform::volume::ReadLimits;
+
+/// The parameter that names the scan at rest.
+pub(super) const REST: &str = "rest";
+
+/// Compares rest and stress of one patient.
+#[derive(Debug, Clone, Copy)]
+pub struct ComparisonWork {
+    /// Limits on each of both scans.
+    pub limits: ReadLimits,
+}
+
+impl Work for ComparisonWork {
+    fn makes(&self) -> Resource {
+        Resource::Comparison
+    }
+
+    fn needs(&self, parameters: &Map<String, Value>) -> Needs {
+        let (mut items, library) = named_models(parameters);
+        let text = |field: &str| parameters.get(field)?.as_str();
+        let named = |field: &str| Some((field.to_owned(), text(field)?.to_owned()));
+        items.extend(named(REST));
+        items.extend(named(limits::NORMALS));
+        Needs {
+            items,
+            library,
+            files: &[MESH_FILE, limits::NORMALS_FILE],
+        }
+    }
+
+    fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
+        let parameters = match given {
+            GivenParameters::Text(pairs) => {
+                let pairs = pairs.iter();
+                ComparisonParameters::from_pairs(
+                    pairs.map(|(name, text)| (name.as_str(), text.as_str())),
+                )
+            }
+            GivenParameters::Json(object) => ComparisonParameters::from_json(object),
+        };
+        Ok(parameters.map_err(|error| error.explain())?.to_json())
+    }
+
+    fn check_order(
+        &self,
+        volume: Option<&str>,
+        parameters: &Map<String, Value>,
+    ) -> Result<(), Failure> {
+        let wrong = |detail: &str| Failure::new(Fault::Request, "invalid-field", detail).at(REST);
+        match parameters.get(REST).and_then(Value::as_str) {
+            None => Err(wrong("The scan at rest is missing.")
+                .fix("Give in `rest` the id of a stored volume, or in a form the file `rest`.")),
+            Some(rest) if Some(rest) == volume => Err(wrong("Stress and rest are one volume.")
+                .fix("Give the scan at stress and the scan at rest.")),
+            Some(_) => Ok(()),
+        }
+    }
+
+    fn plan(&self) -> Plan {
+        Plan::COMPARISON
+    }
+
+    fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
+        let parameters =
+            ComparisonParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
+        let rest = input.items.get(REST).ok_or_else(|| volume_missing(REST))?;
+        let normals = limits::of_input(input)?;
+        let order = ComparisonOrder {
+            stress: &volume_files(&input.files),
+            rest: &volume_files(&rest.files),
+            auto: parameters.fit.is_auto(),
+            models: stored_models(input, &parameters.fit)?,
+            normals: normals.as_ref(),
+            parameters: &parameters,
+        };
+        let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
+        let files = made.files(&Format::ALL, monitor);
+        let files = files.map_err(|error| match error {
+            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
+            error => WorkError::Failed(not_exportable(&error)),
+        })?;
+        Ok(WorkOutput {
+            summary: object(&ComparisonSummary::of(made.report())),
+            files: files.into_iter().map(OutputFile::from).collect(),
+        })
+    }
+
+    fn page_files(&self) -> &'static [&'static str] {
+        page::COMPARISON_FILES
+    }
+
+    fn page(&self, comparison: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
+        page::comparison_page(&|name| comparison.read(name), scan).map_err(|error| error.explain())
+    }
+}
