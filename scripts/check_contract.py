@@ -11,7 +11,7 @@
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
-import copy, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+import copy, csv, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
 
 import pydicom
 from jsonschema import Draft202012Validator
@@ -25,6 +25,7 @@ URL = os.environ["SERVICE_URL"]
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 DOCUMENT = os.path.join(ROOT, "openapi", "ventriform.json")
 EXAMPLES = os.path.join(ROOT, "crates", "http", "src", "openapi", "examples.json")
+PROGRAM = os.path.join(ROOT, "target", "debug", "ventriform")
 PROBLEM = "application/problem+json"
 
 # Problems that the walk cannot provoke, in the service's words.
@@ -59,13 +60,13 @@ class Contract:
         absolute = json.loads(json.dumps(document).replace('"#/components/', '"urn:document#/components/'))
         self.registries = []
         for exact in (False, True):
-            known = close(copy.deepcopy(absolute)) if exact else absolute
+            known = close(copy.deepcopy(absolute), absolute) if exact else absolute
             resource = Resource(contents=known, specification=DRAFT202012)
             self.registries.append(Registry().with_resource("urn:document", resource).crawl())
 
     def errors(self, schema, value, exact):
         schema = json.loads(json.dumps(schema).replace('"#/components/', '"urn:document#/components/'))
-        validator = Draft202012Validator(close(schema) if exact else schema, registry=self.registries[exact])
+        validator = Draft202012Validator(close(schema, self.document) if exact else schema, registry=self.registries[exact])
         return [f"{'/'.join(map(str, e.absolute_path))}: {e.message[:200]}" for e in validator.iter_errors(value)]
 
     def operations(self):
@@ -75,17 +76,29 @@ class Contract:
                     yield path, method, operation
 
 
-def close(schema):
+def close(schema, document):
     """The schema with every object closed against fields that it does not name."""
     if isinstance(schema, dict):
+        merge(schema, document)
         if "properties" in schema and "additionalProperties" not in schema:
             schema["additionalProperties"] = False
         for value in schema.values():
-            close(value)
+            close(value, document)
     elif isinstance(schema, list):
         for value in schema:
-            close(value)
+            close(value, document)
     return schema
+
+
+def merge(schema, document):
+    """One object in place of `allOf` of several, each of which would refuse the fields of the others."""
+    for part in schema.pop("allOf", []):
+        if "$ref" in part:
+            part = document["components"]["schemas"][part["$ref"].split("/")[-1]]
+        part = copy.deepcopy(part)
+        schema.setdefault("properties", {}).update(part.pop("properties", {}))
+        schema.setdefault("required", []).extend(part.pop("required", []))
+        schema.update({name: value for name, value in part.items() if name not in schema})
 
 
 def short(value, most=6, keep=4):
@@ -179,6 +192,59 @@ def event(walk, job):
     walk.recorded["operations"]["follow_job"] = {
         "parameters": {"id": job["id"]}, "200": {"text/event-stream": fields}}
     walk.seen.add("follow_job")
+
+
+def limits(walk, folder):
+    """Normal limits of simulated people, built of stored volumes, added again as a file."""
+    call, cases = walk.call, []
+    healthy = os.path.join(folder, "healthy")
+    subprocess.run([PROGRAM, "phantom", "--normal", "--cases", "14", "-o", healthy], check=True, capture_output=True)
+    for row in csv.DictReader(open(os.path.join(healthy, "cohort.csv"))):
+        request = urllib.request.Request(f"{URL}/v1/volumes", data=open(os.path.join(healthy, row["file"]), "rb").read(),
+                                         headers={"content-type": "application/octet-stream"}, method="POST")
+        stored = json.load(urllib.request.urlopen(request))
+        told = {name: row[name] for name in ("case", "sex", "protocol", "tracer")}
+        cases.append({**told, "volume": stored["id"], "attenuation_corrected": row["attenuation_corrected"] == "yes",
+                      "healthy": row["healthy"] == "yes"})
+    order = {"name": "simulated", "cases": cases, "parameters": {"mixed": True}}
+    _, job = call("post", "/v1/normals", expect=202, body=order)
+    order["cases"] = cases[:2]
+    walk.recorded["operations"]["create_normals"]["request"]["application/json"] = order
+    normals = wait(walk, job)["normals"]
+    file = json.loads(urllib.request.urlopen(f"{URL}/v1/normals/{normals}/normals.json").read())
+    request = walk.recorded["operations"]["create_normals"]["request"]
+    # As a file of its own the limits have another id.
+    _, added = call("post", "/v1/normals", expect=201, query="?name=copy", body=file)
+    call("post", "/v1/normals", expect=200, query="?name=copy", body=file)
+    walk.recorded["operations"]["create_normals"]["request"] = request
+    call("delete", "/v1/normals/{id}", expect=204, id=added["id"])
+    call("get", "/v1/normals", expect=200)
+    return normals
+
+
+def rest_and_stress(walk, folder, rest, normals):
+    """A comparison of a scan with one that has a defect."""
+    stress = os.path.join(folder, "stress")
+    defect = ["--defect", "7:0.6", "--defect", "8:0.6", "--defect", "13:0.6", "--defect", "14:0.6"]
+    subprocess.run([PROGRAM, "phantom", "-o", stress, "--size", "64", "--spacing", "6.4", "--seed", "2", *defect],
+                   check=True, capture_output=True)
+    call = walk.call
+    octets = {"content-type": "application/octet-stream"}
+    scan = open(os.path.join(stress, "spect.nii.gz"), "rb").read()
+    request = urllib.request.Request(f"{URL}/v1/volumes", data=scan, headers=octets, method="POST")
+    stored = json.load(urllib.request.urlopen(request))
+    stated = {"patient_id": "4711", "patient_name": "Doe^Jane", "study_uid": "1.2.840.99999.1.2", "accession_number": "A18"}
+    call("put", "/v1/volumes/{id}/identity", expect=200, id=stored["id"], body=stated)
+    # The only protocol of the limits has neither word in its name.
+    protocol = json.load(urllib.request.urlopen(f"{URL}/v1/normals/{normals}"))["summary"]["groups"][0]["protocol"]
+    parameters = {"sex": "F", "stress_protocol": protocol, "rest_protocol": protocol}
+    order = {"stress": stored["id"], "rest": rest, "normals": normals, "parameters": parameters}
+    _, job = call("post", "/v1/comparisons", expect=202, body=order)
+    comparison = wait(walk, job)["comparison"]
+    waiting = {"prefer": "wait=60", "accept": "application/json"}
+    call("post", "/v1/comparisons", expect=200, body=order, headers=waiting)
+    call("get", "/v1/comparisons", expect=200)
+    return comparison
 
 
 def workitems(walk):
@@ -279,9 +345,17 @@ def everything(walk, folder):
     call("put", "/v1/volumes/{id}/identity", expect=200, id=job["volume"], body=stated)
     call("post", "/v1/beats", expect=200, query="?mass_g=130", body=gated,
          headers={**octets, "prefer": "wait=60", "accept": "application/json"})
-    call("get", "/v1/beats", expect=200)
     for file in ("mesh_gate01.json", "labels_gate01.nii.gz"):
         call("get", "/v1/beats/{id}/{file}", expect=200, id=beat, file=file)
+    normals = limits(walk, folder)
+    scored = f"?normals={normals}&sex=F"
+    body, kind = form({"volume": scan, "expert": truth})
+    _, job = call("post", "/v1/segmentations", expect=202, query=scored, body=body, headers={"content-type": kind})
+    segmentation = wait(walk, job)["segmentation"]
+    _, job = call("post", "/v1/beats", expect=202, query=scored + "&mass_g=130", body=gated, headers=octets)
+    beat = wait(walk, job)["beat"]
+    call("get", "/v1/beats", expect=200)
+    comparison = rest_and_stress(walk, folder, volume["id"], normals)
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
     walk.recorded["operations"]["create_template"].pop("request")
@@ -296,9 +370,10 @@ def everything(walk, folder):
     call("post", "/v1/readers", expect=200, query="?name=first", body=profile)
     call("get", "/v1/readers", expect=200)
 
-    of_kind = {"models": model, "segmentations": segmentation, "beats": beat, "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
+    of_kind = {"models": model, "segmentations": segmentation, "beats": beat, "comparisons": comparison, "normals": normals,
+               "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
     for template, item in walk.contract.document["paths"].items():
-        found = re.match(r"/v1/(models|segmentations|beats|templates|readers|volumes)/\{id\}(/.*)?$", template)
+        found = re.match(r"/v1/(models|segmentations|beats|comparisons|normals|templates|readers|volumes)/\{id\}(/.*)?$", template)
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
             cut = "mesh" not in template or "models" not in template
@@ -481,8 +556,7 @@ def main():
     names = [operation["operationId"] for _, _, operation in contract.operations()]
     failures = [f"operationId {name} is not unique" for name in set(names) if names.count(name) > 1]
     folder = os.environ["SERVICE_DATA"] + "/phantom"
-    program = os.path.join(ROOT, "target", "debug", "ventriform")
-    subprocess.run([program, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
+    subprocess.run([PROGRAM, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
                    check=True, capture_output=True)
     walk = Walk(contract)
     everything(walk, folder)

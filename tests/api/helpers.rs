@@ -472,6 +472,10 @@ impl UploadReader for FakeReader {
     fn profile(&self, profile: &[u8]) -> Result<WorkOutput, Failure> {
         self.0.profile(profile)
     }
+
+    fn normals(&self, limits: &[u8]) -> Result<WorkOutput, Failure> {
+        self.0.normals(limits)
+    }
 }
 
 struct FakeWork(Arc<dyn Work>);
@@ -491,6 +495,14 @@ impl Work for FakeWork {
 
     fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
         self.0.check_parameters(given)
+    }
+
+    fn check_order(
+        &self,
+        volume: Option<&str>,
+        parameters: &Map<String, Value>,
+    ) -> Result<(), Failure> {
+        self.0.check_order(volume, parameters)
     }
 
     fn page_files(&self) -> &'static [&'static str] {
@@ -528,8 +540,21 @@ impl Work for FakeWork {
             });
             output.summary.insert("seen".into(), seen);
         }
+        if self.makes() == Resource::Comparison {
+            let rename = |file| name_as(file, "mesh_stress", "comparison.json");
+            output.files.iter_mut().for_each(rename);
+        }
+        if self.makes() == Resource::Normals {
+            output.files.clear();
+            output.files.push(OutputFile {
+                name: "normals.json".into(),
+                media_type: "application/json".into(),
+                bytes: b"{}".to_vec(),
+            });
+        }
         if self.makes() == Resource::Beat {
-            output.files.iter_mut().for_each(name_as_of_beat);
+            let rename = |file| name_as(file, "mesh_ed", "beat.json");
+            output.files.iter_mut().for_each(rename);
             output.files.push(OutputFile {
                 name: "labels_gate01.nii.gz".into(),
                 media_type: "application/gzip".into(),
@@ -544,18 +569,18 @@ impl Work for FakeWork {
         stored: &StoredItem,
         _scan: &serde_json::Map<String, serde_json::Value>,
     ) -> Result<String, Failure> {
-        let mut names = ["report.json", "beat.json"].into_iter();
+        let mut names = ["report.json", "beat.json", "comparison.json"].into_iter();
         let report = names.find_map(|name| stored.read(name).unwrap()).unwrap();
         let report = String::from_utf8(report).unwrap();
         Ok(format!("<!doctype html><title>report</title>{report}"))
     }
 }
 
-/// The mesh of a model as that of end diastole, and its report as that of a beat.
-fn name_as_of_beat(file: &mut OutputFile) {
+/// Renames the mesh of a model and its report.
+fn name_as(file: &mut OutputFile, mesh: &str, report: &str) {
     file.name = match file.name.strip_prefix("mesh.") {
-        Some(extension) => format!("mesh_ed.{extension}"),
-        None => "beat.json".into(),
+        Some(extension) => format!("{mesh}.{extension}"),
+        None => report.into(),
     };
 }
 

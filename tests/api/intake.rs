@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform::geometry::Vec3;
@@ -280,6 +281,84 @@ async fn a_rule_makes_a_beat_of_a_gated_series_and_a_segmentation_of_another() {
         for (name, value) in parameter.as_object().unwrap() {
             assert_eq!(&job["parameters"][name], value, "{job}");
         }
+    }
+}
+
+/// Whichever comes first; of several scans at rest the one that was made as that at stress.
+#[tokio::test(flavor = "multi_thread")]
+async fn two_series_of_a_study_one_at_stress_and_one_at_rest_become_one_comparison() {
+    let rules = r#"[{ modality = "NM", kind = "comparison", stress = "belastet", rest = "vorher", parameters = { gated = false } }]"#;
+    let shape = [4, 4, 3];
+    let volume = Volume {
+        shape,
+        voxels: (0..48u8).map(f32::from).collect(),
+        frame: VoxelToPatient::centred(shape, [4.0; 3], Vec3::zeros()).unwrap(),
+        integral: true,
+    };
+    let single = || Object::of_nm(&nm_of(&JANE, &[&volume]));
+    let gated = || Object::of_nm(&nm_of(&JANE, &[&volume; 8]));
+    let stress = || single().in_series(1, "TOMO belastet");
+    let rest = || single().in_series(2, "TOMO vorher");
+    for order in [[stress(), rest()], [rest(), stress()]] {
+        let (app, address) = service(|settings| settings.rules = rules.parse().unwrap()).await;
+        // By their headers alone; a gated one, and one of which nothing says what it is, are no partner.
+        let others = [
+            gated().in_series(3, "GATED vorher"),
+            single().in_series(4, "TOMO"),
+        ];
+        for object in others {
+            let mut scu = Scu::open(address);
+            assert_eq!(scu.store(&object), 0);
+            scu.release();
+        }
+        let groups = settled(&app, 2).await;
+        assert!(groups.iter().all(|group| group["job"].is_null()));
+        let unknown: Vec<&Value> =
+            (groups.iter().filter(|group| !group["error"].is_null())).collect();
+        assert_eq!(unknown.len(), 1, "{groups:?}");
+        assert!(text(&unknown[0]["error"]["type"]).ends_with("rest-or-stress"));
+        for (object, known) in order.iter().zip([3, 4]) {
+            let mut scu = Scu::open(address);
+            assert_eq!(scu.store(object), 0);
+            scu.release();
+            settled(&app, known).await;
+        }
+        let groups = settled(&app, 4).await;
+        let of = |object: &Object| {
+            let series = object.set.element_by_name("SeriesInstanceUID").unwrap();
+            let series = series.to_str().unwrap().into_owned();
+            let mut groups = groups.iter();
+            groups
+                .find(|group| group["series"] == series.as_str())
+                .unwrap()
+        };
+        let jobs = app.json("/v1/jobs?kind=comparison").await;
+        let jobs = jobs["jobs"].as_array().unwrap().clone();
+        let pair = |job: &&Value| {
+            job["volume"] == of(&stress())["volume"]
+                && job["parameters"]["rest"] == of(&rest())["volume"]
+        };
+        assert_eq!(jobs.iter().filter(pair).count(), 1, "{jobs:?}");
+    }
+    for (rules, wrong) in [
+        (r#"[{ kind = "beat", rest = "r" }]"#, "its kind is `beat`"),
+        (r#"[{ kind = "normals" }]"#, "cases"),
+    ] {
+        let data = tempfile::tempdir().unwrap();
+        let run = Command::new(env!("CARGO_BIN_EXE_ventriform"))
+            .args([
+                "serve",
+                "--listen",
+                "127.0.0.1:0",
+                "--rules",
+                rules,
+                "--data-dir",
+            ])
+            .arg(data.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(!run.status.success() && said.contains(wrong), "{said}");
     }
 }
 

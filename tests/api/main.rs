@@ -17,6 +17,7 @@ mod blobs;
 mod bombs;
 mod canary;
 mod command;
+mod comparisons;
 mod config;
 mod contract;
 mod dicom;

@@ -3,7 +3,9 @@
 use crate::helpers::{TestApp, text};
 use serde_json::{Value, json};
 use std::path::Path;
-use ventriform::parameters::{BEAT_SPECS, FIT_SPECS, GatedParameters, SPECS};
+use ventriform::parameters::{
+    BEAT_SPECS, COMPARISON_SPECS, ComparisonParameters, FIT_SPECS, GatedParameters, SPECS,
+};
 use ventriform_http::document_json;
 
 /// If set, the test writes the document instead of comparing it.
@@ -42,8 +44,13 @@ fn every_parameter_of_a_job_is_documented_twice() {
         .map(|spec| spec.name)
         .chain(BEAT_SPECS.iter().map(|spec| spec.name))
         .collect();
+    let comparison: Vec<_> = ComparisonParameters::fit_specs()
+        .map(|spec| spec.name)
+        .chain(COMPARISON_SPECS.iter().map(|spec| spec.name))
+        .collect();
     for (path, schema, names) in [
         ("/v1/beats", "BeatParameters", beat),
+        ("/v1/comparisons", "ComparisonParameters", comparison),
         ("/v1/models", "ModelParameters", model),
         ("/v1/segmentations", "SegmentationParameters", fit),
     ] {
@@ -173,8 +180,13 @@ async fn every_operation_refuses_unknown_repeated_and_malformed_parameters() {
             let problem: Value = answer.json().await.unwrap_or_default();
             let what = format!("{method} {path}?{query}: {status} {problem}");
             // The parameters of a job are checked by its work, for JSON and forms alike.
-            let of_job =
-                ["/v1/models", "/v1/segmentations", "/v1/beats"].contains(&path) && status == 422;
+            let with_parameters = [
+                "/v1/models",
+                "/v1/segmentations",
+                "/v1/beats",
+                "/v1/comparisons",
+            ];
+            let of_job = with_parameters.contains(&path) && status == 422;
             assert!(
                 of_job || status == 400 && text(&problem["type"]).contains(code),
                 "{what}"
@@ -211,6 +223,11 @@ fn bytes_are_binary_and_reports_are_typed() {
         ("/v1/segmentations/{id}/report", "SegmentationReport"),
         ("/v1/beats/{id}/report", "BeatReport"),
         ("/v1/beats/{id}/beat.json", "BeatReport"),
+        ("/v1/comparisons/{id}/report", "ComparisonReport"),
+        ("/v1/comparisons/{id}/comparison.json", "ComparisonReport"),
+        ("/v1/comparisons/{id}/polar_rest.json", "PolarMap"),
+        ("/v1/comparisons/{id}/polar_z_rest.json", "PolarFigure"),
+        ("/v1/normals/{id}/normals.json", "NormalLimits"),
         ("/v1/segmentations/{id}/polar.json", "PolarMap"),
     ] {
         let reference = text(&schema(path, "application/json")["$ref"]);

@@ -55,7 +55,7 @@ async fn the_start_page_is_html_for_browsers_and_text_for_curl() {
         text.lines()
             .filter(|line| line.contains("curl -fsS"))
             .count(),
-        7
+        8
     );
     assert!(text.contains(&app.url));
 }

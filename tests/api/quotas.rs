@@ -115,6 +115,15 @@ async fn no_way_in_goes_round_the_quota_of_bytes() {
         ("model", upload("/v1/models")),
         ("segmentation", upload("/v1/segmentations")),
         ("beat", upload("/v1/beats")),
+        (
+            "comparison",
+            app.post("/v1/comparisons")
+                .json(&json!({"stress": id, "rest": "vol_00"})),
+        ),
+        (
+            "normals",
+            app.post("/v1/normals").json(&json!({"cases": []})),
+        ),
         ("job", app.post("/v1/jobs").json(&json!({"volume": id}))),
         ("fetch", app.post("/v1/jobs").json(&order)),
         ("template", json_body("/v1/templates?organ=generic", mesh)),

@@ -142,6 +142,19 @@ impl Object {
         }
     }
 
+    /// The object as another of the same study: another instance and series, with that description.
+    pub fn in_series(mut self, number: u8, description: &str) -> Self {
+        let [instance, series] = ["SOPInstanceUID", "SeriesInstanceUID"].map(|name| {
+            let uid = self.set.element_by_name(name).unwrap();
+            let uid = uid.to_str().unwrap().into_owned();
+            format!("{}.{number}", uid.trim_end_matches('\0'))
+        });
+        put(&mut self.set, (0x08, 0x18), VR::UI, instance.as_str());
+        put(&mut self.set, (0x20, 0x0e), VR::UI, series.as_str());
+        put(&mut self.set, (0x08, 0x103e), VR::LO, description);
+        Self { instance, ..self }
+    }
+
     /// The object as a file.
     pub fn file(&self) -> Vec<u8> {
         let start = ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT);

@@ -119,6 +119,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "model",
             "deform",
             "polar",
+            "normals",
         ],
     ),
     (
@@ -149,7 +150,16 @@ const LIBRARY: &[(&str, &[&str])] = &[
     (
         "export",
         &[
-            "text", "geometry", "numeric", "mesh", "progress", "grid", "volume", "polar", "report",
+            "text",
+            "geometry",
+            "numeric",
+            "mesh",
+            "progress",
+            "grid",
+            "volume",
+            "polar",
+            "comparison",
+            "report",
         ],
     ),
     (
@@ -214,9 +224,16 @@ const LIBRARY: &[(&str, &[&str])] = &[
     (
         "rest_stress",
         &[
+            "geometry",
             "numeric",
+            "mesh",
             "progress",
+            "grid",
+            "draw",
             "volume",
+            "locate",
+            "export",
+            "model",
             "polar",
             "normals",
             "comparison",
@@ -336,10 +353,11 @@ const SERVICE: &[(&str, &[&str])] = &[
             "records", "error", "items", "access", "quotas", "decoding", "service",
         ],
     ),
+    ("pairs", &["records", "intake", "work"]),
     (
         "rules",
         &[
-            "records", "error", "client", "intake", "service", "filing", "uploads",
+            "records", "error", "client", "intake", "service", "filing", "uploads", "pairs",
         ],
     ),
     (

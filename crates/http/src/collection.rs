@@ -81,6 +81,7 @@ pub trait Collection: 'static {
 /// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
 pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     let (noun, plural) = (C::RESOURCE.noun(), C::RESOURCE.plural());
+    let label = C::RESOURCE.label();
     let operation = |method, path: &str, id, summary| {
         Documented::new(method, format!("/v1/{plural}{path}"), plural, id, summary)
     };
@@ -103,25 +104,25 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
         HttpMethod::Get,
         "/{id}",
         format!("get_{noun}"),
-        format!("Show a {noun}"),
+        format!("Show a {label}"),
     )
-    .id(noun)
+    .id(label)
     .parameters::<CachedHeaders>()
-    .json::<C::Body>(&format!("The {noun}"))
+    .json::<C::Body>(&format!("The {label}"))
     .answers::<UnchangedAnswer>()
     .answers::<LookupProblems>();
     let mut erasure = operation(
         HttpMethod::Delete,
         "/{id}",
         format!("delete_{noun}"),
-        format!("Erase a {noun}"),
+        format!("Erase a {label}"),
     )
     .description(
         "Refused while an unfinished job needs it or a legal hold keeps it. Every erasure leaves a \
          receipt, at the path in `Location`; `Prefer: return=representation` asks for it in the \
          answer.",
     )
-    .id(noun)
+    .id(label)
     .parameters::<ErasureHeader>()
     .json::<ReceiptBody>("Erased; the receipt")
     .empty_answer("204", "Erased")

@@ -156,7 +156,7 @@ fn path(id: &str) -> String {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct CascadeQuery {
-    /// Whether to erase also the models, segmentations, beats and templates that were made of the volume, and the records of its jobs
+    /// Whether to erase also the models, segmentations, beats, comparisons and templates that were made of the volume, and the records of its jobs
     #[param(default = false)]
     pub cascade: Option<bool>,
 }
@@ -212,10 +212,10 @@ pub async fn erase(
         Erased::InUse => Err(Problem::new(
             StatusCode::CONFLICT,
             "in-use",
-            format!("An unfinished job needs this {}.", kind.noun()),
+            format!("An unfinished job needs this {}.", kind.label()),
         )
         .fix("Wait for the job to end, or DELETE it; GET /v1/jobs lists the jobs.")),
-        Erased::OnHold { id } => Err(on_hold(&id, kind.noun())),
+        Erased::OnHold { id } => Err(on_hold(&id, kind.label())),
     }
 }
 

@@ -178,6 +178,8 @@ The wall of the ventricle as mask.nii.gz, found with the best model of the libra
   curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' '{url}/v1/segmentations?model=auto' -o mask.nii.gz
 Volumes, ejection fraction and motion of the wall of a gated study:
   curl -fsS --data-binary @gated.nii.gz -H 'Prefer: wait=60' '{url}/v1/beats' -o beat.json
+Rest and stress of one patient, compared:
+  curl -fsS -F stress=@stress.dcm -F rest=@rest.dcm -H 'Prefer: wait=60' '{url}/v1/comparisons' -o comparison.json
 The jobs and their progress:
   curl -fsS '{url}/v1/jobs'
 Stored models, segmentations and beats:

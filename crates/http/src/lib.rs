@@ -7,7 +7,7 @@
 //! | content | where |
 //! |---|---|
 //! | the paths, the layers around them | [`router`] |
-//! | uploads, jobs, results | [`volumes`], [`volume_download`], [`jobs`], [`models`], [`segmentations`], [`beats`], [`templates`], [`readers`] |
+//! | uploads, jobs, results | [`volumes`], [`volume_download`], [`jobs`], [`models`], [`segmentations`], [`beats`], [`comparisons`], [`normals`], [`templates`], [`readers`] |
 //! | webhooks and their deliveries | [`webhooks`], [`webhook_request`] |
 //! | common parts of them | [`collection`] (list, show, erase), [`products`] (meshes, reports, files), [`files`] (ranges, validators), [`validators`] (of JSON), [`response_cache`] |
 //! | who may do what, and the record of it | [`guard`] (before every handler), [`caller`], [`quota`], [`keys`], [`audit`] |
@@ -36,6 +36,7 @@ mod beats;
 pub mod caller;
 mod client;
 mod collection;
+mod comparisons;
 mod connections;
 mod cryptography;
 mod document;
@@ -56,6 +57,7 @@ mod links;
 mod memory;
 mod models;
 mod negotiate;
+mod normals;
 mod observe;
 mod openapi;
 mod pagination;

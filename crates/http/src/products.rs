@@ -1,4 +1,4 @@
-//! The common routes of models, segmentations, beats and templates beside being [`Collection`]s: a mesh
+//! The common routes of models, segmentations, beats, comparisons, limits and templates beside being [`Collection`]s: a mesh
 //! in several formats, files that can be downloaded, and perhaps a report.
 //!
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
@@ -143,14 +143,15 @@ impl Presented {
 /// `GET /v1/{plural}/{id}/report` if there are reports.
 pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
+    let label = P::RESOURCE.label();
     let download = |path: &str, id: &str, summary: String| {
         let path = format!("/v1/{plural}/{{id}}/{path}");
-        Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(noun)
+        Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(label)
     };
     let mesh = download(
         "mesh",
         &format!("get_{noun}_mesh"),
-        format!("Download a {noun}'s mesh"),
+        format!("Download a {label}'s mesh"),
     )
     .description(match P::MESH {
         "mesh" => "In the format that `Accept` asks for; GLB if it allows any.".to_owned(),
@@ -162,7 +163,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     let mut file = download(
         "{file}",
         &format!("get_{noun}_file"),
-        format!("Download one of a {noun}'s files"),
+        format!("Download one of a {label}'s files"),
     )
     .description(P::FILE_HELP);
     let names = file.refer::<FileNames<P>>();
@@ -191,7 +192,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         let report = download(
             "report",
             &format!("get_{noun}_report"),
-            format!("Read a {noun}'s report"),
+            format!("Read a {label}'s report"),
         )
         .parameters::<ConditionalHeaders>();
         let report = if P::FILES.contains(&files::REPORT_PAGE) {
@@ -600,7 +601,7 @@ async fn send_object(
     } else {
         None
     };
-    let memory = dicom::object_memory(UploadFacts::of(&result.volume)?.shape);
+    let memory = dicom::object_memory(UploadFacts::of(&result.source.volume)?.shape);
     let limits = app.service.engine.limits;
     let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
     let made = app

@@ -10,6 +10,7 @@ use axum::http::{HeaderMap, header};
 use futures::StreamExt;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
+use std::sync::LazyLock;
 use ventriform::parameters::nearest;
 
 /// Segments of the path, as [`axum::extract::Path`] reads them, but refused with a problem object.
@@ -89,6 +90,9 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
     let (mut bytes, mut charged) = (Vec::new(), UNCHARGED_BYTES);
     while let Some(piece) = pieces.next().await {
         let piece = piece.map_err(|error| body::interrupted(&error, limits.size))?;
+        if bytes.len() + piece.len() > limits.size.as_usize() {
+            return Err(body::too_large(limits.size));
+        }
         while bytes.len() + piece.len() > charged {
             // A vector that grows has up to twice as much.
             charge(2 * CHARGED_AT_ONCE as u64).await?;
@@ -125,6 +129,22 @@ pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
     object(&json_bytes(request).await?).await
 }
 
+/// The object in the field `parameters` of a JSON object; empty if it has none.
+///
+/// # Errors
+/// 422 if it is another value.
+pub fn parameters_of(object: &Map<String, Value>) -> Answer<&Map<String, Value>> {
+    static EMPTY: LazyLock<Map<String, Value>> = LazyLock::new(Map::new);
+    match object.get("parameters") {
+        None => Ok(&EMPTY),
+        Some(Value::Object(parameters)) => Ok(parameters),
+        Some(_) => Err(
+            Problem::invalid_field("parameters", "`parameters` must be a JSON object.")
+                .fix("Give an object such as {\"points\": 150}."),
+        ),
+    }
+}
+
 /// The JSON merge patch (RFC 7396) in a request's body.
 ///
 /// # Errors
@@ -136,6 +156,14 @@ pub async fn merge_patch(request: Request) -> Answer<Map<String, Value>> {
 
 async fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
     charge_parsed(bytes).await?;
+    object_of(bytes)
+}
+
+/// The JSON object in these bytes, for which the caller has charged.
+///
+/// # Errors
+/// 400 if they are not one JSON object.
+pub fn object_of(bytes: &[u8]) -> Answer<Map<String, Value>> {
     match serde_json::from_slice(bytes) {
         Ok(Value::Object(object)) => Ok(object),
         Ok(_) => Err(body::malformed_json("it is another JSON value")),

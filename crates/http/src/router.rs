@@ -2,10 +2,12 @@
 
 use super::app::App;
 use super::beats::Beats;
+use super::comparisons::Comparisons;
 use super::document::PublishedDocuments;
 use super::guard::{self, hosts, pages};
 use super::limits::BodyLimits;
 use super::models::Models;
+use super::normals::{NORMALS_SIZE, Normals};
 use super::observe::{self, REQUEST_ID};
 use super::openapi::{self, DocumentFrame};
 use super::problem::not_found::no_such_path;
@@ -15,9 +17,9 @@ use super::segmentations::Segmentations;
 use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
-    audit, beats, collection, erasures, front_page, health, idempotency, identities, intake_status,
-    jobs, keys, legal_hold, models, products, readers, segmentations, stow, templates,
-    volume_download, volumes, voxels, webhook_request, webhooks, workitems,
+    audit, beats, collection, comparisons, erasures, front_page, health, idempotency, identities,
+    intake_status, jobs, keys, legal_hold, models, normals, products, readers, segmentations, stow,
+    templates, volume_download, volumes, voxels, webhook_request, webhooks, workitems,
 };
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -44,16 +46,20 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         collection::routes::<Models>().to_vec(),
         collection::routes::<Segmentations>().to_vec(),
         collection::routes::<Beats>().to_vec(),
+        collection::routes::<Comparisons>().to_vec(),
+        collection::routes::<Normals>().to_vec(),
         collection::routes::<Templates>().to_vec(),
         collection::routes::<Readers>().to_vec(),
         // GET /v1/KINDS/{id}/mesh, .../report and .../{file}
         products::routes::<Models>(),
         products::routes::<Segmentations>(),
         products::routes::<Beats>(),
+        products::routes::<Comparisons>(),
+        products::routes::<Normals>(),
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 39] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 41] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
@@ -69,6 +75,8 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(models::create_model).layer(upload()),
         routes!(segmentations::create_segmentation).layer(upload()),
         routes!(beats::create_beat).layer(upload()),
+        routes!(comparisons::create_comparison).layer(upload()),
+        routes!(normals::create_normals).layer(json(NORMALS_SIZE)),
         routes!(templates::create_template).layer(json(MESH_SIZE)),
         routes!(readers::create_reader).layer(json(PROFILE_SIZE)),
         routes!(templates::update_template).layer(json(settings.json_limit)),

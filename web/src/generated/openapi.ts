@@ -126,6 +126,44 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
+        /** @description What changed of the beat from rest to stress. */
+        BeatChange: {
+            /**
+             * Format: double
+             * @description Change from rest to stress, points.
+             */
+            ef_change_points?: number | null;
+            /**
+             * Format: double
+             * @description End-diastolic volume at rest.
+             */
+            rest_edv_ml: number;
+            /**
+             * Format: double
+             * @description Ejection fraction at rest.
+             */
+            rest_ef_percent?: number | null;
+            /**
+             * Format: double
+             * @description End-systolic volume at rest.
+             */
+            rest_esv_ml: number;
+            /**
+             * Format: double
+             * @description End-diastolic volume at stress, ml.
+             */
+            stress_edv_ml: number;
+            /**
+             * Format: double
+             * @description Ejection fraction at stress, per cent; `null` if the gates are no beat.
+             */
+            stress_ef_percent?: number | null;
+            /**
+             * Format: double
+             * @description End-systolic volume at stress.
+             */
+            stress_esv_ml: number;
+        };
         /** @description A signing secret. */
         WebhookSecret: {
             /**
@@ -169,6 +207,11 @@ export interface components {
         BeatParameters: {
             /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
             anterior?: number[];
+            /**
+             * @description Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: what a DICOM header says
+             * @enum {string}
+             */
+            attenuation_corrected?: "yes" | "no";
             /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
             axis?: number[];
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
@@ -234,6 +277,8 @@ export interface components {
              * @default 0.85
              */
             narrowing?: number;
+            /** @description Id of normal limits to compare the wall's uptake with */
+            normals?: string;
             /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
@@ -255,6 +300,11 @@ export interface components {
              * @default 0.6
              */
             polar_threshold?: number;
+            /**
+             * @description The scan's protocol, as the normal limits name it. Default: the only one that they have
+             * @example rest
+             */
+            protocol?: string;
             /**
              * @description Initial search range of the sensors, millimetres to either side
              * @default 10
@@ -279,6 +329,11 @@ export interface components {
              * @enum {string}
              */
             sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header
+             * @enum {string}
+             */
+            sex?: "F" | "M";
             /**
              * @description Stiffness that keeps the length of edges, square millimetres
              * @default 2.5
@@ -311,6 +366,11 @@ export interface components {
              * @default 7.5
              */
             torsion_stiffness?: number;
+            /**
+             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @example Tc-99m tetrofosmin
+             */
+            tracer?: string;
         };
         /** @description The report of a beat. Volumes are millilitres, lengths millimetres, angles degrees of the cycle. */
         BeatReport: {
@@ -526,6 +586,556 @@ export interface components {
              * @description Parts that each side of a triangle is cut into.
              */
             parts: number;
+        };
+        /** @description A row of a cohort's table whose scan a service stores. */
+        CohortCase: {
+            /** @description Whether attenuation was corrected. */
+            attenuation_corrected: boolean;
+            /**
+             * @description Its name, once in the table; not a person's, as the limits repeat it.
+             * @example n01
+             */
+            case: string;
+            /**
+             * @description Whether the person is healthy. Others are left out, unless they are the scan at rest of a healthy one.
+             * @default true
+             */
+            healthy?: boolean;
+            /**
+             * @description Kind of stress or rest, camera and filter, in words: people of one group have the same.
+             * @example rest
+             */
+            protocol: string;
+            /** @description Of a scan at stress, the case that is the same person at rest. */
+            rest_case?: string | null;
+            /** @description The person's sex. */
+            sex: components["schemas"]["Sex"];
+            /**
+             * @description The tracer; `simulated` in it marks the limits as simulated.
+             * @example Tc-99m tetrofosmin
+             */
+            tracer: string;
+            /** @description Id of the volume; gates of one beat for figures of beats. */
+            volume: string;
+        };
+        CohortRequest: {
+            /** @description The scans of the cohort, and what is known of each */
+            cases: components["schemas"]["CohortCase"][];
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            /** @description The name of the limits; not a person's */
+            name?: string;
+            parameters?: components["schemas"]["NormalsFitParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description One of both scans. */
+        ComparedScan: {
+            /** @description Whether attenuation was corrected; `null` where the header does not say. */
+            attenuation_corrected?: boolean | null;
+            /**
+             * Format: double
+             * @description Volume of the cavity of the anatomical wall.
+             */
+            cavity_ml: number;
+            /**
+             * Format: double
+             * @description Confidence of the fit, 0..=1.
+             */
+            confidence: number;
+            /** @description Total dose as the header has it. */
+            injected_dose?: string | null;
+            /** @description The file. */
+            input: components["schemas"]["FileFacts"];
+            long_axis?: components["schemas"]["LongAxis"] | null;
+            /**
+             * Format: double
+             * @description Volume of the anatomical wall's muscle.
+             */
+            muscle_ml: number;
+            perfusion?: components["schemas"]["Perfusion"] | null;
+            polar?: components["schemas"]["PolarSummary"] | null;
+            posture?: components["schemas"]["Posture"] | null;
+            /** @description The tracer, if the header names one. */
+            radiopharmaceutical?: string | null;
+            resolution_mm?: components["schemas"]["Resolution"] | null;
+            /** @description Series Description, if the header has one. */
+            series_description?: string | null;
+            /** @description The model that was fitted. */
+            template: string;
+            /** @description Warnings about the file. */
+            warnings: string[];
+        };
+        /** @description A segment at stress and at rest. */
+        ComparedSegment: components["schemas"]["UptakeChange"] & {
+            /**
+             * Format: double
+             * @description Change of motion from rest to stress, mm; `null` unless both scans are gated.
+             */
+            motion_change_mm?: number | null;
+            /** @description Its name. */
+            name: string;
+            /**
+             * Format: int32
+             * @description Score at rest.
+             */
+            rest_score?: number | null;
+            /**
+             * Format: int64
+             * @description Its number, 1 to 17.
+             */
+            segment: number;
+            /**
+             * Format: int32
+             * @description Score at stress, 0 to 4.
+             */
+            stress_score?: number | null;
+            /**
+             * Format: double
+             * @description Change of thickening from rest to stress, points.
+             */
+            thickening_change_points?: number | null;
+        };
+        /** @description The wall of an artery at stress and at rest. */
+        ComparedTerritory: components["schemas"]["UptakeChange"] & {
+            /** @description LAD, LCX or RCA. */
+            name: string;
+        };
+        /**
+         * @description A comparison: two scans of one patient, fitted by one model, with the main figures. Its volume is the scan at
+         *     stress, its parameter `rest` the one at rest.
+         */
+        Comparison: {
+            /**
+             * Format: date-time
+             * @description When it was made (RFC 3339).
+             */
+            created_at: string;
+            dicom?: components["schemas"]["ScanUids"] | null;
+            /**
+             * Format: date-time
+             * @description When it will be erased unless it is computed again (RFC 3339); absent if it is kept.
+             */
+            expires_at?: string | null;
+            /** @description Its files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant, volume, parameters and mesh, so it is the same on every machine.
+             * @example cmp_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["ComparisonLinks"];
+            /** @description The parameters used, including every default. */
+            parameters: components["schemas"]["ComparisonParameters"];
+            /** @description The program that made it. */
+            software: components["schemas"]["Software"];
+            /** @description Ratio of the cavities, summed scores, what is reversible and what fixed, and flags; the report has all figures. */
+            summary: components["schemas"]["ComparisonSummary"];
+            /** @description The volume it was made of. */
+            volume: string;
+        };
+        WebhookRequest: {
+            /** @description What to tell; the three ends of a job unless given */
+            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+            /**
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret?: string;
+            /**
+             * Format: uri
+             * @description Where to send deliveries: https, and a public host unless the operator allows it
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        ComparisonForm: {
+            /**
+             * Format: binary
+             * @description The scan at rest; several files make up one
+             */
+            rest?: string;
+            /**
+             * Format: binary
+             * @description The scan at stress; several files make up one
+             */
+            stress: string;
+        };
+        /** @description Paths of one comparison. */
+        ComparisonLinks: {
+            /** @description DICOM objects of the study of the scan at stress, for the archive. */
+            dicom: string[];
+            /** @description The wall at stress, in the format that `Accept` asks for. */
+            mesh: string;
+            /** @description The report as an HTML page. */
+            page: string;
+            /** @description The report. */
+            report: string;
+            /** @description The volume at rest. */
+            rest: string;
+            /** @description This comparison. */
+            self: string;
+            /** @description Slices of stress above those of rest. */
+            slices: string;
+            /** @description The volume at stress. */
+            stress: string;
+        };
+        /** @description A page of comparisons. */
+        ComparisonList: {
+            /** @description The comparisons, newest first. */
+            comparisons: components["schemas"]["Comparison"][];
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+        };
+        /** @description The parameters of a comparison */
+        ComparisonParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /**
+             * @description Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: what a DICOM header says
+             * @enum {string}
+             */
+            attenuation_corrected?: "yes" | "no";
+            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
+            base?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @default apparent
+             * @enum {string}
+             */
+            edge?: "apparent" | "anatomical";
+            /**
+             * @description Whether the volumes of both files are gates of one heart beat although their headers say otherwise
+             * @default false
+             */
+            gated?: boolean;
+            /**
+             * @description Name of the model whose fit is kept, of those that are fitted, as a report names its template: a correction by the position, the axis or the base then keeps its heart. Default: the one with the greatest confidence
+             * @example built-in usual
+             */
+            kept_model?: string;
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Id of the model to fit (a template, a model or an earlier segmentation), or auto: fits the built-in hearts, the templates flagged `library` and the models named after it (auto,tpl_12,mdl_34), and keeps the fit with the greatest confidence. Alternative name: template
+             * @default auto
+             */
+            model?: string;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /** @description Id of normal limits to compare the wall's uptake with */
+            normals?: string;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 3
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            resolution?: number;
+            /** @description Id of the volume with the scan at rest */
+            rest?: string;
+            /**
+             * @description The protocol of the scan at rest. Default: the only one with the word rest in its name
+             * @example rest
+             */
+            rest_protocol?: string;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /**
+             * @description Whether both scans are of one patient although their headers name two, as after pseudonymisation
+             * @default false
+             */
+            same_patient?: boolean;
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header
+             * @enum {string}
+             */
+            sex?: "F" | "M";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word stress in its name
+             * @example stress
+             */
+            stress_protocol?: string;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+            /**
+             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @example Tc-99m tetrofosmin
+             */
+            tracer?: string;
+        };
+        /** @description The report of a comparison of rest and stress. */
+        ComparisonReport: {
+            beat?: components["schemas"]["BeatChange"] | null;
+            /**
+             * Format: double
+             * @description Share of the wall with muscle in both scans.
+             */
+            compared_percent: number;
+            /**
+             * Format: double
+             * @description Correlation of both maps.
+             */
+            correlation: number;
+            /**
+             * Format: double
+             * @description Share of the wall below the threshold in both scans.
+             */
+            fixed_percent: number;
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /**
+             * Format: double
+             * @description Share of the wall by which stress was scaled.
+             */
+            matched_percent: number;
+            /** @description Every parameter, defaults written out. */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** @description The scan at rest. */
+            rest: components["schemas"]["ComparedScan"];
+            /**
+             * Format: double
+             * @description Share of the wall that loses more than `reversible_points` at stress.
+             */
+            reversible_percent: number;
+            /**
+             * Format: double
+             * @description Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two scans of an unchanged heart.
+             */
+            reversible_points: number;
+            /**
+             * Format: double
+             * @description Counts of the stress scan that are one count of the rest scan where nothing changed.
+             */
+            scale: number;
+            /**
+             * Format: int32
+             * @description Summed difference score: what the segments' scores at stress exceed those at rest by.
+             */
+            sds?: number | null;
+            /** @description The 17 segments. */
+            segments: components["schemas"]["ComparedSegment"][];
+            /**
+             * Format: int32
+             * @description Summed rest score.
+             */
+            srs?: number | null;
+            /**
+             * Format: int32
+             * @description Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
+             */
+            sss?: number | null;
+            /** @description The scan at stress. */
+            stress: components["schemas"]["ComparedScan"];
+            /** @description The summed scores in per cent of 68, in that order. */
+            summed_percent?: number[] | null;
+            /** @description The walls of the three arteries; none if the orientation is unknown. */
+            territories: components["schemas"]["ComparedTerritory"][];
+            /**
+             * Format: double
+             * @description Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
+             */
+            tid: number;
+            /**
+             * Format: double
+             * @description How far the stress map is turned against the rest map, degrees.
+             */
+            turn_degrees: number;
+        };
+        ComparisonRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            /** @description Normal limits by which both scans are scored */
+            normals?: string;
+            parameters?: components["schemas"]["ComparisonParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description The scan at rest */
+            rest: string;
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("measurements.dcm" | "page.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm")[];
+            /** @description The scan at stress: a volume, or the segmentation or beat of one */
+            stress: string;
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
+        /** @description The main figures of a comparison of rest and stress; the report has all. */
+        ComparisonSummary: {
+            /**
+             * Format: double
+             * @description The lesser confidence of both fits, 0 to 1.
+             */
+            confidence: number;
+            /**
+             * Format: double
+             * @description Change of the ejection fraction from rest to stress, points; `null` unless both scans are gated.
+             */
+            ef_change_points?: number | null;
+            /**
+             * Format: double
+             * @description Share of the wall below the threshold in both scans.
+             */
+            fixed_percent: number;
+            /** @description Reasons to look closer. */
+            flags: components["schemas"]["Flag"][];
+            /**
+             * Format: double
+             * @description Share of the wall that loses uptake at stress.
+             */
+            reversible_percent: number;
+            /**
+             * Format: int32
+             * @description Summed difference score.
+             */
+            sds?: number | null;
+            /**
+             * Format: int32
+             * @description Summed rest score.
+             */
+            srs?: number | null;
+            /**
+             * Format: int32
+             * @description Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
+             */
+            sss?: number | null;
+            /**
+             * Format: double
+             * @description Ratio of the cavities, stress to rest (transient ischaemic dilation).
+             */
+            tid: number;
         };
         /** @description A point of the volume curve. */
         CurvePoint: {
@@ -869,6 +1479,13 @@ export interface components {
              */
             unroundness: number;
         };
+        /** @description A case that is in no group. */
+        ExcludedCase: {
+            /** @description The name in the table. */
+            case: string;
+            /** @description Why. */
+            reason: string;
+        };
         /** @description A figure beside its limits. */
         FigureBeside: {
             /** @description Its name in the limits, with its unit. */
@@ -971,20 +1588,10 @@ export interface components {
             /** @description Oddities of the file that do not prevent its use. */
             warnings: string[];
         };
-        WebhookRequest: {
-            /** @description What to tell; the three ends of a job unless given */
-            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
-            /**
-             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
-             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
-             */
-            secret?: string;
-            /**
-             * Format: uri
-             * @description Where to send deliveries: https, and a public host unless the operator allows it
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
+        /** @description The registered receivers. */
+        WebhookList: {
+            /** @description The oldest first. */
+            webhooks: components["schemas"]["Webhook"][];
         };
         /** @description Figures of a fit, and the fitted model's pose. */
         Fit: {
@@ -1223,6 +1830,41 @@ export interface components {
              */
             rr_ms?: number | null;
         };
+        /** @description Limits of a figure of the whole heart, or of a segment. */
+        GlobalLimit: {
+            /** @description `cavity_ml`, `wall_ml`, `tid`, `ef_percent`, `edv_ml`, `esv_ml`, `phase_sd_degrees`, `phase_bandwidth_degrees`, `motion_mm` or `thickening_percent`. */
+            figure: string;
+            /**
+             * Format: double
+             * @description Quantile of 97.5 per cent.
+             */
+            high: number;
+            /**
+             * Format: double
+             * @description Quantile of 2.5 per cent, linear between the people.
+             */
+            low: number;
+            /**
+             * Format: double
+             * @description Mean.
+             */
+            mean: number;
+            /**
+             * Format: int64
+             * @description Number of people.
+             */
+            n: number;
+            /**
+             * Format: double
+             * @description Standard deviation.
+             */
+            sd: number;
+            /**
+             * Format: int64
+             * @description The segment of motion or thickening, 1 to 17; null for the whole heart.
+             */
+            segment?: number | null;
+        };
         /**
          * @description The people of a group of normal limits.
          * @enum {string}
@@ -1349,6 +1991,8 @@ export interface components {
             beat?: string | null;
             /** @description Whether a client has asked to cancel it. */
             cancel_requested: boolean;
+            /** @description The comparison it made; only for kind `comparison`. */
+            comparison?: string | null;
             /**
              * Format: date-time
              * @description When it was accepted (RFC 3339).
@@ -1387,6 +2031,8 @@ export interface components {
             links: components["schemas"]["JobLinks"];
             /** @description The model it made; only for kind `model`. */
             model?: string | null;
+            /** @description The normal limits it built; only for kind `normals`. */
+            normals?: string | null;
             /** @description The parameters, including every default. */
             parameters: components["schemas"]["JobParameters"];
             /** @description How urgent it is. */
@@ -1428,6 +2074,8 @@ export interface components {
         JobLinks: {
             /** @description The beat it made. */
             beat?: string | null;
+            /** @description The comparison it made. */
+            comparison?: string | null;
             /** @description Its changes as server-sent events. */
             events: string;
             /** @description The segmentation's mask. */
@@ -1436,6 +2084,8 @@ export interface components {
             mesh?: string | null;
             /** @description The model it made. */
             model?: string | null;
+            /** @description The normal limits it built. */
+            normals?: string | null;
             /** @description The report on what it made. */
             report?: string | null;
             /** @description The segmentation it made. */
@@ -1452,7 +2102,7 @@ export interface components {
             /** @description `cursor` of the next page; absent on the last. */
             next_cursor?: string | null;
         };
-        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"];
+        JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["NormalsParameters"];
         JobRequest: components["schemas"]["VolumeJobRequest"] | components["schemas"]["SourceJobRequest"];
         /** @description A series in an archive. */
         JobSource: {
@@ -1605,6 +2255,26 @@ export interface components {
             /** @description SHA-256 of the scan's file, hexadecimal. */
             scan: string;
         };
+        /** @description A person judged by the limits of the others. */
+        LeftOut: {
+            /** @description The name in the table. */
+            case: string;
+            /**
+             * Format: double
+             * @description Deficit score, per cent.
+             */
+            deficit_percent: number;
+            /**
+             * Format: double
+             * @description Share of the wall beyond the limit, per cent.
+             */
+            extent_percent: number;
+            /**
+             * Format: int32
+             * @description Sum of the segments' scores.
+             */
+            summed_score: number;
+        };
         /** @description A legal hold. */
         LegalHold: {
             /** @description The name of the key that set it. */
@@ -1616,6 +2286,21 @@ export interface components {
              * @description Since when (RFC 3339).
              */
             since: string;
+        };
+        /**
+         * @description Normal uptake at every place of the polar map: 32 rows from apex to base, 60 columns from lateral over anterior, septal and inferior. The
+         *     area-weighted mean of `mean` over the places that have one is 1.
+         */
+        LimitMap: {
+            /** @description Mean; null where too few of the people have muscle. */
+            mean: (number | null)[][];
+            /**
+             * @description Covariance of the coefficients by which healthy people differ from the mean as a whole: of 2 r - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a,
+             *     r sin 2a, with the way r from apex (0) to base (1) and the angle a from lateral over anterior. `sd` is what is left beside these.
+             */
+            pattern_covariance: number[][];
+            /** @description Standard deviation, the uncertainty of so small a sample's mean and deviation included. */
+            sd: (number | null)[][];
         };
         /** @description Where the organ was found. */
         Localisation: {
@@ -2110,6 +2795,426 @@ export interface components {
              */
             stored_bytes?: number | null;
         };
+        /** @description A healthy person of a group. */
+        NormalCase: {
+            /** @description The name in the table. */
+            case: string;
+            /** @description `M` or `F`. */
+            sex: components["schemas"]["GroupSex"];
+            /** @description SHA-256 of the scan's file, hexadecimal. */
+            sha256: string;
+        };
+        /** @description The limits of one kind of scan. */
+        NormalGroup: {
+            /** @description Whether attenuation was corrected. */
+            attenuation_corrected: boolean;
+            /** @description The people, in the order of the table. */
+            cases: components["schemas"]["NormalCase"][];
+            /** @description Limits of figures of the whole heart. */
+            figures: components["schemas"]["GlobalLimit"][];
+            /** @description The people, each judged by the limits of the others. */
+            leave_one_out: components["schemas"]["Specificity"];
+            /** @description Mean and standard deviation of the uptake. */
+            map: components["schemas"]["LimitMap"];
+            /** @description The protocol. */
+            protocol: string;
+            /** @description `M`, `F` or `mixed`. */
+            sex: components["schemas"]["GroupSex"];
+            /** @description The tracer. */
+            tracer: string;
+        };
+        /** @description A group of normal limits. */
+        NormalGroupSummary: {
+            /** @description Whether attenuation was corrected. */
+            attenuation_corrected: boolean;
+            /**
+             * Format: int64
+             * @description Number of people.
+             */
+            cases: number;
+            /**
+             * Format: double
+             * @description Share of the wall below the limits of the others, mean over the people, per cent.
+             */
+            mean_extent_percent: number;
+            /** @description The protocol. */
+            protocol: string;
+            /** @description `M`, `F` or `mixed`. */
+            sex: components["schemas"]["GroupSex"];
+            /** @description The tracer. */
+            tracer: string;
+        };
+        /** @description Normal limits, as `ventriform normals build` writes them. */
+        NormalLimits: {
+            /** @description Cases that are in no group. */
+            excluded: components["schemas"]["ExcludedCase"][];
+            /** @description `ventriform-normal-limits`. */
+            format: string;
+            /** @description One group for each kind of scan. */
+            groups: components["schemas"]["NormalGroup"][];
+            /** @description Every parameter of the fits, defaults written out. */
+            parameters: {
+                [key: string]: unknown;
+            };
+            /** @description What the people are, in words. */
+            people: string;
+            /** @description The version of the program that built the limits. */
+            program_version: string;
+            /**
+             * Format: int64
+             * @description 1.
+             */
+            schema_version: number;
+            /** @description SHA-256 of everything else in this file, hexadecimal. */
+            sha256: string;
+            /** @description Whether the people are simulated. Such limits are for tests, not for patients. */
+            simulated: boolean;
+        };
+        /** @description Normal limits: the uptake of healthy people, by sex, protocol, tracer and attenuation correction. */
+        Normals: {
+            /**
+             * Format: date-time
+             * @description When they were added or built (RFC 3339).
+             */
+            created_at: string;
+            /** @description Their files. */
+            files: components["schemas"]["Download"][];
+            /**
+             * @description Derived from tenant and content, so it is the same on every machine.
+             * @example nrm_2c26b46b68ffc68ff99b453c1d304134
+             */
+            id: string;
+            /** @description Related paths. */
+            links: components["schemas"]["NormalsLinks"];
+            /** @description Their name. */
+            name: string;
+            /** @description The program that added or built them. */
+            software: components["schemas"]["Software"];
+            /** @description Their content. */
+            summary: components["schemas"]["NormalsSummary"];
+        };
+        /** @description A registered receiver. */
+        Webhook: {
+            /**
+             * Format: date-time
+             * @description When it was registered (RFC 3339).
+             */
+            created_at: string;
+            /** @description The events that it is told. */
+            events: string[];
+            /**
+             * Format: date-time
+             * @description Since when it answers 410 and is told nothing (RFC 3339).
+             */
+            gone_at?: string | null;
+            /**
+             * @description Its id.
+             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description What signs its deliveries; shown only when it is registered. */
+            secret?: string | null;
+            /**
+             * @description Where it is.
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        /** @description The parameters of normal limits */
+        NormalsFitParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
+            base?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @default apparent
+             * @enum {string}
+             */
+            edge?: "apparent" | "anatomical";
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Whether men and women are one group, where there are too few of each
+             * @default false
+             */
+            mixed?: boolean;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 3
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            resolution?: number;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+        };
+        /** @description Paths of normal limits. */
+        NormalsLinks: {
+            /** @description Their file. */
+            limits: string;
+            /** @description These limits. */
+            self: string;
+        };
+        /** @description A page of normals. */
+        NormalsList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The normals, newest first. */
+            normals: components["schemas"]["Normals"][];
+        };
+        /** @description The parameters of normal limits */
+        NormalsParameters: {
+            /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
+            anterior?: number[];
+            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
+            base?: number[];
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
+             * @default 3
+             */
+            blur?: number;
+            /**
+             * @description Stiffness that keeps the shape of the whole model, square millimetres
+             * @default 6
+             */
+            body_stiffness?: number;
+            /** @description The scans of the cohort, and what is known of each */
+            cases: components["schemas"]["CohortCase"][];
+            /**
+             * @description Damping of the motion per time step
+             * @default 1
+             */
+            damping?: number;
+            /**
+             * @description Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred image) or anatomical (the wall itself, without the thickness that blur adds). The report has the volumes of both
+             * @default apparent
+             * @enum {string}
+             */
+            edge?: "apparent" | "anatomical";
+            /**
+             * @description Final search range of the sensors, millimetres to either side
+             * @default 6
+             */
+            last_reach?: number;
+            /**
+             * @description How far outside the detected edge the contour is drawn, millimetres
+             * @default 0
+             */
+            margin?: number;
+            /**
+             * @description Mass of the whole model relative to a sensor force of 1 per millimetre
+             * @default 0.1
+             */
+            mass?: number;
+            /**
+             * @description Maximum number of time steps
+             * @default 100
+             */
+            max_iterations?: number;
+            /**
+             * @description Whether men and women are one group, where there are too few of each
+             * @default false
+             */
+            mixed?: boolean;
+            /** @description The name of the limits; not a person's */
+            name?: string;
+            /**
+             * @description Factor by which the search range shrinks from step to step
+             * @default 0.85
+             */
+            narrowing?: number;
+            /**
+             * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
+             * @default 3
+             */
+            polar_blur?: number;
+            /**
+             * @description How far the samples of the polar map extend beyond the wall on both sides, millimetres
+             * @default 3
+             */
+            polar_extension?: number;
+            /**
+             * @description How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each level has the share of the map that it has of the wall)
+             * @default standard
+             * @enum {string}
+             */
+            polar_projection?: "standard" | "area";
+            /**
+             * @description Share of the wall's reference uptake below which a sample counts as a defect
+             * @default 0.6
+             */
+            polar_threshold?: number;
+            /**
+             * @description Initial search range of the sensors, millimetres to either side
+             * @default 10
+             */
+            reach?: number;
+            /** @description Resolution of the image, if it is known: full width at half maximum of a point, including motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes a wall look thicker. Default: by calibration on simulated hearts */
+            resolution?: number;
+            /**
+             * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
+             * @default 0
+             */
+            roll?: number;
+            /**
+             * @description What the sensors detect: half_maximum (the point half-way down the steepest outward fall), gradient (the steepest point of that fall), unsigned (the steepest change in either direction) or level (the crossing of half of the organ's uptake)
+             * @default half_maximum
+             * @enum {string}
+             */
+            sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description Stiffness that keeps the length of edges, square millimetres
+             * @default 2.5
+             */
+            spring_stiffness?: number;
+            /**
+             * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
+             * @default body
+             * @example body
+             * @example 0,0,1
+             */
+            superior?: string;
+            /**
+             * @description Stiffness that keeps the thickness of the wall
+             * @default 0.02
+             */
+            thickness_stiffness?: number;
+            /**
+             * @description Length of one time step of the motion
+             * @default 1
+             */
+            time_step?: number;
+            /**
+             * @description Largest displacement of a node per step at which the model counts as at rest, millimetres
+             * @default 0.04
+             */
+            tolerance?: number;
+            /**
+             * @description Stiffness that keeps each node's position among its neighbours, square millimetres
+             * @default 7.5
+             */
+            torsion_stiffness?: number;
+        };
+        NormalsRequest: components["schemas"]["NormalLimits"] | components["schemas"]["CohortRequest"];
+        /** @description The content of normal limits; the file has all. */
+        NormalsSummary: {
+            /**
+             * Format: int64
+             * @description Cases that are in no group.
+             */
+            excluded: number;
+            /** @description One group for each kind of scan. */
+            groups: components["schemas"]["NormalGroupSummary"][];
+            /** @description What the people are, in words. */
+            people: string;
+            /** @description The version of the program that built them. */
+            program_version: string;
+            /** @description SHA-256 of the limits, as reports name it. */
+            sha256: string;
+            /** @description Whether the people are simulated. Such limits are for tests, not for patients. */
+            simulated: boolean;
+        };
         /** @description The group of normal limits that a scan was compared with. */
         NormalsUsed: {
             /** @description Whether attenuation was corrected. */
@@ -2547,10 +3652,18 @@ export interface components {
             /** @description The content of the profile. */
             summary: components["schemas"]["ReaderSummary"];
         };
-        /** @description The registered receivers. */
-        WebhookList: {
-            /** @description The oldest first. */
-            webhooks: components["schemas"]["Webhook"][];
+        /** @description Volumes of one wall, millilitres. */
+        WallVolumes: {
+            /**
+             * Format: double
+             * @description Of the cavity.
+             */
+            cavity: number;
+            /**
+             * Format: double
+             * @description Of the wall.
+             */
+            wall: number;
         };
         /** @description Paths of one reader. */
         ReaderLinks: {
@@ -3023,33 +4136,11 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        /** @description A registered receiver. */
-        Webhook: {
-            /**
-             * Format: date-time
-             * @description When it was registered (RFC 3339).
-             */
-            created_at: string;
-            /** @description The events that it is told. */
-            events: string[];
-            /**
-             * Format: date-time
-             * @description Since when it answers 410 and is told nothing (RFC 3339).
-             */
-            gone_at?: string | null;
-            /**
-             * @description Its id.
-             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
-             */
-            id: string;
-            /** @description What signs its deliveries; shown only when it is registered. */
-            secret?: string | null;
-            /**
-             * @description Where it is.
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
-        };
+        /**
+         * @description A figure of the wall.
+         * @enum {string}
+         */
+        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
         SegmentationForm: {
             /**
              * Format: binary
@@ -3092,6 +4183,11 @@ export interface components {
         SegmentationParameters: {
             /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
             anterior?: number[];
+            /**
+             * @description Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: what a DICOM header says
+             * @enum {string}
+             */
+            attenuation_corrected?: "yes" | "no";
             /** @description Direction from base to apex, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
             axis?: number[];
             /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
@@ -3181,6 +4277,8 @@ export interface components {
              * @default 0.85
              */
             narrowing?: number;
+            /** @description Id of normal limits to compare the wall's uptake with */
+            normals?: string;
             /**
              * @description Organ that the model shows. All but the left ventricle are searched for as the largest bright region and have no polar map
              * @default left_ventricle
@@ -3208,6 +4306,11 @@ export interface components {
              * @default 0.6
              */
             polar_threshold?: number;
+            /**
+             * @description The scan's protocol, as the normal limits name it. Default: the only one that they have
+             * @example rest
+             */
+            protocol?: string;
             /**
              * @description Initial search range of the sensors, millimetres to either side
              * @default 10
@@ -3237,6 +4340,11 @@ export interface components {
              * @enum {string}
              */
             sensor?: "half_maximum" | "gradient" | "unsigned" | "level";
+            /**
+             * @description The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header
+             * @enum {string}
+             */
+            sex?: "F" | "M";
             /**
              * @description Stiffness that keeps the length of edges, square millimetres
              * @default 2.5
@@ -3269,6 +4377,11 @@ export interface components {
              * @default 7.5
              */
             torsion_stiffness?: number;
+            /**
+             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @example Tc-99m tetrofosmin
+             */
+            tracer?: string;
         };
         /** @description The report of a segmentation. Lengths are millimetres in the patient frame LPS. */
         SegmentationReport: {
@@ -3341,6 +4454,11 @@ export interface components {
             /** @description Volumes. */
             volumes_ml: components["schemas"]["FittedVolumes"];
         };
+        /**
+         * @description A patient's sex, as the scan's header has it.
+         * @enum {string}
+         */
+        Sex: "F" | "M";
         /** @description Figures of the triangles' shapes. */
         Shape: {
             /** @description Areas of triangles, mm². */
@@ -3379,7 +4497,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation" | "beat";
+            kind?: "model" | "segmentation" | "beat" | "comparison" | "normals";
             /**
              * @description The caller's own names and values
              * @example {
@@ -3397,7 +4515,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm")[];
             source: components["schemas"]["SourceRequest"];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
@@ -3415,6 +4533,26 @@ export interface components {
             series: string;
             /** @description Study Instance UID */
             study: string;
+        };
+        /** @description The people of a group, each judged by the limits of the others. */
+        Specificity: {
+            /** @description Each person's figures. */
+            cases: components["schemas"]["LeftOut"][];
+            /**
+             * Format: double
+             * @description The deficit score that 95 of 100 people stay below, per cent: quantile of 95 per cent.
+             */
+            deficit_percent_of_95: number;
+            /**
+             * Format: double
+             * @description Mean deficit score, per cent.
+             */
+            mean_deficit_percent: number;
+            /**
+             * Format: double
+             * @description Mean share of the wall beyond the limit, per cent.
+             */
+            mean_extent_percent: number;
         };
         /** @description One of the models of which the best was kept. */
         Start: {
@@ -3725,18 +4863,12 @@ export interface components {
             /** @description Counts and main figures. */
             summary: components["schemas"]["TemplateSummary"];
         };
-        /** @description Volumes of one wall, millilitres. */
-        WallVolumes: {
-            /**
-             * Format: double
-             * @description Of the cavity.
-             */
-            cavity: number;
-            /**
-             * Format: double
-             * @description Of the wall.
-             */
-            wall: number;
+        /** @description A page of volumes. */
+        VolumeList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The volumes, newest first. */
+            volumes: components["schemas"]["Volume"][];
         };
         /** @description Paths of one template. */
         TemplateLinks: {
@@ -3906,6 +5038,34 @@ export interface components {
              */
             file: string;
         };
+        /** @description Uptake of a part of the wall at stress and at rest, means over its area. */
+        UptakeChange: {
+            /**
+             * Format: double
+             * @description Rest less stress, points: positive where stress lacks uptake.
+             */
+            difference_points?: number | null;
+            /**
+             * Format: double
+             * @description Share of its compared area that is fixed.
+             */
+            fixed_percent: number;
+            /**
+             * Format: double
+             * @description At rest.
+             */
+            rest_percent?: number | null;
+            /**
+             * Format: double
+             * @description Share of its compared area that is reversible.
+             */
+            reversible_percent: number;
+            /**
+             * Format: double
+             * @description At stress, scaled to rest; `null` where nothing can be compared, as for the others.
+             */
+            stress_percent?: number | null;
+        };
         /** @description Numbers of edges that meet at a vertex. */
         Valence: {
             /** @description Number of vertices for each valence. */
@@ -4034,7 +5194,7 @@ export interface components {
              * @default model
              * @enum {string}
              */
-            kind?: "model" | "segmentation" | "beat";
+            kind?: "model" | "segmentation" | "beat" | "comparison" | "normals";
             /**
              * @description The caller's own names and values
              * @example {
@@ -4052,7 +5212,7 @@ export interface components {
              */
             priority?: "urgent" | "routine" | "bulk";
             /** @description DICOM objects of the result that are sent to an archive */
-            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm")[];
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm" | "mask_ed.dcm" | "mask_es.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm")[];
             /** @description The archive that they are sent to; that of `source` unless given */
             to?: string;
             /**
@@ -4075,18 +5235,6 @@ export interface components {
             /** @description This volume. */
             self: string;
         };
-        /** @description A page of volumes. */
-        VolumeList: {
-            /** @description `cursor` of the next page; absent on the last. */
-            next_cursor?: string | null;
-            /** @description The volumes, newest first. */
-            volumes: components["schemas"]["Volume"][];
-        };
-        /**
-         * @description A figure of the wall.
-         * @enum {string}
-         */
-        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
     };
     responses: never;
     parameters: never;
@@ -4099,6 +5247,7 @@ export type AppliedReader = components['schemas']['AppliedReader'];
 export type AuditEventName = components['schemas']['AuditEventName'];
 export type AuditPage = components['schemas']['AuditPage'];
 export type Beat = components['schemas']['Beat'];
+export type BeatChange = components['schemas']['BeatChange'];
 export type WebhookSecret = components['schemas']['WebhookSecret'];
 export type BeatLinks = components['schemas']['BeatLinks'];
 export type BeatList = components['schemas']['BeatList'];
@@ -4107,6 +5256,20 @@ export type BeatReport = components['schemas']['BeatReport'];
 export type BeatSummary = components['schemas']['BeatSummary'];
 export type Candidate = components['schemas']['Candidate'];
 export type Closeness = components['schemas']['Closeness'];
+export type CohortCase = components['schemas']['CohortCase'];
+export type CohortRequest = components['schemas']['CohortRequest'];
+export type ComparedScan = components['schemas']['ComparedScan'];
+export type ComparedSegment = components['schemas']['ComparedSegment'];
+export type ComparedTerritory = components['schemas']['ComparedTerritory'];
+export type Comparison = components['schemas']['Comparison'];
+export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type ComparisonForm = components['schemas']['ComparisonForm'];
+export type ComparisonLinks = components['schemas']['ComparisonLinks'];
+export type ComparisonList = components['schemas']['ComparisonList'];
+export type ComparisonParameters = components['schemas']['ComparisonParameters'];
+export type ComparisonReport = components['schemas']['ComparisonReport'];
+export type ComparisonRequest = components['schemas']['ComparisonRequest'];
+export type ComparisonSummary = components['schemas']['ComparisonSummary'];
 export type CurvePoint = components['schemas']['CurvePoint'];
 export type Delivery = components['schemas']['Delivery'];
 export type DeliveryList = components['schemas']['DeliveryList'];
@@ -4119,10 +5282,11 @@ export type ErasedFile = components['schemas']['ErasedFile'];
 export type ErasedItem = components['schemas']['ErasedItem'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
+export type ExcludedCase = components['schemas']['ExcludedCase'];
 export type FigureBeside = components['schemas']['FigureBeside'];
 export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
-export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type WebhookList = components['schemas']['WebhookList'];
 export type Fit = components['schemas']['Fit'];
 export type FitnessFormStages = components['schemas']['FitnessFormStages'];
 export type FitnessForms = components['schemas']['FitnessForms'];
@@ -4134,6 +5298,7 @@ export type FittedVolumes = components['schemas']['FittedVolumes'];
 export type Flag = components['schemas']['Flag'];
 export type GateReport = components['schemas']['GateReport'];
 export type Gates = components['schemas']['Gates'];
+export type GlobalLimit = components['schemas']['GlobalLimit'];
 export type GroupSex = components['schemas']['GroupSex'];
 export type Health = components['schemas']['Health'];
 export type Histogram = components['schemas']['Histogram'];
@@ -4155,7 +5320,9 @@ export type LabelCount = components['schemas']['LabelCount'];
 export type LearntOffset = components['schemas']['LearntOffset'];
 export type LearntOffsets = components['schemas']['LearntOffsets'];
 export type LearntOn = components['schemas']['LearntOn'];
+export type LeftOut = components['schemas']['LeftOut'];
 export type LegalHold = components['schemas']['LegalHold'];
+export type LimitMap = components['schemas']['LimitMap'];
 export type Localisation = components['schemas']['Localisation'];
 export type LongAxis = components['schemas']['LongAxis'];
 export type MeshDocument = components['schemas']['MeshDocument'];
@@ -4167,6 +5334,18 @@ export type ModelParameters = components['schemas']['ModelParameters'];
 export type ModelReport = components['schemas']['ModelReport'];
 export type ModelSummary = components['schemas']['ModelSummary'];
 export type NewKey = components['schemas']['NewKey'];
+export type NormalCase = components['schemas']['NormalCase'];
+export type NormalGroup = components['schemas']['NormalGroup'];
+export type NormalGroupSummary = components['schemas']['NormalGroupSummary'];
+export type NormalLimits = components['schemas']['NormalLimits'];
+export type Normals = components['schemas']['Normals'];
+export type Webhook = components['schemas']['Webhook'];
+export type NormalsFitParameters = components['schemas']['NormalsFitParameters'];
+export type NormalsLinks = components['schemas']['NormalsLinks'];
+export type NormalsList = components['schemas']['NormalsList'];
+export type NormalsParameters = components['schemas']['NormalsParameters'];
+export type NormalsRequest = components['schemas']['NormalsRequest'];
+export type NormalsSummary = components['schemas']['NormalsSummary'];
 export type NormalsUsed = components['schemas']['NormalsUsed'];
 export type NotReady = components['schemas']['NotReady'];
 export type ObjectDelivery = components['schemas']['ObjectDelivery'];
@@ -4183,7 +5362,7 @@ export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
 export type RatesReport = components['schemas']['RatesReport'];
 export type Reader = components['schemas']['Reader'];
-export type WebhookList = components['schemas']['WebhookList'];
+export type WallVolumes = components['schemas']['WallVolumes'];
 export type ReaderLinks = components['schemas']['ReaderLinks'];
 export type ReaderList = components['schemas']['ReaderList'];
 export type ReaderOffsets = components['schemas']['ReaderOffsets'];
@@ -4208,18 +5387,20 @@ export type Scope = components['schemas']['Scope'];
 export type SegmentMotionReport = components['schemas']['SegmentMotionReport'];
 export type SegmentScore = components['schemas']['SegmentScore'];
 export type Segmentation = components['schemas']['Segmentation'];
-export type Webhook = components['schemas']['Webhook'];
+export type WallFigure = components['schemas']['WallFigure'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
 export type SegmentationLinks = components['schemas']['SegmentationLinks'];
 export type SegmentationList = components['schemas']['SegmentationList'];
 export type SegmentationParameters = components['schemas']['SegmentationParameters'];
 export type SegmentationReport = components['schemas']['SegmentationReport'];
 export type SegmentationSummary = components['schemas']['SegmentationSummary'];
+export type Sex = components['schemas']['Sex'];
 export type Shape = components['schemas']['Shape'];
 export type Smoothness = components['schemas']['Smoothness'];
 export type Software = components['schemas']['Software'];
 export type SourceJobRequest = components['schemas']['SourceJobRequest'];
 export type SourceRequest = components['schemas']['SourceRequest'];
+export type Specificity = components['schemas']['Specificity'];
 export type Start = components['schemas']['Start'];
 export type StatedScan = components['schemas']['StatedScan'];
 export type Summary = components['schemas']['Summary'];
@@ -4227,7 +5408,7 @@ export type SurfaceNoise = components['schemas']['SurfaceNoise'];
 export type SurfaceReport = components['schemas']['SurfaceReport'];
 export type TagsPatch = components['schemas']['TagsPatch'];
 export type Template = components['schemas']['Template'];
-export type WallVolumes = components['schemas']['WallVolumes'];
+export type VolumeList = components['schemas']['VolumeList'];
 export type TemplateLinks = components['schemas']['TemplateLinks'];
 export type TemplateList = components['schemas']['TemplateList'];
 export type TemplatePatch = components['schemas']['TemplatePatch'];
@@ -4240,12 +5421,11 @@ export type TimingReport = components['schemas']['TimingReport'];
 export type Uncertainties = components['schemas']['Uncertainties'];
 export type Uncertainty = components['schemas']['Uncertainty'];
 export type UploadForm = components['schemas']['UploadForm'];
+export type UptakeChange = components['schemas']['UptakeChange'];
 export type Valence = components['schemas']['Valence'];
 export type Volume = components['schemas']['Volume'];
 export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
-export type VolumeList = components['schemas']['VolumeList'];
-export type WallFigure = components['schemas']['WallFigure'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

@@ -128,7 +128,9 @@ impl Act {
         }
         Some(match (&self.method, kind) {
             (&Method::DELETE, _) => Activity::Delete,
-            (&Method::POST, "jobs" | "models" | "segmentations" | "beats") if is_list => {
+            (&Method::POST, "jobs" | "models" | "segmentations" | "beats" | "comparisons")
+                if is_list =>
+            {
                 Activity::Execute
             }
             (&Method::POST, _) if is_list && status == StatusCode::OK => Activity::Update,

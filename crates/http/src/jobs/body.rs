@@ -78,6 +78,10 @@ pub struct JobBody {
     segmentation: Option<String>,
     /// The beat it made; only for kind `beat`.
     beat: Option<String>,
+    /// The comparison it made; only for kind `comparison`.
+    comparison: Option<String>,
+    /// The normal limits it built; only for kind `normals`.
+    normals: Option<String>,
     /// Related paths.
     links: JobLinks,
 }
@@ -224,6 +228,12 @@ struct JobLinks {
     /// The beat it made.
     #[serde(skip_serializing_if = "Option::is_none")]
     beat: Option<String>,
+    /// The comparison it made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    comparison: Option<String>,
+    /// The normal limits it built.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    normals: Option<String>,
     /// The segmentation's mask.
     #[serde(skip_serializing_if = "Option::is_none")]
     mask: Option<String>,
@@ -289,7 +299,10 @@ fn body(job: Job, context: &Context) -> JobBody {
         id.filter(|id| Resource::of(id) == Some(resource))
     };
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
-    let beat = made(Resource::Beat);
+    let (beat, comparison) = (made(Resource::Beat), made(Resource::Comparison));
+    let normals = made(Resource::Normals);
+    // Limits have neither mesh nor report.
+    let shown = normals.is_none();
     let result = job.result.as_deref().map(path_of);
     let below = |name: &str| result.as_ref().map(|path| format!("{path}/{name}"));
     let itself = path_of(&job.id);
@@ -319,8 +332,10 @@ fn body(job: Job, context: &Context) -> JobBody {
             segmentation: segmentation.as_deref().map(path_of),
             beat: beat.as_deref().map(path_of),
             mask: segmentation.as_ref().and_then(|_| below("mask.nii.gz")),
-            mesh: below("mesh"),
-            report: below("report"),
+            comparison: comparison.as_deref().map(path_of),
+            normals: normals.as_deref().map(path_of),
+            mesh: below("mesh").filter(|_| shown),
+            report: below("report").filter(|_| shown),
         },
         id: job.id,
         external_id: job.tags.external_id,
@@ -339,5 +354,7 @@ fn body(job: Job, context: &Context) -> JobBody {
         model,
         segmentation,
         beat,
+        comparison,
+        normals,
     }
 }

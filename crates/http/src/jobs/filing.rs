@@ -155,7 +155,7 @@ async fn filed_earlier(
 }
 
 /// The answer about a filed job, after waiting for its end if the client prefers that.
-async fn answer(
+pub async fn answer(
     app: &App,
     filed: Job,
     patience: Option<Duration>,

@@ -20,7 +20,7 @@ use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::query::{NoQuery, Query, moment};
 use super::quota::reserve_job;
-use super::request::{PathSegments, json_object, text, unknown};
+use super::request::{PathSegments, json_object, parameters_of, text, unknown};
 use super::scans::ScanQuery;
 use super::tags::{self, TagQuery};
 use super::validators::ValidatedJson;
@@ -69,22 +69,36 @@ pub async fn create_job(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let counting = reserve_job(&app, &caller, request.headers()).await?;
-    let key = idempotency::key(request.headers())?;
+    let headers = request.headers().clone();
+    let counting = reserve_job(&app, &caller, &headers).await?;
     let trace_parent = observe::trace_parent(&request);
     let object = json_object(request).await?;
-    let mut order = JobOrder {
-        tags: tags::of_object(&app, &object)?,
-        priority: priority::of_object(&object)?,
-        key,
-        trace_parent,
-        ..JobOrder::new(caller.tenant, caller.quota)
-    };
+    let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
     let (work, volume, parameters) = read_job(&app, &object, &mut order).await?;
     let filed = app
         .service
         .file_job(work, volume, parameters, order, &counting);
     filing::accepted(&app, filed.await?).await
+}
+
+/// The order of a job in a JSON object: its names, its priority and its idempotency key.
+///
+/// # Errors
+/// 400 for an unusable key, 422 for an unusable name or priority.
+pub fn order_of(
+    app: &App,
+    caller: &Caller,
+    headers: &HeaderMap,
+    object: &Map<String, Value>,
+    trace_parent: Option<String>,
+) -> Answer<JobOrder> {
+    Ok(JobOrder {
+        tags: tags::of_object(app, object)?,
+        priority: priority::of_object(object)?,
+        key: idempotency::key(headers)?,
+        trace_parent,
+        ..JobOrder::new(caller.tenant.clone(), caller.quota)
+    })
 }
 
 const JOB_FIELDS: [&str; 10] = [
@@ -127,19 +141,7 @@ async fn read_job<'a>(
         }
         (volume, _) => volume.map(str::to_owned),
     };
-    let empty = Map::new();
-    let parameters = match object.get("parameters") {
-        None => &empty,
-        Some(Value::Object(parameters)) => parameters,
-        Some(_) => {
-            return Err(Problem::invalid_field(
-                "parameters",
-                "`parameters` must be a JSON object.",
-            )
-            .fix("Give an object such as {\"points\": 150}."));
-        }
-    };
-    let parameters = work.parameters_from_json(parameters)?;
+    let parameters = work.parameters_from_json(parameters_of(object)?)?;
     // Last, since looking up the name of its host may take seconds.
     order.webhook = webhook_of(app, object).await?;
     Ok((work, volume, parameters))
@@ -151,7 +153,7 @@ async fn read_job<'a>(
 pub struct JobQuery {
     /// Only jobs in this state
     state: Option<JobStateName>,
-    /// Only jobs of this kind: model, segmentation, beat
+    /// Only jobs of this kind: model, segmentation, beat, comparison, normals
     kind: Option<String>,
     /// Only jobs of this priority
     priority: Option<PriorityName>,

@@ -18,6 +18,12 @@ const SEGMENTATION_REPORT: &str = "SegmentationReport";
 /// The schema of a beat's report, which the document's frame registers.
 const BEAT_REPORT: &str = "BeatReport";
 
+/// The schema of a comparison's report, which the document's frame registers.
+const COMPARISON_REPORT: &str = "ComparisonReport";
+
+/// The schema of normal limits, which the document's frame registers.
+const NORMAL_LIMITS: &str = "NormalLimits";
+
 /// The schema of a reader's profile, which the handlers register.
 const READER_PROFILE: &str = "ReaderProfile";
 
@@ -248,6 +254,12 @@ files! {
     BeatAnswer: "The report or the mesh", [meshes(), report_alone(BEAT_REPORT)];
     /// 200 with any of a beat's files.
     BeatFileAnswer: "The file", [meshes(), masks(), pictures(), tables(), report_document(), objects()];
+    /// 200 with the report of a comparison, or its slices.
+    ComparisonAnswer: "The report or the slices", [files_of(["image/png"]), report_alone(COMPARISON_REPORT)];
+    /// 200 with any of a comparison's files.
+    ComparisonFileAnswer: "The file", [meshes(), regions(), pictures(), tables(), reports(), objects()];
+    /// 200 with normal limits.
+    NormalsFileAnswer: "The limits", [report_alone(NORMAL_LIMITS)];
     /// 200 with a reader's profile.
     ReaderFileAnswer: "The profile", [profiles()];
     /// 200 with any of a model's files.
@@ -323,6 +335,10 @@ fn masks() -> Contents {
         "application/nifti",
         "application/x-nifti",
     ])
+}
+
+fn regions() -> Contents {
+    files_of(["application/gzip"])
 }
 
 fn labels() -> Contents {

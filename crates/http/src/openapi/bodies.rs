@@ -10,10 +10,14 @@ use utoipa::openapi::schema::{
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
-use ventriform::parameters::{FitParameters, GatedParameters, ModelParameters};
+use ventriform::normals::{NormalLimits, Sex};
+use ventriform::parameters::{
+    CohortCase, ComparisonParameters, FitParameters, GatedParameters, ModelParameters,
+    NormalsParameters,
+};
 use ventriform_service::hooks::HookEvent;
 use ventriform_service::records::{LegalHold, Resource};
-use ventriform_service::work::dicom;
+use ventriform_service::work::{MOST_CASES, dicom};
 
 /// A job to be filed; `create_job` reads it field by field.
 pub struct JobRequest;
@@ -28,6 +32,16 @@ impl ToSchema for JobRequest {
         schemas.push((JobParameters::name().into(), JobParameters::schema()));
         schemas.push((FitParameters::name().into(), FitParameters::schema()));
         schemas.push((GatedParameters::name().into(), GatedParameters::schema()));
+        schemas.push((
+            ComparisonParameters::name().into(),
+            ComparisonParameters::schema(),
+        ));
+        schemas.push((
+            NormalsJobParameters::name().into(),
+            NormalsJobParameters::schema(),
+        ));
+        schemas.push((CohortCase::name().into(), CohortCase::schema()));
+        schemas.push((Sex::name().into(), Sex::schema()));
         schemas.push((WebhookRequest::name().into(), WebhookRequest::schema()));
         let own = [
             (VolumeJobRequest::name(), VolumeJobRequest::schema()),
@@ -52,24 +66,16 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
     let text = || ObjectBuilder::new().schema_type(Type::String);
     let kind = text()
         .description(Some("The kind of work"))
-        .enum_values(Some(["model", "segmentation", "beat"]))
+        .enum_values(Some([
+            "model",
+            "segmentation",
+            "beat",
+            "comparison",
+            "normals",
+        ]))
         .default(Some(json!("model")));
     let (external_id, labels) = tag_fields(false);
-    let names = dicom::object_names();
-    let most = Resource::ALL.map(|kind| dicom::objects(kind).len());
-    let names = text().enum_values(Some(names));
-    let send = ArrayBuilder::new()
-        .description(Some(
-            "DICOM objects of the result that are sent to an archive",
-        ))
-        .items(RefOr::T(Schema::from(names)))
-        .min_items(Some(1))
-        .max_items(most.into_iter().max());
-    let to = text()
-        .description(Some(
-            "The archive that they are sent to; that of `source` unless given",
-        ))
-        .pattern(Some("^[A-Za-z0-9._-]{1,64}$"));
+    let [(_, send), (_, to)] = send_fields(&Resource::ALL);
     let object = ObjectBuilder::new()
         .property("external_id", external_id)
         .property("labels", labels)
@@ -78,8 +84,8 @@ fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
         .property(input, schema)
         .property("parameters", Ref::from_schema_name(JobParameters::name()))
         .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
-        .property("send", Schema::Array(send.build()))
-        .property("to", Schema::from(to))
+        .property("send", send)
+        .property("to", to)
         .required(input)
         .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
     Schema::from(object.build()).into()
@@ -282,8 +288,185 @@ impl PartialSchema for JobParameters {
         let parameters = AnyOfBuilder::new()
             .item(Ref::from_schema_name(ModelParameters::name()))
             .item(Ref::from_schema_name(FitParameters::name()))
-            .item(Ref::from_schema_name(GatedParameters::name()));
+            .item(Ref::from_schema_name(GatedParameters::name()))
+            .item(Ref::from_schema_name(ComparisonParameters::name()))
+            .item(Ref::from_schema_name(NormalsJobParameters::name()));
         Schema::AnyOf(parameters.build()).into()
+    }
+}
+
+/// The table of a cohort, and a name.
+fn cohort_fields() -> [(&'static str, Schema); 2] {
+    let cases = ArrayBuilder::new()
+        .description(Some("The scans of the cohort, and what is known of each"))
+        .items(Ref::from_schema_name(CohortCase::name()))
+        .min_items(Some(1))
+        .max_items(Some(MOST_CASES));
+    let name = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .description(Some("The name of the limits; not a person's"))
+        .min_length(Some(1))
+        .max_length(Some(80));
+    [
+        ("name", name.into()),
+        ("cases", Schema::Array(cases.build())),
+    ]
+}
+
+/// The parameters of a job that builds normal limits.
+pub struct NormalsJobParameters;
+
+impl ToSchema for NormalsJobParameters {
+    fn name() -> Cow<'static, str> {
+        "NormalsParameters".into()
+    }
+}
+
+impl PartialSchema for NormalsJobParameters {
+    fn schema() -> RefOr<Schema> {
+        let RefOr::T(Schema::Object(mut object)) = NormalsParameters::schema() else {
+            unreachable!("the schema of parameters is an object")
+        };
+        for (name, schema) in cohort_fields() {
+            object.properties.insert(name.into(), schema.into());
+        }
+        object.required.push("cases".into());
+        Schema::Object(object).into()
+    }
+}
+
+/// What is said of a job beside its work: names, priority, webhook.
+fn job_fields(object: ObjectBuilder) -> ObjectBuilder {
+    let (external_id, labels) = tag_fields(false);
+    object
+        .property("external_id", external_id)
+        .property("labels", labels)
+        .property("priority", PriorityField::schema())
+        .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
+        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)))
+}
+
+/// `send` and `to` of results of these kinds.
+fn send_fields(kinds: &[Resource]) -> [(&'static str, Schema); 2] {
+    let text = || ObjectBuilder::new().schema_type(Type::String);
+    let mut names = Vec::new();
+    for object in kinds.iter().copied().flat_map(dicom::objects) {
+        if !names.contains(&object.file_name()) {
+            names.push(object.file_name());
+        }
+    }
+    let most = kinds.iter().map(|kind| dicom::objects(*kind).len()).max();
+    let send = ArrayBuilder::new()
+        .description(Some(
+            "DICOM objects of the result that are sent to an archive",
+        ))
+        .items(RefOr::T(Schema::from(text().enum_values(Some(names)))))
+        .min_items(Some(1))
+        .max_items(most);
+    let to = text()
+        .description(Some(
+            "The archive that they are sent to; that of `source` unless given",
+        ))
+        .pattern(Some("^[A-Za-z0-9._-]{1,64}$"));
+    [("send", Schema::Array(send.build())), ("to", to.into())]
+}
+
+/// A comparison to be made; `create_comparison` reads it field by field.
+pub struct ComparisonRequest;
+
+impl ToSchema for ComparisonRequest {
+    fn name() -> Cow<'static, str> {
+        "ComparisonRequest".into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        JobRequest::schemas(schemas);
+    }
+}
+
+impl PartialSchema for ComparisonRequest {
+    fn schema() -> RefOr<Schema> {
+        let id = |description: &str, kinds: &str| {
+            let id = ObjectBuilder::new()
+                .schema_type(Type::String)
+                .description(Some(description))
+                .pattern(Some(format!("^({kinds})[0-9a-f]{{1,64}}$")));
+            Schema::from(id)
+        };
+        let scans = "vol_|seg_|bea_";
+        let mut object = ObjectBuilder::new()
+            .property(
+                "stress",
+                id(
+                    "The scan at stress: a volume, or the segmentation or beat of one",
+                    scans,
+                ),
+            )
+            .property("rest", id("The scan at rest", scans))
+            .property(
+                "normals",
+                id("Normal limits by which both scans are scored", "nrm_"),
+            )
+            .property(
+                "parameters",
+                Ref::from_schema_name(ComparisonParameters::name()),
+            )
+            .required("stress")
+            .required("rest");
+        for (name, schema) in send_fields(&[Resource::Comparison]) {
+            object = object.property(name, schema);
+        }
+        Schema::from(job_fields(object).build()).into()
+    }
+}
+
+/// Normal limits to be added or built; `create_normals` reads it field by field.
+pub struct NormalsRequest;
+
+impl ToSchema for NormalsRequest {
+    fn name() -> Cow<'static, str> {
+        "NormalsRequest".into()
+    }
+
+    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
+        JobRequest::schemas(schemas);
+        schemas.push((CohortRequest::name().into(), CohortRequest::schema()));
+        schemas.push((
+            NormalsParameters::name().into(),
+            NormalsParameters::schema(),
+        ));
+    }
+}
+
+impl PartialSchema for NormalsRequest {
+    fn schema() -> RefOr<Schema> {
+        let requests = OneOfBuilder::new()
+            .item(Ref::from_schema_name(NormalLimits::name()))
+            .item(Ref::from_schema_name(CohortRequest::name()));
+        Schema::OneOf(requests.build()).into()
+    }
+}
+
+/// A cohort of which normal limits are built.
+pub struct CohortRequest;
+
+impl ToSchema for CohortRequest {
+    fn name() -> Cow<'static, str> {
+        "CohortRequest".into()
+    }
+}
+
+impl PartialSchema for CohortRequest {
+    fn schema() -> RefOr<Schema> {
+        let mut object = ObjectBuilder::new().required("cases");
+        for (name, schema) in cohort_fields() {
+            object = object.property(name, schema);
+        }
+        let object = object.property(
+            "parameters",
+            Ref::from_schema_name(NormalsParameters::name()),
+        );
+        Schema::from(job_fields(object).build()).into()
     }
 }
 
@@ -418,6 +601,11 @@ forms! {
     /// A form whose files are a volume.
     UploadForm {
         "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series, or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form",
+    }
+    /// A form with both scans of a patient.
+    ComparisonForm {
+        "stress": "The scan at stress; several files make up one",
+        "rest": "The scan at rest; several files make up one",
     }
     /// A form with a volume and an expert's mask.
     SegmentationForm {

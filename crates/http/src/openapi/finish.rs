@@ -273,12 +273,15 @@ fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
         }
     }
     let schema = match (name, media_type) {
-        ("report.json" | "beat.json", _) => report_of(folder),
+        ("report.json" | "beat.json" | "comparison.json", _) => report_of(folder),
         ("distance.json", _) => reference("Closeness"),
-        ("polar.json" | "polar_ed.json" | "polar_es.json", _) => reference("PolarMap"),
-        ("polar_motion.json" | "polar_thickening.json" | "polar_phase.json", _) => {
-            reference("PolarFigure")
-        }
+        (
+            "polar.json" | "polar_ed.json" | "polar_es.json" | "polar_stress.json"
+            | "polar_rest.json",
+            _,
+        ) => reference("PolarMap"),
+        (figure, "application/json") if figure.starts_with("polar_") => reference("PolarFigure"),
+        ("normals.json", _) => reference("NormalLimits"),
         ("profile.json", _) => reference("ReaderProfile"),
         (mesh, "application/json") if mesh.starts_with("mesh") => reference("MeshDocument"),
         (_, "model/gltf+json") => json!({"type": "object"}),
@@ -301,6 +304,8 @@ fn report_of(path: &str) -> Value {
         reference("SegmentationReport")
     } else if path.starts_with("/v1/beats") {
         reference("BeatReport")
+    } else if path.starts_with("/v1/comparisons") {
+        reference("ComparisonReport")
     } else {
         reference("ModelReport")
     }

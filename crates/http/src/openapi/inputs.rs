@@ -6,8 +6,8 @@ use utoipa::openapi::schema::{ObjectBuilder, Schema, SchemaType, Type};
 use utoipa::openapi::{RefOr, Required};
 use utoipa::{IntoParams, PartialSchema, ToSchema};
 use ventriform::parameters::{
-    BeatChoice, FIT_SPECS, FitParameters, GatedParameters, Kind, ModelParameters, ParameterSpec,
-    Parameters, schema_of,
+    BeatChoice, ComparisonChoice, ComparisonParameters, FIT_SPECS, FitParameters, GatedParameters,
+    Kind, ModelParameters, ParameterSpec, Parameters, schema_of,
 };
 use ventriform_service::records::Priority;
 
@@ -36,6 +36,17 @@ impl IntoParams for BeatQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let of_fit = GatedParameters::fit_specs().map(parameter_of);
         let own = BeatChoice::SPECS.iter().map(parameter_of);
+        own.chain(of_fit).collect()
+    }
+}
+
+/// Parameters of a comparison as query parameters.
+pub struct ComparisonQuery;
+
+impl IntoParams for ComparisonQuery {
+    fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
+        let of_fit = ComparisonParameters::fit_specs().map(parameter_of);
+        let own = ComparisonChoice::SPECS.iter().map(parameter_of);
         own.chain(of_fit).collect()
     }
 }

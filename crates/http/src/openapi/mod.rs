@@ -22,20 +22,22 @@ mod inputs;
 mod operation;
 
 pub use answers::{
-    BeatAnswer, BeatFileAnswer, DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer,
-    FileProblems, HoldProblems, IdentityProblems, ListProblems, LookupProblems, MeshAnswer,
-    ModelFileAnswer, OriginalAnswer, PatchProblems, ReaderFileAnswer, ReportAnswer,
-    ReportDocumentAnswer, ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, StowAnswers,
-    UnchangedAnswer, UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
+    BeatAnswer, BeatFileAnswer, ComparisonAnswer, ComparisonFileAnswer, DicomProblems,
+    DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems, IdentityProblems,
+    ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, NormalsFileAnswer, OriginalAnswer,
+    PatchProblems, ReaderFileAnswer, ReportAnswer, ReportDocumentAnswer, ScopeProblems,
+    SegmentationAnswer, SegmentationFileAnswer, StowAnswers, UnchangedAnswer, UploadProblems,
+    WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
-    HoldRequest, JobParameters, JobRequest, MeshDocument, SegmentationForm, StatedScanSchema,
-    TagsPatch, TemplatePatch, UploadForm, WebhookRequest, WorkitemBody,
+    ComparisonForm, ComparisonRequest, HoldRequest, JobParameters, JobRequest, MeshDocument,
+    NormalsRequest, SegmentationForm, StatedScanSchema, TagsPatch, TemplatePatch, UploadForm,
+    WebhookRequest, WorkitemBody,
 };
 pub use inputs::{
-    BeatQuery, CachedHeaders, ConditionalHeaders, ErasureHeader, EventHeader, IdempotencyHeader,
-    ModelQuery, OrganField, PreferHeader, PriorityField, SegmentationQuery, TransactionHeader,
-    WebhookSecretHeader, fit_parameters,
+    BeatQuery, CachedHeaders, ComparisonQuery, ConditionalHeaders, ErasureHeader, EventHeader,
+    IdempotencyHeader, ModelQuery, OrganField, PreferHeader, PriorityField, SegmentationQuery,
+    TransactionHeader, WebhookSecretHeader, fit_parameters,
 };
 pub use operation::Documented;
 
@@ -60,6 +62,8 @@ use utoipa::openapi::{RefOr, Required};
         (name = "models", description = "Surface models, and one request from volume to model"),
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "beats", description = "Gated studies as one model in motion, and one request from study to beat"),
+        (name = "comparisons", description = "Rest and stress of one patient"),
+        (name = "normals", description = "Normal limits: the uptake of healthy people, which segmentations, beats and comparisons are scored by"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
         (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
@@ -76,6 +80,8 @@ use utoipa::openapi::{RefOr, Required};
         ventriform::report::Closeness,
         ventriform::report::SegmentationReport,
         ventriform::report::BeatReport,
+        ventriform::report::ComparisonReport,
+        ventriform::normals::NormalLimits,
         ventriform::polar::PolarDocument,
         ventriform::polar::FigureDocument,
     ))

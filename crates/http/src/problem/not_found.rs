@@ -24,7 +24,7 @@ fn unknown_id(resource: Resource, id: &str) -> Problem {
     Problem::new(
         StatusCode::NOT_FOUND,
         "not-found",
-        format!("There is no {} `{}`.", resource.noun(), shorten(id)),
+        format!("There is no {} `{}`.", resource.label(), shorten(id)),
     )
     .fix(format!(
         "Take an id from the list at GET /v1/{}.",
@@ -35,8 +35,11 @@ fn unknown_id(resource: Resource, id: &str) -> Problem {
 fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
     let fix = match resource {
         Resource::Volume => "Upload the same file again; it gets the same id.",
-        Resource::Model | Resource::Segmentation | Resource::Beat => {
+        Resource::Model | Resource::Segmentation | Resource::Beat | Resource::Comparison => {
             "Send the same volume with the same parameters again; the result gets the same id."
+        }
+        Resource::Normals => {
+            "Add the same file, or build the same cohort again; it gets the same id."
         }
         Resource::Template => "Add the same mesh again; it gets the same id.",
         Resource::Reader => "Add the same profile again; it gets the same id.",
@@ -47,7 +50,7 @@ fn erased(resource: Resource, id: &str, at: Timestamp) -> Problem {
         "gone",
         format!(
             "The {} `{id}` was erased at {}.",
-            resource.noun(),
+            resource.label(),
             rfc3339(at)
         ),
     )
@@ -59,7 +62,7 @@ pub fn no_such_file(resource: Resource, name: &str, names: &[String]) -> Problem
     Problem::new(
         StatusCode::NOT_FOUND,
         "not-found",
-        format!("This {} has no file `{}`.", resource.noun(), shorten(name)),
+        format!("This {} has no file `{}`.", resource.label(), shorten(name)),
     )
     .fix(format!("Ask for one of {}.", names.join(", ")))
 }
