@@ -148,7 +148,7 @@ impl DeformParameters {
         }
         let superior = match self.superior {
             Superior::Stated(direction) => Some(direction),
-            Superior::Body | Superior::Frame => None,
+            Superior::Body | Superior::Frame | Superior::Untold => None,
         };
         let directions = [self.hints.axis, superior, self.anterior];
         let usable = |d: &Vec3| d.norm() > 1e-6 && d.norm().is_finite();

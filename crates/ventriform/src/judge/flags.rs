@@ -95,6 +95,16 @@ pub enum Flag {
         /// Share of area with an edge.
         active: f64,
     },
+    /// The apex points to the patient's right.
+    #[error(
+        "the apex points {degrees:.0} degrees to the patient's right: left and right may be exchanged in the file \
+         (compare with another view: the liver lies on the right), or the heart lies on the right (dextrocardia). \
+         The sides of the polar map are those of the file"
+    )]
+    Mirrored {
+        /// Angle of the long axis to the plane between left and right, degrees to the right.
+        degrees: f64,
+    },
     /// Nodes lie at or beyond the border of the volume.
     #[error("{share:.0} % of the model's nodes lie at or beyond the volume's border")]
     TouchesBorder {
@@ -148,6 +158,7 @@ impl Flag {
             Flag::NotAtRest { .. } => "not_at_rest",
             Flag::Folded { .. } => "folded",
             Flag::PoorContrast { .. } => "poor_contrast",
+            Flag::Mirrored { .. } => "mirrored",
             Flag::TouchesBorder { .. } => "touches_border",
             Flag::ImplausibleShape { .. } => "implausible_shape",
             Flag::ValvePlane { .. } => "valve_plane",

@@ -68,6 +68,8 @@ pub enum Superior {
     Frame,
     /// The caller: a direction in the LPS frame of the volume, of any length.
     Stated(Vec3),
+    /// Nothing: neither the file nor the caller says how the volume's axes lie in the patient.
+    Untold,
 }
 
 /// The source of a patient's orientation.
@@ -136,7 +138,7 @@ impl PatientOrientation {
     pub fn stated(superior: Superior, anterior: Option<Vec3>, axis: &Vec3) -> Option<Self> {
         let superior = match superior {
             Superior::Stated(direction) => Some(direction.normalize()),
-            Superior::Body | Superior::Frame => None,
+            Superior::Body | Superior::Frame | Superior::Untold => None,
         };
         let anterior = anterior.map(|direction| direction.normalize());
         let tells = |d: &Vec3| d.cross(axis).norm() > LEAST_SINE;
@@ -181,6 +183,9 @@ impl PatientOrientation {
     ) -> Result<Self, Cancelled> {
         if superior == Superior::Frame {
             return Ok(Self::FRAME);
+        }
+        if superior == Superior::Untold {
+            return Ok(Self::unknown(&cup.axis));
         }
         let body = Self::of_body(volume, &cup.centre, monitor)?;
         let across_heart = ShortAxisSlices::of(&volume.frame, &cup.axis);

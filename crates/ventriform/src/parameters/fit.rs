@@ -5,11 +5,12 @@ use crate::deform::DeformParameters;
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::locate::Hints;
+use crate::locate::patient_orientation::Superior;
 use crate::model::Organ;
 use crate::normals::ScanKind;
 use crate::polar::PolarParameters;
-use crate::volume::Volume;
 use crate::volume::given_mask::MaskChoice;
+use crate::volume::{AffineSource, Volume};
 
 /// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,14 +131,26 @@ impl FitParameters {
         Ok(parameters)
     }
 
-    /// The parameters of the deformation for `volume`, with hints in millimetres.
+    /// The parameters of the deformation for `volume`, whose axes lie in the patient as `source` says, with hints in
+    /// millimetres. If nothing says how they lie, and neither do the parameters, no side of the heart is known.
     ///
     /// # Errors
     /// A [`ParameterError`] for a hint outside the volume.
-    pub fn on(&self, volume: &Volume) -> Result<DeformParameters, ParameterError> {
+    pub fn on(
+        &self,
+        volume: &Volume,
+        source: AffineSource,
+    ) -> Result<DeformParameters, ParameterError> {
+        let deform = self.deform.clone();
+        let untold = !source.states_orientation() && deform.superior == Superior::Body;
         Ok(DeformParameters {
             hints: self.position.hints(volume)?,
-            ..self.deform.clone()
+            superior: if untold && deform.anterior.is_none() {
+                Superior::Untold
+            } else {
+                deform.superior
+            },
+            ..deform
         })
     }
 }
@@ -367,7 +380,8 @@ mod tests {
 
     #[test]
     fn hints_are_millimetres_within_the_volume() {
-        let hinted = |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume());
+        let hinted =
+            |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume(), AffineSource::Caller);
         let seeded = hinted(&[("seed_point", "0,0,0")]).unwrap();
         assert_eq!(seeded.hints.centre, Some(Vec3::new(-9.0, -19.0, -29.0)));
         assert_eq!(seeded.margin, 0.0);

@@ -334,7 +334,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
             Ok(())
         },
         write: |p| match p.deform.superior {
-            Superior::Body => json!("body"),
+            // What the file does not say is no parameter.
+            Superior::Body | Superior::Untold => json!("body"),
             Superior::Frame => json!("frame"),
             Superior::Stated(up) => json!([up.x, up.y, up.z]),
         },

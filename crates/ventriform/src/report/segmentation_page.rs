@@ -179,6 +179,10 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
             ),
             ("dark_apex", "The apical wall is seen".to_owned()),
             (
+                "mirrored",
+                "The apex does not point to the patient's right".to_owned(),
+            ),
+            (
                 "implausible_shape",
                 "Volumes, thickness and length are those of a heart".to_owned(),
             ),

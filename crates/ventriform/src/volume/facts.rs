@@ -95,6 +95,11 @@ impl AffineSource {
     /// Those by which orientation or origin in the patient are assumed.
     pub const ASSUMED: [Self; 2] = [Self::Pixdim, Self::UnknownOrigin];
 
+    /// Whether the orientation in the patient is stated. NIfTI's spacing alone says nothing about it.
+    pub fn states_orientation(self) -> bool {
+        self != Self::Pixdim
+    }
+
     /// Whether orientation and origin in the patient are stated, not assumed.
     pub fn is_placed(self) -> bool {
         !Self::ASSUMED.contains(&self)

@@ -13,10 +13,13 @@ use ventriform::grid::field::Field;
 use ventriform::locate::patient_orientation::{OrientationSource, Superior};
 use ventriform::mesh::shapes;
 use ventriform::model::{Organ, Template};
+use ventriform::parameters::{FitParameters, Parameters};
 use ventriform::polar::{self, PolarMap, PolarParameters};
 use ventriform::progress::Monitor;
+use ventriform::segmentation::{Segmentation, SegmentationOrder, from_files};
+use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{Phantom, Volume};
+use ventriform::volume::{Phantom, ReadLimits, Volume, VolumeFile};
 
 /// A patient whose inferior wall takes up little.
 fn patient() -> Phantom {
@@ -124,4 +127,78 @@ fn short_axis_slices_are_oriented_by_their_header_or_by_what_is_stated_or_not_at
             assert!(change < 0.1, "{apex_first} {superior:?}: {change}");
         }
     }
+}
+
+/// The image in a NIfTI file, its x exchanged if `mirrored`, with the codes of its affines set to `code`.
+fn file(volume: &Volume, mirrored: bool, code: u8) -> Vec<VolumeFile> {
+    let mut bytes = nifti::write(volume, StoredType::Int16, false).unwrap();
+    // qform_code and sform_code; srow_x.
+    bytes[252] = code;
+    bytes[254] = code;
+    if mirrored {
+        bytes[252] = 0;
+        for at in (280..296).step_by(4) {
+            bytes[at + 3] ^= 0x80;
+        }
+    }
+    vec![VolumeFile::in_memory("scan.nii", bytes)]
+}
+
+fn segmented(files: &[VolumeFile], pairs: &[(&str, &str)]) -> Segmentation {
+    let parameters = FitParameters::from_pairs(pairs.iter().copied()).unwrap();
+    let order = SegmentationOrder {
+        volume: files,
+        expert: None,
+        auto: true,
+        models: Vec::new(),
+        reader: None,
+        normals: None,
+        parameters: &parameters,
+    };
+    let made = from_files(&order, &ReadLimits::default(), &Monitor::silent());
+    made.unwrap().segmentation
+}
+
+fn is_mirrored(made: &Segmentation) -> bool {
+    let flags = &made.fit.judgement.flags;
+    flags.iter().any(|flag| flag.code() == "mirrored")
+}
+
+/// Hearts of all poses that the phantom has: told when the file exchanges left and right, and only then.
+#[test]
+fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
+    for seed in 0..8 {
+        let parameters = PhantomParameters {
+            shape: [52; 3],
+            spacing_mm: [5.0; 3],
+            seed,
+            ..PhantomParameters::default()
+        };
+        let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+        assert!(
+            !is_mirrored(&segmented(&file(&volume, false, 1), &[])),
+            "{seed}"
+        );
+        let mirrored = segmented(&file(&volume, true, 1), &[]);
+        assert!(is_mirrored(&mirrored), "{seed}");
+        // It is told of frames that claim a patient only.
+        assert!(
+            !is_mirrored(&segmented(&file(&volume, true, 0), &[])),
+            "{seed}"
+        );
+    }
+}
+
+/// Without codes nothing says how the axes lie in the patient: the wall is found, its sides are not known.
+#[test]
+fn a_file_without_codes_has_no_sides_unless_they_are_stated() {
+    let volume = patient().volume;
+    let coded = segmented(&file(&volume, false, 1), &[]);
+    let bare = file(&volume, false, 0);
+    let untold = segmented(&bare, &[]);
+    let map = untold.polar.as_ref().unwrap();
+    assert_eq!(map.orientation, OrientationSource::Unknown);
+    assert!(!is_mirrored(&untold));
+    let ml = |made: &Segmentation| made.fit.model.wall_ml;
+    assert!((ml(&untold) / ml(&coded) - 1.0).abs() < 0.05);
 }

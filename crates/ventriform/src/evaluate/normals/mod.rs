@@ -42,7 +42,8 @@ pub const LEAST_CONFIDENCE: f64 = 0.5;
 
 /// Flags of a fit that speak against its uptake or its place. Others, such as those of the septum's shape, are raised
 /// for one healthy heart in seven.
-const FLAGS_OF_NO_NORMAL: [&str; 8] = [
+const FLAGS_OF_NO_NORMAL: [&str; 9] = [
+    "mirrored",
     "uncertain_place",
     "motion",
     "label_map",
