@@ -1,23 +1,23 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
 import { at } from "./base";
-import type { Beat, BeatSummary, Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
+import type { Beat, BeatSummary, Comparison, ComparisonSummary, Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
 
-export type { JobState, Problem, Volume } from "./generated/openapi";
+export type { JobState, Normals, Problem, Volume } from "./generated/openapi";
 export type FileOfResult = Download;
-/** Kinds of work. */
-export type Kind = "model" | "segmentation" | "beat";
-export type Job = AnyJob & { kind: Kind };
+/** Kinds of work on scans. */
+export type Kind = "model" | "segmentation" | "beat" | "comparison";
+export type Job = AnyJob & { kind: Kind | "normals" };
 
 export type ParameterValue = string | number | boolean | (number | string)[];
 export type Parameters = Record<string, ParameterValue | null>;
 
-/** A model, a segmentation, a beat or a template; which of them, its id says. */
-export type Result = Pick<Model | Segmentation | Beat, "id" | "created_at" | "volume" | "files"> & {
+/** A model, a segmentation, a beat, a comparison or a template; which of them, its id says. */
+export type Result = Pick<Model | Segmentation | Beat | Comparison, "id" | "created_at" | "volume" | "files"> & {
   parameters: Parameters;
-  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary>;
+  summary: Partial<ModelSummary & SegmentationSummary & BeatSummary & ComparisonSummary>;
   links: Pick<Model["links"], "self" | "mesh"> & Partial<Model["links"]>;
 };
 

@@ -1,12 +1,12 @@
 // One job: its state while it lasts, and why it failed.
 
 import { useState } from "preact/hooks";
-import { type Job, type Kind, type Problem, sentences, words } from "./api";
+import { type Job, type Problem, sentences, words } from "./api";
 import { cancel, forget, isActive } from "./library";
-import { open } from "./route";
+import { open, openComparison } from "./route";
 import { ordinal, stage } from "./words";
 
-const KINDS: Record<Kind, string> = { model: "Model", segmentation: "Fit", beat: "Beat" };
+const KINDS: Record<Job["kind"], string> = { model: "Model", segmentation: "Fit", beat: "Beat", comparison: "Rest and stress", normals: "Normal limits" };
 
 /** What is wrong, and what to do. */
 export function Trouble({ problem }: { problem: Problem | null | undefined }) {
@@ -20,7 +20,8 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
   const what = KINDS[job.kind];
   const act = (go: () => Promise<void>) => () => void go().catch((error: unknown) => setProblem(words(error)));
   const change = () => {
-    if (onChange) onChange(job);
+    if (job.kind === "comparison") openComparison(job.id);
+    else if (onChange) onChange(job);
     else if (job.volume) open(job.volume, job.id);
   };
   return (
@@ -43,7 +44,7 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
       ) : (
         job.state !== "succeeded" && (
           <>
-            <button type="button" onClick={change}>Change and retry</button>
+            {job.kind !== "normals" && <button type="button" onClick={change}>Change and retry</button>}
             <button type="button" class="plain" onClick={act(() => forget(job))}>Remove</button>
           </>
         )

@@ -1,14 +1,16 @@
 // What is stored, as far as this page has read it, and the states of jobs as they change.
 
 import { at } from "./base";
-import { type Job, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
+import { type Job, type Normals, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
 import { Watched } from "./state";
-import { isBeat, isFit, newest } from "./words";
+import { isBeat, isComparison, isFit, newest } from "./words";
 
 export const volumes = new Watched<Volume[]>([]);
 export const models = new Watched<Result[]>([]);
 export const fits = new Watched<Result[]>([]);
 export const beats = new Watched<Result[]>([]);
+export const comparisons = new Watched<Result[]>([]);
+export const normals = new Watched<Normals[]>([]);
 export const templates = new Watched<Result[]>([]);
 export const jobs = new Watched<Job[]>([]);
 /** Where the list of volumes goes on; null at its end. */
@@ -22,16 +24,18 @@ const PAGE = 30;
 
 /** Reads the newest of everything. */
 export async function refresh(): Promise<void> {
-  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value, beats: beats.value };
+  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value, beats: beats.value, comparisons: comparisons.value };
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
-    const [v, m, s, b, t] = await Promise.all([
+    const [v, m, s, b, c, t, n] = await Promise.all([
       page<Volume>("volumes", { limit: Math.max(PAGE, Math.min(100, volumes.value.length)) }),
       page<Result>("models", { limit: 100 }),
       page<Result>("segmentations", { limit: 100 }),
       page<Result>("beats", { limit: 100 }),
+      page<Result>("comparisons", { limit: 100 }),
       page<Result>("templates", { limit: 100 }),
+      page<Normals>("normals", { limit: 100 }),
     ]);
     volumes.value = renewed(known.volumes, volumes.value, v.items);
     more.value = v.next;
@@ -39,8 +43,10 @@ export async function refresh(): Promise<void> {
     models.value = renewed(known.models, models.value, m.items);
     fits.value = renewed(known.fits, fits.value, s.items);
     beats.value = renewed(known.beats, beats.value, b.items);
+    comparisons.value = renewed(known.comparisons, comparisons.value, c.items);
     templates.value = t.items;
-    partial.value = Boolean(m.next || s.next || b.next);
+    normals.value = n.items;
+    partial.value = Boolean(m.next || s.next || b.next || c.next);
     trouble.value = "";
     loaded.value = true;
   } catch (error) {
@@ -112,15 +118,15 @@ export async function loadAllResults(): Promise<void> {
 const MOST = 2000;
 
 /** The results of scans: their collection, and what of it was read. */
-const KINDS = [["segmentations", fits], ["models", models], ["beats", beats]] as const;
+const KINDS = [["segmentations", fits], ["models", models], ["beats", beats], ["comparisons", comparisons]] as const;
 
 function kindOf(id: string): (typeof KINDS)[number] {
-  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : 1];
+  return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : 1];
 }
 
 /** What a job made, once it has succeeded. */
 export function madeBy(job: Job): string | null {
-  return job.segmentation ?? job.model ?? job.beat ?? null;
+  return job.segmentation ?? job.model ?? job.beat ?? job.comparison ?? null;
 }
 
 export function find(id: string): Result | undefined {
@@ -138,6 +144,7 @@ export async function loadResult(id: string): Promise<Result | undefined> {
   }
 }
 
+/** What was made of a scan by itself. */
 export function resultsOf(volume: string): Result[] {
   const own = [...beats.value, ...fits.value, ...models.value].filter(result => result.volume === volume);
   return own.sort(newest);
@@ -156,7 +163,27 @@ export function put(job: Job): void {
   if (known?.state !== job.state && job.state === "succeeded") {
     const made = madeBy(job);
     if (made && !find(made)) void loadResult(made);
+    if (job.kind === "normals") void loadNormals();
   }
+}
+
+/** Reads the list of normal limits again. */
+export async function loadNormals(): Promise<void> {
+  try {
+    normals.value = (await page<Normals>("normals", { limit: 100 })).items;
+  } catch (error) {
+    trouble.value = words(error);
+  }
+}
+
+export async function eraseNormals(id: string): Promise<void> {
+  await call(`/v1/normals/${id}`, { method: "DELETE" });
+  normals.value = normals.value.filter(limits => limits.id !== id);
+}
+
+/** The comparisons in which a scan takes part, at stress or at rest. */
+export function comparisonsOf(volume: string): Result[] {
+  return comparisons.value.filter(made => made.volume === volume || made.parameters["rest"] === volume).sort(newest);
 }
 
 // Browsers open at most six connections to a host, so few jobs are followed by events; the list tells of the others.

@@ -13,7 +13,7 @@ import { WorkList } from "./worklist";
 const DOCS = location.pathname.startsWith(at("/docs"));
 
 function Page() {
-  const { view, volume } = useWatched(route);
+  const { view, volume, result } = useWatched(route);
   const asked = useWatched(wanted);
   const answers = useWatched(reachable);
   const signedIn = useWatched(key);
@@ -30,6 +30,7 @@ function Page() {
         </a>
         <nav aria-label="Pages">
           <a href={at("/#/")} aria-current={view === "list" && !DOCS ? "page" : undefined}>Scans</a>
+          <a href={at("/#/limits")} aria-current={view === "limits" && !DOCS ? "page" : undefined}>Normal limits</a>
           <a href={at("/#/evaluation")} aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>Evaluation</a>
           <a href={at("/docs")} aria-current={DOCS ? "page" : undefined}>API</a>
         </nav>
@@ -44,7 +45,7 @@ function Page() {
       )}
       {asked && <SignIn reason={asked} />}
       <main id="main" tabIndex={-1}>
-        {DOCS ? <Chunk load={docs} name="documentation" /> : volume ? <Chunk key={volume} load={viewer} name="viewer" volume={volume} /> : view === "evaluation" ? <Chunk key="evaluation" load={evaluation} name="evaluation" /> : <WorkList />}
+        {DOCS ? <Chunk load={docs} name="documentation" /> : volume ? <Chunk key={volume} load={viewer} name="viewer" volume={volume} /> : view === "comparison" && result ? <Chunk key="comparison" load={comparison} name="comparison" volume={result} /> : view === "limits" ? <Chunk key="limits" load={limits} name="normal limits" /> : view === "evaluation" ? <Chunk key="evaluation" load={evaluation} name="evaluation" /> : <WorkList />}
       </main>
     </>
   );
@@ -69,6 +70,8 @@ function SignIn({ reason }: { reason: string }) {
 }
 
 const viewer = () => import("./viewer/viewer").then(module => module.Viewer as ComponentType<{ volume?: string }>);
+const comparison = () => import("./viewer/comparisonview").then(({ ComparisonView }) => (({ volume }) => <ComparisonView key={volume} id={volume ?? ""} />) as ComponentType<{ volume?: string }>);
+const limits = () => import("./limits").then(module => module.LimitsView as ComponentType<{ volume?: string }>);
 const evaluation = () => import("./evaluationview").then(module => module.EvaluationView as ComponentType<{ volume?: string }>);
 const docs = () => import("./docs").then(module => module.Docs as ComponentType<{ volume?: string }>);
 

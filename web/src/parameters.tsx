@@ -2,7 +2,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { type Kind, type ParameterValue, type Parameters, type Result, type Volume, get, page } from "./api";
-import { fits, models, templates, volumes } from "./library";
+import { fits, models, normals, templates, volumes } from "./library";
 import { useWatched } from "./state";
 import { cut, isLabelMap, moment, nameOf } from "./words";
 
@@ -30,7 +30,8 @@ interface Operation {
   parameters: { in: string; name?: string; description?: string; schema?: Schema }[];
 }
 
-const NOT_OF_THE_WORK = new Set(["external_id", "labels", "webhook", "webhook_events"]);
+/** Of requests, and of both scans of a comparison, which the page has chosen before. */
+const NOT_OF_THE_WORK = new Set(["external_id", "labels", "webhook", "webhook_events", "priority", "send", "to", "stress", "rest"]);
 
 let specs: Promise<Record<Kind, Spec[]>> | undefined;
 
@@ -41,6 +42,7 @@ export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
       model: read(document.paths["/v1/models"]?.post),
       segmentation: read(document.paths["/v1/segmentations"]?.post),
       beat: read(document.paths["/v1/beats"]?.post),
+      comparison: read(document.paths["/v1/comparisons"]?.post),
     }),
     error => {
       specs = undefined;
@@ -72,9 +74,13 @@ function read(operation?: Operation): Spec[] {
 
 const FEW: Record<Kind, string[]> = {
   model: ["points", "method", "iso"],
-  segmentation: ["model", "edge", "reader", "expert", "frame"],
-  beat: ["model", "mass_g", "rr_ms", "gated"],
+  segmentation: ["model", "edge", "reader", "expert", "frame", "normals"],
+  beat: ["model", "mass_g", "rr_ms", "gated", "normals"],
+  comparison: ["normals"],
 };
+
+/** What chooses the group of the normal limits, once limits are chosen. */
+const GROUP = ["sex", "protocol", "stress_protocol", "rest_protocol", "tracer", "attenuation_corrected"];
 
 const PLACE = ["center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior", "segments_from", "kept_model"];
 const EDGE = ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"];
@@ -101,9 +107,16 @@ const GROUPS: Record<Kind, [string, string[]][]> = {
     ["Springs", SPRINGS],
     ["Polar map", ["polar_*"]],
   ],
+  comparison: [
+    ["Both scans", ["same_patient", "gated", "model"]],
+    ["Where the heart is", PLACE],
+    ["Edge of the wall", EDGE],
+    ["Springs", SPRINGS],
+    ["Polar map", ["polar_*"]],
+  ],
 };
 
-function arranged(kind: Kind, all: Spec[]): { few: Spec[]; groups: [string, Spec[]][] } {
+function arranged(kind: Kind, all: Spec[]): { few: Spec[]; group: Spec[]; groups: [string, Spec[]][] } {
   const left = new Map(all.map(spec => [spec.name, spec]));
   const take = (names: string[]): Spec[] =>
     names.flatMap(name => {
@@ -112,9 +125,10 @@ function arranged(kind: Kind, all: Spec[]): { few: Spec[]; groups: [string, Spec
       return found.flatMap(spec => (spec && left.delete(spec.name) ? [spec] : []));
     });
   const few = take(FEW[kind]);
+  const group = take(GROUP);
   const groups = GROUPS[kind].map(([title, names]): [string, Spec[]] => [title, take(names)]);
   if (left.size) groups.push(["Other", [...left.values()]]);
-  return { few, groups };
+  return { few, group, groups };
 }
 
 /** What a person has written, by parameter; the text of a field, so that a slip can be corrected. */
@@ -177,14 +191,15 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
     setPresets(presetsOf(kind));
   }, [kind]);
   if (!all) return <p class="quiet">Reading the parameters …</p>;
-  const { few, groups } = arranged(kind, all);
+  const { few, group, groups } = arranged(kind, all);
   const field = (spec: Spec) => (
     <Field
       key={spec.name}
       spec={spec}
       volume={volume}
       text={draft[spec.name] ?? ""}
-      onText={text => onChange({ ...draft, [spec.name]: text })}
+      limits={draft["normals"] ?? ""}
+      onText={text => onChange({ ...draft, ...(spec.name === "normals" ? Object.fromEntries(GROUP.map(name => [name, ""])) : {}), [spec.name]: text })}
       error={problem?.field === spec.name ? problem.text : ""}
     />
   );
@@ -194,7 +209,10 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
   const mustShow = inMore.some(spec => spec.name === problem?.field);
   return (
     <div class="parameters">
-      <div class="fields">{few.filter(spec => spec.name !== "frame" || volume.frames > 1).map(field)}</div>
+      <div class="fields">
+        {few.filter(spec => spec.name !== "frame" || volume.frames > 1).map(field)}
+        {draft["normals"] && group.map(field)}
+      </div>
       <details open={mustShow || undefined}>
         <summary>
           More{changed(inMore) ? <span class="count">{changed(inMore)} set</span> : null}
@@ -238,7 +256,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
           <button type="button" class="plain" onClick={() => onChange({})}>All defaults</button>
         </div>
       </details>
-      {problem && !all.some(spec => spec.name === problem.field) && <p class="error" role="alert">{problem.text}</p>}
+      {problem && !all.some(spec => spec.name === problem.field && (draft["normals"] || !GROUP.includes(spec.name))) && <p class="error" role="alert">{problem.text}</p>}
     </div>
   );
 }
@@ -258,6 +276,10 @@ const NAMES: Record<string, string> = {
   w2: "Weight 2",
   w3: "Weight 3",
   w4: "Weight 4",
+  normals: "Normal limits",
+  stress_protocol: "Protocol at stress",
+  rest_protocol: "Protocol at rest",
+  attenuation_corrected: "Attenuation corrected",
 };
 
 function title(name: string): string {
@@ -269,11 +291,13 @@ interface FieldProps {
   spec: Spec;
   volume: Volume;
   text: string;
+  /** The normal limits that are chosen; empty: none. */
+  limits: string;
   onText: (text: string) => void;
   error: string;
 }
 
-function Field({ spec, volume, text, onText, error }: FieldProps) {
+function Field({ spec, volume, text, limits, onText, error }: FieldProps) {
   const { name, schema, help, unit } = spec;
   const id = `parameter-${name}`;
   const described = `${id}-help${error ? ` ${id}-error` : ""}`;
@@ -286,6 +310,8 @@ function Field({ spec, volume, text, onText, error }: FieldProps) {
   let input;
   if (name === "model") input = <ModelChoice common={common} text={text} onText={onText} volume={volume} />;
   else if (name === "expert") input = <ExpertChoice common={common} text={text} onText={onText} volume={volume} />;
+  else if (name === "normals") input = <NormalsChoice common={common} text={text} onText={onText} />;
+  else if (name === "tracer" || /(^|_)protocol$/.test(name)) input = <GroupChoice common={common} text={text} onText={onText} limits={limits} of={name === "tracer" ? "tracer" : "protocol"} />;
   else if (name === "reader") input = <ReaderChoice common={common} text={text} onText={onText} />;
   else if (schema.type === "boolean") {
     input = (
@@ -352,6 +378,31 @@ function ExpertChoice({ common, text, onText, volume }: ChoiceProps) {
       <option value="">none</option>
       {masks.map(mask => <option key={mask.id} value={mask.id}>{cut(nameOf(mask))}</option>)}
       {text && !masks.some(mask => mask.id === text) && <option value={text}>{text}</option>}
+    </select>
+  );
+}
+
+/** Stored normal limits; it says of simulated ones that they are. */
+function NormalsChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
+  const known = useWatched(normals);
+  return (
+    <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
+      <option value="">none: no z, no scores</option>
+      {known.map(limits => <option key={limits.id} value={limits.id}>{cut(limits.name)}{limits.summary.simulated ? " (simulated people, not patients)" : ""}</option>)}
+      {text && !known.some(limits => limits.id === text) && <option value={text}>{text}</option>}
+    </select>
+  );
+}
+
+/** Protocols or tracers of the groups of normal limits. */
+function GroupChoice({ common, text, onText, limits, of }: Omit<ChoiceProps, "volume"> & { limits: string; of: "protocol" | "tracer" }) {
+  const groups = useWatched(normals).find(one => one.id === limits)?.summary.groups ?? [];
+  const words = [...new Set(groups.map(group => group[of]))];
+  return (
+    <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
+      <option value="">automatic</option>
+      {words.map(word => <option key={word} value={word}>{word}</option>)}
+      {text && !words.includes(text) && <option value={text}>{text}</option>}
     </select>
   );
 }

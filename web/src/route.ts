@@ -1,9 +1,11 @@
-// The address of the view: #/ is the list, #/evaluation the results of an evaluation, #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is compared with.
+// The address of the view: #/ is the list, #/evaluation the results of an evaluation, #/limits the normal limits,
+// #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is shown beside, #/comparison/ID the comparison of rest
+// and stress with that id, or the job that makes it.
 
 import { Watched } from "./state";
 
 export interface Route {
-  view: "list" | "scan" | "evaluation";
+  view: "list" | "scan" | "evaluation" | "limits" | "comparison";
   volume: string | null;
   result: string | null;
   other: string | null;
@@ -12,7 +14,8 @@ export interface Route {
 function read(): Route {
   const [, view, volume, result, other] = location.hash.split("/");
   if (view === "scan" && volume) return { view, volume, result: result || null, other: other || null };
-  return { view: view === "evaluation" ? view : "list", volume: null, result: null, other: null };
+  if (view === "comparison" && volume) return { view, volume: null, result: volume, other: null };
+  return { view: view === "evaluation" || view === "limits" ? view : "list", volume: null, result: null, other: null };
 }
 
 export const route = new Watched<Route>(read());
@@ -20,6 +23,11 @@ addEventListener("hashchange", () => (route.value = read()));
 
 export function open(volume: string, result?: string | null, other?: string | null): void {
   location.hash = ["#", "scan", volume, result ?? "", other ?? ""].join("/").replace(/\/+$/, "");
+}
+
+/** Shows a comparison, or the job that makes it. */
+export function openComparison(id: string): void {
+  location.hash = `#/comparison/${id}`;
 }
 
 /** Whether this scan is what the address names: the views follow a change of it a moment later. */

@@ -15,6 +15,8 @@ export type UploadState = "waiting" | "sending" | "reading" | "stored" | "refuse
 
 export interface Upload {
   id: number;
+  /** The number of what was chosen or dropped together. */
+  batch: number;
   group: Group;
   bytes: number;
   sent: number;
@@ -30,10 +32,12 @@ keepNames.watch(() => localStorage.setItem("ventriform.names", keepNames.value ?
 
 export const uploads = new Watched<Upload[]>([]);
 
-/** What to do with each scan that has been stored. */
+/** What to do with each scan that has been stored, and with those that were sent together once all of them are. */
 let whenStored: (volume: Volume) => void = () => undefined;
-export function onStored(act: (volume: Volume) => void): void {
+let whenAllStored: (volumes: Volume[]) => void = () => undefined;
+export function onStored(act: (volume: Volume) => void, together: (volumes: Volume[]) => void): void {
   whenStored = act;
+  whenAllStored = together;
 }
 
 /** The name of a NIfTI file of one gate: what is before and after its number. */
@@ -69,9 +73,15 @@ export async function grouped(files: File[]): Promise<Group[]> {
     if (!id.startsWith("gates ") || (gates >= LEAST_GATES && gates <= MOST_GATES)) return [group];
     return group.files.map(file => ({ name: file.name, files: [file] }));
   };
-  return [...groups].flatMap(apart).map(group => {
+  const named = [...groups].flatMap(apart).map(group => {
     const name = group.files.length === 1 ? (group.files[0]?.name ?? group.name) : group.name;
     return { ...group, name };
+  });
+  // The folders tell files of one name apart: `stress/spect.nii.gz` and `rest/spect.nii.gz`.
+  return named.map(group => {
+    const twin = named.some(other => other !== group && other.name === group.name);
+    const folder = twin && group.files[0] ? folderOf(group.files[0]).split("/").pop() : "";
+    return folder ? { ...group, name: `${folder} ${group.name}` } : group;
   });
 }
 
@@ -99,11 +109,14 @@ async function seriesOf(file: File): Promise<string | null> {
 }
 
 let count = 0;
+let batches = 0;
 
 export async function add(files: File[]): Promise<void> {
   const groups = await grouped(files);
+  const batch = ++batches;
   const made = groups.map(group => ({
     id: ++count,
+    batch,
     group,
     bytes: group.files.reduce((sum, file) => sum + file.size, 0),
     sent: 0,
@@ -175,6 +188,8 @@ async function send(upload: Upload): Promise<void> {
       const volume = JSON.parse(answer.text) as Volume;
       change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
       whenStored(volume);
+      const together = uploads.value.filter(other => other.batch === upload.batch);
+      if (together.every(other => other.state === "stored")) whenAllStored(together.flatMap(other => other.volume ?? []));
     } else {
       change(upload.id, { state: "refused", problem: problemOf(answer.status, answer.text) });
     }

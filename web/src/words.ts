@@ -31,6 +31,13 @@ export function study({ dicom }: Volume, written: (text: string) => string = tex
   return parts.filter(Boolean).join(" · ");
 }
 
+/** What a header says of the acquisition: stress or rest, its description, the tracer. */
+export function acquisition({ dicom }: Volume): string[] {
+  if (!dicom) return [];
+  const { series_description: description, radiopharmaceutical, radionuclide } = dicom;
+  return [description, radiopharmaceutical ?? radionuclide].flatMap(text => (text?.trim() ? [text.trim()] : []));
+}
+
 export function bytes(count: number): string {
   if (count < 1e3) return `${count} B`;
   if (count < 1e6) return `${(count / 1e3).toFixed(0)} kB`;
@@ -107,9 +114,13 @@ export function isBeat(id: string): boolean {
   return id.startsWith("bea_");
 }
 
+export function isComparison(id: string): boolean {
+  return id.startsWith("cmp_");
+}
+
 /** The kind of work that makes such a result. */
 export function kindOf(id: string): Kind {
-  return isFit(id) ? "segmentation" : isBeat(id) ? "beat" : "model";
+  return isFit(id) ? "segmentation" : isBeat(id) ? "beat" : isComparison(id) ? "comparison" : "model";
 }
 
 /** What distinguishes a result from others of the same scan. */
@@ -121,6 +132,7 @@ export function resultName(result: Result): string {
     const what = isBeat(result.id) ? `beat of ${result.summary.gates} gates` : "fit";
     return `${changed.length ? "Corrected " : ""}${what}${by}`.replace(/^./, letter => letter.toUpperCase());
   }
+  if (isComparison(result.id)) return "Rest and stress";
   return `Model, ${String(result.summary["vertices"])} points`;
 }
 

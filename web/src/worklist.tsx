@@ -5,16 +5,18 @@ import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
-import { beats, eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import { beats, comparisons, eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import { offeredPair, pick, picked, statedPair, statedRole, studyKey } from "./pairing";
+import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
 import { open, route } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
-import { bytes, cut, isBeat, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study, titleOf } from "./words";
+import { acquisition, bytes, cut, isBeat, isComparison, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study, titleOf } from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
-type Show = "all" | "fits" | "beats" | "models" | "nothing" | "failed";
+type Show = "all" | "fits" | "beats" | "models" | "comparisons" | "nothing" | "failed";
 type Order = "newest" | "name" | "largest";
 
 /** The kind of fit for a scan: its gates are fitted together. */
@@ -36,6 +38,9 @@ export function WorkList() {
         () => alone && route.value.view === "list" && open(volume.id),
         error => setMessage(words(error)),
       );
+    }, together => {
+      const pair = offeredPair(together);
+      if (pair) picked.value = pair.map(volume => volume.id);
     });
   }, [then]);
   return (
@@ -44,6 +49,7 @@ export function WorkList() {
       <Drop then={then} onThen={setThen} />
       <p class="error" role="status">{message}</p>
       <Uploads />
+      <PickedPair />
       <Scans />
     </div>
   );
@@ -130,6 +136,8 @@ interface Row {
   volume: Volume;
   results: Result[];
   open: Job[];
+  /** The comparisons in which it takes part. */
+  compared: Result[];
 }
 
 function Scans() {
@@ -138,6 +146,7 @@ function Scans() {
   const allModels = useWatched(models);
   const allBeats = useWatched(beats);
   const allJobs = useWatched(jobs);
+  const allComparisons = useWatched(comparisons);
   const next = useWatched(more);
   const isLoaded = useWatched(loaded);
   const problem = useWatched(trouble);
@@ -150,16 +159,17 @@ function Scans() {
     return all.map(volume => ({
       volume,
       results: results.filter(result => result.volume === volume.id),
-      open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded"),
+      open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded" && job.kind !== "normals"),
+      compared: allComparisons.filter(made => made.volume === volume.id || made.parameters["rest"] === volume.id).sort(newest),
     }));
-  }, [all, allFits, allModels, allBeats, allJobs]);
+  }, [all, allFits, allModels, allBeats, allJobs, allComparisons]);
   // A search looks at everything stored, so the rest of the list is read first.
   useEffect(() => {
     if (!search && order === "newest" && show === "all") return;
     void loadAllResults().catch(error => (trouble.value = words(error)));
     if (next && all.length < 2000) void loadMore(100);
   }, [search, order, show, next, all.length]);
-  const shown = rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]);
+  const shown = together(rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]));
   useEffect(() => setAt(0), [search, show, order]);
   const part = shown.slice(at, at + SHOWN);
   if (!isLoaded) return problem ? <p class="error pad">{problem} <button type="button" onClick={() => void refresh()}>Try again</button></p> : <p class="quiet pad">Reading the list …</p>;
@@ -172,6 +182,7 @@ function Scans() {
           <li><b>The left ventricle is found and fitted</b>, usually within two seconds.</li>
           <li><b>Of a gated scan, all gates are fitted together</b>: the wall beats, with its volumes and ejection fraction.</li>
           <li><b>Look at slices, wall and polar map together</b>; correct axis and centre by hand, compare, download.</li>
+          <li><b>Drop a patient’s scans at stress and at rest together</b> to compare them: slices above each other, what is reversible, TID.</li>
         </ol>
         <p class="quiet">No scan at hand? <code>ventriform phantom</code> simulates one.</p>
       </section>
@@ -188,6 +199,7 @@ function Scans() {
             <option value="fits">with a fit</option>
             <option value="beats">with a beat</option>
             <option value="models">with a model</option>
+            <option value="comparisons">with rest and stress compared</option>
             <option value="nothing">without a result</option>
             <option value="failed">with a failed job</option>
           </select>
@@ -203,7 +215,7 @@ function Scans() {
         <span class="quiet" role="status">{shown.length}{next ? "+" : ""} {shown.length === 1 ? "scan" : "scans"}</span>
       </div>
       {problem && <p class="error" role="alert">{problem}</p>}
-      <ul class="scans">{part.map(row => <ScanRow key={row.volume.id} row={row} />)}</ul>
+      <ul class="scans">{groupsOf(part).map(group => <StudyRow key={group[0]!.volume.id} group={group} />)}</ul>
       {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
       {(at > 0 || shown.length > at + SHOWN || next) && (
         <nav class="paging" aria-label="Pages of the list">
@@ -220,11 +232,11 @@ function Scans() {
   );
 }
 
-function matches({ volume, results }: Row, search: string): boolean {
+function matches({ volume, results, compared }: Row, search: string): boolean {
   const text = search.trim().toLowerCase();
   if (!text) return true;
   const labels = Object.entries(volume.labels).map(([name, value]) => `${name}:${value}`);
-  const all = [nameOf(volume), volume.id, volume.external_id ?? "", volume.format, study(volume), ...labels, ...results.map(result => result.id)];
+  const all = [nameOf(volume), volume.id, volume.external_id ?? "", volume.format, study(volume), ...labels, ...acquisition(volume), statedRole(volume) ?? "", ...[...results, ...compared].map(result => result.id)];
   return all.some(word => word.toLowerCase().includes(text));
 }
 
@@ -233,7 +245,8 @@ function passes(row: Row, show: Show): boolean {
     case "fits": return row.results.some(result => isFit(result.id));
     case "beats": return row.results.some(result => isBeat(result.id));
     case "models": return row.results.some(result => !isFit(result.id) && !isBeat(result.id));
-    case "nothing": return row.results.length === 0;
+    case "comparisons": return row.compared.length > 0;
+    case "nothing": return row.results.length === 0 && row.compared.length === 0;
     case "failed": return row.open.some(job => job.state === "failed");
     case "all": return true;
   }
@@ -245,7 +258,61 @@ const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
   largest: (a, b) => b.volume.bytes - a.volume.bytes,
 };
 
-function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
+/** Scans of one study follow the first of them. */
+function together(rows: Row[]): Row[] {
+  const groups = new Map<string, Row[]>();
+  for (const row of rows) {
+    const key = studyKey(row.volume) ?? row.volume.id;
+    groups.set(key, [...(groups.get(key) ?? []), row]);
+  }
+  return [...groups.values()].flat();
+}
+
+/** Neighbours of one study. */
+function groupsOf(rows: Row[]): Row[][] {
+  const groups: Row[][] = [];
+  for (const row of rows) {
+    const last = groups.at(-1);
+    const key = studyKey(row.volume);
+    if (last && key !== null && studyKey(last[0]!.volume) === key) last.push(row);
+    else groups.push([row]);
+  }
+  return groups;
+}
+
+/** A scan, or those of one patient's study under its name, with what was compared. */
+function StudyRow({ group }: { group: Row[] }) {
+  const [first] = group;
+  if (!first) return null;
+  if (group.length === 1) return <ScanRow row={first} compared={first.compared} alone />;
+  const ids = new Set(group.map(row => row.volume.id));
+  const inside = (made: Result) => ids.has(made.volume) && ids.has(String(made.parameters["rest"]));
+  const compared = [...new Map(group.flatMap(row => row.compared).filter(inside).map(made => [made.id, made])).values()];
+  const pair = statedPair(group.map(row => row.volume));
+  const whose = study(first.volume, cut);
+  return (
+    <li class="study">
+      <div class="study-head">
+        <h2 title={study(first.volume)}>{whose || "One study"}</h2>
+        {compared.map(made => <ComparisonLink key={made.id} made={made} />)}
+        {pair && <button type="button" class={compared.length ? "" : "main"} onClick={() => {
+          picked.value = pair.map(volume => volume.id);
+          document.querySelector(".drop")?.scrollIntoView();
+        }}>Compare rest and stress</button>}
+      </div>
+      <ul class="scans">{group.map(row => <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !inside(made))} />)}</ul>
+    </li>
+  );
+}
+
+function ComparisonLink({ made }: { made: Result }) {
+  return <a class="result" href={`#/comparison/${made.id}`}><b>{resultName(made)}</b> {figures(made)}</a>;
+}
+
+/** `alone`: no other scan of its study is beside it, so that it says whose it is. */
+function ScanRow({ row: { volume, results, open: openJobs }, compared, alone = false }: { row: Row; compared: Result[]; alone?: boolean }) {
+  const chosen = useWatched(picked).includes(volume.id);
+  const role = statedRole(volume);
   const [problem, setProblem] = useState("");
   const [state, setState] = useState("");
   const name = nameOf(volume);
@@ -259,8 +326,12 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
     <li class="scan">
       <a class="thumb" href={`#/scan/${volume.id}`} tabIndex={-1} aria-hidden="true"><Picture path={volume.links.preview} label="" /></a>
       <div class="what">
-        <a class="name" href={`#/scan/${volume.id}`} title={name}>{cut(titleOf(volume))}</a>
-        {study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
+        <span class="title">
+          <a class="name" href={`#/scan/${volume.id}`} title={name}>{cut(titleOf(volume))}</a>
+          {role && <span class={`role ${role}`}>{role}</span>}
+        </span>
+        {alone && study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
+        {acquisition(volume).length > 0 && <span>{acquisition(volume).join(" · ")}</span>}
         <span class="quiet">
           {moment(volume.created_at)} · {bytes(volume.bytes)} · {volume.format} · {shape(volume)}
           {isLabelMap(volume) && " · label map"}
@@ -271,19 +342,21 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
       </div>
       <div class="results">
         {openJobs.map(job => <JobLine key={job.id} job={job} />)}
+        {compared.slice(0, 2).map(made => <ComparisonLink key={made.id} made={made} />)}
         {results.slice(0, 4).map(result => (
           <a key={result.id} class="result" href={`#/scan/${volume.id}/${result.id}`}>
             <b>{resultName(result)}</b> {figures(result)}
           </a>
         ))}
         {results.length > 4 && <a class="result" href={`#/scan/${volume.id}`}>and {results.length - 4} more</a>}
-        {results.length === 0 && !openJobs.some(isActive) && <span class="quiet">no result yet</span>}
+        {results.length === 0 && compared.length === 0 && !openJobs.some(isActive) && <span class="quiet">no result yet</span>}
         {problem && <span class="error">{problem}</span>}
         {state && <span class="quiet" role="status">{state}</span>}
       </div>
       <div class="actions">
         <button type="button" onClick={start(fitOf(volume))} aria-label={`Fit ${isGated(volume) ? "the beat" : "the ventricle"} of ${name}`}>Fit</button>
         <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>Model</button>
+        {!isLabelMap(volume) && <button type="button" class="plain" aria-pressed={chosen} aria-label={`Pick ${name} to compare rest and stress`} onClick={() => pick(volume.id)}>{chosen ? "Picked" : "Pick"}</button>}
         <button type="button" class="plain" aria-label={`Download all of ${name} as zip`} onClick={() => {
           setProblem("");
           void import("./bundle").then(bundle => bundle.saveScan(volume, setState)).catch((error: unknown) => {
@@ -299,6 +372,10 @@ function ScanRow({ row: { volume, results, open: openJobs } }: { row: Row }) {
 
 function figures(result: Result) {
   const { summary } = result;
+  if (isComparison(result.id)) {
+    const { sss, sds } = summary;
+    return <><span>TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}{sss != null && `, SSS ${sss}, SDS ${sds}`}</span><Doubts count={summary.flags?.length ?? 0} /></>;
+  }
   if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
   if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
   const given = summary.volumes_ml;

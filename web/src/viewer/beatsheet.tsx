@@ -8,7 +8,7 @@ import { Verdict, headlines } from "./figures";
 import type { LoadedBeat } from "./loaded";
 import { PATIENT, heartPlanes } from "./plane";
 import { drawPolar, uptakeMap } from "./polar";
-import { Drawn, Foot, Head, type Printed } from "./sheet";
+import { BesideLimits, Drawn, Foot, Head, type Printed } from "./sheet";
 import { ColourBar } from "./wall";
 
 /** CSS pixels of a map and of a slice on paper before they are brought to the width of their column. */
@@ -62,6 +62,7 @@ export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & 
           </p>
         </div>
       </div>
+      <BesideLimits shown={shown} />
       <Foot page={1} of={1} />
     </section>
   );

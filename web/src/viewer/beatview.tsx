@@ -1,12 +1,13 @@
 // What was measured of a beat beside its figures: curve, phases, and maps of the wall.
 
 import { useMemo } from "preact/hooks";
-import type { BeatReport } from "../generated/openapi";
+import type { BeatReport, Perfusion, PolarFigure } from "../generated/openapi";
 import { useWatched } from "../state";
 import { number } from "../words";
 import { useCanvas } from "./canvas";
 import { PhaseHistogram, VolumeCurve } from "./charts";
 import type { Lut } from "./colours";
+import { LimitsUsed, PerfusionTable, SegmentScores } from "./comparedfacts";
 import type { Loaded, LoadedBeat } from "./loaded";
 import { type DrawnMap, FIGURES, WallFrame, drawPolar, figureLut, figureMap, placeOnMap, segmentAt, uptakeMap } from "./polar";
 import type { Scene } from "./scene";
@@ -22,7 +23,42 @@ export interface NamedMap {
 /** Uptake of end diastole and end systole, motion, thickening and phase. */
 export function mapsOf({ figures }: Loaded, { ends }: LoadedBeat): NamedMap[] {
   const uptake = ends ? ["Uptake, end diastole", "Uptake, end systole"].map((name, n): NamedMap => ({ name, map: uptakeMap(ends[n]!), lut: null })) : [];
-  return [...uptake, ...figures.map((map): NamedMap => ({ name: FIGURES[map.figure].name, map: figureMap(map), lut: figureLut(map.figure) }))];
+  return [...uptake, ...figures.filter(map => !ofLimits(map)).map((map): NamedMap => ({ name: FIGURES[map.figure].name, map: figureMap(map), lut: figureLut(map.figure) }))];
+}
+
+/** Whether a map shows the uptake beside normal limits. */
+function ofLimits({ figure }: PolarFigure): boolean {
+  return figure === "z" || figure === "score";
+}
+
+/** The maps of the uptake beside normal limits; none without them. */
+export function limitMapsOf({ figures }: Pick<Loaded, "figures">): NamedMap[] {
+  return figures.filter(ofLimits).map((map): NamedMap => ({ name: map.figure === "z" ? "z" : "Score", map: figureMap(map), lut: figureLut(map.figure) }));
+}
+
+/** What was measured against normal limits: figures, both maps, and of whom the limits are. */
+export function PerfusionView({ scene, shown }: { scene: Scene; shown: Loaded }) {
+  const perfusion = perfusionOf(shown);
+  const maps = useMemo(() => limitMapsOf(shown), [shown]);
+  const { heart, mesh } = shown;
+  if (!perfusion) return null;
+  return (
+    <section class="perfusion figures" aria-label="Beside normal limits">
+      <h2>Beside normal limits</h2>
+      <PerfusionTable of={[["", perfusion]]} />
+      {heart && <div class="maps">{maps.map(one => <SmallMap key={one.name} scene={scene} named={one} frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)} />)}</div>}
+      <LimitsUsed perfusion={perfusion} />
+      <details>
+        <summary>Scores of the segments</summary>
+        <SegmentScores perfusion={perfusion} />
+      </details>
+    </section>
+  );
+}
+
+/** The uptake of a fit or beat beside normal limits. */
+export function perfusionOf({ report, beat }: Loaded): Perfusion | null {
+  return report?.perfusion ?? beat?.report.perfusion ?? null;
 }
 
 export function BeatCharts({ scene, report }: { scene: Scene; report: BeatReport }) {
@@ -86,14 +122,14 @@ function SmallMap({ scene, named: { name, map, lut }, frame }: { scene: Scene; n
   const segment = onWall ? segmentAt(map, rows, columns) : undefined;
   return (
     <figure class="polar">
-      <canvas ref={canvas} role="img" aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, 0, map.unit)}`).join(", ")}`} onPointerDown={event => {
+      <canvas ref={canvas} role="img" aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, map.digits, map.unit)}`).join(", ")}`} onPointerDown={event => {
         const place = placeOnMap(map, event.offsetX, event.offsetY, event.currentTarget.clientWidth);
         if (place) scene.cursor.value = frame.at(...place);
       }} />
       <figcaption>
         <b>{name}</b>
         <ColourBar lut={colours} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />
-        <span class="quiet">{segment ? `${segment.name} ${number(segment.mean, 0, map.unit)}` : "\u00a0"}</span>
+        <span class="quiet">{segment ? `${segment.name} ${number(segment.mean, map.digits, map.unit)}` : "\u00a0"}</span>
       </figcaption>
     </figure>
   );

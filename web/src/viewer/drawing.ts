@@ -37,14 +37,36 @@ function sample(voxels: Voxels, plane: Plane, origin: Vec, nx: number, ny: numbe
 
 const scratch = document.createElement("canvas");
 
-/** Paints the slice through `origin` into a rectangle of the context. */
-export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, origin: Vec, box: { x: number; y: number; width: number; height: number }, factor: number): void {
-  const finest = scene.voxels.spacing / (scene.smooth.value ? 3 : 1);
+/** What is painted of voxels, and how. */
+export interface Look {
+  voxels: Voxels;
+  lut: Lut;
+  /** The values of the first and the last colour. */
+  low: number;
+  high: number;
+  smooth: boolean;
+}
+
+/** A grid of places in a slice, `step` millimetres apart. */
+interface Grid {
+  nx: number;
+  ny: number;
+  step: number;
+}
+
+export interface Box {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+/** Paints the slice through `origin` into a rectangle of the context; `tint` changes the pixels of its grid. */
+export function paintVoxels(context: CanvasRenderingContext2D, { voxels, lut, low, high, smooth }: Look, plane: Plane, origin: Vec, box: Box, factor: number, tint?: (pixels: Uint8ClampedArray, grid: Grid) => void): void {
+  const finest = voxels.spacing / (smooth ? 3 : 1);
   const step = Math.max(finest, 1 / factor);
   const [nx, ny] = [Math.max(1, Math.ceil(box.width / factor / step)), Math.max(1, Math.ceil(box.height / factor / step))];
-  const values = sample(scene.voxels, plane, origin, nx, ny, step);
-  const { low, high } = scene.windowNow;
-  const lut: Lut = scene.lut.value;
+  const values = sample(voxels, plane, origin, nx, ny, step);
   const image = new ImageData(nx, ny);
   const gain = 255 / (high - low || 1);
   const pixels = image.data;
@@ -57,21 +79,27 @@ export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Pl
     pixels[4 * n + 2] = outside ? 17 : lut[at + 2]!;
     pixels[4 * n + 3] = 255;
   }
+  tint?.(pixels, { nx, ny, step });
+  if (scratch.width < nx || scratch.height < ny) Object.assign(scratch, { width: Math.max(nx, scratch.width), height: Math.max(ny, scratch.height) });
+  scratch.getContext("2d")?.putImageData(image, 0, 0);
+  context.imageSmoothingEnabled = smooth;
+  const [width, height] = [nx * step * factor, ny * step * factor];
+  context.drawImage(scratch, 0, 0, nx, ny, box.x + (box.width - width) / 2, box.y + (box.height - height) / 2, width, height);
+}
+
+/** Paints the slice of a scene. */
+export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, origin: Vec, box: Box, factor: number): void {
+  const look = { voxels: scene.voxels, lut: scene.lut.value, ...scene.windowNow, smooth: scene.smooth.value };
   const difference = scene.difference.value;
-  if (difference) {
+  paintVoxels(context, look, plane, origin, box, factor, difference ? (pixels, { nx, ny, step }) => {
     const [fit, other] = [difference.fit, difference.other].map(voxels => sample(voxels, plane, origin, nx, ny, step));
-    for (let n = 0; n < values.length; n++) {
+    for (let n = 0; n < nx * ny; n++) {
       const [a, b] = [fit![n]! > 0.5, other![n]! > 0.5];
       if (a === b) continue;
       const tint = a ? [255, 140, 0] : [40, 170, 255];
       for (let channel = 0; channel < 3; channel++) pixels[4 * n + channel] = 0.4 * pixels[4 * n + channel]! + 0.6 * tint[channel]!;
     }
-  }
-  if (scratch.width < nx || scratch.height < ny) Object.assign(scratch, { width: Math.max(nx, scratch.width), height: Math.max(ny, scratch.height) });
-  scratch.getContext("2d")?.putImageData(image, 0, 0);
-  context.imageSmoothingEnabled = scene.smooth.value;
-  const [width, height] = [nx * step * factor, ny * step * factor];
-  context.drawImage(scratch, 0, 0, nx, ny, box.x + (box.width - width) / 2, box.y + (box.height - height) / 2, width, height);
+  } : undefined);
 }
 
 /** Strokes the contours of the layers; the context's origin is the slice's, in CSS pixels. */

@@ -2,7 +2,7 @@
 
 import { at } from "../base";
 import { useState } from "preact/hooks";
-import { type Result, type Volume, key, save, words } from "../api";
+import { type Kind, type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
 import type { Agreement, BeatReport, Evidence, ModelSummary, SegmentationReport } from "../generated/openapi";
@@ -70,7 +70,8 @@ const BEAT: [string, Row[]][] = [
   ]],
 ];
 
-const ROWS = { segmentation: FIT, model: MODEL, beat: BEAT };
+/** Figures of comparisons have a view of their own. */
+const ROWS: Record<Kind, [string, Row[]][]> = { segmentation: FIT, model: MODEL, beat: BEAT, comparison: [["", []]] };
 
 /** The figures that are read first. */
 export function headlines(shown: Loaded): [string, string, string][] {

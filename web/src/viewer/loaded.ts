@@ -79,6 +79,8 @@ async function loadBeat(result: Result): Promise<Loaded> {
     json<PolarFigure>("polar_motion.json"),
     json<PolarFigure>("polar_thickening.json"),
     json<PolarFigure>("polar_phase.json"),
+    json<PolarFigure>("polar_z.json"),
+    json<PolarFigure>("polar_score.json"),
   ]);
   const heart = heartOf({ fit: report, posture: report.posture ?? null, polar });
   const mesh = meanOf(meshes);
@@ -119,7 +121,7 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
   const otherEdge = file("mesh_anatomical.json") ?? file("mesh_apparent.json");
   const maskFile = file("mask.nii.gz");
   const expertId = result.parameters["expert"];
-  const [mesh, inner, report, polar, mask, expert, distance] = await Promise.all([
+  const [mesh, inner, report, polar, mask, expert, distance, ...figures] = await Promise.all([
     get<Mesh>(meshFile.href),
     otherEdge ? get<Mesh>(otherEdge.href) : null,
     fit ? json<SegmentationReport>("report.json") : null,
@@ -128,6 +130,8 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
     // The expert's mask may have been erased since; the fit is shown all the same.
     typeof expertId === "string" ? expertOf(expertId, result.parameters).catch(() => null) : null,
     fit ? null : json<Closeness>("distance.json"),
+    json<PolarFigure>("polar_z.json"),
+    json<PolarFigure>("polar_score.json"),
   ]);
   const heart = report && heartOf(report);
   return {
@@ -135,7 +139,7 @@ export async function loadLoaded(result: Result): Promise<Loaded> {
     report,
     beat: null,
     gates: null,
-    figures: [],
+    figures: figures.filter(map => map !== null),
     mesh,
     otherEdge: inner,
     polar,

@@ -23,6 +23,8 @@ export interface DrawnMap extends Laid {
   below: [number, number, number] | null;
   /** Whether the range closes to a ring, so that nothing lies between two values. */
   cyclic: boolean;
+  /** Digits of the segments' means where they are written. */
+  digits: number;
 }
 
 /** What the figures are called, and how their units are written. */
@@ -44,7 +46,7 @@ export function figureMap(map: PolarFigure): DrawnMap {
   const cyclic = map.figure === "phase";
   const [least = 0, most = 1] = map.range;
   const segments = map.segments.map(({ number, name, mean }) => ({ number, name, mean: mean ?? null }));
-  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null, cyclic };
+  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null, cyclic, digits: map.figure === "z" ? 1 : 0 };
 }
 
 /** An uptake as it is shown: the reference is a mean of the brightest wall, so that some places lie a little above it. */
@@ -62,6 +64,7 @@ export function uptakeMap(map: PolarMap): DrawnMap {
     unit: "%",
     below: null,
     cyclic: false,
+    digits: 0,
   };
 }
 
@@ -234,6 +237,13 @@ function polarOf(x: number, y: number, size: number): [number, number] {
 
 const MARGIN = 0.07;
 
+/** The share of a drawn map's width and height at which a place lies; inverse of `placeOnMap`. */
+export function onMap(map: Laid, rows: number, columns: number): [number, number] {
+  const radius = Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))) * (0.5 - MARGIN);
+  const angle = (2 * Math.PI * columns) / map.columns;
+  return [0.5 + radius * Math.cos(angle), 0.5 - radius * Math.sin(angle)];
+}
+
 export function placeOnMap(map: Laid, x: number, y: number, size: number): [number, number] | null {
   const [radius, turns] = polarOf(x, y, size);
   if (radius > 1) return null;
@@ -254,7 +264,12 @@ export interface PolarStyle {
   threshold: boolean;
   territories: boolean;
   cursor: [number, number] | null;
+  /** What is written on the segments: their means unless given. */
+  labels?: PolarLabels;
 }
+
+/** What may be written on the segments of a map. */
+export type PolarLabels = "means" | "numbers" | "nothing";
 
 const TERRITORY: Record<string, string> = { LAD: "#7ee0ff", LCX: "#b6ff8a", RCA: "#ffb3f0" };
 
@@ -373,10 +388,11 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   const text = size < 180 ? 8 : Math.max(10, Math.min(14, size / 26));
   const cursor = style.cursor && cursorOn(map, style.cursor, at);
   const places = map.segments.map(({ number }) => at(...labelPlace(map, number)));
-  for (const [n, { mean }] of map.segments.entries()) {
+  const labels = style.labels ?? "means";
+  for (const [n, { number, mean }] of (labels === "nothing" ? [] : map.segments).entries()) {
     const others = places.filter((_, other) => other !== n);
     const [x, y] = cursor ? besideRing(places[n]!, cursor, others, text) : places[n]!;
-    write(mean === null ? "–" : mean.toFixed(0), x, y, `600 ${text}px system-ui, sans-serif`);
+    write(labels === "numbers" ? String(number) : mean === null ? "–" : written(mean, map.digits), x, y, `600 ${text}px system-ui, sans-serif`);
   }
   if (oriented) {
     for (const [name, turns] of [["A", 0.25], ["S", 0.5], ["I", 0.75], ["L", 0]] as const) {
@@ -393,6 +409,11 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
       context.stroke();
     }
   }
+}
+
+/** A mean without the sign of a zero. */
+function written(mean: number, digits: number): string {
+  return mean.toFixed(digits).replace(/^-(0(?:\.0+)?)$/, "$1");
 }
 
 /** Radius of the cursor's ring, CSS pixels. */

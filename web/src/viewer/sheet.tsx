@@ -4,6 +4,8 @@ import { type ComponentChildren, render } from "preact";
 import type { Volume } from "../api";
 import { counts, isFit, moment, nameOf, number, resultName, shape, study } from "../words";
 import { BeatSheet } from "./beatsheet";
+import { limitMapsOf, perfusionOf } from "./beatview";
+import { LimitsUsed, PerfusionTable } from "./comparedfacts";
 import { type Camera } from "./camera";
 import { DIVERGING, LUTS, UPTAKE } from "./colours";
 import { drawSlice } from "./drawing";
@@ -29,8 +31,13 @@ export interface Printed {
   parameters: [string, string][];
 }
 
+/** What is printed of a result. */
+export function sheetOf(printed: Printed): ComponentChildren {
+  return printed.shown.beat ? <BeatSheet {...printed} beat={printed.shown.beat} /> : <Sheet {...printed} />;
+}
+
 /** Puts the sheet into the document while it is printed; the answer stops that. */
-export function printsAs(printed: () => Printed | null): () => void {
+export function printsAs(printed: () => ComponentChildren): () => void {
   let host: HTMLElement | null = null;
   const before = () => {
     const now = printed();
@@ -38,7 +45,7 @@ export function printsAs(printed: () => Printed | null): () => void {
     host = document.createElement("div");
     host.className = "sheet";
     document.body.append(host);
-    render(now.shown.beat ? <BeatSheet {...now} beat={now.shown.beat} /> : <Sheet {...now} />, host);
+    render(now, host);
   };
   const after = () => {
     if (!host) return;
@@ -125,6 +132,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
           </div>
         </div>
         {polar?.note && <p class="quiet">Uptake: {polar.note}.</p>}
+        <BesideLimits shown={shown} />
         <Walls scene={scene} shown={shown} />
         <h2>How it was made</h2>
         <p>
@@ -137,6 +145,29 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
         <Foot page={2} />
       </section>
     </>
+  );
+}
+
+/** The uptake beside normal limits, on paper. */
+export function BesideLimits({ shown }: { shown: Loaded }) {
+  const perfusion = perfusionOf(shown);
+  if (!perfusion) return null;
+  return (
+    <div class="beside-limits">
+      {limitMapsOf(shown).map(({ name, map, lut }) => (
+        <figure key={name}>
+          <Drawn width={180} height={180} name={name} draw={element => {
+            const context = element.getContext("2d");
+            if (context && lut) drawPolar(context, map, 180, RATIO, { lut, segments: false, threshold: false, territories: false, cursor: null });
+          }} />
+          <figcaption><span>{name}</span>{lut && <ColourBar lut={lut} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />}</figcaption>
+        </figure>
+      ))}
+      <div class="figures">
+        <PerfusionTable of={[["", perfusion]]} />
+        <LimitsUsed perfusion={{ ...perfusion, flags: [] }} />
+      </div>
+    </div>
   );
 }
 

@@ -36,7 +36,7 @@ export interface Shown {
   surface: Float32Array | null;
   /** The wall in every gate of a beat, with the same triangles as `mesh`, their mean. */
   gates: Mesh[] | null;
-  /** Figures of a beat's wall, laid flat. */
+  /** Figures of the wall, laid flat: of a beat, and beside normal limits. */
   figures: PolarFigure[];
 }
 

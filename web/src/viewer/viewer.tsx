@@ -1,16 +1,16 @@
 // One scan: its slices, the wall, the polar map, what was measured, and what can be done about it.
 
 import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { type Job, type Kind, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
+import { type Job, type Kind, type Parameters, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
-import { beats, eraseResult, find, fits, isActive, jobs, loadResult, loadScan, madeBy, models, resultsOf } from "../library";
+import { beats, comparisons, comparisonsOf, eraseResult, find, fits, isActive, jobs, loadResult, loadScan, madeBy, models, resultsOf } from "../library";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
-import { home, isAt, open, route } from "../route";
+import { home, isAt, open, openComparison, route } from "../route";
 import { useWatched } from "../state";
 import { file } from "../work";
 import { isBeat, isFit, isGated, kindOf, moment, nameOf, resultName, shape, study, titleOf } from "../words";
-import { BeatCharts, BeatMaps } from "./beatview";
+import { BeatCharts, BeatMaps, PerfusionView } from "./beatview";
 import { LUT, UPTAKE, WALL_LUT, kept } from "./colours";
 import { Correction } from "./correction";
 import { Downloads, Figures, Takeaways } from "./figures";
@@ -19,7 +19,7 @@ import { Pictures } from "./pictures";
 import { Player } from "./player";
 import { PolarView } from "./polarview";
 import { Scene } from "./scene";
-import { type Printed, printsAs } from "./sheet";
+import { type Printed, printsAs, sheetOf } from "./sheet";
 
 export function Viewer({ volume: id }: { volume: string }) {
   const [volume, setVolume] = useState<Volume | null>(null);
@@ -66,7 +66,9 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       }
       if (!running.current.delete(job.id) || job.state !== "succeeded") continue;
       const made = madeBy(job);
-      if (made && isAt(volume.id)) open(volume.id, made, job.labels["parent"] ?? null);
+      if (!made || !isAt(volume.id)) continue;
+      if (job.kind === "comparison") openComparison(made);
+      else open(volume.id, made, job.labels["parent"] ?? null);
     }
   }, [own]);
 
@@ -123,7 +125,7 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   const printed = useRef<Printed | null>(null);
   const [changed, setChanged] = useState<[string, string][]>([]);
   printed.current = scene && shown ? { scene, volume, shown, other, parameters: changed } : null;
-  useEffect(() => printsAs(() => printed.current), []);
+  useEffect(() => printsAs(() => printed.current && sheetOf(printed.current)), []);
   useEffect(() => {
     const result = shown?.result;
     if (result) void parameterSpecs().then(specs => setChanged(Object.entries(draftOf(result.parameters, specs[kindOf(result.id)]))), () => undefined);
@@ -182,10 +184,11 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   const [problem, setProblem] = useState<{ field: string | null; text: string } | null>(null);
   const [sending, setSending] = useState(false);
 
-  const repeat = (job: Pick<Job, "kind" | "parameters">) => {
-    setKind(job.kind);
+  const repeat = ({ kind, parameters }: Pick<Job, "kind" | "parameters">) => {
+    if (kind === "normals" || kind === "comparison") return;
+    setKind(kind);
     setTab("work");
-    void parameterSpecs().then(specs => setDraft(draftOf(job.parameters, specs[job.kind])));
+    void parameterSpecs().then(specs => setDraft(draftOf(parameters as Parameters, specs[kind])));
   };
   useEffect(() => {
     if (!retry) return;
@@ -238,6 +241,7 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
             </li>
           ))}
         </ul>
+        <Comparisons volume={volume.id} />
         {own.filter(job => job.state !== "succeeded").slice(0, 5).map(job => <JobLine key={job.id} job={job} onChange={repeat} />)}
       </section>
       <div class="tabs" role="group" aria-label="What to do">
@@ -257,13 +261,19 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
           </span>
           <ParameterForm kind={kind} volume={volume} draft={draft} onChange={setDraft} problem={problem} />
           <button class="main" disabled={sending}>{kind === "model" ? "Make the model" : "Fit"}</button>
-          {shown && <button type="button" class="plain" onClick={() => repeat({ kind: kindOf(shown.result.id), parameters: shown.result.parameters })}>Take the parameters of the shown result</button>}
+          {shown && <button type="button" class="plain" onClick={() => repeat({ kind: kindOf(shown.result.id), parameters: shown.result.parameters as Job["parameters"] })}>Take the parameters of the shown result</button>}
         </form>
       )}
       {tab === "correct" && scene && <Correction scene={scene} volume={volume} shown={shown} />}
       <p class="research foot">Research software, not a medical device. Measurements are no diagnosis.</p>
     </aside>
   );
+}
+
+/** The comparisons of rest and stress in which a scan takes part. */
+function Comparisons({ volume }: { volume: string }) {
+  useWatched(comparisons);
+  return <>{comparisonsOf(volume).map(made => <a key={made.id} class="result" href={`#/comparison/${made.id}`}><b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span></a>)}</>;
 }
 
 /** Which result a corrected fit came from, and what was changed. */
@@ -294,6 +304,7 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
           )}
         </div>
       )}
+      <PerfusionView scene={scene} shown={shown} />
       {shown.beat && <BeatMaps scene={scene} shown={shown} beat={shown.beat} />}
       {!shown.beat && <Figures shown={shown} other={other} />}
       <Downloads result={shown.result} volume={volume} />

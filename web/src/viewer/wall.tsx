@@ -64,7 +64,7 @@ function percent(values: Float32Array): Float32Array {
 }
 
 /** The value of a map at every vertex. */
-function byMap(mesh: Mesh, map: DrawnMap, heart: Axis): Float32Array {
+export function byMap(mesh: Mesh, map: DrawnMap, heart: Axis): Float32Array {
   const frame = new WallFrame(mesh, heart, map.rows, map.columns);
   return Float32Array.from(mesh.vertices, vertex => valueAt(map, ...frame.place(vertex)));
 }

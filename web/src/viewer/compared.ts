@@ -1,0 +1,150 @@
+// A comparison of rest and stress with all that its view draws, and the planes in which both hearts are cut at the same
+// levels.
+
+import { type FileOfResult, type Result, call, get } from "../api";
+import type { ComparedScan, ComparisonReport, PolarFigure, PolarMap } from "../generated/openapi";
+import type { Mesh } from "./mesh";
+import { type Axis, type Plane, frameOf, heartPlanes } from "./plane";
+import { type DrawnMap, WallFrame, figureMap, uptakeMap } from "./polar";
+import type { Triple } from "./shown";
+import { type Vec, add, mix, scale, sub, turned, unit } from "./vector";
+import { type Voxels, unpackNifti } from "./volume";
+
+export type WhichScan = "stress" | "rest";
+
+/** One of both scans. */
+export interface ComparedHeart {
+  scan: WhichScan;
+  report: ComparedScan;
+  mesh: Mesh;
+  /** The image about the heart; null where no file has it. */
+  region: Voxels | null;
+  polar: PolarMap | null;
+  z: PolarFigure | null;
+  score: PolarFigure | null;
+  /** Its axis, with the stress heart turned as its polar map is. */
+  heart: Axis | null;
+  /** Whether the sides of the wall are known. */
+  oriented: boolean;
+}
+
+export interface Compared {
+  result: Result;
+  report: ComparisonReport;
+  stress: ComparedHeart;
+  rest: ComparedHeart;
+  difference: PolarFigure | null;
+}
+
+/** Where nothing tells the superior direction, the service takes that of the frame. */
+const FRAME_SUPERIOR: Vec = [0, 0, 1];
+
+function axisOf({ long_axis: ends, posture }: ComparedScan, turnDegrees: number): Axis | null {
+  if (!ends) return null;
+  const [base, apex] = [ends.base as Triple, ends.apex as Triple];
+  const superior = (posture?.superior as Triple | undefined) ?? FRAME_SUPERIOR;
+  return { base, apex, superior: turned(superior, unit(sub(apex, base)), (turnDegrees * Math.PI) / 180), roll: 0 };
+}
+
+export async function loadComparison(result: Result): Promise<Compared> {
+  const file = (name: string): FileOfResult | undefined => result.files.find(one => one.name === name);
+  const json = async <T>(name: string): Promise<T | null> => {
+    const found = file(name);
+    return found ? get<T>(found.href) : null;
+  };
+  const report = await json<ComparisonReport>("comparison.json");
+  if (!report) throw new Error("This comparison has no report.");
+  const heart = async (scan: WhichScan): Promise<ComparedHeart> => {
+    const image = file(`region_${scan}.nii.gz`);
+    const [mesh, region, polar, z, score] = await Promise.all([
+      json<Mesh>(`mesh_${scan}.json`),
+      image ? call(image.href).then(async answer => unpackNifti(await answer.arrayBuffer())) : null,
+      json<PolarMap>(`polar_${scan}.json`),
+      json<PolarFigure>(`polar_z_${scan}.json`),
+      json<PolarFigure>(`polar_score_${scan}.json`),
+    ]);
+    if (!mesh) throw new Error(`This comparison has no mesh of the heart at ${scan}.`);
+    const own = report[scan];
+    return { scan, report: own, mesh, region, polar, z, score, heart: axisOf(own, scan === "stress" ? report.turn_degrees : 0), oriented: (polar?.orientation ?? "unknown") !== "unknown" };
+  };
+  const [stress, rest, difference] = await Promise.all([heart("stress"), heart("rest"), json<PolarFigure>("polar_difference.json")]);
+  return { result, report, stress, rest, difference };
+}
+
+/** Slices of a kind, as many as in the service's picture of both scans (`rest_stress/slices.rs`), at the same levels. */
+export const SLICES = 8;
+/** Shares of the long axis, from the apex, at which the first and the last short-axis slice lie. */
+const SHORT_ENDS_SHARE = [0.06, 0.94] as const;
+/** Distance from the long axis of the outermost long-axis slices, as a share of its length. */
+const LONG_ENDS_SHARE = 0.28;
+/** Millimetres that a slice shows. */
+export const SLICE_MM = 112;
+
+export interface SliceKind {
+  name: string;
+  short: string;
+  /** From where to where its levels lie. */
+  way: string;
+}
+
+export const KINDS: SliceKind[] = [
+  { name: "Short axis", short: "SA", way: "apex to base" },
+  { name: "Vertical long axis", short: "VLA", way: "septum to lateral wall" },
+  { name: "Horizontal long axis", short: "HLA", way: "inferior to anterior wall" },
+];
+
+/** The plane of a kind of slices, and the place in the middle of one of them. */
+export function sliceAt(heart: Axis, kind: number, number: number): { plane: Plane; origin: Vec } {
+  const { anterior, lateral, length, middle } = frameOf(heart);
+  const [short, horizontal, vertical] = heartPlanes(heart) as [Plane, Plane, Plane];
+  const share = number / (SLICES - 1);
+  if (kind === 0) {
+    const along = SHORT_ENDS_SHARE[0] + (SHORT_ENDS_SHARE[1] - SHORT_ENDS_SHARE[0]) * share;
+    return { plane: short, origin: mix(heart.apex, heart.base, along) };
+  }
+  const aside = (2 * share - 1) * LONG_ENDS_SHARE * length;
+  return { plane: kind === 1 ? vertical : horizontal, origin: add(middle, scale(kind === 1 ? lateral : anterior, aside)) };
+}
+
+/** Millimetres between neighbouring slices of a kind. */
+export function spacingOf(heart: Axis, kind: number): number {
+  const { length } = frameOf(heart);
+  const share = kind === 0 ? SHORT_ENDS_SHARE[1] - SHORT_ENDS_SHARE[0] : 2 * LONG_ENDS_SHARE;
+  return (share * length) / (SLICES - 1);
+}
+
+/** The lines of a heart's polar map on its wall. */
+export function wallFrameOf({ mesh, heart, polar }: ComparedHeart): WallFrame | null {
+  return heart && polar ? new WallFrame(mesh, heart, polar.rows, polar.columns) : null;
+}
+
+export interface NamedMap {
+  name: string;
+  /** The name under a small map. */
+  short: string;
+  map: DrawnMap;
+  /** The scan, of what is shown of one. */
+  scan: WhichScan | null;
+  /** The figure; uptake is shown in colours that a person chooses. */
+  figure: PolarFigure["figure"] | "uptake";
+}
+
+/** The map of every figure, in the order in which they are shown. */
+export function mapsOf({ stress, rest, difference }: Compared): NamedMap[] {
+  const maps: NamedMap[] = [];
+  for (const one of [stress, rest]) if (one.polar) maps.push({ name: `Uptake, ${one.scan}`, short: one.scan === "stress" ? "Stress" : "Rest", map: uptakeMap(one.polar), scan: one.scan, figure: "uptake" });
+  if (difference) maps.push({ name: "Rest less stress", short: "Rest less stress", map: figureMap(difference), scan: null, figure: "difference" });
+  for (const one of [stress, rest]) if (one.z) maps.push({ name: `z, ${one.scan}`, short: `z, ${one.scan}`, map: figureMap(one.z), scan: one.scan, figure: "z" });
+  for (const one of [stress, rest]) if (one.score) maps.push({ name: `Score, ${one.scan}`, short: `Score, ${one.scan}`, map: figureMap(one.score), scan: one.scan, figure: "score" });
+  return maps;
+}
+
+/** Reasons to look closer, those against comparing at all first. */
+export function flagsOf({ flags }: Pick<ComparisonReport, "flags">): ComparisonReport["flags"] {
+  return [...flags].sort((a, b) => Number(b.code === "not_comparable") - Number(a.code === "not_comparable"));
+}
+
+/** Whether what it was scored by is of simulated people. */
+export function isSimulated({ stress, rest }: ComparisonReport): boolean {
+  return [stress, rest].some(({ perfusion }) => perfusion?.normals.simulated);
+}

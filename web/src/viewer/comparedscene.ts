@@ -1,0 +1,42 @@
+// What the views of a comparison share: colours, the chosen slice, the cursor on both walls, from where the walls are seen.
+
+import { Watched } from "../state";
+import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";
+import type { PolarLabels } from "./polar";
+import { type Vec, unit } from "./vector";
+
+/** What is written on the segments of the polar maps of uptake. */
+export type Written = PolarLabels | "scores";
+
+export class ComparedScene {
+  /** Colours of the uptake in slices, polar maps and walls. */
+  readonly lut = new Watched<Lut>(kept(WALL_LUT, UPTAKE) ?? LUTS[UPTAKE]!);
+  /** Uptake in slices that has the last colour, per cent of each scan's own reference. */
+  readonly brightest = new Watched<number>(100);
+  readonly smooth = new Watched<boolean>(true);
+  readonly contours = new Watched<boolean>(false);
+  /** The slice of both scans that is marked and shown large. */
+  readonly chosen = new Watched<{ kind: number; number: number }>({ kind: 0, number: 3 });
+  /** The place on both walls: shares of width and height of a drawn polar map. */
+  readonly cursor = new Watched<[number, number] | null>(null);
+  readonly written = new Watched<Written>("means");
+  /** From where both walls are seen, in directions of the heart: lateral, anterior, apex. */
+  readonly seen = new Watched<{ toward: Vec; up: Vec }>(FROM_FRONT);
+
+  /** Everything that changes a slice. */
+  watch(act: () => void): () => void {
+    const all: { watch(act: () => void): () => void }[] = [this.lut, this.brightest, this.smooth, this.contours, this.chosen, this.cursor];
+    const ends = all.map(watched => watched.watch(act));
+    return () => ends.forEach(end => end());
+  }
+}
+
+/** Anterior and lateral wall, apex down. */
+export const FROM_FRONT = seenFrom([0.65, 0.55, 0.52]);
+/** Inferior and septal wall, apex down. */
+export const FROM_BEHIND = seenFrom([-0.65, -0.55, 0.52]);
+
+function seenFrom(direction: Vec): { toward: Vec; up: Vec } {
+  const toward = unit(direction);
+  return { toward, up: unit([toward[0] * toward[2], toward[1] * toward[2], toward[2] ** 2 - 1]) };
+}
