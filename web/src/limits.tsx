@@ -1,7 +1,7 @@
 // Normal limits that are stored: what they are made of; one is added from its file, or erased.
 
 import { useRef, useState } from "preact/hooks";
-import { type Normals, post, save, words } from "./api";
+import { type Normals, call, save, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
 import { JobLine } from "./jobline";
@@ -25,7 +25,9 @@ export function LimitsView() {
       setState(`Adding ${file.name} …`);
       try {
         const name = file.name.replace(/\.json$/i, "").slice(0, 100);
-        const added = await post<Normals>(`/v1/normals?${new URLSearchParams({ name })}`, await read(file));
+        // As it was written: read and written again by a browser, numbers are spelt otherwise, and the file's hash is another.
+        const answer = await call(`/v1/normals?${new URLSearchParams({ name })}`, { method: "POST", headers: { "content-type": "application/json" }, body: await textOf(file) });
+        const added = (await answer.json()) as Normals;
         setState(`Added: ${added.name}.`);
       } catch (error) {
         setState("");
@@ -60,12 +62,15 @@ export function LimitsView() {
   );
 }
 
-async function read(file: File): Promise<unknown> {
+/** The text of a JSON file. */
+async function textOf(file: File): Promise<string> {
+  const text = await file.text();
   try {
-    return JSON.parse(await file.text()) as unknown;
+    JSON.parse(text);
   } catch {
-    throw new Error("This is no JSON file. Choose the file that `normals build` has written.".replaceAll("`", ""));
+    throw new Error("This is no JSON file. Choose the file that normals build has written.");
   }
+  return text;
 }
 
 function LimitsItem({ limits }: { limits: Normals }) {

@@ -58,7 +58,8 @@ export function moment(text: string): string {
 
 export function number(value: unknown, digits = 1, unit = ""): string {
   if (typeof value !== "number" || !Number.isFinite(value)) return "–";
-  return value.toFixed(digits) + (unit ? `\u2009${unit}` : "");
+  // Not the sign of a zero.
+  return value.toFixed(digits).replace(/^-(0(?:\.0+)?)$/, "$1") + (unit ? `\u2009${unit}` : "");
 }
 
 /** A value of the image: counts are whole; images of a scale below ten keep two digits. */

@@ -298,7 +298,7 @@ function StudyRow({ group }: { group: Row[] }) {
         {pair && <button type="button" class={compared.length ? "" : "main"} onClick={() => {
           picked.value = pair.map(volume => volume.id);
           document.querySelector(".drop")?.scrollIntoView();
-        }}>Compare rest and stress</button>}
+        }}>{compared.length ? "Compare again" : "Compare rest and stress"}</button>}
       </div>
       <ul class="scans">{group.map(row => <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !inside(made))} />)}</ul>
     </li>

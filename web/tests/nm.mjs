@@ -71,38 +71,42 @@ function image([nx, ny], steps) {
   ];
 }
 
-export function nm(nifti, patient, id = "PH7") {
+/** `series`: number, description and tracer of one series of several in a study. */
+export function nm(nifti, patient, id = "PH7", series = null) {
   const scan = scanOf(nifti);
-  return nmFile({ ...scan, id }, patient, "RECON TOMO", [
+  return nmFile({ ...scan, id, series }, patient, "RECON TOMO", [
     element(0x00280008, "IS", scan.shape[2]),
     element(0x00280009, "AT", 0x00540080),
   ], [element(0x00540080, "US", Array.from({ length: scan.shape[2] }, (_, n) => n + 1))]);
 }
 
 /** An NM file with the elements that say how its frames are counted, and those of each frame. */
-function nmFile({ shape, pixels, steps, origin, id = "PH7" }, patient, type, counted, vectors) {
+function nmFile({ shape, pixels, steps, origin, id = "PH7", series = null }, patient, type, counted, vectors) {
   const kind = "1.2.840.10008.5.1.4.1.1.20";
+  const of = series ? `.${series.number}` : "";
   const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
   return Buffer.concat([
-    ...head(kind, `${ROOT}.7.3`),
+    ...head(kind, `${ROOT}.7.3${of}`),
     element(0x00080005, "CS", "ISO_IR 192"),
     element(0x00080008, "CS", ["DERIVED", "PRIMARY", type, "EMISSION"]),
     element(0x00080016, "UI", kind),
-    element(0x00080018, "UI", `${ROOT}.7.3`),
+    element(0x00080018, "UI", `${ROOT}.7.3${of}`),
     element(0x00080020, "DA", "20250115"),
     element(0x00080050, "SH", "ACC7"),
     element(0x00080060, "CS", "NM"),
+    ...(series ? [element(0x0008103e, "LO", series.description)] : []),
     element(0x00100010, "PN", patient),
     element(0x00100020, "LO", id),
     element(0x00180050, "DS", number(Math.abs(steps[2]))),
     element(0x00180088, "DS", number(steps[2] * Math.sign(steps[0] * steps[1]))),
     element(0x0020000d, "UI", `${ROOT}.7.1`),
-    element(0x0020000e, "UI", `${ROOT}.7.2`),
+    element(0x0020000e, "UI", `${ROOT}.7.2${of}`),
     element(0x00200052, "UI", `${ROOT}.7.4`),
     element(0x00280002, "US", 1),
     element(0x00280004, "CS", "MONOCHROME2"),
     ...counted,
     ...image(shape, steps),
+    ...(series ? [element(0x00540016, "SQ", item(element(0x00180031, "LO", series.tracer)))] : []),
     element(0x00540022, "SQ", item(element(0x00200032, "DS", origin.map(number)), element(0x00200037, "DS", sides.map(number)))),
     ...vectors,
     element(0x7fe00010, "OW", pixels),

@@ -12,6 +12,7 @@ import { gunzipSync } from "node:zlib";
 import { join } from "node:path";
 import assert from "node:assert/strict";
 import { chromium } from "playwright-core";
+import { comparisons } from "./comparison.mjs";
 import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
 
@@ -19,7 +20,7 @@ const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const SCAN = join(SCREENSHOTS, "phantom/spect.nii.gz");
 const TRUTH = join(SCREENSHOTS, "phantom/lv_truth.nii.gz");
-const PATIENCE = 120_000;
+const PATIENCE = Number(process.env.PATIENCE ?? 120_000);
 
 let [passed, failed] = [0, 0];
 const ends = [];
@@ -484,6 +485,8 @@ async function main() {
     await close();
     await own.stop();
   });
+
+  await comparisons({ PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose });
 
   await check("the documentation of the API", async () => {
     for (const [width, dark] of [[1280, false], [400, true]]) {

@@ -45,7 +45,7 @@ export function PerfusionView({ scene, shown }: { scene: Scene; shown: Loaded })
   return (
     <section class="perfusion figures" aria-label="Beside normal limits">
       <h2>Beside normal limits</h2>
-      <PerfusionTable of={[["", perfusion]]} />
+      <PerfusionTable of={[["this scan", perfusion]]} />
       {heart && <div class="maps">{maps.map(one => <SmallMap key={one.name} scene={scene} named={one} frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)} />)}</div>}
       <LimitsUsed perfusion={perfusion} />
       <details>

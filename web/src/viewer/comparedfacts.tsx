@@ -5,6 +5,7 @@ import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/ope
 import { Simulated } from "../limits";
 import { number } from "../words";
 import { flagsOf, isSimulated } from "./compared";
+import { shown } from "./polar";
 
 /** A signed change. */
 function change(value: number | null | undefined, digits: number, unit: string): string {
@@ -102,7 +103,7 @@ export function TerritoryTable({ report }: { report: ComparisonReport }) {
       <tbody>{report.territories.map(one => (
         <tr key={one.name}>
           <th scope="row">{one.name}</th>
-          <td>{number(one.stress_percent, 0)}</td><td>{number(one.rest_percent, 0)}</td><td>{number(one.difference_points, 0)}</td>
+          <td>{number(shown(one.stress_percent), 0)}</td><td>{number(shown(one.rest_percent), 0)}</td><td>{number(one.difference_points, 0)}</td>
           <td>{number(one.reversible_percent, 0, "%")}</td><td>{number(one.fixed_percent, 0, "%")}</td>
         </tr>
       ))}</tbody>
@@ -121,7 +122,7 @@ export function SegmentChanges({ report }: { report: ComparisonReport }) {
       <tbody>{report.segments.map(one => (
         <tr key={one.segment}>
           <th scope="row">{one.segment} {one.name}</th>
-          <td>{number(one.stress_percent, 0)}</td><td>{number(one.rest_percent, 0)}</td><td>{number(one.difference_points, 0)}</td>
+          <td>{number(shown(one.stress_percent), 0)}</td><td>{number(shown(one.rest_percent), 0)}</td><td>{number(one.difference_points, 0)}</td>
           <td>{number(one.reversible_percent, 0, "%")}</td>
           {scored && <td>{one.stress_score ?? "–"} / {one.rest_score ?? "–"}</td>}
           {moved && <><td>{change(one.motion_change_mm, 1, "")}</td><td>{change(one.thickening_change_points, 0, "")}</td></>}

@@ -42,7 +42,7 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
   const written = useWatched(scene.written);
   const lut = useWatched(scene.lut);
   const hasScores = compared.report.sss != null;
-  const choices: [Written, string][] = [["means", "per cent"], ...(hasScores ? [["scores", "scores"] as [Written, string]] : []), ["numbers", "segment numbers"], ["nothing", "nothing"]];
+  const choices: [Written, string][] = [["means", "per cent"], ...(hasScores ? [["scores", "scores"] as [Written, string]] : []), ["numbers", "segments"], ["nothing", "nothing"]];
   return (
     <section class="compared-maps" aria-label="Polar maps">
       <div class="toolbar" role="toolbar" aria-label="Polar maps">

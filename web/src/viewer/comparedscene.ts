@@ -33,8 +33,6 @@ export class ComparedScene {
 
 /** Anterior and lateral wall, apex down. */
 export const FROM_FRONT = seenFrom([0.65, 0.55, 0.52]);
-/** Inferior and septal wall, apex down. */
-export const FROM_BEHIND = seenFrom([-0.65, -0.55, 0.52]);
 
 function seenFrom(direction: Vec): { toward: Vec; up: Vec } {
   const toward = unit(direction);

@@ -20,6 +20,9 @@ const MARGIN = 1.22;
 /** A segment in the middle of each artery's territory. */
 const TERRITORIES = [["LAD", 7], ["LCX", 12], ["RCA", 10]] as const;
 
+/** The cosine of the angle to the eye from which a side counts as the far one. */
+const FAR_SIDE = -0.35;
+
 interface Letter {
   text: string;
   place: Vec;
@@ -60,17 +63,15 @@ export function cameraOf({ mesh, heart }: ComparedHeart, seen: { toward: Vec; up
   return { toward: inPatient(seen.toward), up: inPatient(seen.up), target, span };
 }
 
-/** Writes the letters over a drawn wall; those of the far side are faint. */
+/** Writes the letters over a drawn wall; those of the far side are hidden with it. */
 function write(context: CanvasRenderingContext2D, one: ComparedHeart, camera: Camera, width: number, height: number): void {
   for (const { text, place, outward, size } of lettersOf(one)) {
     const facing = dot(outward, camera.toward);
-    // A territory's name lies on the wall, and is hidden with it.
-    if (size < 14 && facing < 0.1) continue;
+    // A territory's name lies on the wall, a side's letter beside it.
+    if (facing < (size < 14 ? 0.1 : FAR_SIDE)) continue;
     const [x, y] = project(camera, place, width / height);
-    context.globalAlpha = facing < -0.3 ? 0.45 : 1;
     label(context, text, x * width, y * height, "center", size);
   }
-  context.globalAlpha = 1;
 }
 
 /** Draws wall and letters on paper. */

@@ -2,6 +2,7 @@
 
 import type { PolarFigure, PolarMap, WallFigure } from "../generated/openapi";
 import { CYCLE, DIFFERENCE, LUTS, type Lut, NO_WALL, OUTWARD, UPTAKE, VALVE_PLANE, colour, thresholdOn } from "./colours";
+import { number } from "../words";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
@@ -389,10 +390,10 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   const cursor = style.cursor && cursorOn(map, style.cursor, at);
   const places = map.segments.map(({ number }) => at(...labelPlace(map, number)));
   const labels = style.labels ?? "means";
-  for (const [n, { number, mean }] of (labels === "nothing" ? [] : map.segments).entries()) {
+  for (const [n, segment] of (labels === "nothing" ? [] : map.segments).entries()) {
     const others = places.filter((_, other) => other !== n);
     const [x, y] = cursor ? besideRing(places[n]!, cursor, others, text) : places[n]!;
-    write(labels === "numbers" ? String(number) : mean === null ? "–" : written(mean, map.digits), x, y, `600 ${text}px system-ui, sans-serif`);
+    write(labels === "numbers" ? String(segment.number) : number(segment.mean, map.digits), x, y, `600 ${text}px system-ui, sans-serif`);
   }
   if (oriented) {
     for (const [name, turns] of [["A", 0.25], ["S", 0.5], ["I", 0.75], ["L", 0]] as const) {
@@ -409,11 +410,6 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
       context.stroke();
     }
   }
-}
-
-/** A mean without the sign of a zero. */
-function written(mean: number, digits: number): string {
-  return mean.toFixed(digits).replace(/^-(0(?:\.0+)?)$/, "$1");
 }
 
 /** Radius of the cursor's ring, CSS pixels. */

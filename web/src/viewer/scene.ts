@@ -78,7 +78,9 @@ export class Scene {
   constructor(readonly still: Voxels, lut: Lut, wallLut: Lut) {
     const { voxels } = this;
     this.cursor = new Watched<Vec>(voxels.middle);
-    this.window = new Watched<Window>({ low: Math.min(0, voxels.lowest), high: voxels.percentile(0.9995) || voxels.highest });
+    // A scale with an intercept may miss its zero by a rounding error.
+    const least = voxels.lowest < -1e-6 * voxels.highest ? voxels.lowest : 0;
+    this.window = new Watched<Window>({ low: Math.min(0, least), high: voxels.percentile(0.9995) || voxels.highest });
     this.lut = new Watched(lut);
     this.wallLut = new Watched(wallLut);
   }

@@ -112,6 +112,7 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
         </div>
         {heart && <Drawn width={690} height={88} name="Short axis from apex to base" draw={element => drawStack(element, scene, heartPlanes(heart)[0]!, { width: 690, height: 88, ratio: RATIO, cursor: false })} />}
         <Legend scene={scene} />
+        <BesideLimits shown={shown} />
         <Foot page={1} />
       </section>
       <section class="paper">
@@ -132,7 +133,6 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
           </div>
         </div>
         {polar?.note && <p class="quiet">Uptake: {polar.note}.</p>}
-        <BesideLimits shown={shown} />
         <Walls scene={scene} shown={shown} />
         <h2>How it was made</h2>
         <p>
@@ -164,7 +164,7 @@ export function BesideLimits({ shown }: { shown: Loaded }) {
         </figure>
       ))}
       <div class="figures">
-        <PerfusionTable of={[["", perfusion]]} />
+        <PerfusionTable of={[["this scan", perfusion]]} />
         <LimitsUsed perfusion={{ ...perfusion, flags: [] }} />
       </div>
     </div>

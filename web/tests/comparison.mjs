@@ -1,0 +1,246 @@
+// Rest and stress on the page: from two files to the display, figures, normal limits, work list, paper.
+
+import assert from "node:assert/strict";
+import { spawnSync } from "node:child_process";
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
+import { nm } from "./nm.mjs";
+
+/** Mid and apical segments of the LAD, which lack uptake at stress. */
+const LAD = [7, 8, 13, 14];
+const FIGURES = [["1440-light", 1440, false], ["1440-dark", 1440, true], ["400-light", 400, false], ["400-dark", 400, true]];
+
+/** Simulated scans of one patient, as NIfTI and as NM files of one study, and normal limits of simulated people. */
+function made({ PROGRAM, SCREENSHOTS }) {
+  const run = (...all) => {
+    const { status, stderr } = spawnSync(PROGRAM, all, { encoding: "utf8" });
+    assert.equal(status, 0, stderr);
+  };
+  const at = (...parts) => join(SCREENSHOTS, ...parts);
+  const size = ["--size", "64", "--spacing", "5", "--seed", "4"];
+  run("phantom", "-o", at("rest"), ...size);
+  run("phantom", "-o", at("stress"), ...size, ...LAD.flatMap(segment => ["--defect", `${segment}:0.6`]));
+  const files = {};
+  for (const [number, role] of ["stress", "rest"].entries()) {
+    const scan = readFileSync(at(role, "spect.nii.gz"));
+    const series = { number, description: `Cardiac ${role}`, tracer: "Tetrofosmin Tc-99m" };
+    files[role] = at(`${role}.dcm`);
+    writeFileSync(files[role], nm(scan, "Compared^Clara", "PH9", series));
+    files[`plain ${role}`] = at(`heart_${role}.nii.gz`);
+    writeFileSync(files[`plain ${role}`], scan);
+  }
+  files.other = at("other.dcm");
+  writeFileSync(files.other, nm(readFileSync(at("rest", "spect.nii.gz")), "Other^Olga", "PH10", { number: 7, description: "Cardiac rest", tracer: "Tetrofosmin Tc-99m" }));
+  run("phantom", "-o", at("healthy"), "--normal", "--cases", "13", "--size", "52", "--spacing", "5", "--seed", "5");
+  files.limits = at("healthy limits.json");
+  run("normals", "build", at("healthy"), "-o", files.limits, "--mixed");
+  return files;
+}
+
+const displayed = async page => {
+  await page.waitForSelector(".compared-slices");
+  await page.waitForSelector(".compared-maps .polar canvas");
+  await page.waitForSelector(".heart-wall canvas");
+};
+
+/** Whether a canvas shows something: so many colours. */
+const isDrawn = canvas => canvas.evaluate(element => {
+  const copy = Object.assign(document.createElement("canvas"), { width: element.width, height: element.height });
+  const context = copy.getContext("2d");
+  context.drawImage(element, 0, 0);
+  return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
+});
+
+const number = (value, digits, unit = "") => value.toFixed(digits) + (unit && `\u2009${unit}`);
+
+export async function comparisons(tools) {
+  const { browser, service, tab, check, look, printed, choose, SCREENSHOTS } = tools;
+  let files;
+  const data = () => (files ??= made(tools));
+  const read = async (address, path) => (await fetch(address + path)).json();
+  const reportOf = async (address, id) => {
+    const { links } = await read(address, `/v1/comparisons/${id}`);
+    return (await fetch(address + links.report, { headers: { accept: "application/json" } })).json();
+  };
+
+  await check("rest and stress: five actions from two files to the display, figures as the service says", async () => {
+    const { stress, rest } = data();
+    const own = await service();
+    for (const [name, width, dark] of FIGURES) {
+      const { page, faults, close } = await tab(browser, own.address, { width, height: 900, dark });
+      await page.waitForSelector(".drop");
+      if (name === "1440-light") {
+        // A click, a choice of both files, and a press: headers say which is stress.
+        const [chooser] = await Promise.all([page.waitForEvent("filechooser"), page.getByRole("button", { name: "Choose files" }).click()]);
+        await chooser.setFiles([stress, rest]);
+        await page.waitForSelector(".pair-form");
+        assert.match(await page.textContent(".pair-form"), /headers say which is which/);
+        assert.match(await page.textContent(".pair-choice:has(:checked)"), /Cardiac stress/);
+        await look(page, `pair-form-${name}`);
+        await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+      } else {
+        // The list has both under the name of their study.
+        await page.waitForSelector(".study");
+        assert.match(await page.textContent(".study-head"), /Compared Clara.*patient ID PH9.*study of 2025-01-15/);
+        assert.deepEqual((await page.locator(".study .title .role").allTextContents()).sort(), ["rest", "stress"]);
+        assert.match(await page.textContent(".study .scans"), /Cardiac stress · Tetrofosmin Tc-99m/);
+        await look(page, `study-${name}`);
+        await page.locator(".study-head .result").click();
+      }
+      await displayed(page);
+      const id = await page.evaluate(() => location.hash.split("/").pop());
+      assert.match(id, /^cmp_/);
+      const report = await reportOf(own.address, id);
+      assert.ok(report.reversible_percent > 8, `${report.reversible_percent} % reversible`);
+      const shown = await page.textContent(".compared-headlines");
+      for (const figure of [`TID${number(report.tid, 2)}`, `Reversible${number(report.reversible_percent, 0, "%")}`, `Fixed${number(report.fixed_percent, 0, "%")}`]) assert.ok(shown.includes(figure), `${figure} in ${shown}`);
+      const words = await page.textContent(".verdict");
+      for (const { reason } of report.flags) assert.ok(words.toLowerCase().includes(reason.toLowerCase()), reason);
+      const territories = page.locator(".particulars summary", { hasText: "Territories" });
+      await territories.click();
+      const lad = report.territories.find(one => one.name === "LAD");
+      assert.ok((await page.locator(".particulars tr", { hasText: "LAD" }).first().textContent()).includes(number(lad.reversible_percent, 0, "%")));
+      await page.locator(".particulars summary", { hasText: "Segments" }).click();
+
+      // A press on the map takes the cursor to all maps and slices; arrows choose another level.
+      const map = page.locator(".compared-maps .polar canvas").first();
+      await map.scrollIntoViewIfNeeded();
+      const box = await map.boundingBox();
+      await map.click({ position: { x: box.width * 0.5, y: box.height * 0.2 } });
+      await page.waitForFunction(() => /7 mid anterior/.test(document.querySelector(".readout").textContent));
+      const mid = report.segments.find(one => one.segment === 7);
+      assert.ok((await page.textContent(".readout")).includes(`Reversible part${number(mid.reversible_percent, 0, "%")}`));
+      const slices = page.locator(".compared-slices");
+      await slices.focus();
+      assert.equal(await slices.getAttribute("aria-valuetext"), "Short axis, slice 4 of 8");
+      await page.keyboard.press("ArrowRight");
+      await page.keyboard.press("ArrowDown");
+      assert.equal(await slices.getAttribute("aria-valuetext"), "Vertical long axis, slice 5 of 8");
+      assert.ok((await isDrawn(slices)) > 200, "slices are drawn");
+      for (const wall of await page.locator(".heart-wall canvas[role=slider]").all()) assert.ok((await isDrawn(wall)) > 50, "walls are drawn");
+      await page.getByLabel("On the maps").selectOption("numbers");
+      await look(page, `comparison-${name}`);
+      await page.getByRole("button", { name: "Slice, large" }).click();
+      await page.getByLabel("contours").check();
+      await page.waitForSelector(".below .slice canvas");
+      await look(page, `comparison-slice-${name}`);
+      if (width === 1440) {
+        for (const label of ["Report", "Print"]) {
+          const place = await page.locator(".takeaways").getByText(label, { exact: true }).boundingBox();
+          assert.ok(place.y > 0 && place.y + place.height < 900, `${label} above the fold`);
+        }
+        assert.equal(await printed(page, `comparison-${name}`), 1, "one page on paper");
+      }
+      assert.ok((await page.locator(".downloads summary", { hasText: "DICOM objects" }).count()) === 1);
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    await own.stop();
+  });
+
+  await check("rest and stress: scans are picked from the list, names are only a guess, slips are said in words", async () => {
+    const { stress, other, "plain stress": plainStress, "plain rest": plainRest } = data();
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address, { width: 1440, height: 900, expected: [/status of 4\d\d/] });
+    await page.waitForSelector(".drop");
+    await page.getByLabel("then").selectOption("nothing");
+    await choose(page, plainStress, plainRest);
+    await page.waitForSelector(".pair-form");
+    assert.match(await page.textContent(".pair-form"), /Guessed from the names/);
+    await page.getByRole("button", { name: "Not now" }).click();
+    // Scans of two patients are named, and compared once the person says that they are one.
+    await choose(page, stress, other);
+    await page.waitForFunction(() => /name two patients/.test(document.querySelector(".pair-form")?.textContent ?? ""));
+    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+    await page.waitForFunction(() => /Patient ID/.test(document.querySelector(".working [role=alert]")?.textContent ?? ""));
+    await look(page, "two-patients-1440");
+    await page.getByLabel("These are scans of one patient").check();
+    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+    await displayed(page);
+    assert.match(await page.textContent(".verdict"), /not comparable as they are/);
+    // Picked by hand, the other way round: the flag says so.
+    await page.goto(`${own.address}/#/`);
+    await page.getByRole("button", { name: /^Pick heart_stress/ }).click();
+    await page.getByRole("button", { name: /^Pick heart_rest/ }).click();
+    await page.waitForSelector(".pair-form");
+    await page.locator(".pair-choice", { hasText: "heart_rest" }).locator("input").check();
+    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+    await displayed(page);
+    assert.match(await page.textContent(".comparison header"), /stress\s*heart_rest/);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
+  await check("normal limits are added, chosen, always called simulated, and erased", async () => {
+    const { "plain stress": plainStress, "plain rest": plainRest, limits } = data();
+    const own = await service();
+    for (const [name, width, dark] of FIGURES) {
+      const { page, faults, close } = await tab(browser, `${own.address}/#/limits`, { width, height: 900, dark, expected: [/status of 422/] });
+      await page.waitForSelector(".limits h1");
+      if (name === "1440-light") {
+        await look(page, "limits-empty");
+        await page.setInputFiles("input[aria-label='File of normal limits']", { name: "no.json", mimeType: "application/json", buffer: Buffer.from("{\"format\": \"else\"}") });
+        await page.waitForSelector(".limits [role=alert]");
+        await page.setInputFiles("input[aria-label='File of normal limits']", limits);
+      }
+      await page.waitForSelector(".limits-item");
+      assert.match(await page.textContent(".limits-item"), /healthy limits.*simulated people, not patients.*men and women together.*phantom.*13/);
+      await look(page, `limits-${name}`);
+      await page.goto(`${own.address}/#/`);
+      await page.waitForSelector(".drop");
+      if (name === "1440-light") {
+        await page.getByLabel("then").selectOption("nothing");
+        await choose(page, plainStress, plainRest);
+        await page.waitForSelector("#parameter-normals");
+        await page.selectOption("#parameter-normals", { index: 1 });
+        await page.selectOption("#parameter-stress_protocol", "phantom");
+        await page.selectOption("#parameter-rest_protocol", "phantom");
+        await look(page, "pair-limits-1440");
+        await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+      } else await page.locator(".scan .result", { hasText: "SSS" }).first().click();
+      await displayed(page);
+      const id = await page.evaluate(() => location.hash.split("/").pop());
+      const report = await reportOf(own.address, id);
+      const shown = await page.textContent(".compared-headlines");
+      for (const score of ["sss", "srs", "sds"]) assert.ok(shown.includes(`${score.toUpperCase()}${report[score]}`), `${score} ${report[score]} in ${shown}`);
+      assert.ok(report.sss > report.srs, `${report.sss} and ${report.srs}`);
+      assert.match(await page.textContent(".simulated-note"), /simulated people, not patients/);
+      assert.equal(await page.locator(".compared-maps .polar").count(), 7);
+      assert.ok((await page.textContent(".particulars")).includes(number(report.stress.perfusion.deficit_percent, 1, "%")));
+      await page.getByLabel("On the maps").selectOption("scores");
+      await look(page, `scored-${name}`);
+      if (width === 1440) assert.equal(await printed(page, `scored-${name}`), 1, "one page on paper");
+      // No word of a category or a diagnosis.
+      assert.doesNotMatch(await page.textContent(".comparison"), /abnormal|ischa?emia|infarct|probable|low risk|high risk/i);
+
+      // A fit beside the same limits.
+      await page.locator(".comparison header a").first().click();
+      await page.waitForSelector(".side");
+      if (name === "1440-light") {
+        await page.getByRole("button", { name: "New fit or model" }).click();
+        await page.waitForSelector("#parameter-normals");
+        await page.selectOption("#parameter-normals", { index: 1 });
+        await page.getByRole("button", { name: "Fit", exact: true }).click();
+      }
+      await page.waitForSelector(".perfusion .maps canvas");
+      const [fit] = (await read(own.address, "/v1/segmentations")).segmentations;
+      const { perfusion } = await (await fetch(own.address + fit.links.report, { headers: { accept: "application/json" } })).json();
+      const words = await page.textContent(".perfusion");
+      for (const figure of [number(perfusion.deficit_percent, 1, "%"), `${perfusion.summed_score} (`, "simulated people, not patients"]) assert.ok(words.includes(figure), `${figure} in ${words}`);
+      await look(page, `fit-limits-${name}`);
+      if (width === 1440) assert.equal(await printed(page, `fit-limits-${name}`), 2, "pages on paper");
+      assert.deepEqual(faults, []);
+      await close();
+    }
+    const { page, faults, close } = await tab(browser, `${own.address}/#/limits`, { width: 1440, height: 900 });
+    await page.waitForSelector(".limits-item");
+    await page.getByRole("button", { name: "Erase healthy limits" }).click();
+    await page.locator(".ask .danger").click();
+    await page.waitForFunction(() => !document.querySelector(".limits-item"));
+    assert.deepEqual((await read(own.address, "/v1/normals")).normals, []);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+}
