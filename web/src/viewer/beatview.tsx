@@ -7,7 +7,7 @@ import { number } from "../words";
 import { useCanvas } from "./canvas";
 import { PhaseHistogram, VolumeCurve } from "./charts";
 import type { Lut } from "./colours";
-import { LimitsUsed, PerfusionTable, SegmentScores } from "./comparedfacts";
+import { FiguresBeside, LimitsUsed, PerfusionTable, SegmentScores } from "./comparedfacts";
 import type { Loaded, LoadedBeat } from "./loaded";
 import { type DrawnMap, FIGURES, WallFrame, drawPolar, figureLut, figureMap, placeOnMap, segmentAt, uptakeMap } from "./polar";
 import type { Scene } from "./scene";
@@ -52,6 +52,7 @@ export function PerfusionView({ scene, shown }: { scene: Scene; shown: Loaded })
         <summary>Scores of the segments</summary>
         <SegmentScores perfusion={perfusion} />
       </details>
+      <FiguresBeside perfusion={perfusion} />
     </section>
   );
 }

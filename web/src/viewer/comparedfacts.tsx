@@ -9,7 +9,7 @@ import { shown } from "./polar";
 
 /** A signed change. */
 function change(value: number | null | undefined, digits: number, unit: string): string {
-  return typeof value === "number" && value > 0 ? `+${number(value, digits, unit)}` : number(value, digits, unit);
+  return typeof value === "number" && Number(value.toFixed(digits)) > 0 ? `+${number(value, digits, unit)}` : number(value, digits, unit);
 }
 
 /** The figures that are read first: name, figure, and what stands smaller beside it. */
@@ -21,7 +21,7 @@ export function headlinesOf(report: ComparisonReport): [string, string, string][
     ["Reversible", number(reversible_percent, 0, "%"), "of the wall"],
     ["Fixed", number(fixed_percent, 0, "%"), "of the wall"],
     ...scores,
-    ...(beat?.ef_change_points == null ? [] : [["EF, change", change(beat.ef_change_points, 0, "points"), `${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`] as [string, string, string]]),
+    ...(beat?.ef_change_points == null ? [] : [["EF, change", change(beat.ef_change_points, 0, ""), `points: ${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`] as [string, string, string]]),
   ];
 }
 
@@ -79,6 +79,37 @@ export function PerfusionTable({ of }: { of: [string, Perfusion][] }) {
       <thead class={of.length > 1 ? "" : "hidden"}><tr><td />{of.map(([name]) => <th key={name} scope="col">{name}</th>)}</tr></thead>
       <tbody>{rows.map(([name, read]) => <tr key={name}><th scope="row">{name}</th>{of.map(([scan, one]) => <td key={scan}>{read(one)}</td>)}</tr>)}</tbody>
     </table>
+  );
+}
+
+const UNITS: Record<string, string> = { ml: "ml", mm: "mm", g: "g", percent: "%", degrees: "°", points: "points" };
+const FIGURE_WORDS: Record<string, string> = { ef: "EF", edv: "EDV", esv: "ESV", tid: "TID", sd: "SD" };
+
+/** The name of a figure of the limits, which ends with its unit, in words and with the unit apart. */
+function figureName(name: string): [string, string] {
+  const words = name.split("_");
+  const unit = UNITS[words.at(-1) ?? ""] ?? "";
+  const left = (unit ? words.slice(0, -1) : words).map(word => FIGURE_WORDS[word] ?? word).join(" ");
+  return [left.charAt(0).toUpperCase() + left.slice(1), unit];
+}
+
+/** Figures of the whole heart beside the range of 95 in 100 of the people. */
+export function FiguresBeside({ perfusion }: { perfusion: Perfusion }) {
+  const rows = perfusion.figures.filter(one => one.segment == null);
+  if (rows.length === 0) return null;
+  return (
+    <details>
+      <summary>Figures of the heart beside their limits</summary>
+      <table class="segments">
+        <caption class="hidden">Figures of the heart beside their limits</caption>
+        <thead><tr><th scope="col">Figure</th><th scope="col">here</th><th scope="col">95 in 100 people</th><th scope="col">z</th></tr></thead>
+        <tbody>{rows.map(one => {
+          const [name, unit] = figureName(one.figure);
+          const digits = one.high < 10 ? 2 : 0;
+          return <tr key={one.figure}><th scope="row">{name}</th><td>{number(one.value, digits, unit)}</td><td>{number(one.low, digits)} to {number(one.high, digits)}</td><td>{number(one.z, 1)}</td></tr>;
+        })}</tbody>
+      </table>
+    </details>
   );
 }
 

@@ -14,7 +14,7 @@ import { ColourBar, byMap, coloursOf } from "./wall";
 /** CSS pixels of the slices, of a map and of a wall on paper before they are brought to the width of their place. */
 const [WIDTH, HEIGHT, MAP, WALL] = [700, 500, 190, 160];
 /** The height of the slices where maps of z and scores need room. */
-const LOW_HEIGHT = 405;
+const LOW_HEIGHT = 430;
 const RATIO = 3;
 
 interface Props {

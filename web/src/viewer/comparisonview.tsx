@@ -12,7 +12,7 @@ import { home } from "../route";
 import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
-import { BeatTable, Headlines, LimitsUsed, MatchTable, PerfusionTable, Reasons, SegmentChanges, SimulatedNote, TerritoryTable, madeWith } from "./comparedfacts";
+import { BeatTable, Headlines, LimitsUsed, MatchTable, PerfusionTable, Reasons, SegmentChanges, SegmentScores, SimulatedNote, TerritoryTable, madeWith } from "./comparedfacts";
 import { ComparedMaps, lutOf } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
@@ -67,7 +67,7 @@ function Working({ id }: { id: string }) {
       {!ended && <JobLine job={known} />}
       {ended && (
         <section class="picked" aria-label="What can be changed">
-          {ended.state === "cancelled" ? <p>The comparison was cancelled.</p> : <p role="alert"><Trouble problem={ended.error} /></p>}
+          {ended.state === "cancelled" ? <p>The comparison was cancelled.</p> : <p role="alert"><Trouble problem={otherPatient && ended.error ? { ...ended.error, fix: null } : ended.error} /></p>}
           {again && <PairForm pair={again.pair} stress={again.pair[0].id} draft={again.draft} problem={again.problem} otherPatient={otherPatient ?? false} />}
         </section>
       )}
@@ -157,13 +157,14 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
           <summary>Beside normal limits</summary>
           <PerfusionTable of={beside} />
           {beside.slice(0, 1).map(([scan, perfusion]) => <LimitsUsed key={scan} perfusion={perfusion} />)}
+          {beside.map(([scan, perfusion]) => <details key={scan}><summary>Scores at {scan}</summary><div class="wide" tabIndex={0} role="region" aria-label={`Scores at ${scan}`}><SegmentScores perfusion={perfusion} /></div></details>)}
         </details>
       )}
       {report.beat && <details open><summary>The beat</summary><BeatTable report={report} /></details>}
       {report.territories.length > 0 && <details><summary>Territories</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Territories"><TerritoryTable report={report} /></div></details>}
       <details><summary>Segments</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Segments"><SegmentChanges report={report} /></div></details>
       <details><summary>How both were matched</summary><MatchTable report={report} /></details>
-      {[...report.stress.warnings, ...report.rest.warnings].map(text => <p key={text} class="warning">{text}</p>)}
+      {(["stress", "rest"] as const).flatMap(scan => report[scan].warnings.map(text => <p key={scan + text} class="warning">{scan === "stress" ? "Stress" : "Rest"}: {text}</p>))}
     </section>
   );
 }
@@ -173,7 +174,7 @@ function Others({ compared: { result } }: { compared: Compared }) {
   const scans = [result.volume, String(result.parameters["rest"])];
   const others = useWatched(comparisons).filter(other => other.id !== result.id && (scans.includes(other.volume) || scans.includes(String(other.parameters["rest"]))));
   return (
-    <section aria-label="Other comparisons">
+    <section class="others" aria-label="Other comparisons">
       {others.slice(0, 4).map(other => <a key={other.id} class="result" href={`#/comparison/${other.id}`}><b>Compared {moment(other.created_at)}</b>{other.parameters["normals"] ? " with normal limits" : ""}</a>)}
       <Again result={result} />
       <Confirm label="Erase this comparison" question="Erase this comparison? The scans stay." act={() => eraseResult(result.id).then(home)}>Erase</Confirm>

@@ -5,6 +5,7 @@ import { type Job, type Kind, type Parameters, type Result, type Volume, fieldOf
 import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
 import { beats, comparisons, comparisonsOf, eraseResult, find, fits, isActive, jobs, loadResult, loadScan, madeBy, models, resultsOf } from "../library";
+import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { home, isAt, open, openComparison, route } from "../route";
 import { useWatched } from "../state";
@@ -273,7 +274,15 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
 /** The comparisons of rest and stress in which a scan takes part. */
 function Comparisons({ volume }: { volume: string }) {
   useWatched(comparisons);
-  return <>{comparisonsOf(volume).map(made => <a key={made.id} class="result" href={`#/comparison/${made.id}`}><b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span></a>)}</>;
+  return (
+    <>
+      {comparisonsOf(volume).map(made => <a key={made.id} class="result" href={`#/comparison/${made.id}`}><b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span></a>)}
+      <button type="button" class="plain" onClick={() => {
+        if (!picked.value.includes(volume)) pick(volume);
+        home();
+      }}>Compare rest and stress …</button>
+    </>
+  );
 }
 
 /** Which result a corrected fit came from, and what was changed. */
