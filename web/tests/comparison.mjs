@@ -51,6 +51,44 @@ const isDrawn = canvas => canvas.evaluate(element => {
   return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
 });
 
+/**
+ * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the uptake
+ * in the colours of both.
+ */
+const likeness = (page, path) => page.evaluate(async path => {
+  const picture = await createImageBitmap(await (await fetch(path)).blob());
+  const shown = document.querySelector(".compared-slices");
+  // As `comparedslices.tsx` and `rest_stress/slices.rs` lay their cells.
+  const [aside, above, ratio] = [46, 19, shown.width / shown.clientWidth];
+  const cell = Math.min((shown.clientWidth - aside) / 8, (shown.clientHeight - 3 * above) / 6);
+  const left = aside + (shown.clientWidth - aside - 8 * cell) / 2;
+  const cut = (source, x, y, size) => {
+    const context = Object.assign(document.createElement("canvas"), { width: 22, height: 22 }).getContext("2d");
+    context.imageSmoothingQuality = "high";
+    // Without the border, which marks the chosen slice.
+    context.drawImage(source, x + 0.06 * size, y + 0.06 * size, 0.88 * size, 0.88 * size, 0, 0, 22, 22);
+    return context.getImageData(0, 0, 22, 22).data.filter((_, n) => n % 4 === 1);
+  };
+  let least = 1;
+  for (let row = 0; row < 6; row++) {
+    for (let n = 0; n < 8; n++) {
+      const kind = Math.floor(row / 2);
+      const a = cut(shown, (left + n * cell) * ratio, ((kind + 1) * above + row * cell) * ratio, cell * ratio);
+      const b = cut(picture, 84 + n * 88, row * 88 + kind * 10, 88);
+      const mean = values => values.reduce((sum, value) => sum + value, 0) / values.length;
+      const [p, q] = [mean(a), mean(b)];
+      let [both, one, other] = [0, 0, 0];
+      for (let at = 0; at < a.length; at++) {
+        both += (a[at] - p) * (b[at] - q);
+        one += (a[at] - p) ** 2;
+        other += (b[at] - q) ** 2;
+      }
+      least = Math.min(least, both / Math.sqrt(one * other));
+    }
+  }
+  return least;
+}, path);
+
 const number = (value, digits, unit = "") => value.toFixed(digits) + (unit && `\u2009${unit}`);
 
 export async function comparisons(tools) {
@@ -92,6 +130,11 @@ export async function comparisons(tools) {
       assert.match(id, /^cmp_/);
       const report = await reportOf(own.address, id);
       assert.ok(report.reversible_percent > 8, `${report.reversible_percent} % reversible`);
+      if (name === "1440-light") {
+        const alike = await likeness(page, `/v1/comparisons/${id}/slices.png`);
+        console.log(`  slices: correlation with the service's picture at least ${alike.toFixed(3)}`);
+        assert.ok(alike > 0.98, `${alike}`);
+      }
       const shown = await page.textContent(".compared-headlines");
       for (const figure of [`TID${number(report.tid, 2)}`, `Reversible${number(report.reversible_percent, 0, "%")}`, `Fixed${number(report.fixed_percent, 0, "%")}`]) assert.ok(shown.includes(figure), `${figure} in ${shown}`);
       const words = await page.textContent(".verdict");

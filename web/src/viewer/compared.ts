@@ -77,8 +77,8 @@ export const SLICES = 8;
 const SHORT_ENDS_SHARE = [0.06, 0.94] as const;
 /** Distance from the long axis of the outermost long-axis slices, as a share of its length. */
 const LONG_ENDS_SHARE = 0.28;
-/** Millimetres that a slice shows. */
-export const SLICE_MM = 112;
+/** Millimetres that a slice shows, as in that picture. */
+export const SLICE_MM = 114.4;
 
 export interface SliceKind {
   name: string;

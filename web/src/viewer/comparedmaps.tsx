@@ -11,6 +11,9 @@ import { LUTS, type Lut, WALL_LUT, keep } from "./colours";
 import { type DrawnMap, drawPolar, figureLut, isInValvePlane, placeOnMap, segmentAt, valueAt } from "./polar";
 import { ColourBar } from "./wall";
 
+/** Share of a map that an arrow key moves the cursor by. */
+const STEP = 0.03;
+
 /** The colours of a map: those that were chosen, of uptake; else the figure's own. */
 export function lutOf({ figure }: NamedMap, chosen: Lut): Lut {
   return figure === "uptake" ? chosen : figureLut(figure);
@@ -89,6 +92,7 @@ function Map({ named, compared, scene }: { named: NamedMap; compared: Compared; 
     <figure class="polar">
       <canvas
         ref={canvas}
+        tabIndex={0}
         role="img"
         aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, map.digits, map.unit)}`).join(", ")}`}
         onPointerDown={event => {
@@ -96,6 +100,15 @@ function Map({ named, compared, scene }: { named: NamedMap; compared: Compared; 
           go(event);
         }}
         onPointerMove={event => event.buttons && go(event)}
+        onKeyDown={event => {
+          const ways: Record<string, [number, number]> = { ArrowUp: [0, -1], ArrowDown: [0, 1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
+          const way = ways[event.key];
+          if (!way) return;
+          event.preventDefault();
+          const [x, y] = cursor ?? [0.5, 0.5];
+          const next: [number, number] = cursor ? [x + STEP * way[0], y + STEP * way[1]] : [x, y];
+          if (placeOnMap(map, next[0], next[1], 1)) scene.cursor.value = next;
+        }}
       />
       <figcaption>
         <b>{short}</b>
