@@ -89,6 +89,20 @@ const likeness = (page, path) => page.evaluate(async path => {
   return least;
 }, path);
 
+/** The height of what is printed that its pages cut off, px. */
+async function cutOff(page) {
+  const before = page.viewportSize();
+  await page.emulateMedia({ media: "print" });
+  await page.setViewportSize({ width: 703, height: 1040 });
+  await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
+  await page.waitForTimeout(300);
+  const cut = await page.evaluate(() => Math.max(...[...document.querySelectorAll(".paper")].map(paper => paper.scrollHeight - paper.clientHeight)));
+  await page.evaluate(() => dispatchEvent(new Event("afterprint")));
+  await page.emulateMedia({ media: null });
+  await page.setViewportSize(before);
+  return cut;
+}
+
 const number = (value, digits, unit = "") => value.toFixed(digits) + (unit && `\u2009${unit}`);
 
 export async function comparisons(tools) {
@@ -173,6 +187,7 @@ export async function comparisons(tools) {
           assert.ok(place.y > 0 && place.y + place.height < 900, `${label} above the fold`);
         }
         assert.equal(await printed(page, `comparison-${name}`), 1, "one page on paper");
+        assert.equal(await cutOff(page), 0, "nothing is cut off");
       }
       assert.ok((await page.locator(".downloads summary", { hasText: "DICOM objects" }).count()) === 1);
       assert.deepEqual(faults, []);
@@ -201,6 +216,7 @@ export async function comparisons(tools) {
     await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
     await displayed(page);
     assert.match(await page.textContent(".verdict"), /not comparable as they are/);
+    assert.equal(await cutOff(page), 0, "nothing is cut off");
     // Picked by hand, the other way round: the flag says so.
     await page.goto(`${own.address}/#/`);
     await page.getByRole("button", { name: /^Pick heart_stress/ }).click();
@@ -253,7 +269,10 @@ export async function comparisons(tools) {
       assert.ok((await page.textContent(".particulars")).includes(number(report.stress.perfusion.deficit_percent, 1, "%")));
       await page.getByLabel("On the maps").selectOption("scores");
       await look(page, `scored-${name}`);
-      if (width === 1440) assert.equal(await printed(page, `scored-${name}`), 1, "one page on paper");
+      if (width === 1440) {
+        assert.equal(await printed(page, `scored-${name}`), 1, "one page on paper");
+        assert.equal(await cutOff(page), 0, "nothing is cut off");
+      }
       // No word of a category or a diagnosis.
       assert.doesNotMatch(await page.textContent(".comparison"), /abnormal|ischa?emia|infarct|probable|low risk|high risk/i);
 
@@ -273,6 +292,7 @@ export async function comparisons(tools) {
       for (const figure of [number(perfusion.deficit_percent, 1, "%"), `${perfusion.summed_score} (`, "simulated people, not patients"]) assert.ok(words.includes(figure), `${figure} in ${words}`);
       await look(page, `fit-limits-${name}`);
       if (width === 1440) assert.equal(await printed(page, `fit-limits-${name}`), 2, "pages on paper");
+      if (width === 1440) assert.equal(await cutOff(page), 0, "nothing is cut off");
       assert.deepEqual(faults, []);
       await close();
     }

@@ -13,8 +13,6 @@ import { ColourBar, byMap, coloursOf } from "./wall";
 
 /** CSS pixels of the slices, of a map and of a wall on paper before they are brought to the width of their place. */
 const [WIDTH, HEIGHT, MAP, WALL] = [700, 500, 190, 160];
-/** The height of the slices where maps of z and scores need room. */
-const LOW_HEIGHT = 430;
 const RATIO = 3;
 
 interface Props {
@@ -27,7 +25,6 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
   const { report, result, stress, rest } = compared;
   const maps = mapsOf(compared);
   const lut = scene.lut.value;
-  const height = maps.length > 3 ? LOW_HEIGHT : HEIGHT;
   const beside = (["stress", "rest"] as const).flatMap(scan => {
     const { perfusion } = report[scan];
     return perfusion ? [[scan, perfusion] as [string, typeof perfusion]] : [];
@@ -53,7 +50,7 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
       <Head volume={scans.stress} title="Left ventricle: rest and stress">Compared {moment(result.created_at)}</Head>
       <div class="scans-line">{(["stress", "rest"] as const).map(scan => <span key={scan}><b>{scan === "stress" ? "Stress" : "Rest"}</b> {nameOf(scans[scan])}{madeWith(report[scan]) && ` · ${madeWith(report[scan])}`}</span>)}<SimulatedNote report={report} /></div>
       <Headlines report={report} />
-      <Drawn width={WIDTH} height={height} name="Slices of stress above those of rest" draw={element => drawSlices(element, compared, scene, { width: WIDTH, height, ratio: RATIO, marks: false })} />
+      <Drawn width={WIDTH} height={HEIGHT} name="Slices of stress above those of rest" draw={element => drawSlices(element, compared, scene, { width: WIDTH, height: HEIGHT, ratio: RATIO, marks: false })} />
       <div class={beside.length > 0 ? "sheet-lower" : ""}>
         <div class={`sheet-maps${maps.length > 3 ? " many" : ""}`}>
           {maps.slice(0, 3).map(map)}
