@@ -373,8 +373,8 @@ function ScanRow({ row: { volume, results, open: openJobs }, compared, alone = f
 function figures(result: Result) {
   const { summary } = result;
   if (isComparison(result.id)) {
-    const { sss, sds } = summary;
-    return <><span>TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}{sss != null && `, SSS ${sss}, SDS ${sds}`}</span><Doubts count={summary.flags?.length ?? 0} /></>;
+    const { sss, sds, ef_change_points: change } = summary;
+    return <><span>TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}{sss != null && `, SSS ${sss}, SDS ${sds}`}{change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}</span><Doubts count={summary.flags?.length ?? 0} /></>;
   }
   if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
   if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;

@@ -14,10 +14,11 @@ function change(value: number | null | undefined, digits: number, unit: string):
 
 /** The figures that are read first: name, figure, and what stands smaller beside it. */
 export function headlinesOf(report: ComparisonReport): [string, string, string][] {
+  const isUncertain = report.flags.some(flag => flag.code === "tid_uncertain");
   const { tid, reversible_percent, fixed_percent, sss, srs, sds, summed_percent, beat, stress, rest } = report;
   const scores = ([["SSS", sss], ["SRS", srs], ["SDS", sds]] as const).flatMap(([name, score], n): [string, string, string][] => (score == null ? [] : [[name, String(score), summed_percent ? number(summed_percent[n], 0, "%") : ""]]));
   return [
-    ["TID", number(tid, 2), `${number(stress.cavity_ml, 0)} / ${number(rest.cavity_ml, 0, "ml")}`],
+    ["TID", number(tid, 2), `${number(stress.cavity_ml, 0)}\u00a0/\u00a0${number(rest.cavity_ml, 0, "ml")}${isUncertain ? ", uncertain" : ""}`],
     ["Reversible", number(reversible_percent, 0, "%"), "of the wall"],
     ["Fixed", number(fixed_percent, 0, "%"), "of the wall"],
     ...scores,
@@ -33,12 +34,17 @@ export function Headlines({ report }: { report: ComparisonReport }) {
   );
 }
 
+/** Whether both scans should not be compared at all: that is said before any figure. */
+export function areNotComparable(report: ComparisonReport): boolean {
+  return report.flags.some(flag => flag.code === "not_comparable");
+}
+
 /** Reasons to look closer, in words. */
 export function Reasons({ report }: { report: ComparisonReport }) {
   const flags = flagsOf(report);
   return (
     <div class={flags.length ? "verdict doubt" : "verdict"}>
-      {flags.some(flag => flag.code === "not_comparable") && <p><b>These scans are not comparable as they are.</b></p>}
+      {areNotComparable(report) && <p><b>These scans are not comparable as they are.</b></p>}
       {flags.length > 0 ? <ul>{flags.map(flag => <li key={flag.code + flag.reason}>{sentence(flag.reason)}</li>)}</ul> : <p class="quiet">No reason to doubt the comparison was found.</p>}
     </div>
   );

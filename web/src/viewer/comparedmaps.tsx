@@ -68,6 +68,7 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
         <Readout compared={compared} scene={scene} maps={maps} />
         {maps.slice(3).map(named => <Map key={named.name} named={named} compared={compared} scene={scene} />)}
       </div>
+      {!(compared.stress.oriented && compared.rest.oriented) && <p class="warning">Nothing tells which side is anterior: segments have no names, and both hearts may be turned against each other.</p>}
     </section>
   );
 }

@@ -12,7 +12,7 @@ import { home } from "../route";
 import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
-import { BeatTable, Headlines, LimitsUsed, MatchTable, PerfusionTable, Reasons, SegmentChanges, SegmentScores, SimulatedNote, TerritoryTable, madeWith } from "./comparedfacts";
+import { BeatTable, Headlines, LimitsUsed, MatchTable, PerfusionTable, Reasons, SegmentChanges, SegmentScores, SimulatedNote, TerritoryTable, areNotComparable, madeWith } from "./comparedfacts";
 import { ComparedMaps, lutOf } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
@@ -114,9 +114,10 @@ function Comparison({ compared, scans }: ComparisonProps) {
       <aside class="facts" aria-label="Figures">
         <Head compared={compared} scans={scans} />
         <Takeaways result={compared.result} volume={scans.stress} />
+        {areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Headlines report={compared.report} />
         <SimulatedNote report={compared.report} />
-        <Reasons report={compared.report} />
+        {!areNotComparable(compared.report) && <Reasons report={compared.report} />}
         <Particulars compared={compared} />
         <Downloads result={compared.result} volume={scans.stress} />
         <Others compared={compared} />
