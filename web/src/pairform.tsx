@@ -1,6 +1,6 @@
 // Two scans of one patient, and what is asked before they are compared.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useMemo, useState } from "preact/hooks";
 import { type Volume, fieldOf, words } from "./api";
 import { areOfTwoPatients, picked, statedRole, stressOf } from "./pairing";
 import { type Draft, ParameterForm, parameterSpecs, valuesOf } from "./parameters";
@@ -34,7 +34,6 @@ export function PairForm({ pair, stress: chosenBefore = null, draft: before = {}
   const [draft, setDraft] = useState<Draft>(before);
   const [problem, setProblem] = useState(first);
   const [sending, setSending] = useState(false);
-  useEffect(() => setStress(chosenBefore ?? guess.stress?.id ?? null), [guess, chosenBefore]);
   const twoPatients = otherPatient || areOfTwoPatients(a, b);
   const asOnePatient = draft["same_patient"] === "true";
   const alike = statedRole(a) !== null && statedRole(a) === statedRole(b);

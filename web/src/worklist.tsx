@@ -169,7 +169,7 @@ function Scans() {
     void loadAllResults().catch(error => (trouble.value = words(error)));
     if (next && all.length < 2000) void loadMore(100);
   }, [search, order, show, next, all.length]);
-  const shown = together(rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]));
+  const shown = byStudy(rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]));
   useEffect(() => setAt(0), [search, show, order]);
   const part = shown.slice(at, at + SHOWN);
   if (!isLoaded) return problem ? <p class="error pad">{problem} <button type="button" onClick={() => void refresh()}>Try again</button></p> : <p class="quiet pad">Reading the list …</p>;
@@ -259,7 +259,7 @@ const COMPARE: Record<Order, (a: Row, b: Row) => number> = {
 };
 
 /** Scans of one study follow the first of them. */
-function together(rows: Row[]): Row[] {
+function byStudy(rows: Row[]): Row[] {
   const groups = new Map<string, Row[]>();
   for (const row of rows) {
     const key = studyKey(row.volume) ?? row.volume.id;

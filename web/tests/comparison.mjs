@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { nm } from "./nm.mjs";
+import { gated, nm } from "./nm.mjs";
 
 /** Mid and apical segments of the LAD, which lack uptake at stress. */
 const LAD = [7, 8, 13, 14];
@@ -28,6 +28,8 @@ function made({ PROGRAM, SCREENSHOTS }) {
     writeFileSync(files[role], nm(scan, "Compared^Clara", "PH9", series));
     files[`plain ${role}`] = at(`heart_${role}.nii.gz`);
     writeFileSync(files[`plain ${role}`], scan);
+    files[`gated ${role}`] = at(`gated_${role}.nii.gz`);
+    writeFileSync(files[`gated ${role}`], gated(scan, readFileSync(at(role, "lv_truth.nii.gz")), 8));
   }
   files.other = at("other.dcm");
   writeFileSync(files.other, nm(readFileSync(at("rest", "spect.nii.gz")), "Other^Olga", "PH10", { number: 7, description: "Cardiac rest", tracer: "Tetrofosmin Tc-99m" }));
@@ -226,6 +228,31 @@ export async function comparisons(tools) {
     await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
     await displayed(page);
     assert.match(await page.textContent(".comparison header"), /stress\s*heart_rest/);
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
+  await check("rest and stress of gated scans: the change of the ejection fraction", async () => {
+    const { "gated stress": gatedStress, "gated rest": gatedRest } = data();
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address, { width: 1440, height: 900 });
+    await page.waitForSelector(".drop");
+    await page.getByLabel("then").selectOption("nothing");
+    await choose(page, gatedStress, gatedRest);
+    await page.waitForSelector(".pair-form");
+    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).click();
+    await displayed(page);
+    const { beat, segments } = await reportOf(own.address, await page.evaluate(() => location.hash.split("/").pop()));
+    const points = Math.round(beat.ef_change_points);
+    const shown = await page.textContent(".compared-headlines");
+    assert.ok(shown.includes(`EF, change${points > 0 ? "+" : ""}${points}points: ${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`), shown);
+    assert.ok((await page.textContent(".particulars")).includes(`End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}${number(beat.rest_edv_ml, 0, "ml")}`));
+    await page.locator(".particulars summary", { hasText: "Segments" }).click();
+    const moved = Math.abs(segments[6].motion_change_mm).toFixed(1);
+    assert.ok((await page.locator(".particulars tr", { hasText: "7 mid anterior" }).textContent()).includes(moved));
+    await look(page, "comparison-gated-1440");
+    assert.equal(await cutOff(page), 0, "nothing is cut off");
     assert.deepEqual(faults, []);
     await close();
     await own.stop();

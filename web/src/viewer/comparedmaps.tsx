@@ -64,16 +64,16 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
         </label>
       </div>
       <div class={`maps${maps.length > 3 ? "" : " few"}`}>
-        {maps.slice(0, 3).map(named => <Map key={named.name} named={named} compared={compared} scene={scene} />)}
+        {maps.slice(0, 3).map(named => <OneMap key={named.name} named={named} compared={compared} scene={scene} />)}
         <Readout compared={compared} scene={scene} maps={maps} />
-        {maps.slice(3).map(named => <Map key={named.name} named={named} compared={compared} scene={scene} />)}
+        {maps.slice(3).map(named => <OneMap key={named.name} named={named} compared={compared} scene={scene} />)}
       </div>
       {!(compared.stress.oriented && compared.rest.oriented) && <p class="warning">Nothing tells which side is anterior: segments have no names, and both hearts may be turned against each other.</p>}
     </section>
   );
 }
 
-function Map({ named, compared, scene }: { named: NamedMap; compared: Compared; scene: ComparedScene }) {
+function OneMap({ named, compared, scene }: { named: NamedMap; compared: Compared; scene: ComparedScene }) {
   const { name, short, map } = named;
   const lut = useWatched(scene.lut);
   const written = useWatched(scene.written);
