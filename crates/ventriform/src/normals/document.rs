@@ -239,9 +239,15 @@ impl NormalLimits {
         }
     }
 
+    /// The hash of everything but itself, however numbers are spelt: programs that write `1.0` as `1` change nothing.
     fn content_sha256(&self) -> String {
+        let as_decimal = |(name, value): (&String, &Value)| {
+            let decimal = value.as_f64().map(Value::from);
+            (name.clone(), decimal.unwrap_or_else(|| value.clone()))
+        };
         let content = Self {
             sha256: String::new(),
+            parameters: self.parameters.iter().map(as_decimal).collect(),
             ..self.clone()
         };
         hex(&Sha256::digest(content.to_json()))
