@@ -7,11 +7,12 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use ventriform::grid::agreement::compare;
 use ventriform::mesh_files::{MeshFileError, MeshStatement};
 use ventriform::progress::Monitor;
 use ventriform::report::AgreementReport;
-use ventriform::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, MaskLabel, read_mask};
+use ventriform::volume::given_mask::{
+    GivenMask, GivenMaskError, MaskAgreement, MaskAgreementError, MaskChoice, MaskLabel, read_mask,
+};
 use ventriform::volume::{VolumeError, VolumeFile};
 use ventriform_service::work::problems::Explain;
 
@@ -79,36 +80,23 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
             note!("{}: {structure} was compared", path.display());
         }
     }
-    // A surface has no grid of its own.
-    let turned = a.mask.surface.is_some() && b.mask.surface.is_none();
-    let (holder, carried, path) = if !turned {
-        (a.mask, b.mask, &args.b)
-    } else {
-        (b.mask, a.mask, &args.a)
-    };
-    let refused = |error: GivenMaskError| anyhow!("{}: {}", path.display(), error.with_advice());
-    // No voxel of either is lost beyond the other's border.
-    let holder = match carried.on((holder.mask.shape, &holder.frame), true, &monitor) {
-        Ok(placed) if placed.outside == 0 => holder,
-        Err(
-            error @ (GivenMaskError::Cancelled(_) | GivenMaskError::Elsewhere { inside: 0, .. }),
-        ) => {
-            return Err(refused(error));
+    let made = a.mask.agreement(b.mask, args.resample, &monitor);
+    let MaskAgreement {
+        agreement,
+        resampled,
+    } = made.map_err(|error| match error {
+        MaskAgreementError::Unplaced {
+            of_reference,
+            error,
+        } => {
+            let path = if of_reference { &args.b } else { &args.a };
+            anyhow!("{}: {}", path.display(), error.with_advice())
         }
-        _ => holder.holding(&carried, &monitor).map_err(refused)?,
-    };
-    let grid = (holder.mask.shape, &holder.frame);
-    let placed = carried.on(grid, args.resample, &monitor).map_err(refused)?;
-    if placed.resampled {
-        note!("{}: resampled to the grid of A", path.display());
+        error => error.into(),
+    })?;
+    if resampled {
+        note!("{}: resampled to the grid of A", args.b.display());
     }
-    let spacing = holder.frame.spacing();
-    let (judged, reference) = if !turned {
-        (&holder.mask, &placed.mask)
-    } else {
-        (&placed.mask, &holder.mask)
-    };
-    let agreement = compare(judged, reference, spacing, &monitor)?;
     json(&serde_json::to_string_pretty(&AgreementReport::of(
         &agreement,
     ))?);

@@ -270,6 +270,17 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "gated",
         ],
     ),
+    (
+        "front",
+        &[
+            "progress",
+            "grid",
+            "volume",
+            "parameters",
+            "pipeline",
+            "segmentation",
+        ],
+    ),
 ];
 
 /// The same for the service.

@@ -1,5 +1,67 @@
 //! Surface models of the left ventricle (LV) from cardiac SPECT, and segmentations made with them.
 //!
+//! # A file to a model
+//!
+//! ```no_run
+//! let scan = ventriform::open("scan.nii.gz")?;
+//! let parameters = ventriform::ModelParameters::from_pairs([("points", "150")])?;
+//! let model = ventriform::generate(&scan, &parameters)?;
+//! let bytes = ventriform::encode(ventriform::Format::Glb, &model.mesh, &model.metadata())?;
+//! std::fs::write("heart.glb", bytes)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`open`] takes NIfTI and DICOM files, folders and zip archives. Voxels in memory become a [`Scan`], too, here those
+//! of a phantom; volumes from elsewhere are made with [`Volume::from_array`].
+//!
+//! ```
+//! use ventriform::{ModelParameters, Monitor, PhantomParameters, Scan};
+//!
+//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
+//! let scan = Scan::try_from(ventriform::phantom(&small, &Monitor::silent())?.volume)?;
+//!
+//! let parameters = ModelParameters::from_pairs([("points", "100")])?;
+//! let model = ventriform::generate(&scan, &parameters)?;
+//! assert_eq!(model.mesh.vertices.len(), 100);
+//! assert!(model.report.is_sound());
+//! assert!(model.report.distance.mean_mm < 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # A patient to a mask
+//!
+//! [`segment`] finds the ventricle, fits the built-in hearts to it and keeps the best fit.
+//!
+//! ```
+//! use ventriform::{FitParameters, Monitor, PhantomParameters, Scan};
+//!
+//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
+//! let volume = ventriform::phantom(&small, &Monitor::silent())?.volume;
+//! let (shape, voxel_mm3) = (volume.shape, volume.frame.voxel_volume());
+//!
+//! let found = ventriform::segment(&Scan::try_from(volume)?, &FitParameters::default())?;
+//! let mask = &found.segmentation.mask;
+//! assert_eq!(mask.shape, shape);
+//! let millilitres = mask.count() as f64 * voxel_mm3 / 1000.0;
+//! assert!((80.0..400.0).contains(&millilitres));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Models of one's own, a reader's profile, normal limits, progress and cancelling: [`segmentation::from_files`].
+//!
+//! # Two masks compared
+//!
+//! ```no_run
+//! let (mask, expert) = (ventriform::open_mask("mask.nii.gz")?, ventriform::open_mask("expert.nii.gz")?);
+//! let agreement = ventriform::measure(mask, expert)?;
+//! println!("Jaccard {:.3}", agreement.jaccard);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`compare`] does it for masks in memory, and [`voxelise`] makes a mask of a closed mesh.
+//!
+//! # How it works
+//!
 //! ```text
 //! volume ──> surface ──> retile ──> optimise ──> report ──> export
 //! voxels     triangles   N points   flips, fit   figures    GLB, STL, JSON ...
@@ -16,87 +78,6 @@
 //!
 //! The modules are listed in the order in which a volume passes through them. The names that most
 //! programs need are re-exported here.
-//!
-//! # Generate a model
-//!
-//! [`generate`] reads files; [`generate_from`] takes a [`Volume`], here a phantom. Volumes from
-//! elsewhere are made with [`Volume::from_array`].
-//!
-//! ```
-//! use ventriform::{Format, ModelParameters, Monitor, PhantomParameters};
-//!
-//! let quiet = Monitor::silent();
-//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
-//! let scan = ventriform::phantom(&small, &quiet)?.volume;
-//!
-//! let parameters = ModelParameters::from_pairs([("points", "100")])?;
-//! let model = ventriform::generate_from(&scan, &parameters, &quiet)?;
-//! assert_eq!(model.mesh.vertices.len(), 100);
-//! assert!(model.report.is_sound());
-//!
-//! let stl = ventriform::encode(Format::Stl, &model.mesh, &model.metadata())?;
-//! assert_eq!(stl.len(), 84 + 50 * model.mesh.triangles.len());
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! # Segment a volume
-//!
-//! [`segment`] finds the ventricle, deforms each template to fit it and keeps the best fit.
-//!
-//! ```
-//! use ventriform::{ModelParameters, Monitor, NamedTemplate, Organ, PhantomParameters, Template};
-//!
-//! let quiet = Monitor::silent();
-//! let patient = |seed| {
-//!     let small = PhantomParameters {
-//!         shape: [48; 3],
-//!         spacing_mm: [4.5; 3],
-//!         seed,
-//!         ..Default::default()
-//!     };
-//!     ventriform::phantom(&small, &quiet)
-//! };
-//! let parameters = ModelParameters::from_pairs([("points", "100")])?;
-//! let model = ventriform::generate_from(&patient(1)?.volume, &parameters, &quiet)?;
-//! let templates = [NamedTemplate {
-//!     name: "first patient".into(),
-//!     template: Template::new(model.mesh, Organ::LeftVentricle, &quiet)?,
-//!     built_in: false,
-//! }];
-//!
-//! let scan = patient(2)?.volume;
-//! let found = ventriform::segment(&scan, &templates, &Default::default(), None, &quiet)?;
-//! assert_eq!(found.mask.shape, scan.shape);
-//! let millilitres = found.mask.count() as f64 * scan.frame.voxel_volume() / 1000.0;
-//! assert!((80.0..400.0).contains(&millilitres));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
-//!
-//! # Measure
-//!
-//! A model comes with its figures in [`Model::report`]. [`compare`] measures the agreement of two
-//! masks, and [`voxelise`] makes a mask of a closed mesh.
-//!
-//! ```
-//! use ventriform::{Mask, ModelParameters, Monitor, PhantomParameters};
-//!
-//! let quiet = Monitor::silent();
-//! let small = PhantomParameters { shape: [48; 3], spacing_mm: [4.5; 3], ..Default::default() };
-//! let made = ventriform::phantom(&small, &quiet)?;
-//! let parameters = ModelParameters::from_pairs([("points", "100")])?;
-//! let model = ventriform::generate_from(&made.volume, &parameters, &quiet)?;
-//! assert!(model.report.distance.mean_mm < 1.0);
-//!
-//! let frame = &made.truth.frame;
-//! let wall = Mask {
-//!     shape: made.truth.shape,
-//!     voxels: made.truth.voxels.iter().map(|v| *v > 0.5).collect(),
-//! };
-//! let inside = ventriform::voxelise(&model.mesh, wall.shape, frame);
-//! let agreement = ventriform::compare(&inside, &wall, frame.spacing(), &quiet)?;
-//! assert!(agreement.dice > 0.6);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 pub mod text;
 
@@ -159,14 +140,17 @@ pub mod rest_stress;
 
 pub mod evaluate;
 
+mod front;
+
 pub use export::{Format, Metadata, encode};
+pub use front::{Scan, generate, measure, open, open_mask, segment};
 pub use grid::agreement::{Agreement, compare};
 pub use grid::voxelise::{Mask, voxelise};
 pub use grid::{Affine, ArrayError, Volume};
 pub use mesh::TriMesh;
 pub use model::{Organ, Template};
-pub use parameters::{FitParameters, ModelParameters};
-pub use pipeline::{Model, generate, generate_from};
+pub use parameters::{FitParameters, ModelParameters, Parameters};
+pub use pipeline::Model;
 pub use progress::Monitor;
-pub use segmentation::{NamedTemplate, Segmentation, SegmentationParameters, segment};
+pub use segmentation::{NamedTemplate, Segmentation, SegmentationParameters, SegmentedVolume};
 pub use volume::{PhantomParameters, ReadLimits, VolumeFile, phantom};

@@ -57,6 +57,9 @@ pub(super) fn files_in(
     file: &VolumeFile,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<VolumeFile>>, VolumeError> {
+    if file.arrays().is_some() {
+        return Ok(None);
+    }
     let io = |error: io::Error| io_error(file, &error);
     let mut bytes = file.bytes().map_err(io)?;
     let mut mark = [0; 4];

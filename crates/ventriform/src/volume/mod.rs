@@ -20,6 +20,8 @@
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
+//! `array_file` reads volumes that are in memory already.
+//!
 //! `gate_files` reads files of one gate each as the gates of one study.
 //!
 //! `surface_file` reads a closed surface (STL, PLY, OBJ, VTK, VTP, glTF) as the voxels inside it.
@@ -47,6 +49,7 @@
 //! ```
 
 mod archive;
+mod array_file;
 mod decode;
 pub mod dicom;
 pub mod error;

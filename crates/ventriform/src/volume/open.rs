@@ -14,6 +14,7 @@ use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
 use super::{Provenance, Segment, Volume, VolumeError};
 use crate::draw::Image;
 use crate::geometry::frame::VoxelToPatient;
+use crate::grid::gates::GATES;
 use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
@@ -332,23 +333,37 @@ pub fn describe(volume: &Volume) -> Result<VolumeFacts, VolumeError> {
         source: AffineSource::Caller,
         warnings: Vec::new(),
     };
-    let header = HeaderFacts {
-        file: "the array",
+    let header = array_header("the array", &placement, volume.shape, 1);
+    let intensity = summarise(&volume.voxels, volume.shape[0]);
+    facts(header, Some(0), intensity, Vec::new())
+}
+
+/// What a file of `frames` volumes in memory would say.
+pub(super) fn array_header<'a>(
+    file: &'a str,
+    placement: &'a Placement,
+    shape: [usize; 3],
+    frames: usize,
+) -> HeaderFacts<'a> {
+    let mut file_shape = shape.to_vec();
+    if frames > 1 {
+        file_shape.push(frames);
+    }
+    HeaderFacts {
+        file,
         format: FileFormat::Array,
         byte_order: ByteOrder::Little,
         compressed: false,
         data_type: DataType::F32.name(),
         scaling: None,
-        file_shape: volume.shape.to_vec(),
-        frames: 1,
-        gated: false,
-        shape: volume.shape,
-        placement: &placement,
+        file_shape,
+        frames,
+        gated: GATES.contains(&frames),
+        shape,
+        placement,
         unit: LengthUnit::Millimetre,
         warnings: &[],
-    };
-    let intensity = summarise(&volume.voxels, volume.shape[0]);
-    facts(header, Some(0), intensity, Vec::new())
+    }
 }
 
 fn facts(

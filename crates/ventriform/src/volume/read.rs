@@ -1,5 +1,6 @@
 //! The two entry points: a volume to compute with, or only the facts about a file.
 
+use super::array_file::ArrayFile;
 use super::dicom::DicomFile;
 use super::gate_files::{GateFiles, order_of};
 use super::gate_timing::GateTiming;
@@ -341,6 +342,7 @@ fn open_as(
         Recognised::Gates(files) => Box::new(GateFiles::open(&files, limits)?),
         Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
         Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits)?),
+        Recognised::Arrays(file) => Box::new(ArrayFile::open(file, limits)?),
     };
     Ok(Opened {
         file,

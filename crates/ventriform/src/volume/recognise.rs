@@ -24,6 +24,8 @@ pub(super) enum Recognised<'a> {
     Dicom(Vec<&'a VolumeFile>),
     /// A closed surface.
     Mesh(&'a VolumeFile),
+    /// Volumes in memory.
+    Arrays(&'a VolumeFile),
 }
 
 /// The kind of a single file.
@@ -32,6 +34,7 @@ enum FileKind {
     NiftiSingle,
     NiftiHeader,
     Dicom,
+    Arrays,
     Other,
 }
 
@@ -48,6 +51,7 @@ struct Sorted<'a> {
     singles: Vec<&'a VolumeFile>,
     headers: Vec<&'a VolumeFile>,
     dicom: Vec<&'a VolumeFile>,
+    arrays: Vec<&'a VolumeFile>,
     /// Files that are no volumes, with their first bytes.
     others: Vec<(&'a VolumeFile, Vec<u8>)>,
     empty: Vec<&'a VolumeFile>,
@@ -74,6 +78,7 @@ pub(super) fn recognise<'a>(
             Ok((FileKind::NiftiSingle, _)) => sorted.singles.push(file),
             Ok((FileKind::NiftiHeader, _)) => sorted.headers.push(file),
             Ok((FileKind::Dicom, _)) => sorted.dicom.push(file),
+            Ok((FileKind::Arrays, _)) => sorted.arrays.push(file),
             Ok((FileKind::Other, start)) => sorted.others.push((file, start)),
             Err(VolumeError::Empty { .. }) if files.len() > 1 => sorted.empty.push(file),
             Err(error) => return Err(error),
@@ -95,6 +100,8 @@ impl<'a> Sorted<'a> {
     ) -> Result<Recognised<'a>, VolumeError> {
         let kinds = [self.singles.len(), self.headers.len(), self.dicom.len()];
         match (kinds, &self.others[..]) {
+            ([0, 0, 0], []) if self.arrays.len() == 1 => Ok(Recognised::Arrays(self.arrays[0])),
+            _ if !self.arrays.is_empty() => Err(self.not_one(inside)),
             ([1, 0, 0], _) => Ok(Recognised::Nifti {
                 header: self.singles[0],
                 voxels: self.singles[0],
@@ -178,6 +185,7 @@ impl<'a> Sorted<'a> {
             named(self.singles.len(), "NIfTI file"),
             named(self.headers.len(), "NIfTI header"),
             named(self.dicom.len(), "DICOM file"),
+            named(self.arrays.len(), "array"),
             named(self.others.len(), "other file"),
             named(self.empty.len(), "empty file"),
         ];
@@ -192,7 +200,7 @@ impl<'a> Sorted<'a> {
     fn notes(&self, volume: &Recognised<'_>) -> Vec<String> {
         let used = |file: &VolumeFile| match volume {
             Recognised::Nifti { voxels, .. } => std::ptr::eq(file, *voxels),
-            Recognised::Gates(_) | Recognised::Dicom(_) => false,
+            Recognised::Gates(_) | Recognised::Dicom(_) | Recognised::Arrays(_) => false,
             Recognised::Mesh(mesh) => std::ptr::eq(file, *mesh),
         };
         let foreign = self.others.iter().map(|(file, _)| *file);
@@ -245,6 +253,9 @@ fn stem(file: &VolumeFile, ending: &str) -> Option<String> {
 
 /// The kind of `file`, and its first bytes.
 fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(FileKind, Vec<u8>), VolumeError> {
+    if file.arrays().is_some() {
+        return Ok((FileKind::Arrays, Vec::new()));
+    }
     let mut start = vec![0; EXAMINED_BYTES];
     let mut source = Source::open(file, limits.unpacked_bytes.max(EXAMINED_BYTES as u64))?;
     let there = source.fill(&mut start)?;

@@ -6,6 +6,7 @@
 
 use super::VolumeError;
 use super::unpack::{self, Unpacked};
+use crate::grid::Volume;
 use crate::text::escaped;
 use flate2::bufread::{DeflateDecoder, GzDecoder};
 use std::fs::File;
@@ -35,6 +36,8 @@ enum Content {
     Memory(Arc<[u8]>),
     /// A file inside an archive.
     Entry(Arc<Entry>),
+    /// Volumes that are no file.
+    Arrays(Arc<[Volume]>),
 }
 
 /// The name of a file for messages: control characters are escaped.
@@ -78,6 +81,23 @@ impl VolumeFile {
         }
     }
 
+    /// Volumes in memory in place of a file: one, or the gates of a study on one grid.
+    pub fn of_arrays(name: impl Into<String>, volumes: impl Into<Arc<[Volume]>>) -> Self {
+        Self {
+            name: shown(name.into()),
+            content: Content::Arrays(volumes.into()),
+            found: false,
+        }
+    }
+
+    /// The volumes in memory; `None` for files.
+    pub(super) fn arrays(&self) -> Option<Arc<[Volume]>> {
+        match &self.content {
+            Content::Arrays(volumes) => Some(Arc::clone(volumes)),
+            _ => None,
+        }
+    }
+
     /// The file of `size` bytes in `archive` whose `packed` bytes begin at byte `begin`.
     pub(super) fn inside(
         archive: &Self,
@@ -108,6 +128,8 @@ impl VolumeFile {
         Ok(match &self.content {
             Content::Path(path) => Box::new(File::open(path)?),
             Content::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
+            // They are recognised before anything reads bytes.
+            Content::Arrays(_) => return Err(ErrorKind::Unsupported.into()),
             Content::Entry(entry) => {
                 let packed = Window {
                     archive: entry.archive.bytes()?,

@@ -133,6 +133,7 @@ fn equal_voxels_give_equal_bytes_whatever_the_container() {
             "float.nii",
             nifti::write(&scan, StoredType::Float32, false).unwrap(),
         ),
+        VolumeFile::of_arrays("the array", [scan]),
     ];
     let [first, others @ ..] = files.map(segmented);
     for other in others {

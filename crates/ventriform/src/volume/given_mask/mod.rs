@@ -14,11 +14,14 @@
 //!    over one by one, however they are stored (turned, mirrored, cropped, padded); another lattice is
 //!    refused with both geometries, or resampled if the caller asks.
 //!
+//! 4. `agree`: two of them are compared on the grid of one.
+//!
 //! A closed surface (STL, PLY, OBJ, VTK, VTP, glTF, our JSON) is a mask, too: it has one structure and no grid, and is
 //! voxelised on the volume's, a voxel being inside where its centre is.
 //!
 //! Guaranteed: no voxel of another structure counts, also where segments overlap.
 
+mod agree;
 mod choice;
 mod error;
 mod geometry;
@@ -29,6 +32,7 @@ mod structures;
 #[cfg(test)]
 mod tests;
 
+pub use agree::{MaskAgreement, MaskAgreementError};
 pub use choice::MaskChoice;
 pub use error::GivenMaskError;
 pub use geometry::GridGeometry;
