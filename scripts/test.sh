@@ -4,7 +4,7 @@
 #
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
-#                              pygeodesic, schemathesis, the page in a browser, generated clients, kills, DICOM, Orthanc,
+#                              pygeodesic, schemathesis, the page in a browser, the Python package, generated clients, kills, DICOM, Orthanc,
 #                              licences and SBOM)
 set -uo pipefail
 cd "$(dirname "$0")/.."
@@ -122,8 +122,11 @@ if [ "$quick" = --quick ]; then finish; fi
 if wait "${running[install]}"; then
   export PYTHON=$tools/python/bin/python NODE_PATH=$tools/node_modules
   # Build once before the checks run in parallel. Naming a test gives the libraries the same features as
-  # `cargo test` does.
-  cargo build --quiet --workspace --bins --examples --test layering
+  # `cargo test` does. The Python package has features of its own, and its wheel is built before the checks, which
+  # would wait for cargo's lock.
+  cargo build --quiet --workspace --exclude ventriform-python --bins --examples --test layering
+  check "wheel of the Python package" scripts/check_python.sh --build
+  start python scripts/check_python.sh --test
   start formats scripts/check_formats.sh
   start geodesics scripts/check_geodesics.sh
   start codecs scripts/check_codecs.sh
@@ -141,6 +144,7 @@ if wait "${running[install]}"; then
   start pgbouncer scripts/check_pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start dependencies "$PYTHON" scripts/dependencies.py check
+  collect python "Python package: tests, types, notebooks"
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
   collect codecs "codecs of compressed DICOM against libjpeg-turbo, GDCM, CharLS and OpenJPEG"

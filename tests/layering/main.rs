@@ -14,6 +14,7 @@ const CRATES: &[(&str, &[&str])] = &[
     ("crates/service", &["ventriform"]),
     ("crates/store", &["ventriform-service"]),
     ("crates/http", &["ventriform", "ventriform-service"]),
+    ("crates/python", &["ventriform", "ventriform-service"]),
     ("tools", &["ventriform"]),
     (
         ".",

@@ -1,0 +1,180 @@
+//! `calibrate` and `evaluate`: work on folders of cases.
+
+use crate::errors::{Stopped, broken, refused, stopped};
+use crate::run::{Tell, abandonable};
+use crate::values::table;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use serde_json::json;
+use std::path::PathBuf;
+use ventriform::deform::DeformParameters;
+use ventriform::evaluate::calibration::{Calibration, CalibrationError, CaseFigures};
+use ventriform::evaluate::calibration::{calibrate as learn, cases_of};
+use ventriform::evaluate::parameters::InSample;
+use ventriform::evaluate::rows::Variant;
+use ventriform::evaluate::{
+    Cohort, EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep,
+    evaluate as judge,
+};
+use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
+use ventriform::parameters::FitParameters;
+use ventriform::volume::given_mask::MaskChoice;
+
+/// The text of the profile, and the table of cases and problems as JSON.
+#[pyfunction]
+#[pyo3(signature = (cohort, mask, parameters, progress=None))]
+pub fn calibrate(
+    py: Python<'_>,
+    cohort: PathBuf,
+    mask: String,
+    parameters: &Bound<'_, PyDict>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(String, String)> {
+    let parameters: FitParameters = table(parameters)?;
+    abandonable(py, progress, move |tell: &Tell| {
+        let no_cohort = |error: &dyn std::fmt::Display| {
+            let fix = "Give a folder with a folder for each case, which holds a scan and a mask.";
+            Stopped::Failed(refused("cohort", error, fix))
+        };
+        let cases = cases_of(&cohort, &mask).map_err(|error| {
+            let folder = cohort.clone();
+            no_cohort(&CalibrationError::Folder { folder, error })
+        })?;
+        let made = learn(&cases, &parameters, &|share| tell("fit", share));
+        let made = made.map_err(|error| no_cohort(&error))?;
+        Ok((made.profile.to_json(), cases_table(&made)))
+    })
+}
+
+fn cases_table(made: &Calibration) -> String {
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+    let figures = |f: &CaseFigures| {
+        json!({
+            "jaccard": f.jaccard,
+            "contour_distance_voxels": finite(f.contour),
+            "wall_ml": f.wall_ml,
+            "cavity_ml": finite(f.cavity_ml),
+        })
+    };
+    let rows = made.rows.iter().map(|row| {
+        json!({
+            "case": row.case,
+            "reader_ml": row.reader_ml,
+            "without": figures(&row.without),
+            "held_out": row.held_out.as_ref().map(figures),
+            "in_sample": figures(&row.in_sample),
+        })
+    });
+    json!({
+        "cases": rows.collect::<Vec<_>>(),
+        "problems": made.problems,
+    })
+    .to_string()
+}
+
+/// What an evaluation is asked for.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct EvaluationOrder {
+    cohort: PathBuf,
+    out: PathBuf,
+    points: Vec<usize>,
+    reference_points: Vec<usize>,
+    models: Vec<String>,
+    method: String,
+    manual: Option<String>,
+    label: Option<String>,
+    resample: bool,
+    mesh_unit: Option<String>,
+    mesh_frame: Option<String>,
+    leave_one_out: bool,
+    in_sample: Vec<String>,
+    program: Vec<u8>,
+}
+
+struct Told<'a>(&'a Tell);
+
+impl EvaluationObserver for Told<'_> {
+    fn progress(&self, step: EvaluationStep, fraction: f64) {
+        (self.0)(step.as_str(), fraction);
+    }
+}
+
+/// Fits models to every patient of a cohort and writes tables, plots and pictures; gives the problems.
+#[pyfunction]
+#[pyo3(signature = (order, progress=None))]
+pub fn evaluate(
+    py: Python<'_>,
+    order: EvaluationOrder,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<(String, String)>> {
+    abandonable(py, progress, move |tell: &Tell| {
+        let refuse = |error: EvaluateError| match error {
+            EvaluateError::ModelParameter(error) => stopped(&error),
+            error => Stopped::Failed(refused("cohort", error, "")),
+        };
+        let parameters = EvaluationParameters {
+            points: order.points,
+            reference_points: order.reference_points,
+            variants: variants(&order.models)?,
+            method: order.method,
+            deform: DeformParameters::default(),
+            in_sample: match order.in_sample.as_slice() {
+                [word] if word == "all" => InSample::All,
+                names => InSample::Named(names.to_vec()),
+            },
+            leave_one_out: order.leave_one_out,
+        };
+        parameters.validate().map_err(refuse)?;
+        let cohort = Cohort::open(&order.cohort, order.manual.as_deref());
+        let mut cohort = cohort.map_err(|error| {
+            let fix = "Give a folder with a folder for each case.";
+            Stopped::Failed(refused("cohort", error, fix))
+        })?;
+        cohort.masks = MaskChoice {
+            label: order.label.as_deref().map(|text| {
+                let Ok(label) = text.parse();
+                label
+            }),
+            resample: order.resample,
+            mesh: MeshStatement {
+                unit: order.mesh_unit.as_deref().and_then(MeshUnit::named),
+                frame: order.mesh_frame.as_deref().and_then(MeshFrame::named),
+            },
+        };
+        if parameters.leave_one_out {
+            cohort.judge_templates();
+        }
+        let made = judge(
+            &cohort,
+            &parameters,
+            &order.program,
+            &order.out,
+            &Told(tell),
+        );
+        let made = made.map_err(refuse)?;
+        if !made.has_fit() {
+            let reason = "no fit succeeded; see the reasons in evaluation.html";
+            return Err(Stopped::Failed(broken(reason)));
+        }
+        Ok(made.problems)
+    })
+}
+
+fn variants(names: &[String]) -> Result<Vec<Variant>, Stopped> {
+    let known = [
+        Variant::Reference,
+        Variant::Retiled,
+        Variant::Optimised,
+        Variant::Auto,
+    ];
+    let variant = |name: &String| {
+        let found = known.into_iter().find(|known| known.as_str() == name);
+        found.ok_or_else(|| {
+            let words = known.map(Variant::as_str).join(", ");
+            let reason = format!("`{name}` is no kind of model");
+            Stopped::Failed(refused("models", reason, &format!("Give some of {words}.")))
+        })
+    };
+    names.iter().map(variant).collect()
+}

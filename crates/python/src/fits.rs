@@ -1,0 +1,224 @@
+//! `segment`, `beat` and `compare`: the commands with the same steps, and their files.
+
+use crate::arrays::{affine, mesh, positions, voxels};
+use crate::errors::{Stopped, refused, stopped};
+use crate::files::{Files, formats, named, unwritable};
+use crate::given::{GivenModel, GivenModels, GivenNormals, files, reader};
+use crate::run::run;
+use crate::values::{table, with_fit};
+use crate::volumes::NativeVolume;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use ventriform::export::Part;
+use ventriform::gated::{self, GatedOrder};
+use ventriform::mesh_files::MeshStatement;
+use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters};
+use ventriform::progress::{Monitor, Plan};
+use ventriform::rest_stress::{self, ComparisonNormals, ComparisonOrder};
+use ventriform::segmentation::{self, SegmentationOrder};
+use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions, VolumeFile};
+
+/// What a fit is given beside its parameters.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct FitOrder {
+    /// The models to fit.
+    model: Vec<GivenModel>,
+    /// The formats of the meshes' files.
+    formats: Vec<String>,
+    /// Parts of the wall that become files of their own.
+    parts: Vec<String>,
+    /// Limits to compare with.
+    normals: Option<GivenNormals>,
+    /// Protocols of stress and rest in the limits.
+    protocols: [Option<String>; 2],
+    /// An expert's mask.
+    expert: Option<Py<NativeVolume>>,
+    /// Name and text of a reader's profile.
+    reader: Option<(String, Vec<u8>)>,
+    /// Whether the page names nobody.
+    deidentify: bool,
+}
+
+fn whose(
+    files: &[VolumeFile],
+    frame: Option<usize>,
+    monitor: &Monitor<'_>,
+) -> Result<Option<Provenance>, Stopped> {
+    let found = volume::provenance(
+        files,
+        &ReadOptions { frame },
+        &ReadLimits::default(),
+        monitor,
+    );
+    found.map_err(|error| stopped(&error))
+}
+
+fn files_of(py: Python<'_>, files: Files) -> PyResult<Bound<'_, PyDict>> {
+    let dict = PyDict::new(py);
+    for (name, bytes) in files {
+        dict.set_item(name, PyBytes::new(py, &bytes))?;
+    }
+    Ok(dict)
+}
+
+/// The left ventricle, or another organ, of the volume.
+#[pyfunction]
+#[pyo3(signature = (volume, order, parameters, progress=None))]
+pub fn segment<'py>(
+    py: Python<'py>,
+    volume: Py<NativeVolume>,
+    order: FitOrder,
+    parameters: &Bound<'py, PyDict>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let parameters: FitParameters = table(parameters)?;
+    let scan = &volume.get().files;
+    let expert = order.expert.map(|expert| expert.get().files.clone());
+    let (given, profile, limits_given) =
+        (GivenModels::new(order.model), order.reader, order.normals);
+    let (names, parts, anonymous) = (order.formats, order.parts, order.deidentify);
+    let (made, files) = run(py, Plan::SEGMENTATION, progress, |monitor| {
+        let formats = formats(&names)?;
+        let (auto, models) = given.read(&parameters.mask.mesh)?;
+        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let whose = whose(scan, parameters.frame, monitor)?.filter(|_| !anonymous);
+        let order = SegmentationOrder {
+            volume: scan,
+            expert: expert.as_deref(),
+            auto,
+            models,
+            reader: reader(profile)?,
+            normals: normals.as_ref(),
+            parameters: &parameters,
+        };
+        let made = segmentation::from_files(&order, &ReadLimits::default(), monitor);
+        let made = made.map_err(|error| stopped(&error))?;
+        let mut files = made.files(&formats, None, monitor).map_err(unwritable)?;
+        for name in &parts {
+            let part = Part::named(name).ok_or_else(|| no_part(name))?;
+            let cut = made.part_files(part, &formats, monitor);
+            files.extend(cut.map_err(unwritable)?);
+        }
+        files.push(made.page(&files, whose.as_ref()));
+        Ok((made, named(files)))
+    })?;
+    let segmentation = made.segmentation;
+    let fit = &segmentation.fit.model;
+    let edge = made.parameters.deform.edge;
+    let volume = &made.reading.volume;
+    let result = PyDict::new(py);
+    result.set_item("files", files_of(py, files)?)?;
+    result.set_item("affine", affine(&volume.frame))?;
+    result.set_item("shown", edge.as_str())?;
+    result.set_item("mesh", mesh(py, &fit.mesh)?)?;
+    if let (Some(surface), Some(mask)) = (fit.other_surface(edge), segmentation.other_mask) {
+        result.set_item("other", edge.other().as_str())?;
+        result.set_item("other_mesh", mesh(py, &surface.mesh)?)?;
+        result.set_item("other_mask", voxels(py, mask.voxels, volume.shape)?)?;
+    }
+    let mask = segmentation.mask.voxels;
+    result.set_item("mask", voxels(py, mask, volume.shape)?)?;
+    Ok(result)
+}
+
+fn no_part(name: &str) -> Stopped {
+    let words = Part::ALL.map(Part::as_str).join(", ");
+    let reason = format!("`{name}` is no part of a wall");
+    Stopped::Failed(refused("parts", reason, &format!("Give some of {words}.")))
+}
+
+/// One wall in motion of the gates.
+#[pyfunction]
+#[pyo3(signature = (gates, order, parameters, progress=None))]
+pub fn beat<'py>(
+    py: Python<'py>,
+    gates: Vec<Py<NativeVolume>>,
+    order: FitOrder,
+    parameters: &Bound<'py, PyDict>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let parameters = with_fit::<BeatChoice>(parameters)?;
+    let gates = files(&gates);
+    let (given, limits_given) = (GivenModels::new(order.model), order.normals);
+    let (names, anonymous) = (order.formats, order.deidentify);
+    let (made, files) = run(py, Plan::BEAT, progress, |monitor| {
+        let formats = formats(&names)?;
+        // Files of one gate each are not one volume; whose scan they are says the first.
+        let whose = match whose(&gates, Some(0), monitor) {
+            Err(error) if gates.len() > 1 => {
+                whose(&gates[..1], Some(0), monitor).map_err(|_| error)
+            }
+            whose => whose,
+        }?;
+        let (auto, models) = given.read(&MeshStatement::default())?;
+        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let order = GatedOrder {
+            gates: &gates,
+            auto,
+            models,
+            normals: normals.as_ref(),
+            parameters: &parameters.fit,
+            choice: parameters.choice,
+        };
+        let made = gated::from_files(&order, &ReadLimits::default(), monitor);
+        let made = made.map_err(|error| stopped(&error))?;
+        let mut files = made.files(&formats, monitor).map_err(unwritable)?;
+        files.push(made.page(&files, whose.filter(|_| !anonymous).as_ref()));
+        Ok((made, named(files)))
+    })?;
+    let result = PyDict::new(py);
+    result.set_item("files", files_of(py, files)?)?;
+    if let Some(gate) = made.reading.gates.first() {
+        result.set_item("affine", affine(&gate.frame))?;
+    }
+    let meshes = made.meshes.iter();
+    let vertices: Vec<Bound<'py, PyArray2<f64>>> = meshes
+        .map(|mesh| positions(py, &mesh.vertices))
+        .collect::<PyResult<_>>()?;
+    result.set_item("vertices", vertices)?;
+    if let Some(first) = made.meshes.first() {
+        result.set_item("faces", crate::arrays::corners(py, &first.triangles)?)?;
+    }
+    Ok(result)
+}
+
+/// Rest and stress of one patient.
+#[pyfunction]
+#[pyo3(signature = (stress, rest, order, parameters, progress=None))]
+pub fn compare<'py>(
+    py: Python<'py>,
+    stress: Vec<Py<NativeVolume>>,
+    rest: Vec<Py<NativeVolume>>,
+    order: FitOrder,
+    parameters: &Bound<'py, PyDict>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let parameters = with_fit::<ComparisonChoice>(parameters)?;
+    let (stress, rest) = (files(&stress), files(&rest));
+    let (given, limits_given) = (GivenModels::new(order.model), order.normals);
+    let protocols = order.protocols;
+    let files = run(py, Plan::COMPARISON, progress, |monitor| {
+        let (auto, models) = given.read(&MeshStatement::default())?;
+        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let order = ComparisonOrder {
+            stress: &stress,
+            rest: &rest,
+            auto,
+            models,
+            normals: normals.map(|order| {
+                let own = order.kind.protocol.clone();
+                let protocols = protocols.map(|stated| stated.or_else(|| own.clone()));
+                ComparisonNormals::new(&order, protocols)
+            }),
+            parameters: &parameters,
+        };
+        let made = rest_stress::from_files(&order, &ReadLimits::default(), monitor);
+        let made = made.map_err(|error| stopped(&error))?;
+        Ok(named(made.files(monitor).map_err(unwritable)?))
+    })?;
+    let result = PyDict::new(py);
+    result.set_item("files", files_of(py, files)?)?;
+    Ok(result)
+}

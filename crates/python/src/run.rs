@@ -1,0 +1,237 @@
+//! Work beside the interpreter.
+//!
+//! In: work that takes a [`Monitor`]. Out: its result, or an exception.
+//!
+//! 1. The work runs on a thread of its own, in a pool of threads that belongs to this process: a process that was forked
+//!    has none of its parent's threads and makes its own.
+//! 2. The calling thread lets go of the interpreter and looks every [`LOOK_EVERY`] for signals (Ctrl-C) and for
+//!    progress, which it tells the caller's function.
+//! 3. A signal, or an exception of that function, cancels the work. Its exception is raised when the work has ended,
+//!    which takes a stage at most 50 ms.
+//!
+//! [`abandonable`] is for work that has no monitor: it is left to itself when a signal arrives, and ends with its next
+//! report.
+//!
+//! Guaranteed: a panic becomes an exception.
+
+use crate::errors::{Stopped, broken, exception, internal};
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
+
+/// Time between two looks for signals and progress.
+const LOOK_EVERY: Duration = Duration::from_millis(25);
+
+/// The pool of this process, by its number.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Imports NumPy, which the first array does otherwise: a signal that arrives then would be a panic.
+fn import_numpy(py: Python<'_>) -> PyResult<()> {
+    static IMPORTED: AtomicBool = AtomicBool::new(false);
+    if !IMPORTED.load(Ordering::Relaxed) {
+        py.import("numpy")?;
+        PyArray1::<f64>::zeros(py, 0, false);
+        IMPORTED.store(true, Ordering::Relaxed);
+    }
+    Ok(())
+}
+
+/// The pool of this process. It is asked for with the interpreter held, so that no other thread holds the lock while a
+/// process is forked.
+fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+    let mut kept = lock(&POOL);
+    let process = std::process::id();
+    if let Some((owner, pool)) = &*kept
+        && *owner == process
+    {
+        return Ok(Arc::clone(pool));
+    }
+    let made = ThreadPoolBuilder::new()
+        .thread_name(|n| format!("ventriform-{n}"))
+        .build()
+        .map_err(|error| exception(py, &broken(error)))?;
+    let made = Arc::new(made);
+    // The threads of a parent's pool are not here to be told to end.
+    std::mem::forget(kept.replace((process, Arc::clone(&made))));
+    Ok(made)
+}
+
+type Outcome<T> = Result<Result<T, Stopped>, Box<dyn Any + Send>>;
+
+/// What the working thread tells the calling one.
+struct Watch<T> {
+    outcome: Mutex<Option<Outcome<T>>>,
+    ended: Condvar,
+    latest: Mutex<Option<(&'static str, f64)>>,
+    stage: Mutex<&'static str>,
+    total: TotalProgress,
+    cancel: CancelToken,
+    begin: Instant,
+}
+
+impl<T: Send> Watch<T> {
+    fn new(plan: Plan) -> Self {
+        Self {
+            outcome: Mutex::new(None),
+            ended: Condvar::new(),
+            latest: Mutex::new(None),
+            stage: Mutex::new(""),
+            total: TotalProgress::new(plan),
+            cancel: CancelToken::new(),
+            begin: Instant::now(),
+        }
+    }
+
+    fn tell(&self, stage: &'static str, fraction: f64) {
+        *lock(&self.stage) = stage;
+        let mut latest = lock(&self.latest);
+        let before = latest.map_or(0.0, |(_, before)| before);
+        *latest = Some((stage, fraction.max(before)));
+    }
+
+    fn end(&self, outcome: Outcome<T>) {
+        if let Ok(Ok(_)) = &outcome {
+            let stage = *lock(&self.stage);
+            self.tell(stage, 1.0);
+        }
+        *lock(&self.outcome) = Some(outcome);
+        self.ended.notify_one();
+    }
+
+    /// The outcome, if there is one within [`LOOK_EVERY`].
+    fn wait(&self) -> Option<Outcome<T>> {
+        let outcome = lock(&self.outcome);
+        let waited = self
+            .ended
+            .wait_timeout_while(outcome, LOOK_EVERY, |outcome| outcome.is_none());
+        let (mut outcome, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        outcome.take()
+    }
+
+    /// Looks for signals, and tells `progress` what is new.
+    fn look(&self, py: Python<'_>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        py.check_signals()?;
+        let latest = lock(&self.latest).take();
+        if let (Some(progress), Some((stage, fraction))) = (progress, latest) {
+            progress.call1((stage, fraction))?;
+        }
+        Ok(())
+    }
+}
+
+impl<T: Send> Observer for Watch<T> {
+    fn progress(&self, stage: Stage, fraction: f64) {
+        self.tell(stage.as_str(), self.total.advance(stage, fraction));
+    }
+
+    fn now_ms(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64() * 1e3
+    }
+}
+
+fn raise<T>(py: Python<'_>, outcome: Outcome<T>) -> PyResult<T> {
+    match outcome {
+        Ok(Ok(made)) => Ok(made),
+        Ok(Err(Stopped::Failed(failure))) => Err(exception(py, &failure)),
+        Ok(Err(Stopped::Cancelled)) => Err(internal(py, "the work was cancelled by nobody")),
+        Err(panic) => {
+            let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+            let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
+            Err(internal(py, &text.unwrap_or_default()))
+        }
+    }
+}
+
+/// Does `work`, whose stages are those of `plan`.
+pub fn run<T: Send>(
+    py: Python<'_>,
+    plan: Plan,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Monitor<'_>) -> Result<T, Stopped> + Send,
+) -> PyResult<T> {
+    import_numpy(py)?;
+    let pool = pool(py)?;
+    let watch = Watch::new(plan);
+    let watched = &watch;
+    std::thread::scope(|scope| {
+        let act = move || {
+            let monitor = Monitor::new(watched, watched.cancel.clone());
+            let act = AssertUnwindSafe(|| pool.install(|| work(&monitor)));
+            watched.end(catch_unwind(act));
+        };
+        let thread = std::thread::Builder::new().spawn_scoped(scope, act);
+        thread.map_err(|error| exception(py, &broken(error)))?;
+        let mut raised = None;
+        let outcome = loop {
+            if let Some(outcome) = py.detach(|| watched.wait()) {
+                break outcome;
+            }
+            if raised.is_none()
+                && let Err(error) = watched.look(py, progress)
+            {
+                watched.cancel.cancel();
+                raised = Some(error);
+            }
+        };
+        match raised {
+            Some(error) => Err(error),
+            None => {
+                let made = raise(py, outcome)?;
+                watched.look(py, progress)?;
+                Ok(made)
+            }
+        }
+    })
+}
+
+/// Tells the share that is done of work that has no monitor.
+pub type Tell = Box<dyn Fn(&'static str, f64) + Send + Sync>;
+
+/// The payload of a panic by which abandoned work ends.
+struct Abandoned;
+
+/// Does `work`, which has no monitor. When a signal arrives it is left to itself.
+pub fn abandonable<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Tell) -> Result<T, Stopped> + Send + 'static,
+) -> PyResult<T> {
+    import_numpy(py)?;
+    let pool = pool(py)?;
+    let watch = Arc::new(Watch::new(Plan::SEGMENTATION));
+    let (watched, told) = (Arc::clone(&watch), Arc::clone(&watch));
+    let tell: Tell = Box::new(move |step, fraction| {
+        if told.cancel.is_cancelled() {
+            resume_unwind(Box::new(Abandoned));
+        }
+        *lock(&told.stage) = step;
+        *lock(&told.latest) = Some((step, fraction));
+    });
+    let act = move || {
+        let act = AssertUnwindSafe(|| pool.install(|| work(&tell)));
+        watched.end(catch_unwind(act));
+    };
+    let thread = std::thread::Builder::new().spawn(act);
+    thread.map_err(|error| exception(py, &broken(error)))?;
+    loop {
+        if let Some(outcome) = py.detach(|| watch.wait()) {
+            let made = raise(py, outcome)?;
+            watch.look(py, progress)?;
+            return Ok(made);
+        }
+        if let Err(error) = watch.look(py, progress) {
+            watch.cancel.cancel();
+            return Err(error);
+        }
+    }
+}

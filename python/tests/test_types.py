@@ -1,0 +1,95 @@
+"""What type checkers, `help` and `inspect` tell."""
+
+from __future__ import annotations
+
+import inspect
+import pathlib
+import pydoc
+import re
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+import ventriform as vf
+from ventriform import _tables
+
+SCRIPT = '''
+import ventriform as vf
+
+scan = vf.read("rest.dcm")
+model: vf.Model = vf.generate(scan, points=150, seed=1)
+points: int = model.report.mesh.vertices
+fit = vf.segment(scan, model=[model, "auto"], edge="anatomical")
+share: float = fit.confidence
+wall: float = fit.report.volumes_ml.wall
+for flag in fit.flags:
+    print(flag.code.upper(), fit.mask.sum(), fit.polar[0, 0])
+beat = vf.beat("gated.nii.gz", mass_g=130.0)
+ef: float | None = beat.report.ef_percent
+with vf.Client("http://127.0.0.1:8080", "key") as service:
+    job: str = service.submit("model", "vol_1", points=100).id
+'''
+
+
+def check(script: str, folder: pathlib.Path) -> subprocess.CompletedProcess[str]:
+    path = folder / "script.py"
+    path.write_text(script)
+    command = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--cache-dir", str(folder / "cache"), str(path)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+
+
+def test_a_users_script_is_well_typed(tmp_path: pathlib.Path) -> None:
+    made = check(SCRIPT, tmp_path)
+    assert made.returncode == 0, made.stdout + made.stderr
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    ['vf.generate("a", points="many")', 'vf.generate("a", pointz=3)', 'vf.segment("a", edge="inner")', 'vf.segment("a").masks'],
+)
+def test_a_mistake_is_seen_by_the_checker(mistake: str, tmp_path: pathlib.Path) -> None:
+    assert check(f"import ventriform as vf\n{mistake}\n", tmp_path).returncode == 1
+
+
+def test_committed_files_are_those_that_the_tables_give() -> None:
+    made = subprocess.run([sys.executable, ROOT / "scripts/python_types.py", "check"], capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr
+
+
+@pytest.mark.parametrize("name", ["generate", "segment", "beat", "compare", "calibrate"])
+def test_help_shows_every_parameter_with_its_range(name: str) -> None:
+    function = getattr(vf, name)
+    signature, text = inspect.signature(function), pydoc.render_doc(function, renderer=pydoc.plaintext)
+    rows = _tables.rows(name)
+    assert len(rows) > 20
+    for row in rows:
+        parameter = signature.parameters[row["name"]]
+        assert parameter.default == _tables.default(row)
+        if row["name"] in ("label", "reader") and f"    {row['name']} : " not in text:
+            continue
+        assert f"{row['name']} : {_tables.values(row)}" in text, row["name"]
+        assert " ".join(row["summary"].split()) in text
+
+
+@pytest.mark.parametrize("name", ["generate", "segment", "beat", "compare", "calibrate", "measure", "evaluate"])
+def test_the_command_has_the_same_parameters(name: str, command: object) -> None:
+    """Every flag of the command is a parameter here, but those that name files, limits and DICOM objects."""
+    from conftest import PROGRAM
+
+    told = subprocess.run([PROGRAM, name, "--help"], capture_output=True, text=True, check=True).stdout
+    flags = set(re.findall(r"^ +(?:-\w, )?--([a-z0-9-]+)", told, re.MULTILINE))
+    elsewhere = {
+        "output", "report", "part", "format", "quiet", "help", "version", "dicom", "patient-id", "patient-name",
+        "patient-birth-date", "patient-sex", "study-uid", "study-date", "study-id", "accession-number",
+        "referring-physician", "frame-of-reference-uid", "deidentify", "deidentify-secret", "made-at", "file-limit",
+        "folder-limit", "mesh-limit", "model", "expert", "reader", "cohort", "out", "stress", "rest",
+        # To study the effect of support springs, not to fit.
+        "support", "support-radius", "support-scaling", "no-align",
+    }
+    ours = {parameter.replace("_", "-") for parameter in inspect.signature(getattr(vf, name)).parameters}
+    # Parameters of a fit that a beat or a comparison refuses.
+    refused = {row["name"].replace("_", "-") for row in _tables.rows("segment")}
+    assert len(flags) > 5
+    assert flags - elsewhere - ours - (refused if name in ("beat", "compare") else set()) == set()

@@ -1,0 +1,67 @@
+"""Surface models of the left ventricle from cardiac SPECT: generated, fitted, measured.
+
+>>> import ventriform as vf
+>>> scan = vf.read("rest.dcm")
+>>> fit = vf.segment(scan)
+>>> fit.mask, fit.confidence, fit.polar
+
+Functions: `read`, `generate`, `segment`, `beat`, `compare`, `measure`, `calibrate`, `evaluate`, `phantom`. Their parameters
+are those of the commands of the same names. Positions are millimetres in the patient frame RAS, as nibabel has it, unless
+`frame="LPS"` is asked for; files are LPS, as the command writes them.
+
+Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is a
+client of the service (extra `client`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ._errors import (
+    InputError,
+    InternalError,
+    MissingExtraError,
+    TooLargeError,
+    UnreadableError,
+    VentriformError,
+)
+from ._functions import beat, calibrate, compare, evaluate, generate, measure, phantom, read, segment
+from ._native import __version__
+from ._results import (
+    Beat,
+    Calibration,
+    Comparison,
+    Evaluation,
+    Files,
+    Fit,
+    Flag,
+    Measured,
+    Model,
+    Phantom,
+    Profile,
+    Surface,
+    Volume,
+    Wall,
+)
+
+if TYPE_CHECKING:
+    from . import plot, reports
+    from .client import Client
+
+__all__ = [
+    "Beat", "Calibration", "Client", "Comparison", "Evaluation", "Files", "Fit", "Flag", "InputError", "InternalError",
+    "Measured", "MissingExtraError", "Model", "Phantom", "Profile", "Surface", "TooLargeError", "UnreadableError",
+    "VentriformError", "Volume", "Wall", "__version__", "beat", "calibrate", "compare", "evaluate", "generate", "measure",
+    "phantom", "plot", "read", "reports", "segment",
+]
+
+
+def __getattr__(name: str) -> Any:
+    # Modules that few programs need, and that take time to import.
+    import importlib
+
+    if name == "Client":
+        return importlib.import_module(".client", __name__).Client
+    if name in ("plot", "reports", "client"):
+        return importlib.import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,511 @@
+"""The commands as functions. What `**parameters` takes comes from the library's tables (`_tables`)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from . import _inputs, _native
+from ._errors import InputError
+from ._frames import checked
+from ._results import (
+    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, Phantom, Profile, Volume, teller, unwrap,
+)
+from ._tables import with_table
+
+Path = str | os.PathLike[str]
+
+
+def _kept(source: Any) -> tuple[str, Any] | None:
+    """How a pickle finds the volume again; None where it takes the voxels along."""
+    sources = [source] if _inputs.is_path(source) or _inputs.is_bytes(source) else source
+    if not isinstance(sources, Sequence) or not sources:
+        return None
+    if all(_inputs.is_path(one) for one in sources):
+        return "paths", [os.fspath(one) for one in sources]
+    if all(_inputs.is_bytes(one) for one in sources):
+        return "bytes", [(f"bytes{n}", bytes(one)) for n, one in enumerate(sources, 1)]
+    return None
+
+
+def read(source: Any, *, frame: str = "RAS") -> Volume:
+    """Reads a scan, decoding every voxel once, so that an unusable file is refused here.
+
+    Parameters
+    ----------
+    source : path, sequence of paths, bytes, or image
+        NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a `Volume`; an image
+        of nibabel or SimpleITK; a dataset of pydicom, or those of a series. Files are read again when they are used, so
+        they must stay where they are.
+    frame : {'RAS', 'LPS'}
+        The patient frame of the volume's affine.
+    """
+    kept = checked(frame)
+    if isinstance(source, Volume):
+        return source.in_frame(kept)
+    native = _inputs.native(source, unwrap)
+    native.frames()
+    return Volume._of(native, kept, _kept(source))
+
+
+@with_table("generate")
+def generate(scan: Any, *, progress: Any = None, **parameters: Any) -> Model:
+    """Makes a surface model of a volume, as `ventriform generate`.
+
+    Parameters
+    ----------
+    scan : Volume, path, bytes or image
+        As `read` takes it.
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
+    [parameters]
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        If the volume cannot be read, no model can be made of it, or a parameter cannot be used.
+    """
+    native = _inputs.native(scan, unwrap)
+    return Model(_native.generate(native, parameters, teller(progress)), name=_stem(scan, "model"))
+
+
+@with_table("segment")
+def segment(
+    scan: Any,
+    *,
+    model: Any = "auto",
+    reader: Any = None,
+    expert: Any = None,
+    normals: Any = None,
+    sex: str | None = None,
+    protocol: str | None = None,
+    tracer: str | None = None,
+    attenuation_corrected: bool | None = None,
+    formats: Sequence[str] = ("glb", "stl", "json"),
+    parts: Sequence[str] = (),
+    deidentify: bool = False,
+    progress: Any = None,
+    **parameters: Any,
+) -> Fit:
+    """Fits a model to the left ventricle, or another organ, in a volume, as `ventriform segment`.
+
+    Parameters
+    ----------
+    scan : Volume, path, bytes or image
+        As `read` takes it.
+    model : 'auto', Model, path, or a sequence of these
+        What to fit: the built-in hearts, models, or files of closed meshes. The fit with the greatest confidence is kept.
+    reader : Profile or path, optional
+        How a reader draws the wall (`calibrate`): the wall is drawn as that reader would.
+    expert : Volume, path, bytes or image, optional
+        An expert's mask to measure the result against: a volume, or the file of a closed mesh.
+    normals : path or bytes, optional
+        Normal limits to compare the wall's uptake with (`ventriform normals build` writes them).
+    sex : {'M', 'F'}, optional
+        The patient's sex; by default that of a DICOM header.
+    protocol, tracer : str, optional
+        The scan's, as the limits name them.
+    attenuation_corrected : bool, optional
+        Whether the scan's attenuation was corrected.
+    formats : sequence of str
+        Formats of the meshes among the files.
+    parts : sequence of {'endocardium', 'epicardium', 'base'}
+        Parts of the wall that become files of their own.
+    deidentify : bool
+        Leave patient, study and series out of report.html.
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
+    [parameters]
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        If the volume or a model cannot be read, the organ is not found, or a parameter cannot be used.
+    """
+    order = _order(model, formats, parts, normals, (sex, protocol, tracer, attenuation_corrected), deidentify)
+    order["expert"] = None if expert is None else _inputs.native(expert, unwrap)
+    order["reader"] = _profile(reader)
+    native = _inputs.native(scan, unwrap)
+    return Fit(_native.segment(native, order, parameters, teller(progress)))
+
+
+@with_table("beat")
+def beat(
+    gates: Any,
+    *,
+    model: Any = "auto",
+    normals: Any = None,
+    sex: str | None = None,
+    protocol: str | None = None,
+    tracer: str | None = None,
+    attenuation_corrected: bool | None = None,
+    formats: Sequence[str] = ("glb",),
+    deidentify: bool = False,
+    progress: Any = None,
+    **parameters: Any,
+) -> Beat:
+    """Fits one model in motion to the gates of a study, as `ventriform beat`.
+
+    Parameters
+    ----------
+    gates : Volume, path, bytes or image, or a sequence of them
+        A volume with all gates, or one for each gate in their order.
+    model, normals, sex, protocol, tracer, attenuation_corrected, formats, deidentify, progress
+        As `segment` takes them.
+    [parameters]
+
+    Returns
+    -------
+    Beat
+
+    Raises
+    ------
+    InputError
+        If the gates cannot be read or are no beat, or a parameter cannot be used.
+    """
+    order = _order(model, formats, (), normals, (sex, protocol, tracer, attenuation_corrected), deidentify)
+    return Beat(_native.beat(_inputs.gates(gates, unwrap), order, parameters, teller(progress)))
+
+
+@with_table("compare")
+def compare(
+    stress: Any,
+    rest: Any,
+    *,
+    model: Any = "auto",
+    normals: Any = None,
+    sex: str | None = None,
+    protocol: str | None = None,
+    stress_protocol: str | None = None,
+    rest_protocol: str | None = None,
+    tracer: str | None = None,
+    attenuation_corrected: bool | None = None,
+    progress: Any = None,
+    **parameters: Any,
+) -> Comparison:
+    """Compares rest and stress of one patient, as `ventriform compare`.
+
+    Parameters
+    ----------
+    stress, rest : Volume, path, bytes or image, or a sequence of gates
+        The scans. Where both are gated, a beat is fitted to each.
+    stress_protocol, rest_protocol : str, optional
+        The protocols of the scans, as the limits name them; by default the only one with the word stress or rest in its
+        name.
+    model, normals, sex, protocol, tracer, attenuation_corrected, progress
+        As `segment` takes them.
+    [parameters]
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        If a heart cannot be fitted, the scans are one scan or of two patients, or a parameter cannot be used.
+    """
+    order = _order(model, (), (), normals, (sex, protocol, tracer, attenuation_corrected), False)
+    order["protocols"] = [stress_protocol, rest_protocol]
+    scans = [_inputs.gates(scan, unwrap) for scan in (stress, rest)]
+    made = _native.compare(scans[0], scans[1], order, parameters, teller(progress))
+    return Comparison(made["files"])
+
+
+def measure(
+    a: Any,
+    b: Any,
+    *,
+    label: str | int | None = None,
+    label_a: str | int | None = None,
+    label_b: str | int | None = None,
+    resample: bool = False,
+    mesh_unit: str | None = None,
+    mesh_frame: str | None = None,
+    progress: Any = None,
+) -> Measured:
+    """Compares two masks, as `ventriform measure`.
+
+    Parameters
+    ----------
+    a, b : Fit, Volume, path, bytes or image
+        The mask to judge, and the reference: a volume of 0 and another value, a label map, a DICOM Segmentation,
+        probabilities of which those above .5 count, or the file of a closed mesh.
+    label : str or int, optional
+        Structure to compare, of each that holds several: number of a label or segment, or name of a segment.
+    label_a, label_b : str or int, optional
+        Structure of one of them.
+    resample : bool
+        Bring `b` to the grid of `a` by the nearest voxel if they are different grids.
+    mesh_unit : {'mm', 'cm', 'm'}, optional
+        Unit of meshes that do not state theirs.
+    mesh_frame : {'lps', 'ras'}, optional
+        Frame of meshes that do not state theirs.
+
+    Returns
+    -------
+    Measured
+
+    Raises
+    ------
+    InputError
+        If a mask cannot be read or is empty, or which structure is meant cannot be told.
+    """
+    _one_of("mesh_unit", mesh_unit, ("mm", "cm", "m"))
+    _one_of("mesh_frame", mesh_frame, ("lps", "ras"))
+    masks = [_inputs.native(_mask(mask), unwrap) for mask in (a, b)]
+    labels = [None if one is None else str(one) for one in (label, label_a, label_b)]
+    text, structures, resampled = _native.measure(
+        masks[0], masks[1], labels, bool(resample), [mesh_unit, mesh_frame], teller(progress)
+    )
+    return Measured(text, structures, resampled)
+
+
+@with_table("calibrate")
+def calibrate(
+    cohort: Path, *, mask: str = "lv_expert_img", name: str = "reader", progress: Any = None, **parameters: Any
+) -> Calibration:
+    """Learns how a reader draws the wall, as `ventriform calibrate`.
+
+    Ctrl-C returns at once; fits that have begun end by themselves.
+
+    Parameters
+    ----------
+    cohort : path
+        A folder with a folder for each case, which holds spect.nii.gz (or .nii, .dcm) and the reader's mask.
+    mask : str
+        Name of the masks' files, without .nii.gz.
+    name : str
+        The reader's name in reports.
+    progress : callable or tqdm, optional
+        Told 'fit' and the share of the cases that is done.
+    [parameters]
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If no mask can be learnt from, or a parameter cannot be used.
+    """
+    import json
+
+    text, figures = _native.calibrate(cohort, mask, parameters, teller(progress))
+    table = json.loads(figures)
+    return Calibration(Profile(text.encode(), name), table["cases"], table["problems"])
+
+
+def evaluate(
+    cohort: Path,
+    out: Path,
+    *,
+    points: Sequence[int] = (67, 110, 150, 200, 300),
+    reference_points: Sequence[int] = (67,),
+    models: Sequence[str] = ("reference", "retiled", "optimised", "auto"),
+    method: str = "refined",
+    manual: str | None = None,
+    label: str | int | None = None,
+    resample: bool = False,
+    mesh_unit: str | None = None,
+    mesh_frame: str | None = None,
+    leave_one_out: bool = False,
+    in_sample: Sequence[str] = (),
+    progress: Any = None,
+) -> Evaluation:
+    """Makes models of a cohort's templates, fits them to every patient and writes tables, as `ventriform evaluate`.
+
+    Ctrl-C returns at once; fits that have begun end by themselves. Existing fits in `out` are reused.
+
+    Parameters
+    ----------
+    cohort : path
+        A folder with a folder for each case: spect.nii.gz, lv_expert_img.nii.gz and lv_truth.nii.gz.
+    out : path
+        Folder for the results, made if it is missing.
+    points, reference_points : sequence of int
+        Numbers of points of our models, and of the reference model.
+    models : sequence of {'reference', 'retiled', 'optimised', 'auto'}
+        Which models to fit.
+    method : {'refined', 'paper'}
+        How our models are made.
+    manual : str, optional
+        Template whose model is made from its expert's mask.
+    label : str or int, optional
+        Structure of the masks, where their files hold several.
+    resample : bool
+        Resample masks that lie on another grid than their scan; without it they are not used.
+    mesh_unit, mesh_frame : str, optional
+        As `measure` takes them.
+    leave_one_out : bool
+        Choose model, number of points and reader's profile for each case without that case.
+    in_sample : sequence of str
+        Cases that the program's constants were chosen on, or 'all': their figures are labelled in-sample.
+    progress : callable or tqdm, optional
+        Told step and its completed fraction.
+
+    Returns
+    -------
+    Evaluation
+
+    Raises
+    ------
+    InputError
+        If the folder is no cohort, or no fit succeeded.
+    """
+    order = {
+        "cohort": os.fspath(cohort), "out": os.fspath(out), "points": list(points),
+        "reference_points": list(reference_points), "models": list(models), "method": method, "manual": manual,
+        "label": None if label is None else str(label), "resample": resample, "mesh_unit": mesh_unit,
+        "mesh_frame": mesh_frame, "leave_one_out": leave_one_out, "in_sample": list(in_sample),
+        "program": _program(),
+    }
+    return Evaluation(os.fspath(out), _native.evaluate(order, teller(progress)))
+
+
+def phantom(
+    *,
+    seed: int = 1,
+    size: int | Sequence[int] = 64,
+    spacing_mm: float | Sequence[float] = 6.4,
+    length_mm: float = 85.0,
+    width_mm: float = 65.0,
+    wall_mm: float = 11.0,
+    noise: float = 0.05,
+    liver: float = 0.5,
+    right_ventricle: float = 0.3,
+    motion_mm: float = 0.0,
+    heads: int = 1,
+    defects: Mapping[int, float] | None = None,
+    frame: str = "RAS",
+    progress: Any = None,
+) -> Phantom:
+    """Simulates a scan with its true mask.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers for shape and noise.
+    size : int or 3 ints, 16 to 1024
+        Voxels along each axis.
+    spacing_mm : float or 3 floats, 0.5 to 20
+        Voxel size.
+    length_mm, width_mm, wall_mm : float
+        The ventricle's outer length (30 to 150) and width (20 to 150), and the thickness of its wall (2 to 25).
+    noise : float, 0 to 1
+        Standard deviation divided by the mean in healthy wall.
+    liver, right_ventricle : float
+        Uptake relative to healthy wall.
+    motion_mm : float, -60 to 60
+        How far the patient moves towards the head half-way through the scan.
+    heads : {1, 2}
+        Heads of the camera.
+    defects : dict of int to float, optional
+        Perfusion defects: AHA segment (1 to 17) and severity (0 to 1).
+    frame : {'RAS', 'LPS'}
+        The patient frame of the volumes' affine.
+
+    Returns
+    -------
+    Phantom
+
+    Raises
+    ------
+    InputError
+        If a value is out of its range.
+    """
+    kept = checked(frame)
+    try:
+        order = {
+            "shape": [int(size)] * 3 if isinstance(size, int) else [int(n) for n in size],
+            "spacing_mm": [float(spacing_mm)] * 3 if isinstance(spacing_mm, (int, float)) else list(spacing_mm),
+            "length_mm": length_mm, "width_mm": width_mm, "wall_mm": wall_mm, "noise": noise, "liver": liver,
+            "right_ventricle": right_ventricle, "motion_mm": motion_mm, "heads": heads,
+            "defects": list((defects or {}).items()), "seed": seed,
+        }
+        voxels, truth, lps = _native.phantom(order, teller(progress))
+    except (TypeError, OverflowError) as error:
+        raise InputError("phantom", f"{error}.", "Give the types that help(ventriform.phantom) lists.") from error
+    made = [Volume(array, lps, frame="LPS").in_frame(kept) for array in (voxels, truth)]
+    return Phantom(made[0], made[1])
+
+
+def _stem(source: Any, otherwise: str) -> str:
+    if not _inputs.is_path(source):
+        return otherwise
+    return os.path.basename(os.fspath(source)).split(".")[0] or otherwise
+
+
+def _one_of(field: str, value: str | None, words: Sequence[str]) -> None:
+    if value is not None and value not in words:
+        raise InputError(field, f"`{value}` is not one of the choices.", f"Give one of {', '.join(words)}.")
+
+
+def _mask(source: Any) -> Any:
+    if isinstance(source, Fit):
+        import numpy as np
+
+        return Volume(source.mask.astype(np.float32, order="F"), source.in_frame("LPS").affine, frame="LPS")
+    return source
+
+
+def _order(
+    model: Any, formats: Sequence[str], parts: Sequence[str], normals: Any, kind: tuple[Any, ...], deidentify: bool
+) -> dict[str, Any]:
+    given = list(model) if isinstance(model, (list, tuple)) else [model]
+    if not given:
+        raise InputError("model", "No model was given.", "Give 'auto', a Model or a path.")
+    models: list[Any] = []
+    for one in given:
+        if isinstance(one, Model):
+            models.append((one.name, one._native))
+        elif _inputs.is_path(one):
+            models.append(os.fspath(one))
+        else:
+            raise InputError("model", f"A {type(one).__name__} is no model.", "Give 'auto', a Model or a path.")
+    for field, words in (("formats", formats), ("parts", parts)):
+        if isinstance(words, str) or not all(isinstance(word, str) for word in words):
+            raise InputError(field, f"{words!r} is no sequence of words.", "Give a list of words.")
+    limits = None if normals is None else (_content("normals", normals), *kind)
+    if limits is None and any(one is not None for one in kind):
+        raise InputError("normals", "A scan's kind was stated without limits.", "Give `normals` too.")
+    return {
+        "model": models, "formats": list(formats), "parts": list(parts), "normals": limits, "protocols": [None, None],
+        "expert": None, "reader": None, "deidentify": deidentify,
+    }
+
+
+def _profile(reader: Any) -> tuple[str, bytes] | None:
+    if reader is None:
+        return None
+    if isinstance(reader, Profile):
+        return reader.name, reader.to_bytes()
+    return _stem(reader, "reader"), _content("reader", reader)
+
+
+def _content(field: str, source: Any) -> bytes:
+    if _inputs.is_bytes(source):
+        return bytes(source)
+    if not _inputs.is_path(source):
+        raise InputError(field, f"A {type(source).__name__} is no file.", "Give a path or bytes.")
+    try:
+        with open(source, "rb") as file:
+            return file.read()
+    except OSError as error:
+        raise InputError(field, f"{error}.", "Give the path of a file that can be read.") from error
+
+
+def _program() -> bytes:
+    """The compiled part, by which stored fits of another build are known."""
+    with open(_native.__file__, "rb") as file:
+        return file.read()

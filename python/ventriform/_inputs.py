@@ -1,0 +1,183 @@
+"""What functions take: paths, bytes, arrays, and images of nibabel, SimpleITK and pydicom.
+
+Images are recognised by what they can do, so that none of those packages is needed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from . import _native
+from ._errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+#: Whole numbers beyond this are not told apart by the 32-bit floats that voxels are kept in.
+MOST_EXACT_WHOLE = 1 << 24
+
+#: Millimetres of NIfTI's units of length.
+UNIT_MM = {"meter": 1000.0, "micron": 0.001}
+
+
+def voxels(array: Any) -> NDArray[np.float32]:
+    """An array (i, j, k) or (i, j, k, gate) as 32-bit floats in Fortran order; no copy where it is that already."""
+    import numpy as np
+
+    refuse_fix = "Give an array of numbers (i, j, k), or (i, j, k, gate)."
+    try:
+        found = np.asarray(array)
+    except Exception as error:
+        raise InputError("array", f"It is no array: {error}.", refuse_fix) from error
+    if found.dtype.kind not in "buif":
+        raise InputError("array", f"Its values are {found.dtype}.", "Give whole numbers or floats.")
+    if found.ndim not in (3, 4) or 0 in found.shape:
+        raise InputError("array", f"The array has the shape {found.shape}.", refuse_fix)
+    if found.dtype.kind in "ui" and found.dtype.itemsize > 2:
+        most = max(abs(int(found.max())), abs(int(found.min())))
+        if most > MOST_EXACT_WHOLE:
+            reason = f"It holds {most}: voxels are 32-bit floats, which do not tell all whole numbers that large apart."
+            raise InputError("array", reason, "Number the labels anew, or scale the values.")
+    with np.errstate(over="ignore"):
+        single = np.asfortranarray(found, dtype=np.float32)
+    if found.dtype.itemsize > 4 and np.isinf(single).any() and not np.isinf(found).any():
+        raise InputError("array", "A value is beyond 32-bit floats.", "Scale the values.")
+    return single
+
+
+def affine_rows(affine: Any, to_lps: bool) -> list[list[float]]:
+    """The rows of a 4x4 affine, turned from RAS to LPS if `to_lps`."""
+    import numpy as np
+
+    try:
+        matrix = np.array(affine, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("affine", f"It is no matrix of numbers: {error}.", "Give a 4x4 matrix.") from error
+    if matrix.shape != (4, 4):
+        raise InputError("affine", f"It has the shape {matrix.shape}.", "Give a 4x4 matrix.")
+    if to_lps:
+        matrix[:2] *= -1.0
+        matrix += 0.0
+    rows: list[list[float]] = matrix.tolist()
+    return rows
+
+
+def is_path(source: Any) -> bool:
+    """Whether it names a file."""
+    return isinstance(source, (str, os.PathLike))
+
+
+def is_bytes(source: Any) -> bool:
+    """Whether it is the content of a file."""
+    return isinstance(source, (bytes, bytearray, memoryview))
+
+
+def is_nibabel(source: Any) -> bool:
+    """Whether it is an image of nibabel."""
+    return hasattr(source, "dataobj") and hasattr(source, "affine")
+
+
+def is_simpleitk(source: Any) -> bool:
+    """Whether it is an image of SimpleITK."""
+    return all(hasattr(source, name) for name in ("GetSpacing", "GetOrigin", "GetDirection", "GetPixelID"))
+
+
+def is_pydicom(source: Any) -> bool:
+    """Whether it is a dataset of pydicom."""
+    return hasattr(source, "save_as") and hasattr(source, "to_json_dict")
+
+
+def of_nibabel(image: Any) -> _native.NativeVolume:
+    """The voxels of an image of nibabel."""
+    import numpy as np
+
+    if image.affine is None:
+        raise InputError("affine", "The image has no affine.", "Give an image with its place in the patient.")
+    affine = np.array(image.affine, dtype=np.float64)
+    units = getattr(getattr(image, "header", None), "get_xyzt_units", None)
+    scale = UNIT_MM.get(units()[0], 1.0) if units else 1.0
+    affine[:3] *= scale
+    array = np.asanyarray(image.dataobj)
+    while array.ndim > 3 and array.shape[-1] == 1:
+        array = array[..., 0]
+    return _native.NativeVolume.from_array(voxels(array), affine_rows(affine, to_lps=True))
+
+
+def of_simpleitk(image: Any) -> _native.NativeVolume:
+    """The voxels of an image of SimpleITK."""
+    import numpy as np
+    import SimpleITK
+
+    dimension = image.GetDimension()
+    if dimension not in (3, 4):
+        raise InputError("image", f"The image has {dimension} dimensions.", "Give an image of 3, or of 4 with gates.")
+    if image.GetNumberOfComponentsPerPixel() != 1:
+        raise InputError("image", "A voxel has several components.", "Give an image of one number a voxel.")
+    direction = np.array(image.GetDirection(), dtype=np.float64).reshape(dimension, dimension)[:3, :3]
+    affine = np.eye(4)
+    affine[:3, :3] = direction * np.array(image.GetSpacing()[:3])
+    affine[:3, 3] = image.GetOrigin()[:3]
+    array = SimpleITK.GetArrayViewFromImage(image).transpose()
+    return _native.NativeVolume.from_array(voxels(array), affine_rows(affine, to_lps=False))
+
+
+def dicom_bytes(dataset: Any, index: int = 0) -> tuple[str, bytes]:
+    """Name and bytes of the file of a dataset of pydicom."""
+    import io
+
+    # A file of pixels without pixels is refused here, because its absence is not seen in the file's bytes.
+    if not any(name in dataset for name in ("PixelData", "FloatPixelData", "DoubleFloatPixelData")):
+        raise InputError("PixelData", "The dataset has no pixels.", "Read it without stop_before_pixels.")
+    buffer = io.BytesIO()
+    try:
+        dataset.save_as(buffer, enforce_file_format=True)
+    except Exception as error:
+        fix = "Give a dataset as pydicom.dcmread returns it, with its file_meta."
+        raise InputError("dataset", f"It cannot be written as a file: {error}.", fix) from error
+    return f"dataset{index}.dcm", buffer.getvalue()
+
+
+Source = Any
+Native = _native.NativeVolume
+
+
+def native(source: Source, unwrap: Callable[[Any], Native | None]) -> Native:
+    """The volume that `source` is, unread where it is files. `unwrap` knows the package's own volumes."""
+    own = unwrap(source)
+    if own is not None:
+        return own
+    if is_path(source):
+        return Native.from_paths([os.fspath(source)])
+    if is_bytes(source):
+        return Native.from_bytes([("bytes", bytes(source))])
+    if is_nibabel(source):
+        return of_nibabel(source)
+    if is_simpleitk(source):
+        return of_simpleitk(source)
+    if is_pydicom(source):
+        return Native.from_bytes([dicom_bytes(source)])
+    if isinstance(source, Sequence) and len(source) > 0:
+        if all(is_path(one) for one in source):
+            return Native.from_paths([os.fspath(one) for one in source])
+        if all(is_bytes(one) for one in source):
+            return Native.from_bytes([(f"bytes{n}", bytes(one)) for n, one in enumerate(source, 1)])
+        if all(is_pydicom(one) for one in source):
+            return Native.from_bytes([dicom_bytes(one, n) for n, one in enumerate(source, 1)])
+        if len(source) == 1:
+            return native(source[0], unwrap)
+    raise InputError(
+        "source",
+        f"A value of type {type(source).__name__} is no volume.",
+        "Give a path, paths, bytes, a ventriform.Volume, an image of nibabel or SimpleITK, or datasets of pydicom.",
+    )
+
+
+def gates(source: Source, unwrap: Callable[[Any], Native | None]) -> list[Native]:
+    """The volumes of a gated study: one that holds all gates, or one for each."""
+    apart = isinstance(source, Sequence) and not is_path(source) and not is_bytes(source) and len(source) > 1
+    if apart and not any(is_path(one) or is_bytes(one) or is_pydicom(one) for one in source):
+        return [native(one, unwrap) for one in source]
+    return [native(source, unwrap)]

@@ -1,0 +1,106 @@
+"""The library's tables of parameters as signatures, docstrings and stubs."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from . import _native
+
+Row = dict[str, Any]
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_TABLES: dict[str, list[Row]] = _native.parameter_tables()
+
+
+def rows(command: str) -> list[Row]:
+    """The rows of a command's parameters."""
+    return _TABLES[command]
+
+
+def default(row: Row) -> Any:
+    """The default as a value; None where it depends on other parameters or there is none."""
+    text = row["default"]
+    if not text:
+        return None
+    kind = row["kind"]
+    if kind == "integer":
+        return int(text)
+    if kind == "number":
+        return float(text)
+    if kind == "switch":
+        return text == "true"
+    return text
+
+
+def annotation(row: Row) -> str:
+    """The type of a parameter."""
+    kind = row["kind"]
+    if kind == "integer" or kind == "integers" and row["count"] == 1:
+        made = "int"
+    elif kind == "number":
+        made = "float"
+    elif kind == "switch":
+        made = "bool"
+    elif kind == "choice":
+        made = f"Literal[{', '.join(map(repr, row['words']))}]"
+    elif kind == "direction":
+        words = f"Literal[{', '.join(map(repr, row['words']))}] | " if row["words"] else ""
+        made = f"{words}Sequence[float]"
+    elif kind == "integers":
+        made = "Sequence[int]"
+    elif kind == "numbers":
+        made = "Sequence[float]"
+    else:
+        made = "str | int"
+    return made if default(row) is not None else f"{made} | None"
+
+
+def values(row: Row) -> str:
+    """Which values are taken, in words."""
+    kind = row["kind"]
+    if kind in ("integer", "number"):
+        low, high = row["range"]
+        word = "int" if kind == "integer" else "float"
+        if high == 2**64 - 1:
+            return f"{word}, from {low}"
+        return f"{word}, {low:g} to {high:g}" if kind == "number" else f"{word}, {low} to {high}"
+    if kind == "switch":
+        return "bool"
+    if kind == "choice":
+        return "{" + ", ".join(map(repr, row["words"])) + "}"
+    if kind == "direction":
+        words = ", ".join(map(repr, row["words"]))
+        return f"{{{words}}} or 3 floats" if words else "3 floats"
+    if kind in ("integers", "numbers"):
+        word = "int" if kind == "integers" else "float"
+        return word if row["count"] == 1 else f"{row['count']} {word}s"
+    return f"str, such as {row['example']}"
+
+
+def _described(row: Row) -> str:
+    known = default(row)
+    told = f", default {known!r}" if known is not None else ", optional"
+    return f"    {row['name']} : {values(row)}{told}\n        {row['summary']}."
+
+
+def with_table(command: str) -> Callable[[Function], Function]:
+    """Gives a function with `**parameters` the signature and the docstring of its table."""
+
+    def decorate(function: Function) -> Function:
+        own = inspect.signature(function)
+        before = [p for p in own.parameters.values() if p.kind is not p.VAR_KEYWORD]
+        taken = {p.name for p in before}
+        listed = [row for row in rows(command) if row["name"] not in taken]
+        added = [
+            inspect.Parameter(row["name"], inspect.Parameter.KEYWORD_ONLY, default=default(row), annotation=annotation(row))
+            for row in listed
+        ]
+        function.__signature__ = own.replace(parameters=[*before, *added])  # type: ignore[attr-defined]
+        head = inspect.cleandoc(function.__doc__ or "")
+        table = "\n".join(inspect.cleandoc("\n" + _described(row)) for row in listed)
+        function.__doc__ = head.replace("[parameters]", table)
+        return function
+
+    return decorate

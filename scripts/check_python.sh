@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Builds the Python package's wheel, installs it into an environment of its own and tests it there.
+#
+#   scripts/check_python.sh            everything
+#   scripts/check_python.sh --build    only the wheel and its environment, which scripts/test.sh does beforehand: it needs cargo's lock
+#   scripts/check_python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
+#   scripts/check_python.sh --write    writes the generated stubs anew
+#
+# The wheel has the dev profile, in which the library is optimised. VENTRIFORM_WHEEL: a wheel to test instead.
+# CARGO_CONFIG: a file of further settings for cargo.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+tools=$PWD/target/test-tools
+venv=$tools/python-package
+wheels=$tools/wheels
+export PYTHONDONTWRITEBYTECODE=1 VENTRIFORM_PROGRAM=$PWD/target/debug/ventriform
+
+build() {
+  if ! cmp -s python/requirements-test.txt "$venv/requirements.done"; then
+    python3 -m venv "$venv"
+    "$venv/bin/pip" install -q -r python/requirements-test.txt
+    cp python/requirements-test.txt "$venv/requirements.done"
+  fi
+  local wheel=${VENTRIFORM_WHEEL:-}
+  if [ -z "$wheel" ]; then
+    rm -rf "$wheels"
+    "$venv/bin/maturin" build --quiet --profile dev --strip --auditwheel skip --interpreter "$venv/bin/python" \
+      --out "$wheels" ${CARGO_CONFIG:+--config "$CARGO_CONFIG"}
+    wheel=$(ls "$wheels"/*.whl)
+  fi
+  "$venv/bin/pip" install -q --no-deps --force-reinstall "$wheel"
+}
+
+run_tests() {
+  [ -x "$VENTRIFORM_PROGRAM" ] || cargo build --quiet --bins --test layering
+  "$venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
+  "$venv/bin/python" -m mypy --strict --cache-dir "$tools/mypy" -p ventriform
+  "$venv/bin/python" -m mypy.stubtest ventriform --allowlist python/stubtest_allowlist.txt
+  [ -z "$(ls python/examples/*.ipynb 2>/dev/null)" ] ||
+    "$venv/bin/python" -m pytest -q -p no:cacheprovider --nbmake python/examples
+}
+
+case ${1:-} in
+  --build) build ;;
+  --test) run_tests ;;
+  --write)
+    python3 scripts/python_types.py write reports
+    build
+    "$venv/bin/python" scripts/python_types.py write
+    ;;
+  *)
+    build
+    run_tests
+    ;;
+esac
