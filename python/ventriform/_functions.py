@@ -82,10 +82,6 @@ def segment(
     reader: Any = None,
     expert: Any = None,
     normals: Any = None,
-    sex: str | None = None,
-    protocol: str | None = None,
-    tracer: str | None = None,
-    attenuation_corrected: bool | None = None,
     formats: Sequence[str] = ("glb", "stl", "json"),
     parts: Sequence[str] = (),
     deidentify: bool = False,
@@ -106,12 +102,6 @@ def segment(
         An expert's mask to measure the result against: a volume, or the file of a closed mesh.
     normals : path or bytes, optional
         Normal limits to compare the wall's uptake with (`ventriform normals build` writes them).
-    sex : {'M', 'F'}, optional
-        The patient's sex; by default that of a DICOM header.
-    protocol, tracer : str, optional
-        The scan's, as the limits name them.
-    attenuation_corrected : bool, optional
-        Whether the scan's attenuation was corrected.
     formats : sequence of str
         Formats of the meshes among the files.
     parts : sequence of {'endocardium', 'epicardium', 'base'}
@@ -131,7 +121,7 @@ def segment(
     InputError
         If the volume or a model cannot be read, the organ is not found, or a parameter cannot be used.
     """
-    order = _order(model, formats, parts, normals, (sex, protocol, tracer, attenuation_corrected), deidentify)
+    order = _order(model, formats, parts, (normals, parameters), deidentify)
     order["expert"] = None if expert is None else _inputs.native(expert, unwrap)
     order["reader"] = _profile(reader)
     native = _inputs.native(scan, unwrap)
@@ -144,10 +134,6 @@ def beat(
     *,
     model: Any = "auto",
     normals: Any = None,
-    sex: str | None = None,
-    protocol: str | None = None,
-    tracer: str | None = None,
-    attenuation_corrected: bool | None = None,
     formats: Sequence[str] = ("glb",),
     deidentify: bool = False,
     progress: Any = None,
@@ -159,7 +145,7 @@ def beat(
     ----------
     gates : Volume, path, bytes or image, or a sequence of them
         A volume with all gates, or one for each gate in their order.
-    model, normals, sex, protocol, tracer, attenuation_corrected, formats, deidentify, progress
+    model, normals, formats, deidentify, progress
         As `segment` takes them.
     [parameters]
 
@@ -172,7 +158,7 @@ def beat(
     InputError
         If the gates cannot be read or are no beat, or a parameter cannot be used.
     """
-    order = _order(model, formats, (), normals, (sex, protocol, tracer, attenuation_corrected), deidentify)
+    order = _order(model, formats, (), (normals, parameters), deidentify)
     return Beat(_native.beat(_inputs.gates(gates, unwrap), order, parameters, teller(progress)))
 
 
@@ -183,12 +169,8 @@ def compare(
     *,
     model: Any = "auto",
     normals: Any = None,
-    sex: str | None = None,
-    protocol: str | None = None,
-    stress_protocol: str | None = None,
-    rest_protocol: str | None = None,
-    tracer: str | None = None,
-    attenuation_corrected: bool | None = None,
+    formats: Sequence[str] = ("glb", "json"),
+    deidentify: bool = False,
     progress: Any = None,
     **parameters: Any,
 ) -> Comparison:
@@ -198,10 +180,7 @@ def compare(
     ----------
     stress, rest : Volume, path, bytes or image, or a sequence of gates
         The scans. Where both are gated, a beat is fitted to each.
-    stress_protocol, rest_protocol : str, optional
-        The protocols of the scans, as the limits name them; by default the only one with the word stress or rest in its
-        name.
-    model, normals, sex, protocol, tracer, attenuation_corrected, progress
+    model, normals, formats, deidentify, progress
         As `segment` takes them.
     [parameters]
 
@@ -214,8 +193,7 @@ def compare(
     InputError
         If a heart cannot be fitted, the scans are one scan or of two patients, or a parameter cannot be used.
     """
-    order = _order(model, (), (), normals, (sex, protocol, tracer, attenuation_corrected), False)
-    order["protocols"] = [stress_protocol, rest_protocol]
+    order = _order(model, formats, (), (normals, parameters), deidentify)
     scans = [_inputs.gates(scan, unwrap) for scan in (stress, rest)]
     made = _native.compare(scans[0], scans[1], order, parameters, teller(progress))
     return Comparison(made["files"])
@@ -459,8 +437,12 @@ def _mask(source: Any) -> Any:
     return source
 
 
+_OF_LIMITS = ("sex", "protocol", "stress_protocol", "rest_protocol", "tracer", "attenuation_corrected")
+"""Parameters that choose a group of normal limits."""
+
+
 def _order(
-    model: Any, formats: Sequence[str], parts: Sequence[str], normals: Any, kind: tuple[Any, ...], deidentify: bool
+    model: Any, formats: Sequence[str], parts: Sequence[str], limits: tuple[Any, dict[str, Any]], deidentify: bool
 ) -> dict[str, Any]:
     given = list(model) if isinstance(model, (list, tuple)) else [model]
     if not given:
@@ -476,11 +458,12 @@ def _order(
     for field, words in (("formats", formats), ("parts", parts)):
         if isinstance(words, str) or not all(isinstance(word, str) for word in words):
             raise InputError(field, f"{words!r} is no sequence of words.", "Give a list of words.")
-    limits = None if normals is None else (_content("normals", normals), *kind)
-    if limits is None and any(one is not None for one in kind):
+    normals, parameters = limits
+    if normals is None and any(parameters.get(name) is not None for name in _OF_LIMITS):
         raise InputError("normals", "A scan's kind was stated without limits.", "Give `normals` too.")
     return {
-        "model": models, "formats": list(formats), "parts": list(parts), "normals": limits, "protocols": [None, None],
+        "model": models, "formats": list(formats), "parts": list(parts),
+        "normals": None if normals is None else _content("normals", normals),
         "expert": None, "reader": None, "deidentify": deidentify,
     }
 

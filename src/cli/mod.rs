@@ -86,6 +86,15 @@ enum Command {
         /// Shell to write the script for
         shell: clap_complete::Shell,
     },
+    /// Print the manual page, of the program or of a command
+    #[command(
+        after_help = "Example: ventriform man > ventriform.1; ventriform man segment > ventriform-segment.1"
+    )]
+    Man {
+        /// Command to print the page of
+        #[arg(value_name = "COMMAND")]
+        of: Option<String>,
+    },
 }
 
 /// Exit status of a command whose arguments cannot be used, as clap has it.
@@ -127,6 +136,7 @@ pub fn main() -> ExitCode {
             output::write_out(&script);
             Ok(())
         }
+        Command::Man { of } => manual(of.as_deref()),
     };
     match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -139,6 +149,29 @@ pub fn main() -> ExitCode {
             }
         }
     }
+}
+
+/// Prints the manual page of the program, or of the command `of`.
+fn manual(of: Option<&str>) -> anyhow::Result<()> {
+    let mut program = Cli::command();
+    program.build();
+    let command = match of {
+        None => program,
+        Some(name) => {
+            let found = program.find_subcommand(name).cloned();
+            let Some(found) = found else {
+                let reason = format!("there is no command {name}; `ventriform --help` lists them");
+                return Err(UnusableArgument::new(reason).into());
+            };
+            found
+                .name(format!("ventriform-{name}"))
+                .version(env!("CARGO_PKG_VERSION"))
+        }
+    };
+    let mut page = Vec::new();
+    clap_mangen::Man::new(command).render(&mut page)?;
+    output::write_out(&page);
+    Ok(())
 }
 
 /// Prints help and version as clap lays them out, and refusals of arguments with the arguments' control

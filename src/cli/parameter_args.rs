@@ -20,7 +20,7 @@ pub type FitArgs = TableArgs<FitParameters>;
 pub struct UnusableArgument(String);
 
 impl UnusableArgument {
-    /// With that reason.
+    /// Arguments that cannot be used for that reason.
     pub fn new(reason: String) -> Self {
         Self(reason)
     }

@@ -3,7 +3,7 @@
 use crate::arrays::{affine, mesh, positions, voxels};
 use crate::errors::{Stopped, refused, stopped};
 use crate::files::{Files, formats, named, unwritable};
-use crate::given::{GivenModel, GivenModels, GivenNormals, files, reader};
+use crate::given::{GivenModel, GivenModels, files, normals, reader};
 use crate::run::run;
 use crate::values::{table, with_fit};
 use crate::volumes::NativeVolume;
@@ -15,7 +15,7 @@ use ventriform::gated::{self, GatedOrder};
 use ventriform::mesh_files::MeshStatement;
 use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters};
 use ventriform::progress::{Monitor, Plan};
-use ventriform::rest_stress::{self, ComparisonNormals, ComparisonOrder};
+use ventriform::rest_stress::{self, ComparisonOrder};
 use ventriform::segmentation::{self, SegmentationOrder};
 use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions, VolumeFile};
 
@@ -29,10 +29,8 @@ pub struct FitOrder {
     formats: Vec<String>,
     /// Parts of the wall that become files of their own.
     parts: Vec<String>,
-    /// Limits to compare with.
-    normals: Option<GivenNormals>,
-    /// Protocols of stress and rest in the limits.
-    protocols: [Option<String>; 2],
+    /// The text of normal limits to compare with.
+    normals: Option<Vec<u8>>,
     /// An expert's mask.
     expert: Option<Py<NativeVolume>>,
     /// Name and text of a reader's profile.
@@ -82,7 +80,7 @@ pub fn segment<'py>(
     let (made, files) = run(py, Plan::SEGMENTATION, progress, |monitor| {
         let formats = formats(&names)?;
         let (auto, models) = given.read(&parameters.mask.mesh)?;
-        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let normals = normals(limits_given)?;
         let whose = whose(scan, parameters.frame, monitor)?.filter(|_| !anonymous);
         let order = SegmentationOrder {
             volume: scan,
@@ -153,7 +151,7 @@ pub fn beat<'py>(
             whose => whose,
         }?;
         let (auto, models) = given.read(&MeshStatement::default())?;
-        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let normals = normals(limits_given)?;
         let order = GatedOrder {
             gates: &gates,
             auto,
@@ -198,25 +196,26 @@ pub fn compare<'py>(
     let parameters = with_fit::<ComparisonChoice>(parameters)?;
     let (stress, rest) = (files(&stress), files(&rest));
     let (given, limits_given) = (GivenModels::new(order.model), order.normals);
-    let protocols = order.protocols;
+    let (names, anonymous) = (order.formats, order.deidentify);
     let files = run(py, Plan::COMPARISON, progress, |monitor| {
+        let formats = formats(&names)?;
+        // Of gates that are no volume together, the first says whose they are.
+        let whose = whose(&stress, None, monitor).or_else(|_| whose(&stress, Some(0), monitor))?;
         let (auto, models) = given.read(&MeshStatement::default())?;
-        let normals = limits_given.map(GivenNormals::order).transpose()?;
+        let normals = normals(limits_given)?;
         let order = ComparisonOrder {
             stress: &stress,
             rest: &rest,
             auto,
             models,
-            normals: normals.map(|order| {
-                let own = order.kind.protocol.clone();
-                let protocols = protocols.map(|stated| stated.or_else(|| own.clone()));
-                ComparisonNormals::new(&order, protocols)
-            }),
+            normals: normals.as_ref(),
             parameters: &parameters,
         };
         let made = rest_stress::from_files(&order, &ReadLimits::default(), monitor);
         let made = made.map_err(|error| stopped(&error))?;
-        Ok(named(made.files(monitor).map_err(unwritable)?))
+        let mut files = made.files(&formats, monitor).map_err(unwritable)?;
+        files.push(made.page(&files, whose.filter(|_| !anonymous).as_ref()));
+        Ok(named(files))
     })?;
     let result = PyDict::new(py);
     result.set_item("files", files_of(py, files)?)?;

@@ -6,10 +6,10 @@ use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use ventriform::mesh_files::{self, MeshStatement};
-use ventriform::normals::{NormalLimits, ScanKind, Sex};
+use ventriform::normals::NormalLimits;
 use ventriform::parameters::FitParameters;
 use ventriform::reader::ReaderProfile;
-use ventriform::segmentation::{NamedMesh, NamedReader, NormalsOrder};
+use ventriform::segmentation::{NamedMesh, NamedReader};
 use ventriform::volume::{ReadLimits, VolumeFile};
 use ventriform_service::work::problems::advice;
 
@@ -109,38 +109,10 @@ pub fn reader(given: Option<(String, Vec<u8>)>) -> Result<Option<NamedReader>, S
         .transpose()
 }
 
-/// Normal limits and what is stated of the scan: text of the limits, sex, protocol, tracer, attenuation corrected.
-#[derive(FromPyObject)]
-pub struct GivenNormals(
-    Vec<u8>,
-    Option<String>,
-    Option<String>,
-    Option<String>,
-    Option<bool>,
-);
-
-impl GivenNormals {
-    /// The limits, read and checked.
-    pub fn order(self) -> Result<NormalsOrder, Stopped> {
-        let Self(text, sex, protocol, tracer, attenuation_corrected) = self;
-        let limits = NormalLimits::from_json(&text).map_err(|error| stopped(&error))?;
-        let sex = sex.map(|sex| {
-            let refuse = || {
-                let reason = format!("`{sex}` is no sex that limits are made for");
-                Stopped::Failed(refused("sex", reason, "Give M or F."))
-            };
-            Sex::parse(&sex).ok_or_else(refuse)
-        });
-        Ok(NormalsOrder {
-            limits,
-            kind: ScanKind {
-                sex: sex.transpose()?,
-                protocol,
-                tracer,
-                attenuation_corrected,
-            },
-        })
-    }
+/// Normal limits, from the text that `normals build` makes.
+pub fn normals(given: Option<Vec<u8>>) -> Result<Option<NormalLimits>, Stopped> {
+    let read = |text: Vec<u8>| NormalLimits::from_json(&text).map_err(|error| stopped(&error));
+    given.map(read).transpose()
 }
 
 /// The files of several volumes that Python holds.
