@@ -61,6 +61,28 @@ class AppliedReader(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class BeatChange(Document):
+    """What changed of the beat from rest to stress."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    ef_change_points: float | None = None
+    """Change from rest to stress, points."""
+    rest_edv_ml: float
+    """End-diastolic volume at rest."""
+    rest_ef_percent: float | None = None
+    """Ejection fraction at rest."""
+    rest_esv_ml: float
+    """End-systolic volume at rest."""
+    stress_edv_ml: float
+    """End-diastolic volume at stress, ml."""
+    stress_ef_percent: float | None = None
+    """Ejection fraction at stress, per cent; `null` if the gates are no beat."""
+    stress_esv_ml: float
+    """End-systolic volume at stress."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class BeatReport(Document):
     """The report of a beat. Volumes are millilitres, lengths millimetres, angles degrees of the cycle."""
 
@@ -154,6 +176,94 @@ class Candidate(Document):
     """Root of the mean squared strain."""
     template: str
     """The model's name."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ComparedScan(Document):
+    """One of both scans."""
+
+    _built: ClassVar[dict[str, str]] = {"input": "FileFacts", "long_axis": "LongAxis", "perfusion": "Perfusion", "polar": "PolarSummary", "posture": "Posture", "resolution_mm": "Resolution"}
+
+    attenuation_corrected: bool | None = None
+    """Whether attenuation was corrected; `null` where the header does not say."""
+    cavity_ml: float
+    """Volume of the cavity of the anatomical wall."""
+    confidence: float
+    """Confidence of the fit, 0..=1."""
+    injected_dose: str | None = None
+    """Total dose as the header has it."""
+    input: FileFacts
+    """The file."""
+    long_axis: LongAxis | None = None
+    """The ventricle's long axis."""
+    muscle_ml: float
+    """Volume of the anatomical wall's muscle."""
+    perfusion: Perfusion | None = None
+    """The wall's uptake beside normal limits, if some were given."""
+    polar: PolarSummary | None = None
+    """Uptake of the wall, by its own reference."""
+    posture: Posture | None = None
+    """Which way is up in the patient."""
+    radiopharmaceutical: str | None = None
+    """The tracer, if the header names one."""
+    resolution_mm: Resolution | None = None
+    """Full width at half maximum of the image's point response."""
+    series_description: str | None = None
+    """Series Description, if the header has one."""
+    template: str
+    """The model that was fitted."""
+    warnings: list[str]
+    """Warnings about the file."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ComparisonReport(Document):
+    """The report of a comparison of rest and stress."""
+
+    _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "rest": "ComparedScan", "stress": "ComparedScan"}
+
+    beat: BeatChange | None = None
+    """What changed of the beat; `null` unless both scans are gated."""
+    compared_percent: float
+    """Share of the wall with muscle in both scans."""
+    correlation: float
+    """Correlation of both maps."""
+    fixed_percent: float
+    """Share of the wall below the threshold in both scans."""
+    flags: list[Flag]
+    """Reasons to look closer."""
+    matched_percent: float
+    """Share of the wall by which stress was scaled."""
+    parameters: dict[str, Any]
+    """Every parameter, defaults written out."""
+    rest: ComparedScan
+    """The scan at rest."""
+    reversible_percent: float
+    """Share of the wall that loses more than `reversible_points` at stress."""
+    reversible_points: float
+    """Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two
+    scans of an unchanged heart."""
+    scale: float
+    """Counts of the stress scan that are one count of the rest scan where nothing changed."""
+    sds: int | None = None
+    """Summed difference score: what the segments' scores at stress exceed those at rest by."""
+    segments: list[Any]
+    """The 17 segments."""
+    srs: int | None = None
+    """Summed rest score."""
+    sss: int | None = None
+    """Summed stress score, 0 to 68; `null` without normal limits, as for all scores."""
+    stress: ComparedScan
+    """The scan at stress."""
+    summed_percent: list[float] | None = None
+    """The summed scores in per cent of 68, in that order."""
+    territories: list[Any]
+    """The walls of the three arteries; none if the orientation is unknown."""
+    tid: float
+    """Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of
+    all gates."""
+    turn_degrees: float
+    """How far the stress map is turned against the rest map, degrees."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -620,6 +730,8 @@ class Job(Document):
     """The beat it made; only for kind `beat`."""
     cancel_requested: bool
     """Whether a client has asked to cancel it."""
+    comparison: str | None = None
+    """The comparison it made; only for kind `comparison`."""
     created_at: str
     """When it was accepted (RFC 3339)."""
     deliveries: list[ObjectDelivery] | None = None
@@ -642,6 +754,8 @@ class Job(Document):
     """Related paths."""
     model: str | None = None
     """The model it made; only for kind `model`."""
+    normals: str | None = None
+    """The normal limits it built; only for kind `normals`."""
     parameters: dict[str, Any]
     """The parameters, including every default."""
     priority: str
@@ -674,6 +788,8 @@ class JobLinks(Document):
 
     beat: str | None = None
     """The beat it made."""
+    comparison: str | None = None
+    """The comparison it made."""
     events: str
     """Its changes as server-sent events."""
     mask: str | None = None
@@ -682,6 +798,8 @@ class JobLinks(Document):
     """The mesh of what it made."""
     model: str | None = None
     """The model it made."""
+    normals: str | None = None
+    """The normal limits it built."""
     report: str | None = None
     """The report on what it made."""
     segmentation: str | None = None
@@ -1775,13 +1893,13 @@ class WallVolumes(Document):
 
 
 register(
-    Agreement, AppliedReader, BeatReport, Candidate, CurvePoint, Distance, DistanceDirection, Evidence,
-    FigureBeside, FileFacts, Fit, FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages,
-    FitnessTerms, FittedVolumes, Flag, GateReport, Gates, Histogram, Histograms, Intensity, IntensityFacts, Job,
-    JobLinks, JobSource, LabelCount, LegalHold, Localisation, LongAxis, MeshFacts, ModelReport, NormalsUsed,
-    ObjectDelivery, OptimiseReport, Perfusion, PhaseReport, PolarMap, PolarSegment, PolarSummary, Posture, Problem,
-    RatesReport, ReaderOffsets, RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport,
-    SegmentScore, SegmentationReport, Shape, Smoothness, Software, Start, Summary, SurfaceNoise, SurfaceReport,
-    Territory, TerritoryScore, Thickness, Thicknesses, TimingReport, Uncertainties, Uncertainty, Valence,
-    StoredVolume, VolumeFile, VolumeLinks, WallVolumes,
+    Agreement, AppliedReader, BeatChange, BeatReport, Candidate, ComparedScan, ComparisonReport, CurvePoint,
+    Distance, DistanceDirection, Evidence, FigureBeside, FileFacts, Fit, FitnessFormStages, FitnessForms,
+    FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes, Flag, GateReport, Gates,
+    Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks, JobSource, LabelCount, LegalHold, Localisation,
+    LongAxis, MeshFacts, ModelReport, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport, PolarMap,
+    PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
+    RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
+    Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses, TimingReport,
+    Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks, WallVolumes,
 )
