@@ -88,7 +88,7 @@ Version: $version
 Architecture: $3
 Maintainer: The developers of ventriform <ventriform@localhost>
 Installed-Size: $(du -sk --apparent-size "$tree" | cut -f 1)
-Depends: libc6 (>= 2.17), adduser
+Depends: libc6 (>= 2.17), adduser, procps
 Recommends: ca-certificates
 Section: science
 Priority: optional

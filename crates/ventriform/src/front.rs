@@ -2,7 +2,7 @@
 //!
 //! In: a path, or voxels in memory. Out: a [`Scan`], and of that a model, a segmentation, or the agreement of two masks.
 //! Every function calls the one of its module with [`ReadLimits::default`] and a silent monitor. Programs that show
-//! progress, cancel, or take files from strangers call those: [`pipeline::generate`](crate::pipeline::generate),
+//! progress, cancel, or take files from strangers call those: [`pipeline::generate`],
 //! [`segmentation::from_files`], [`read_mask`].
 
 use crate::grid::Volume;
