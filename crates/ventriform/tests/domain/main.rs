@@ -40,3 +40,4 @@ mod reader;
 mod beat;
 
 mod evaluate_reference;
+mod examples;
