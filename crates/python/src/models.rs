@@ -19,7 +19,9 @@ use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions};
 /// A model, with whose scan it is of.
 #[pyclass(frozen, module = "ventriform._native")]
 pub struct NativeModel {
+    /// The model.
     pub model: Model,
+    /// What files say of it, with the distance of every vertex to the surface.
     metadata: Metadata,
     scan: Option<Provenance>,
 }

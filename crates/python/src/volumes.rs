@@ -15,6 +15,7 @@ use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFacts, VolumeFile}
 /// A volume, or the gates of a study. Its files are read when somebody asks for what is in them.
 #[pyclass(frozen, module = "ventriform._native")]
 pub struct NativeVolume {
+    /// Its files, or its arrays in their place.
     pub files: Vec<VolumeFile>,
     facts: OnceLock<VolumeFacts>,
 }
