@@ -22,6 +22,16 @@ PLAIN = {"number": "float", "integer": "int", "string": "str", "boolean": "bool"
 PREFIX = "#/components/schemas/"
 
 
+def flat(schema):
+    """A schema with the properties of those that it is made of."""
+    parts = [SCHEMAS[of["$ref"].removeprefix(PREFIX)] if "$ref" in of else of for of in schema.get("allOf", [])]
+    made = {"properties": {}, "required": []} if parts else {}
+    for part in map(flat, parts):
+        made["properties"] |= part.get("properties", {})
+        made["required"] += part.get("required", [])
+    return made | schema
+
+
 def type_of(schema, found):
     """The type of a value, and how it is built: a class's name with [] for each level of lists
     and {} of dictionaries, or nothing."""
@@ -29,7 +39,7 @@ def type_of(schema, found):
         name = schema["$ref"].removeprefix(PREFIX)
         if name in OPEN:
             return "dict[str, Any]", ""
-        if "properties" not in SCHEMAS[name]:
+        if "properties" not in flat(SCHEMAS[name]):
             return type_of(SCHEMAS[name], found)
         found.append(name)
         return RENAMED.get(name, name), RENAMED.get(name, name)
@@ -55,7 +65,7 @@ def text_block(text, indent):
 
 
 def class_of(name, found):
-    schema = SCHEMAS[name]
+    schema = flat(SCHEMAS[name])
     required = set(schema.get("required", []))
     fields, builders = [], {}
     for field, of in schema["properties"].items():

@@ -73,6 +73,9 @@ def test_a_comparison(folder: pathlib.Path, command: Command, tmp_path: pathlib.
     ours = vf.compare(stress, rest)
     assert_same(ours.files, tmp_path / "out")
     assert ours.polar("difference").shape == (32, 60)
+    assert ours.report.to_dict() == json.loads((tmp_path / "out/comparison.json").read_text())
+    assert [segment.segment for segment in ours.report.segments] == list(range(1, 18))
+    assert ours.report.segments[7].reversible_percent > 20
 
 
 def test_measured_masks(scan: pathlib.Path, fit: vf.Fit, folder: pathlib.Path, command: Command, tmp_path: pathlib.Path) -> None:

@@ -543,25 +543,28 @@ class Beat(Result):
 
 
 class Comparison(Result):
-    """Rest and stress of one patient, compared.
-
-    Attributes
-    ----------
-    report : dict
-        The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories, flags.
-    """
+    """Rest and stress of one patient, compared."""
 
     def __init__(self, files: dict[str, bytes]) -> None:
         self.files = Files(files)
-        self.report: dict[str, Any] = self.files.json("comparison.json")
+        self._report: reports.ComparisonReport | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Comparison, (dict(self.files),)
 
     @property
+    def report(self) -> reports.ComparisonReport:
+        """The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories, flags."""
+        if self._report is None:
+            from .reports import ComparisonReport
+
+            self._report = ComparisonReport.from_json(self.files["comparison.json"])
+        return self._report
+
+    @property
     def flags(self) -> list[Flag]:
         """Reasons to look closer."""
-        return [Flag(flag["code"], flag["reason"]) for flag in self.report["flags"]]
+        return [Flag(flag.code, flag.reason) for flag in self.report.flags]
 
     def polar(self, scan: str) -> _Floats:
         """The polar map of `stress`, `rest` or their `difference`, (32, 60); NaN where there is none."""

@@ -217,10 +217,60 @@ class ComparedScan(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class ComparedSegment(Document):
+    """A segment at stress and at rest."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    difference_points: float | None = None
+    """Rest less stress, points: positive where stress lacks uptake."""
+    fixed_percent: float
+    """Share of its compared area that is fixed."""
+    rest_percent: float | None = None
+    """At rest."""
+    reversible_percent: float
+    """Share of its compared area that is reversible."""
+    stress_percent: float | None = None
+    """At stress, scaled to rest; `null` where nothing can be compared, as for the others."""
+    motion_change_mm: float | None = None
+    """Change of motion from rest to stress, mm; `null` unless both scans are gated."""
+    name: str
+    """Its name."""
+    rest_score: int | None = None
+    """Score at rest."""
+    segment: int
+    """Its number, 1 to 17."""
+    stress_score: int | None = None
+    """Score at stress, 0 to 4."""
+    thickening_change_points: float | None = None
+    """Change of thickening from rest to stress, points."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ComparedTerritory(Document):
+    """The wall of an artery at stress and at rest."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    difference_points: float | None = None
+    """Rest less stress, points: positive where stress lacks uptake."""
+    fixed_percent: float
+    """Share of its compared area that is fixed."""
+    rest_percent: float | None = None
+    """At rest."""
+    reversible_percent: float
+    """Share of its compared area that is reversible."""
+    stress_percent: float | None = None
+    """At stress, scaled to rest; `null` where nothing can be compared, as for the others."""
+    name: str
+    """LAD, LCX or RCA."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class ComparisonReport(Document):
     """The report of a comparison of rest and stress."""
 
-    _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "rest": "ComparedScan", "stress": "ComparedScan"}
+    _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "rest": "ComparedScan", "segments": "ComparedSegment[]", "stress": "ComparedScan", "territories": "ComparedTerritory[]"}
 
     beat: BeatChange | None = None
     """What changed of the beat; `null` unless both scans are gated."""
@@ -247,7 +297,7 @@ class ComparisonReport(Document):
     """Counts of the stress scan that are one count of the rest scan where nothing changed."""
     sds: int | None = None
     """Summed difference score: what the segments' scores at stress exceed those at rest by."""
-    segments: list[Any]
+    segments: list[ComparedSegment]
     """The 17 segments."""
     srs: int | None = None
     """Summed rest score."""
@@ -257,7 +307,7 @@ class ComparisonReport(Document):
     """The scan at stress."""
     summed_percent: list[float] | None = None
     """The summed scores in per cent of 68, in that order."""
-    territories: list[Any]
+    territories: list[ComparedTerritory]
     """The walls of the three arteries; none if the orientation is unknown."""
     tid: float
     """Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of
@@ -1893,13 +1943,14 @@ class WallVolumes(Document):
 
 
 register(
-    Agreement, AppliedReader, BeatChange, BeatReport, Candidate, ComparedScan, ComparisonReport, CurvePoint,
-    Distance, DistanceDirection, Evidence, FigureBeside, FileFacts, Fit, FitnessFormStages, FitnessForms,
-    FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes, Flag, GateReport, Gates,
-    Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks, JobSource, LabelCount, LegalHold, Localisation,
-    LongAxis, MeshFacts, ModelReport, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport, PolarMap,
-    PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
-    RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
-    Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses, TimingReport,
-    Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks, WallVolumes,
+    Agreement, AppliedReader, BeatChange, BeatReport, Candidate, ComparedScan, ComparedSegment, ComparedTerritory,
+    ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, FigureBeside, FileFacts, Fit,
+    FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes,
+    Flag, GateReport, Gates, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks, JobSource, LabelCount,
+    LegalHold, Localisation, LongAxis, MeshFacts, ModelReport, NormalsUsed, ObjectDelivery, OptimiseReport,
+    Perfusion, PhaseReport, PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets,
+    RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport,
+    Shape, Smoothness, Software, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness,
+    Thicknesses, TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks,
+    WallVolumes,
 )
