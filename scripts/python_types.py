@@ -13,11 +13,14 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python/ventriform"
 
 # The documents that the package returns; what they refer to follows.
-DOCUMENTS = ["ModelReport", "SegmentationReport", "BeatReport", "ComparisonReport", "PolarMap", "Agreement", "Job", "Volume"]
+DOCUMENTS = [
+    "ModelReport", "SegmentationReport", "BeatReport", "ComparisonReport", "NormalLimits", "PolarMap", "Agreement", "Job",
+    "Volume",
+]
 # Objects whose fields are the caller's parameters.
-OPEN = {"ModelParameters", "SegmentationParameters", "BeatParameters", "ComparisonParameters", "JobParameters"}
+OPEN = {"ModelParameters", "SegmentationParameters", "BeatParameters", "ComparisonParameters", "NormalsFitParameters", "JobParameters"}
 # What the package has another object for.
-RENAMED = {"Volume": "StoredVolume"}
+RENAMED = {"Volume": "StoredVolume", "NormalLimits": "LimitsDocument"}
 PLAIN = {"number": "float", "integer": "int", "string": "str", "boolean": "bool", "null": "None"}
 PREFIX = "#/components/schemas/"
 

@@ -178,19 +178,20 @@ def test_numbers_of_numpy_are_numbers(scan: pathlib.Path, model: vf.Model) -> No
 
 
 def test_other_arguments_are_checked(scan: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    work: dict[str, Any] = {
-        "model": lambda: vf.segment(scan, model=tmp_path / "none.json"),
-        "formats": lambda: vf.segment(scan, formats=["dwg"]),
-        "parts": lambda: vf.segment(scan, parts=["lid"]),
-        "reader": lambda: vf.segment(scan, reader=3),
-        "normals": lambda: vf.segment(scan, sex="F"),
-        "frame": lambda: vf.read(scan, frame="XYZ"),
-        "progress": lambda: vf.generate(scan, progress=3),
-        "mesh_unit": lambda: vf.measure(scan, scan, mesh_unit="inch"),
-        "cohort": lambda: vf.calibrate(tmp_path / "none"),
-        "phantom": lambda: vf.phantom(size=4),
-    }
-    for field, call in work.items():
+    work: list[tuple[str, Any]] = [
+        ("model", lambda: vf.segment(scan, model=tmp_path / "none.json")),
+        ("formats", lambda: vf.segment(scan, formats=["dwg"])),
+        ("parts", lambda: vf.segment(scan, parts=["lid"])),
+        ("reader", lambda: vf.segment(scan, reader=3)),
+        ("normals", lambda: vf.segment(scan, sex="F")),
+        ("frame", lambda: vf.read(scan, frame="XYZ")),
+        ("progress", lambda: vf.generate(scan, progress=3)),
+        ("mesh_unit", lambda: vf.measure(scan, scan, mesh_unit="inch")),
+        ("cohort", lambda: vf.calibrate(tmp_path / "none")),
+        ("cohort", lambda: vf.build_normals(tmp_path / "none")),
+        ("phantom", lambda: vf.phantom(size=4)),
+    ]
+    for field, call in work:
         with pytest.raises(vf.InputError) as raised:
             call()
         assert raised.value.field == field and raised.value.fix, field

@@ -20,7 +20,7 @@ import pytest
 
 import ventriform as vf
 
-#: Issue 40: Ctrl-C ends a run within this.
+#: Ctrl-C ends a run within this.
 MOST_SECONDS_TO_END = 0.2
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import pickle
 
 import pytest
 from conftest import DATA, Command
@@ -76,6 +77,21 @@ def test_a_comparison(folder: pathlib.Path, command: Command, tmp_path: pathlib.
     assert ours.report.to_dict() == json.loads((tmp_path / "out/comparison.json").read_text())
     assert [segment.segment for segment in ours.report.segments] == list(range(1, 18))
     assert ours.report.segments[7].reversible_percent > 20
+
+
+def test_normal_limits(command: Command, tmp_path: pathlib.Path) -> None:
+    healthy = tmp_path / "healthy"
+    command("phantom", "--normal", "--cases", 14, "-o", healthy)
+    command("normals", "build", healthy, "--mixed", "-o", tmp_path / "limits.json")
+    limits = vf.build_normals(healthy, mixed=True)
+    assert limits.to_bytes() == (tmp_path / "limits.json").read_bytes()
+    group = limits.groups[0]
+    assert len(group.cases) + len(limits.excluded) == 14 and limits.document.simulated
+    scan = next(healthy.rglob("*.nii.gz"))
+    command("segment", scan, "--model", "auto", "--normals", tmp_path / "limits.json", "-o", tmp_path / "out")
+    ours = vf.segment(scan, normals=pickle.loads(pickle.dumps(limits)))
+    assert_same(ours.files, tmp_path / "out")
+    assert ours.report.perfusion is not None and ours.report.perfusion.summed_score < 10
 
 
 def test_measured_masks(scan: pathlib.Path, fit: vf.Fit, folder: pathlib.Path, command: Command, tmp_path: pathlib.Path) -> None:

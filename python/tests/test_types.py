@@ -58,11 +58,11 @@ def test_committed_files_are_those_that_the_tables_give() -> None:
     assert made.returncode == 0, made.stderr
 
 
-@pytest.mark.parametrize("name", ["generate", "segment", "beat", "compare", "calibrate"])
+@pytest.mark.parametrize("name", ["generate", "segment", "beat", "compare", "calibrate", "build_normals"])
 def test_help_shows_every_parameter_with_its_range(name: str) -> None:
     function = getattr(vf, name)
     signature, text = inspect.signature(function), pydoc.render_doc(function, renderer=pydoc.plaintext)
-    rows = _tables.rows(name)
+    rows = _tables.rows(name.removeprefix("build_"))
     assert len(rows) > 20
     for row in rows:
         parameter = signature.parameters[row["name"]]
@@ -73,12 +73,15 @@ def test_help_shows_every_parameter_with_its_range(name: str) -> None:
         assert " ".join(row["summary"].split()) in text
 
 
-@pytest.mark.parametrize("name", ["generate", "segment", "beat", "compare", "calibrate", "measure", "evaluate"])
+@pytest.mark.parametrize(
+    "name", ["generate", "segment", "beat", "compare", "calibrate", "build_normals", "measure", "evaluate"]
+)
 def test_the_command_has_the_same_parameters(name: str, command: object) -> None:
     """Every flag of the command is a parameter here, but those that name files, limits and DICOM objects."""
     from conftest import PROGRAM
 
-    told = subprocess.run([PROGRAM, name, "--help"], capture_output=True, text=True, check=True).stdout
+    words = ["normals", "build"] if name == "build_normals" else [name]
+    told = subprocess.run([PROGRAM, *words, "--help"], capture_output=True, text=True, check=True).stdout
     flags = set(re.findall(r"^ +(?:-\w, )?--([a-z0-9-]+)", told, re.MULTILINE))
     elsewhere = {
         "output", "report", "part", "format", "quiet", "help", "version", "dicom", "patient-id", "patient-name",
@@ -89,7 +92,7 @@ def test_the_command_has_the_same_parameters(name: str, command: object) -> None
         "support", "support-radius", "support-scaling", "no-align",
     }
     ours = {parameter.replace("_", "-") for parameter in inspect.signature(getattr(vf, name)).parameters}
-    # Parameters of a fit that a beat or a comparison refuses.
+    # Parameters of a fit that a beat, a comparison or normal limits refuse.
     refused = {row["name"].replace("_", "-") for row in _tables.rows("segment")}
     assert len(flags) > 5
-    assert flags - elsewhere - ours - (refused if name in ("beat", "compare") else set()) == set()
+    assert flags - elsewhere - ours - (refused if name in ("beat", "compare", "build_normals") else set()) == set()

@@ -5,8 +5,8 @@
 >>> fit = vf.segment(scan)
 >>> fit.mask, fit.confidence, fit.polar
 
-Functions: `read`, `generate`, `segment`, `beat`, `compare`, `measure`, `calibrate`, `evaluate`, `phantom`. Their parameters
-are those of the commands of the same names. Positions are millimetres in the patient frame RAS, as nibabel has it, unless
+Functions: `read`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`, `evaluate`,
+`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in the patient frame RAS, as nibabel has it, unless
 `frame="LPS"` is asked for; files are LPS, as the command writes them.
 
 Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is a
@@ -25,7 +25,7 @@ from ._errors import (
     UnreadableError,
     VentriformError,
 )
-from ._functions import beat, calibrate, compare, evaluate, generate, measure, phantom, read, segment
+from ._functions import beat, build_normals, calibrate, compare, evaluate, generate, measure, phantom, read, segment
 from ._native import __version__
 from ._results import (
     Beat,
@@ -37,6 +37,7 @@ from ._results import (
     Flag,
     Measured,
     Model,
+    NormalLimits,
     Phantom,
     Profile,
     Surface,
@@ -50,9 +51,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Beat", "Calibration", "Client", "Comparison", "Evaluation", "Files", "Fit", "Flag", "InputError", "InternalError",
-    "Measured", "MissingExtraError", "Model", "Phantom", "Profile", "Surface", "TooLargeError", "UnreadableError",
-    "VentriformError", "Volume", "Wall", "__version__", "beat", "calibrate", "compare", "evaluate", "generate", "measure",
-    "phantom", "plot", "read", "reports", "segment",
+    "Measured", "MissingExtraError", "Model", "NormalLimits", "Phantom", "Profile", "Surface", "TooLargeError",
+    "UnreadableError", "VentriformError", "Volume", "Wall", "__version__", "beat", "build_normals", "calibrate", "compare",
+    "evaluate", "generate", "measure", "phantom", "plot", "read", "reports", "segment",
 ]
 
 

@@ -10,7 +10,7 @@ from . import _inputs, _native
 from ._errors import InputError
 from ._frames import checked
 from ._results import (
-    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, Phantom, Profile, Volume, teller, unwrap,
+    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Volume, teller, unwrap,
 )
 from ._tables import with_table
 
@@ -100,8 +100,8 @@ def segment(
         How a reader draws the wall (`calibrate`): the wall is drawn as that reader would.
     expert : Volume, path, bytes or image, optional
         An expert's mask to measure the result against: a volume, or the file of a closed mesh.
-    normals : path or bytes, optional
-        Normal limits to compare the wall's uptake with (`ventriform normals build` writes them).
+    normals : NormalLimits, path or bytes, optional
+        Normal limits to compare the wall's uptake with (`build_normals`).
     formats : sequence of str
         Formats of the meshes among the files.
     parts : sequence of {'endocardium', 'epicardium', 'base'}
@@ -284,6 +284,30 @@ def calibrate(
     return Calibration(Profile(text.encode(), name), table["cases"], table["problems"])
 
 
+@with_table("normals")
+def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> NormalLimits:
+    """Builds normal limits from scans of healthy people, as `ventriform normals build`.
+
+    Parameters
+    ----------
+    cohort : path
+        A folder with scans and cohort.csv: case, file, sex, protocol, tracer, attenuation_corrected, healthy.
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
+    [parameters]
+
+    Returns
+    -------
+    NormalLimits
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read, a group has too few usable cases, or a parameter cannot be used.
+    """
+    return NormalLimits(_native.build_normals(cohort, parameters, teller(progress)).encode())
+
+
 def evaluate(
     cohort: Path,
     out: Path,
@@ -463,7 +487,7 @@ def _order(
         raise InputError("normals", "A scan's kind was stated without limits.", "Give `normals` too.")
     return {
         "model": models, "formats": list(formats), "parts": list(parts),
-        "normals": None if normals is None else _content("normals", normals),
+        "normals": _limits(normals),
         "expert": None, "reader": None, "deidentify": deidentify,
     }
 
@@ -474,6 +498,12 @@ def _profile(reader: Any) -> tuple[str, bytes] | None:
     if isinstance(reader, Profile):
         return reader.name, reader.to_bytes()
     return _stem(reader, "reader"), _content("reader", reader)
+
+
+def _limits(normals: Any) -> bytes | None:
+    if normals is None:
+        return None
+    return normals.to_bytes() if isinstance(normals, NormalLimits) else _content("normals", normals)
 
 
 def _content(field: str, source: Any) -> bytes:

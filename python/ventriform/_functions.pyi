@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, Phantom, Profile, Volume
+from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Volume
 
 Path = str | os.PathLike[str]
 def read(
@@ -259,6 +259,37 @@ def calibrate(
     polar_blur: float = 3.0,
     polar_projection: Literal['standard', 'area'] = 'standard',
 ) -> Calibration: ...
+def build_normals(
+    cohort: Path,
+    *,
+    progress: Any = None,
+    mixed: bool = False,
+    roll: float = 0.0,
+    superior: Literal['body', 'frame'] | Sequence[float] = 'body',
+    anterior: Sequence[float] | None = None,
+    base: Sequence[float] | None = None,
+    sensor: Literal['half_maximum', 'gradient', 'unsigned', 'level'] = 'half_maximum',
+    blur: float = 3.0,
+    reach: float = 10.0,
+    last_reach: float = 6.0,
+    narrowing: float = 0.85,
+    margin: float = 0.0,
+    edge: Literal['apparent', 'anatomical'] = 'apparent',
+    resolution: float | None = None,
+    spring_stiffness: float = 2.5,
+    torsion_stiffness: float = 7.5,
+    body_stiffness: float = 6.0,
+    thickness_stiffness: float = 0.02,
+    mass: float = 0.1,
+    damping: float = 1.0,
+    time_step: float = 1.0,
+    tolerance: float = 0.04,
+    max_iterations: int = 100,
+    polar_threshold: float = 0.6,
+    polar_extension: float = 3.0,
+    polar_blur: float = 3.0,
+    polar_projection: Literal['standard', 'area'] = 'standard',
+) -> NormalLimits: ...
 def evaluate(
     cohort: Path,
     out: Path,

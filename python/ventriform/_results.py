@@ -657,6 +657,46 @@ class Profile:
         _write(path, self._text)
 
 
+class NormalLimits:
+    """Normal limits of healthy people, as `build_normals` makes them: `normals` of `segment`, `beat` and `compare`."""
+
+    __slots__ = ("_document", "_text")
+
+    def __init__(self, text: bytes) -> None:
+        self._text = text
+        self._document: reports.LimitsDocument | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return NormalLimits, (self._text,)
+
+    @property
+    def document(self) -> reports.LimitsDocument:
+        """Their file: groups with cases, maps of mean and standard deviation, and how they were made."""
+        if self._document is None:
+            from .reports import LimitsDocument
+
+            self._document = LimitsDocument.from_json(self._text)
+        return self._document
+
+    @property
+    def groups(self) -> list[reports.NormalGroup]:
+        """The limits of each sex, protocol, tracer and correction."""
+        return self.document.groups
+
+    @property
+    def excluded(self) -> list[tuple[str, str]]:
+        """Cases that were left out, and why."""
+        return [(case.case, case.reason) for case in self.document.excluded]
+
+    def to_bytes(self) -> bytes:
+        """The bytes of their file."""
+        return self._text
+
+    def save(self, path: _Path) -> None:
+        """Writes the file that `ventriform normals build` would write."""
+        _write(path, self._text)
+
+
 class Calibration:
     """A reader's profile with figures that say what it is worth.
 

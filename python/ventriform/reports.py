@@ -430,6 +430,18 @@ class Evidence(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class ExcludedCase(Document):
+    """A case that is in no group."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    case: str
+    """The name in the table."""
+    reason: str
+    """Why."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class FigureBeside(Document):
     """A figure beside its limits."""
 
@@ -694,6 +706,29 @@ class Gates(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class GlobalLimit(Document):
+    """Limits of a figure of the whole heart, or of a segment."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    figure: str
+    """`cavity_ml`, `wall_ml`, `tid`, `ef_percent`, `edv_ml`, `esv_ml`, `phase_sd_degrees`, `phase_bandwidth_degrees`,
+    `motion_mm` or `thickening_percent`."""
+    high: float
+    """Quantile of 97.5 per cent."""
+    low: float
+    """Quantile of 2.5 per cent, linear between the people."""
+    mean: float
+    """Mean."""
+    n: int
+    """Number of people."""
+    sd: float
+    """Standard deviation."""
+    segment: int | None = None
+    """The segment of motion or thickening, 1 to 17; null for the whole heart."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Histogram(Document):
     """Counts over equal bins, before and after optimisation side by side. The bin [lower, lower + width) is the first;
     the last one includes its upper end."""
@@ -897,6 +932,22 @@ class LabelCount(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class LeftOut(Document):
+    """A person judged by the limits of the others."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    case: str
+    """The name in the table."""
+    deficit_percent: float
+    """Deficit score, per cent."""
+    extent_percent: float
+    """Share of the wall beyond the limit, per cent."""
+    summed_score: int
+    """Sum of the segments' scores."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class LegalHold(Document):
     """A legal hold."""
 
@@ -908,6 +959,23 @@ class LegalHold(Document):
     """The reason that was given."""
     since: str
     """Since when (RFC 3339)."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LimitMap(Document):
+    """Normal uptake at every place of the polar map: 32 rows from apex to base, 60 columns from lateral over anterior,
+    septal and inferior. The area-weighted mean of `mean` over the places that have one is 1."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    mean: list[list[float | None]]
+    """Mean; null where too few of the people have muscle."""
+    pattern_covariance: list[list[float]]
+    """Covariance of the coefficients by which healthy people differ from the mean as a whole: of 2 r - 1, r cos a, r
+    sin a, (2 r - 1)² - 1/3, r cos 2a, r sin 2a, with the way r from apex (0) to base (1) and the angle a from
+    lateral over anterior. `sd` is what is left beside these."""
+    sd: list[list[float | None]]
+    """Standard deviation, the uncertainty of so small a sample's mean and deviation included."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -1023,6 +1091,70 @@ class ModelReport(Document):
     """Milliseconds of each stage and their `total`."""
     warnings: list[str]
     """Sentences about the input and the model that a user should know."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class NormalCase(Document):
+    """A healthy person of a group."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    case: str
+    """The name in the table."""
+    sex: str
+    """`M` or `F`."""
+    sha256: str
+    """SHA-256 of the scan's file, hexadecimal."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class NormalGroup(Document):
+    """The limits of one kind of scan."""
+
+    _built: ClassVar[dict[str, str]] = {"cases": "NormalCase[]", "figures": "GlobalLimit[]", "leave_one_out": "Specificity", "map": "LimitMap"}
+
+    attenuation_corrected: bool
+    """Whether attenuation was corrected."""
+    cases: list[NormalCase]
+    """The people, in the order of the table."""
+    figures: list[GlobalLimit]
+    """Limits of figures of the whole heart."""
+    leave_one_out: Specificity
+    """The people, each judged by the limits of the others."""
+    map: LimitMap
+    """Mean and standard deviation of the uptake."""
+    protocol: str
+    """The protocol."""
+    sex: str
+    """`M`, `F` or `mixed`."""
+    tracer: str
+    """The tracer."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LimitsDocument(Document):
+    """Normal limits, as `ventriform normals build` writes them."""
+
+    _built: ClassVar[dict[str, str]] = {"excluded": "ExcludedCase[]", "groups": "NormalGroup[]"}
+
+    excluded: list[ExcludedCase]
+    """Cases that are in no group."""
+    format: str
+    """`ventriform-normal-limits`."""
+    groups: list[NormalGroup]
+    """One group for each kind of scan."""
+    parameters: dict[str, Any]
+    """Every parameter of the fits, defaults written out."""
+    people: str
+    """What the people are, in words."""
+    program_version: str
+    """The version of the program that built the limits."""
+    schema_version: int
+    """1."""
+    sha256: str
+    """SHA-256 of everything else in this file, hexadecimal."""
+    simulated: bool
+    """Whether the people are simulated. Such limits are for tests, not for patients."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -1596,6 +1728,22 @@ class Software(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class Specificity(Document):
+    """The people of a group, each judged by the limits of the others."""
+
+    _built: ClassVar[dict[str, str]] = {"cases": "LeftOut[]"}
+
+    cases: list[LeftOut]
+    """Each person's figures."""
+    deficit_percent_of_95: float
+    """The deficit score that 95 of 100 people stay below, per cent: quantile of 95 per cent."""
+    mean_deficit_percent: float
+    """Mean deficit score, per cent."""
+    mean_extent_percent: float
+    """Mean share of the wall beyond the limit, per cent."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Start(Document):
     """One of the models of which the best was kept."""
 
@@ -1944,13 +2092,13 @@ class WallVolumes(Document):
 
 register(
     Agreement, AppliedReader, BeatChange, BeatReport, Candidate, ComparedScan, ComparedSegment, ComparedTerritory,
-    ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, FigureBeside, FileFacts, Fit,
+    ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, ExcludedCase, FigureBeside, FileFacts, Fit,
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes,
-    Flag, GateReport, Gates, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks, JobSource, LabelCount,
-    LegalHold, Localisation, LongAxis, MeshFacts, ModelReport, NormalsUsed, ObjectDelivery, OptimiseReport,
-    Perfusion, PhaseReport, PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets,
-    RefusedTemplate, Resolution, RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport,
-    Shape, Smoothness, Software, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness,
-    Thicknesses, TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks,
-    WallVolumes,
+    Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks,
+    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, NormalCase,
+    NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport, PolarMap,
+    PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
+    RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
+    Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses,
+    TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks, WallVolumes,
 )

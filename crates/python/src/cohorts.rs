@@ -1,8 +1,8 @@
-//! `calibrate` and `evaluate`: work on folders of cases.
+//! `calibrate`, `normals build` and `evaluate`: work on folders of cases.
 
 use crate::errors::{Stopped, broken, refused, stopped};
-use crate::run::{Tell, abandonable};
-use crate::values::table;
+use crate::run::{Tell, abandonable, run};
+use crate::values::{table, with_fit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use ventriform::deform::DeformParameters;
 use ventriform::evaluate::calibration::{Calibration, CalibrationError, CaseFigures};
 use ventriform::evaluate::calibration::{calibrate as learn, cases_of};
+use ventriform::evaluate::normals::{self, BuildError, NormalsOptions};
 use ventriform::evaluate::parameters::InSample;
 use ventriform::evaluate::rows::Variant;
 use ventriform::evaluate::{
@@ -18,7 +19,10 @@ use ventriform::evaluate::{
 };
 use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
 use ventriform::parameters::FitParameters;
+use ventriform::progress::Plan;
+use ventriform::volume::ReadLimits;
 use ventriform::volume::given_mask::MaskChoice;
+use ventriform_service::work::problems::Explain;
 
 /// The text of the profile, and the table of cases and problems as JSON.
 #[pyfunction]
@@ -70,6 +74,41 @@ fn cases_table(made: &Calibration) -> String {
         "problems": made.problems,
     })
     .to_string()
+}
+
+/// The text of normal limits, built of healthy people's scans.
+#[pyfunction]
+#[pyo3(signature = (cohort, parameters, progress=None))]
+pub fn build_normals(
+    py: Python<'_>,
+    cohort: PathBuf,
+    parameters: &Bound<'_, PyDict>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let options = NormalsOptions {
+        parameters: with_fit(parameters)?,
+        program_version: env!("CARGO_PKG_VERSION").to_owned(),
+        limits: ReadLimits::default(),
+    };
+    run(py, Plan::NORMALS, progress, |monitor| {
+        let made = normals::build(&cohort, &options, &|_, _| (), monitor);
+        Ok(made.map_err(no_limits)?.to_json())
+    })
+}
+
+fn no_limits(error: BuildError) -> Stopped {
+    match error {
+        BuildError::Cancelled(cancelled) => cancelled.into(),
+        BuildError::Normals { error: ref why, .. } => {
+            let mut failure = why.explain();
+            failure.detail = error.to_string();
+            Stopped::Failed(failure.at("cohort"))
+        }
+        error => {
+            let fix = "Give a folder with cohort.csv and the scans that it names.";
+            Stopped::Failed(refused("cohort", error, fix))
+        }
+    }
 }
 
 /// What an evaluation is asked for.

@@ -31,7 +31,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::cohorts::{calibrate, evaluate};
+    use super::cohorts::{build_normals, calibrate, evaluate};
     #[pymodule_export]
     use super::fits::{beat, compare, segment};
     #[pymodule_export]

@@ -6,7 +6,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde_json::{Map, Number, Value};
 use ventriform::parameters::{
     BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, ComparisonChoice, FIT_SPECS, Kind,
-    ParameterError, ParameterSpec, Parameters, SPECS, WithFit,
+    NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec, Parameters, SPECS, WithFit,
 };
 use ventriform_service::work::problems::Explain;
 
@@ -124,6 +124,9 @@ pub fn parameter_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         &rows(py, WithFit::<ComparisonChoice>::fit_specs())?,
     )?;
     tables.set_item("compare", compare)?;
+    let normals = rows(py, NORMALS_SPECS)?;
+    extend(&normals, &rows(py, WithFit::<NormalsChoice>::fit_specs())?)?;
+    tables.set_item("normals", normals)?;
     Ok(tables)
 }
 
