@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::beat_report::{BeatReport, SegmentMotionReport};
-use super::page_parts::{flags_headline, short, volume_line};
+use super::page_parts::{flags_headline, polar_maps, short, volume_line};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -12,6 +12,11 @@ use crate::draw::text::{data_uri, number};
 use crate::draw::views;
 use crate::mesh::TriMesh;
 use crate::volume::Provenance;
+
+/// How to read the polar maps.
+const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's wall; motion in \
+    mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle. There is no \
+    normal database behind them.";
 
 /// A beat's report with its pictures, all of them SVG.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +62,7 @@ pub fn beat_page(page: &BeatPage) -> String {
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             (curves(page))
-            (maps(page))
+            (polar_maps(&BeatPage::MAPS, page.maps, MAPS_HINT))
             section {
                 h2 { "Gates and segments" }
                 div.row.beside { (gates(report)) (segments(report)) }
@@ -233,34 +238,6 @@ fn curves(page: &BeatPage) -> Markup {
                         number(phase.bandwidth_degrees, 0),
                         number(phase.entropy_percent, 0),
                     )))
-                }
-            }
-        }
-    }
-}
-
-fn maps(page: &BeatPage) -> Markup {
-    let titled = BeatPage::MAPS.into_iter().filter_map(|(name, title)| {
-        let found = page.maps.iter().find(|(known, _)| *known == name)?;
-        Some((title, found.1))
-    });
-    let mut titled = titled.peekable();
-    html! {
-        @if titled.peek().is_some() {
-            section {
-                h2 { "Maps of the wall" }
-                p.hint {
-                    "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's wall; "
-                    "motion in mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle. "
-                    "There is no normal database behind them."
-                }
-                div.row {
-                    @for (title, svg) in titled {
-                        figure.paper {
-                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
-                            figcaption { (title) }
-                        }
-                    }
                 }
             }
         }

@@ -5,13 +5,18 @@ use maud::{Markup, html};
 use super::comparison_report::{
     ComparedScan, ComparedSegmentReport, ComparisonReport, UptakeChange,
 };
-use super::page_parts::{flags_headline, short};
+use super::page_parts::{flags_headline, polar_maps, short};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument};
 use crate::draw::text::{data_uri, number, signed};
 use crate::volume::Provenance;
+
+/// How to read the polar maps.
+const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; \
+    differences in points, stress scaled to rest where nothing changed; z in standard deviations from the normal \
+    mean; scores from 0 (normal) to 4 (none).";
 
 /// A comparison's report with its pictures.
 #[derive(Debug, Clone, Copy)]
@@ -56,7 +61,7 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", warnings.map(String::as_str)))
             (slices(page))
-            (maps(page))
+            (polar_maps(&ComparisonPage::MAPS, page.maps, MAPS_HINT))
             section {
                 h2 { "Territories and segments" }
                 (territories(report))
@@ -198,36 +203,6 @@ fn slices(page: &ComparisonPage) -> Markup {
                 }
                 figure.paper.wide {
                     img src=(data_uri("image/png", png)) alt="Slices of the heart at stress above those at rest";
-                }
-            }
-        }
-    }
-}
-
-fn maps(page: &ComparisonPage) -> Markup {
-    let titled = ComparisonPage::MAPS
-        .into_iter()
-        .filter_map(|(name, title)| {
-            let found = page.maps.iter().find(|(known, _)| *known == name)?;
-            Some((title, found.1))
-        });
-    let mut titled = titled.peekable();
-    html! {
-        @if titled.peek().is_some() {
-            section {
-                h2 { "Maps of the wall" }
-                p.hint {
-                    "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; "
-                    "differences in points, stress scaled to rest where nothing changed; z in standard deviations from the normal "
-                    "mean; scores from 0 (normal) to 4 (none)."
-                }
-                div.row {
-                    @for (title, svg) in titled {
-                        figure.paper {
-                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
-                            figcaption { (title) }
-                        }
-                    }
                 }
             }
         }

@@ -2,7 +2,8 @@
 
 use super::input::FileFacts;
 use crate::draw::document::Sign;
-use crate::draw::text::number;
+use crate::draw::text::{data_uri, number};
+use maud::{Markup, html};
 use serde_json::{Map, Value};
 
 /// Format, voxels and spacing of a volume, for the line below the title.
@@ -24,6 +25,35 @@ pub(super) fn flags_headline(flags: usize, result: &str) -> (Sign, String) {
         ),
         1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
         n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
+    }
+}
+
+/// The polar maps beside each other: of `titles` (file name, title) those that `maps` (file name, SVG) has.
+pub(super) fn polar_maps(
+    titles: &[(&'static str, &'static str)],
+    maps: &[(&'static str, &[u8])],
+    hint: &str,
+) -> Markup {
+    let titled = titles.iter().filter_map(|(name, title)| {
+        let found = maps.iter().find(|(known, _)| known == name)?;
+        Some((*title, found.1))
+    });
+    let mut titled = titled.peekable();
+    html! {
+        @if titled.peek().is_some() {
+            section {
+                h2 { "Maps of the wall" }
+                p.hint { (hint) }
+                div.row {
+                    @for (title, svg) in titled {
+                        figure.paper {
+                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
+                            figcaption { (title) }
+                        }
+                    }
+                }
+            }
+        }
     }
 }
 
