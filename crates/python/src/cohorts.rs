@@ -22,7 +22,6 @@ use ventriform::parameters::FitParameters;
 use ventriform::progress::Plan;
 use ventriform::volume::ReadLimits;
 use ventriform::volume::given_mask::MaskChoice;
-use ventriform_service::work::problems::Explain;
 
 /// The text of the profile, and the table of cases and problems as JSON.
 #[pyfunction]
@@ -97,14 +96,10 @@ pub fn build_normals(
 }
 
 fn no_limits(error: BuildError) -> Stopped {
-    match error {
-        BuildError::Cancelled(cancelled) => cancelled.into(),
-        BuildError::Normals { error: ref why, .. } => {
-            let mut failure = why.explain();
-            failure.detail = error.to_string();
-            Stopped::Failed(failure.at("cohort"))
-        }
-        error => {
+    match stopped(&error) {
+        Stopped::Cancelled => Stopped::Cancelled,
+        Stopped::Failed(failure) if failure.fix.is_some() => Stopped::Failed(failure.at("cohort")),
+        Stopped::Failed(_) => {
             let fix = "Give a folder with cohort.csv and the scans that it names.";
             Stopped::Failed(refused("cohort", error, fix))
         }

@@ -2,19 +2,19 @@
 
 use super::files::volume_files;
 use super::limits;
-use super::models::{MESH_FILE, named_models, stored_models};
+use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
-use super::problems::{Explain, not_exportable, work_error};
+use super::parameters;
+use super::problems::{Explain, unwritten, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::Format;
 use ventriform::gated::{GatedOrder, from_files};
-use ventriform::parameters::GatedParameters;
+use ventriform::parameters::{BeatChoice, GatedParameters};
 use ventriform::progress::{Monitor, Plan};
 use ventriform::report::{BeatSummary, object};
-use ventriform::segmentation::SegmentationFilesError;
 use ventriform::volume::ReadLimits;
 
 /// Fits one wall in motion to the gates of volumes.
@@ -31,8 +31,7 @@ impl Work for BeatWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let (mut items, library) = named_models(parameters);
-        let normals = parameters.get(limits::NORMALS).and_then(Value::as_str);
-        items.extend(normals.map(|id| (limits::NORMALS.to_owned(), id.to_owned())));
+        items.extend(named_item(parameters, limits::NORMALS));
         Needs {
             items,
             library,
@@ -41,16 +40,7 @@ impl Work for BeatWork {
     }
 
     fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
-        let parameters = match given {
-            GivenParameters::Text(pairs) => {
-                let pairs = pairs.iter();
-                GatedParameters::from_pairs(
-                    pairs.map(|(name, text)| (name.as_str(), text.as_str())),
-                )
-            }
-            GivenParameters::Json(object) => GatedParameters::from_json(object),
-        };
-        Ok(parameters.map_err(|error| error.explain())?.to_json())
+        parameters::check_with_fit::<BeatChoice>(given)
     }
 
     fn plan(&self) -> Plan {
@@ -71,10 +61,7 @@ impl Work for BeatWork {
         };
         let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
         let files = made.files(&Format::ALL, monitor);
-        let files = files.map_err(|error| match error {
-            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
-            error => WorkError::Failed(not_exportable(&error)),
-        })?;
+        let files = files.map_err(unwritten)?;
         Ok(WorkOutput {
             summary: object(&BeatSummary::of(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),

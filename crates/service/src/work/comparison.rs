@@ -3,19 +3,19 @@
 
 use super::files::volume_files;
 use super::limits;
-use super::models::{MESH_FILE, named_models, stored_models};
+use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
-use super::problems::{Explain, not_exportable, volume_missing, work_error};
+use super::parameters;
+use super::problems::{Explain, unwritten, volume_missing, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Fault, Resource};
 use serde_json::{Map, Value};
 use ventriform::export::Format;
-use ventriform::parameters::ComparisonParameters;
+use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
 use ventriform::progress::{Monitor, Plan};
 use ventriform::report::{ComparisonSummary, object};
 use ventriform::rest_stress::{ComparisonOrder, from_files};
-use ventriform::segmentation::SegmentationFilesError;
 use ventriform::volume::ReadLimits;
 
 /// The parameter that names the scan at rest.
@@ -35,10 +35,8 @@ impl Work for ComparisonWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let (mut items, library) = named_models(parameters);
-        let text = |field: &str| parameters.get(field)?.as_str();
-        let named = |field: &str| Some((field.to_owned(), text(field)?.to_owned()));
-        items.extend(named(REST));
-        items.extend(named(limits::NORMALS));
+        let named = [REST, limits::NORMALS];
+        items.extend((named.iter()).filter_map(|field| named_item(parameters, field)));
         Needs {
             items,
             library,
@@ -47,16 +45,7 @@ impl Work for ComparisonWork {
     }
 
     fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
-        let parameters = match given {
-            GivenParameters::Text(pairs) => {
-                let pairs = pairs.iter();
-                ComparisonParameters::from_pairs(
-                    pairs.map(|(name, text)| (name.as_str(), text.as_str())),
-                )
-            }
-            GivenParameters::Json(object) => ComparisonParameters::from_json(object),
-        };
-        Ok(parameters.map_err(|error| error.explain())?.to_json())
+        parameters::check_with_fit::<ComparisonChoice>(given)
     }
 
     fn check_order(
@@ -93,10 +82,7 @@ impl Work for ComparisonWork {
         };
         let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
         let files = made.files(&Format::ALL, monitor);
-        let files = files.map_err(|error| match error {
-            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
-            error => WorkError::Failed(not_exportable(&error)),
-        })?;
+        let files = files.map_err(unwritten)?;
         Ok(WorkOutput {
             summary: object(&ComparisonSummary::of(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),

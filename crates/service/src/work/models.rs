@@ -12,6 +12,12 @@ use ventriform::segmentation::{NamedMesh, SegmentationError};
 /// The file of a model that is fitted.
 pub(super) const MESH_FILE: &str = "mesh.json";
 
+/// The item that the parameter `field` names, with that field.
+pub(super) fn named_item(parameters: &Map<String, Value>, field: &str) -> Option<(String, String)> {
+    let id = parameters.get(field)?.as_str()?;
+    Some((field.to_owned(), id.to_owned()))
+}
+
 /// The ids of the models that `parameters` name, by field, and whether the flagged templates are fitted too.
 pub(super) fn named_models(parameters: &Map<String, Value>) -> (BTreeMap<String, String>, bool) {
     let model = parameters.get("model").and_then(Value::as_str);

@@ -204,21 +204,11 @@ impl Work for NormalsWork {
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             limits: self.limits,
         };
-        let limits = of_scans(&scans, &options, &|_, _| (), monitor).map_err(of_build)?;
+        let limits =
+            of_scans(&scans, &options, &|_, _| (), monitor).map_err(|error| match error {
+                BuildError::Cancelled(cancelled) => cancelled.into(),
+                error => WorkError::Failed(error.explain().at(CASES)),
+            })?;
         Ok(limits::output(&limits))
-    }
-}
-
-fn of_build(error: BuildError) -> WorkError {
-    match error {
-        BuildError::Cancelled(cancelled) => cancelled.into(),
-        BuildError::Normals { error: ref why, .. } => {
-            let mut failure = why.explain();
-            failure.detail = error.to_string();
-            WorkError::Failed(failure.at(CASES))
-        }
-        other => WorkError::Failed(
-            Failure::new(Fault::Content, "unsuitable-cohort", other.to_string()).at(CASES),
-        ),
     }
 }

@@ -13,6 +13,7 @@ use std::fmt::Display;
 use ventriform::beat::BeatError;
 use ventriform::comparison::WhichScan;
 use ventriform::deform::DeformError;
+use ventriform::evaluate::normals::BuildError;
 use ventriform::export::dicom::{DicomError, StatedIdentity};
 use ventriform::export::read_json::ReadMeshError;
 use ventriform::gated::GatedError;
@@ -25,7 +26,7 @@ use ventriform::pipeline::PipelineError;
 use ventriform::reader::ProfileError;
 use ventriform::rest_stress::ComparisonError;
 use ventriform::retile::RetileError;
-use ventriform::segmentation::SegmentationError;
+use ventriform::segmentation::{SegmentationError, SegmentationFilesError};
 use ventriform::surface::SurfaceError;
 use ventriform::volume::VolumeError;
 use ventriform::volume::given_mask::GivenMaskError;
@@ -235,6 +236,24 @@ impl Explain for SegmentationError {
 
     fn is_cancelled(&self) -> bool {
         SegmentationError::is_cancelled(self)
+    }
+}
+
+impl Explain for BuildError {
+    fn explain(&self) -> Failure {
+        match self {
+            Self::Normals { error, .. } => {
+                let mut failure = error.explain();
+                failure.detail = self.to_string();
+                failure
+            }
+            Self::Cancelled(_) => failure(CANCELLED_FAILURE, self, None, START_AGAIN.into()),
+            _ => Failure::new(Fault::Content, "unsuitable-cohort", self.to_string()),
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Cancelled(_))
     }
 }
 
@@ -650,6 +669,14 @@ const GIVE_MESH_JSON: &str = "Give a JSON mesh as `generate` writes it (mesh.jso
 /// A mesh that no file format can represent, or not one of them.
 pub(super) fn not_exportable(error: &dyn Error) -> Failure {
     Failure::new(Fault::Content, "not-exportable", sentence(error))
+}
+
+/// Why a result's files are not written.
+pub(super) fn unwritten(error: SegmentationFilesError) -> WorkError {
+    match error {
+        SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
+        error => WorkError::Failed(not_exportable(&error)),
+    }
 }
 
 /// A stored result whose files do not fit together, or cannot be read.

@@ -2,10 +2,10 @@
 
 use super::files::volume_files;
 use super::limits;
-use super::models::{MESH_FILE, name_of, named_models, stored_models};
+use super::models::{MESH_FILE, name_of, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
-use super::problems::{Explain, not_exportable, profile_missing, unreadable_model, work_error};
+use super::problems::{Explain, profile_missing, unreadable_model, unwritten, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
@@ -15,9 +15,7 @@ use ventriform::parameters::{FitParameters, Parameters};
 use ventriform::progress::{Monitor, Plan};
 use ventriform::reader::ReaderProfile;
 use ventriform::report::object;
-use ventriform::segmentation::{
-    NamedFile, NamedReader, SegmentationFilesError, SegmentationOrder, from_files,
-};
+use ventriform::segmentation::{NamedFile, NamedReader, SegmentationOrder, from_files};
 use ventriform::volume::ReadLimits;
 
 /// The file of a reader's profile.
@@ -36,12 +34,9 @@ impl Work for SegmentationWork {
     }
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
-        let text = |field: &str| parameters.get(field)?.as_str();
-        let named = |field: &str| Some((field.to_owned(), text(field)?.to_owned()));
         let (mut items, library) = named_models(parameters);
-        items.extend(named("expert"));
-        items.extend(named("reader"));
-        items.extend(named(limits::NORMALS));
+        let named = ["expert", "reader", limits::NORMALS];
+        items.extend((named.iter()).filter_map(|field| named_item(parameters, field)));
         Needs {
             items,
             library,
@@ -74,10 +69,7 @@ impl Work for SegmentationWork {
         };
         let made = from_files(&order, &self.limits, monitor).map_err(|error| work_error(&error))?;
         let files = made.files(&Format::ALL, Some(input.volume.clone()), monitor);
-        let files = files.map_err(|error| match error {
-            SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
-            error => WorkError::Failed(not_exportable(&error)),
-        })?;
+        let files = files.map_err(unwritten)?;
         Ok(WorkOutput {
             summary: object(&made.summary()),
             files: files.into_iter().map(OutputFile::from).collect(),
