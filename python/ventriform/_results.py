@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from . import _inputs, _native
@@ -394,7 +395,6 @@ class Fit(Result):
         if "other" in made:
             lps, faces = made["other_mesh"]
             self.walls[made["other"]] = Wall(lps, faces, frame, made["other_mask"])
-        self._report: reports.SegmentationReport | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Fit, (self._made, self.frame)
@@ -413,14 +413,12 @@ class Fit(Result):
         """From voxel indices to millimetres in `frame`, (4, 4)."""
         return affine_from_lps(self._made["affine"], self.frame)
 
-    @property
+    @cached_property
     def report(self) -> reports.SegmentationReport:
         """The figures of `report.json`."""
-        if self._report is None:
-            from .reports import SegmentationReport
+        from .reports import SegmentationReport
 
-            self._report = SegmentationReport.from_json(self.files["report.json"])
-        return self._report
+        return SegmentationReport.from_json(self.files["report.json"])
 
     @property
     def confidence(self) -> float:
@@ -503,7 +501,6 @@ class Beat(Result):
         self.frame: Frame = frame
         self.faces: NDArray[np.int32] = made["faces"]
         self.vertices = points_from_lps(np.stack(made["vertices"]), frame)
-        self._report: reports.BeatReport | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Beat, (self._made, self.frame)
@@ -517,14 +514,12 @@ class Beat(Result):
         """The wall at every gate."""
         return [Surface(lps, self.faces, self.frame) for lps in self._made["vertices"]]
 
-    @property
+    @cached_property
     def report(self) -> reports.BeatReport:
         """The figures of `beat.json`."""
-        if self._report is None:
-            from .reports import BeatReport
+        from .reports import BeatReport
 
-            self._report = BeatReport.from_json(self.files["beat.json"])
-        return self._report
+        return BeatReport.from_json(self.files["beat.json"])
 
     @property
     def ef_percent(self) -> float | None:
@@ -547,19 +542,16 @@ class Comparison(Result):
 
     def __init__(self, files: dict[str, bytes]) -> None:
         self.files = Files(files)
-        self._report: reports.ComparisonReport | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Comparison, (dict(self.files),)
 
-    @property
+    @cached_property
     def report(self) -> reports.ComparisonReport:
         """The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories, flags."""
-        if self._report is None:
-            from .reports import ComparisonReport
+        from .reports import ComparisonReport
 
-            self._report = ComparisonReport.from_json(self.files["comparison.json"])
-        return self._report
+        return ComparisonReport.from_json(self.files["comparison.json"])
 
     @property
     def flags(self) -> list[Flag]:
@@ -660,23 +652,18 @@ class Profile:
 class NormalLimits:
     """Normal limits of healthy people, as `build_normals` makes them: `normals` of `segment`, `beat` and `compare`."""
 
-    __slots__ = ("_document", "_text")
-
     def __init__(self, text: bytes) -> None:
         self._text = text
-        self._document: reports.LimitsDocument | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return NormalLimits, (self._text,)
 
-    @property
+    @cached_property
     def document(self) -> reports.LimitsDocument:
         """Their file: groups with cases, maps of mean and standard deviation, and how they were made."""
-        if self._document is None:
-            from .reports import LimitsDocument
+        from .reports import LimitsDocument
 
-            self._document = LimitsDocument.from_json(self._text)
-        return self._document
+        return LimitsDocument.from_json(self._text)
 
     @property
     def groups(self) -> list[reports.NormalGroup]:
