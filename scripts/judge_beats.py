@@ -30,12 +30,16 @@ def beat(program, gated, out):
 def variants(gated, folder):
     """The study with a quarter of the last gate's counts taken off, and with its gates rotated by three."""
     image = nibabel.load(gated)
-    voxels = np.asarray(image.dataobj)
+    # The stored integers with their slope, so that a variant differs by nothing else.
+    voxels = image.dataobj.get_unscaled()
+    slope, intercept = image.dataobj.slope, image.dataobj.inter
     lost = voxels.copy()
     lost[..., -1] = np.round(0.75 * lost[..., -1])
     for name, made in ("lost", lost), ("rotated", np.roll(voxels, 3, axis=3)):
         path = folder / f"{name}.nii.gz"
-        nibabel.save(nibabel.Nifti1Image(made.astype(np.int16), image.affine, image.header), path)
+        variant = nibabel.Nifti1Image(made.astype(np.int16), image.affine, image.header)
+        variant.header.set_slope_inter(slope, intercept)
+        nibabel.save(variant, path)
         yield name, path
 
 

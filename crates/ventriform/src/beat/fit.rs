@@ -3,7 +3,9 @@
 //! In: a [`GatedStudy`], the anatomical wall of its summed image, the image's resolution. Out: a [`BeatFit`]: the wall
 //! at every moment of the beat. The steps:
 //!
-//! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis.
+//! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis, and turned so that the one with the
+//!    least energy about the wall is the first: the steps, which end before the value is at rest, are then the same
+//!    wherever in the cycle the study begins.
 //! 2. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
 //! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
 //!    stretch, activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which
@@ -13,7 +15,7 @@
 //!    off.
 //!
 //! Guaranteed: the muscle of every column is the same at every moment; the same study gives the same figures on any
-//! number of threads.
+//! number of threads, and wherever in the cycle it begins.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -87,6 +89,8 @@ pub struct BeatFit {
     unknowns: Vec<f64>,
     row_spacing: f64,
     still: StillWall,
+    /// The gate of the study, counted from 0, with which the unknowns' cycle begins.
+    first_gate: usize,
     /// Share of the orders of the gates that are as smooth as theirs ([`super::order`]).
     pub orders_as_smooth: f64,
     /// Share of the voxels about the wall that lie outside of the volume.
@@ -136,7 +140,7 @@ pub fn fit(
         outermost + GRID_MARGIN_MM,
     );
     let scale = bright(&still.peaks) / count as f64;
-    let images = (study.gates.par_iter().zip(&study.factors))
+    let mut images = (study.gates.par_iter().zip(&study.factors))
         .map(|(gate, factor)| {
             monitor.check()?;
             let value = |p: &Vec3| (cubic(gate, p) * factor / scale) as f32;
@@ -146,7 +150,7 @@ pub fn fit(
     let middle: Vec<f64> = (0..layout.nodes())
         .map(|node| still.mid_wall(node))
         .collect();
-    let weights = (grid.positions())
+    let weights: Vec<f32> = (grid.positions())
         .map(|[arc, column, distance]| {
             let far = distance - Nodes::at(layout.rows, arc, column).value(&middle);
             if far >= REACH_MM[0] || arc >= coordinates.rim_arc + BEYOND_RIM_MM {
@@ -158,6 +162,12 @@ pub fn fit(
             }
         })
         .collect();
+    let first_gate = least_energy(&images, &weights);
+    images.rotate_left(first_gate);
+    let mut gate_weights: Vec<f64> = (study.counted().iter())
+        .map(|counted| f64::from(u8::from(*counted)))
+        .collect();
+    gate_weights.rotate_left(first_gate);
     let priors = &parameters.priors;
     let relative: Vec<f64> = (still.peaks.iter())
         .map(|peak| peak / (scale * count as f64))
@@ -165,9 +175,7 @@ pub fn fit(
     let start = start_of(&layout, &still, &relative, resolution_mm, priors);
     let observed = Observed {
         images,
-        gate_weights: (study.counted().iter())
-            .map(|counted| f64::from(u8::from(*counted)))
-            .collect(),
+        gate_weights,
         weights,
         bases: gate_harmonics(harmonic_count, count),
         rim: still.rim.clone(),
@@ -220,10 +228,24 @@ pub fn fit(
         unknowns,
         row_spacing: wall.row_spacing,
         still,
+        first_gate,
         orders_as_smooth,
         share_outside,
         steps,
     })
+}
+
+/// The image whose weighted sum of squares is the least.
+fn least_energy(images: &[Vec<f32>], weights: &[f32]) -> usize {
+    let energy = |image: &Vec<f32>| -> f64 {
+        (image.iter().zip(weights))
+            .map(|(value, weight)| f64::from(weight * value * value))
+            .sum()
+    };
+    let energies: Vec<f64> = images.iter().map(energy).collect();
+    (0..images.len())
+        .min_by(|a, b| energies[*a].total_cmp(&energies[*b]))
+        .unwrap_or(0)
 }
 
 /// Share of the weight of `points` that lies outside of the volume.
@@ -265,7 +287,7 @@ fn minimise(
     let (typical, bounds) = steps_and_bounds(&objective.layout, &start);
     let (mut unknowns, mut steps) = (start, 0);
     let ef_at = |objective: &Objective, point: &[f64]| {
-        ejection_fraction(&curve(objective, point, CURVE_MOMENTS))
+        ejection_fraction(&curve(objective, point, CURVE_MOMENTS, 0.0))
     };
     let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
     for stage_steps in stages {
@@ -380,10 +402,16 @@ pub(super) fn ejection_fraction(curve: &[Volumes]) -> f64 {
     1.0 - least / most
 }
 
-fn curve(objective: &Objective, unknowns: &[f64], moments: usize) -> Vec<Volumes> {
+/// Volumes at `moments` equal steps of the cycle, the first at `start_turns`.
+fn curve(
+    objective: &Objective,
+    unknowns: &[f64],
+    moments: usize,
+    start_turns: f64,
+) -> Vec<Volumes> {
     (0..moments)
         .map(|moment| {
-            let turns = moment as f64 / moments as f64;
+            let turns = start_turns + moment as f64 / moments as f64;
             let basis = harmonics(objective.layout.harmonics, turns, 0.0);
             volumes(objective, unknowns, &basis)
         })
@@ -391,21 +419,35 @@ fn curve(objective: &Objective, unknowns: &[f64], moments: usize) -> Vec<Volumes
 }
 
 impl BeatFit {
-    /// Volumes at `moments` equal steps of the beat, the first at the beginning of the first gate.
+    /// Volumes at `moments` equal steps of the beat, the first at the beginning of the study's first gate.
     pub fn curve(&self, moments: usize) -> Vec<Volumes> {
-        curve(&self.objective, &self.unknowns, moments)
+        curve(&self.objective, &self.unknowns, moments, self.start_turns())
+    }
+
+    /// The beginning of the study's first gate in the unknowns' cycle.
+    fn start_turns(&self) -> f64 {
+        -(self.first_gate as f64) / self.gate_count() as f64
+    }
+
+    /// The harmonics of each gate of the study, in its order.
+    fn bases(&self) -> impl Iterator<Item = &Vec<f64>> {
+        let (before, from_first) = {
+            let bases = self.objective.bases();
+            bases.split_at(bases.len() - self.first_gate)
+        };
+        from_first.iter().chain(before)
     }
 
     /// Volumes of each gate, in the mean over its width.
     pub fn gates(&self) -> Vec<Volumes> {
-        let bases = self.objective.bases().iter();
-        bases
+        self.bases()
             .map(|basis| volumes(&self.objective, &self.unknowns, basis))
             .collect()
     }
 
     /// The wall at `turns` of the beat, on the rays of the summed image's wall.
     pub fn moment(&self, turns: f64) -> WallMoment {
+        let turns = self.start_turns() + turns;
         let basis = harmonics(self.objective.layout.harmonics, turns, 0.0);
         self.wall_of(&basis)
     }
@@ -430,7 +472,7 @@ impl BeatFit {
                 ..mesh.clone()
             }
         };
-        self.objective.bases().iter().map(moved).collect()
+        self.bases().map(moved).collect()
     }
 
     fn wall_of(&self, basis: &[f64]) -> WallMoment {

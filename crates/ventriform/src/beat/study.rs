@@ -62,15 +62,20 @@ impl GatedStudy {
         let upper = &sorted[sorted.len() / 2..];
         let usual = upper.iter().sum::<f64>() / upper.len() as f64;
         let factors: Vec<f64> = counts.iter().map(|counts| usual / counts).collect();
-        let mut sum = first.clone();
-        sum.integral = false;
-        sum.voxels.fill(0.0);
+        // In f64, where the order of the gates does not show after rounding to f32.
+        let mut voxels = vec![0.0_f64; first.voxels.len()];
         for (gate, factor) in gates.iter().zip(&factors) {
             monitor.check().map_err(|Cancelled| BeatError::Cancelled)?;
-            for (sum, value) in sum.voxels.iter_mut().zip(&gate.voxels) {
-                *sum += *factor as f32 * value;
+            for (sum, value) in voxels.iter_mut().zip(&gate.voxels) {
+                *sum += factor * f64::from(*value);
             }
         }
+        let sum = Volume {
+            shape: first.shape,
+            voxels: voxels.into_iter().map(|value| value as f32).collect(),
+            frame: first.frame.clone(),
+            integral: false,
+        };
         Ok(Self {
             losses: counts.iter().map(|counts| 1.0 - counts / usual).collect(),
             gates,

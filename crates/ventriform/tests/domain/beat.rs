@@ -236,16 +236,32 @@ fn counts_give_a_second_opinion_on_thickening() {
     assert!((0.3..1.0).contains(&(mean / truth)), "{mean} of {truth}");
 }
 
+/// The moments of the curve fall on others by a rotation of eight gates only where they divide evenly, so EF may differ
+/// by the curve's grid.
 #[test]
-fn gates_that_begin_elsewhere_in_the_cycle_give_the_same_ejection_fraction() {
-    let mut rotated = gates().to_vec();
-    rotated.rotate_left(3);
-    let report = beat_of(&rotated, BeatChoice::default()).unwrap().report();
+fn gates_that_begin_elsewhere_in_the_cycle_give_the_same_figures() {
     let whole = whole().report();
-    let [rotated, first] = [&report, &whole].map(|report| report.ef_percent.unwrap());
-    assert!((rotated - first).abs() < 0.5, "{rotated} {first}");
-    let later = (whole.end_systole_degrees - report.end_systole_degrees).rem_euclid(360.0);
-    assert!((later - 135.0).abs() < 6.0, "{later}");
+    for turn in [3, 6] {
+        let mut rotated = gates().to_vec();
+        rotated.rotate_left(turn);
+        let report = beat_of(&rotated, BeatChoice::default()).unwrap().report();
+        let [found, first] = [&report, &whole].map(|report| report.ef_percent.unwrap());
+        assert!((found - first).abs() < 0.05, "{found} {first}");
+        let later = (whole.end_systole_degrees - report.end_systole_degrees).rem_euclid(360.0);
+        assert!((later - 45.0 * turn as f64).abs() < 0.5, "{later}");
+        for (found, first) in report
+            .gates
+            .iter()
+            .zip(whole.gates.iter().cycle().skip(turn))
+        {
+            let apart = (found.cavity_ml - first.cavity_ml).abs();
+            assert!(apart < 0.05, "{} {}", found.cavity_ml, first.cavity_ml);
+        }
+        for (found, first) in report.segments.iter().zip(&whole.segments) {
+            let apart = (found.motion_mm - first.motion_mm).abs();
+            assert!(apart < 0.05, "{} {}", found.motion_mm, first.motion_mm);
+        }
+    }
 }
 
 /// A quarter of the counts of the last gate is lost, as after irregular beats.
