@@ -39,8 +39,8 @@ pub enum ComparisonFlag {
     },
     /// A file does not say whose scan it is and how it was made.
     OriginNotStated {
-        /// Which scan.
-        scan: WhichScan,
+        /// Which scan; `None`: neither file says so.
+        scan: Option<WhichScan>,
     },
     /// A header does not say whether the scan is at rest or at stress.
     RoleNotStated {
@@ -141,7 +141,11 @@ impl fmt::Display for ComparisonFlag {
                 f,
                 "{reversible_percent:.0} % of the wall is reversible: a wall that lacks uptake looks thinner, so the ratio of the cavities is too large by an unknown part"
             ),
-            Self::OriginNotStated { scan } => write!(
+            Self::OriginNotStated { scan: None } => write!(
+                f,
+                "neither file names a patient, tracer or attenuation correction: make sure that those of both scans are the same"
+            ),
+            Self::OriginNotStated { scan: Some(scan) } => write!(
                 f,
                 "the {scan} scan's file names no patient, tracer or attenuation correction: make sure that they are those of the other scan"
             ),

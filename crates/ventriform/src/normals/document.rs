@@ -9,6 +9,7 @@ use crate::text::hex;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
 use std::fmt;
 
 /// The file's statement of its format.
@@ -237,6 +238,21 @@ impl NormalLimits {
                 groups: groups.iter().map(ToString::to_string).collect(),
             }),
         }
+    }
+
+    /// The tracer of the groups that a header's text names: the only one whose name stands in the text, or that the
+    /// text is a part of. Headers spell tracers freely ("Tc-99m Tetrofosmin", "TETROFOSMIN").
+    pub fn tracer_named(&self, text: &str) -> Option<&str> {
+        let text = text.trim().to_lowercase();
+        let named = |tracer: &&str| {
+            let name = tracer.trim().to_lowercase();
+            !name.is_empty() && !text.is_empty() && (text.contains(&name) || name.contains(&text))
+        };
+        let tracers = self.groups.iter().map(|group| group.tracer.as_str());
+        let found: BTreeSet<&str> = tracers.filter(named).collect();
+        (found.len() == 1)
+            .then(|| found.into_iter().next())
+            .flatten()
     }
 
     /// The hash of everything but itself, however numbers are spelt: programs that write `1.0` as `1` change nothing.

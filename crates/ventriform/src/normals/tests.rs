@@ -103,6 +103,31 @@ fn still_limits() -> PlaceLimits {
     }
 }
 
+/// Headers spell tracers freely; a text that names none or several of the groups' tracers chooses no group.
+#[test]
+fn a_headers_tracer_names_one_of_the_groups() {
+    let tracers = ["Tc-99m tetrofosmin", "Tc-99m sestamibi", "Tl-201 chloride"];
+    let of = |tracer: &&str| NormalGroup {
+        tracer: (*tracer).to_owned(),
+        ..group()
+    };
+    let limits = NormalLimits {
+        groups: tracers.iter().map(of).collect(),
+        ..file()
+    };
+    for (text, named) in [
+        ("Tc-99m Tetrofosmin", Some(tracers[0])),
+        ("TETROFOSMIN ", Some(tracers[0])),
+        ("Myoview (Tc-99m tetrofosmin)", Some(tracers[0])),
+        ("tl-201", Some(tracers[2])),
+        ("Tc-99m", None),
+        ("FDG", None),
+        (" ", None),
+    ] {
+        assert_eq!(limits.tracer_named(text), named, "{text}");
+    }
+}
+
 #[test]
 fn limits_of_equal_hearts_are_that_heart_and_the_least_deviation() {
     let scans: Vec<ScanPlaces> = (1..=20_u32)

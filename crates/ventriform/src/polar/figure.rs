@@ -72,7 +72,7 @@ impl WallFigure {
 
     /// Whether the figure stands on uptake, so that it has no place in the valve plane.
     pub fn is_of_uptake(self) -> bool {
-        matches!(self, Self::Z | Self::Score)
+        matches!(self, Self::Difference | Self::Z | Self::Score)
     }
 
     pub(super) fn ticks(self) -> &'static [f64] {
@@ -98,7 +98,7 @@ impl WallFigure {
                 "Phase of the wall's greatest thickness, degrees of the cycle; grey: no wall, or none that moves"
             }
             Self::Difference => {
-                "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; grey: no wall in one of them"
+                "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; grey: no wall in one of them; hatched: valve plane at rest"
             }
             Self::Z => {
                 "Uptake against normal limits, standard deviations from the normal mean; grey: nothing to compare; hatched: valve plane"

@@ -75,9 +75,17 @@ pub(super) fn flags(
 ) -> Vec<ComparisonFlag> {
     let mut flags = Vec::new();
     let both = [(WhichScan::Stress, stress), (WhichScan::Rest, rest)];
+    let unstated: Vec<WhichScan> = (both.iter())
+        .filter(|(_, heart)| heart.provenance().is_none())
+        .map(|(scan, _)| *scan)
+        .collect();
+    match unstated[..] {
+        [] => {}
+        [scan] => flags.push(ComparisonFlag::OriginNotStated { scan: Some(scan) }),
+        _ => flags.push(ComparisonFlag::OriginNotStated { scan: None }),
+    }
     for (scan, heart) in both {
         if heart.provenance().is_none() {
-            flags.push(ComparisonFlag::OriginNotStated { scan });
             continue;
         }
         match heart.stated_role() {

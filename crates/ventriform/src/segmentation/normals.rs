@@ -23,8 +23,8 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     ]
 }
 
-/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex and correction are those of the
-/// scan's header, if the parameters do not state them.
+/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex, tracer and correction are those of
+/// the scan's header, if the parameters do not state them.
 ///
 /// # Errors
 /// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit
@@ -46,6 +46,10 @@ pub fn judged_by_normals(
     }
     let kind = ScanKind {
         sex: stated.or(header),
+        tracer: (parameters.scan.tracer.clone()).or_else(|| {
+            let named = limits.tracer_named(scan?.radiopharmaceutical.as_deref()?)?;
+            Some(named.to_owned())
+        }),
         attenuation_corrected: (parameters.scan.attenuation_corrected)
             .or_else(|| scan?.attenuation_corrected()),
         ..parameters.scan.clone()
