@@ -364,7 +364,7 @@ def everything(walk, folder):
     call("get", "/v1/templates", expect=200)
     offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
     hashes = {"scan": "a" * 64, "mask": "b" * 64}
-    profile = {"format": "ventriform-reader-profile", "version": 1, "edge": "apparent", "masks": 1,
+    profile = {"format": "ventriform-reader-profile", "version": 2, "kind": "edge", "edge": "apparent", "masks": 1,
                "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset}, "learnt_on": [hashes]}
     _, reader = call("post", "/v1/readers", expect=201, query="?name=first", body=profile)
     call("post", "/v1/readers", expect=200, query="?name=first", body=profile)

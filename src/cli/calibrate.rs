@@ -6,21 +6,23 @@ use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
 use ventriform::evaluate::calibration::{
-    Calibration, CalibrationError, CaseFigures, calibrate, cases_of,
+    Calibration, CalibrationError, CaseFigures, LEVEL_MARGIN_E_J, MeanJaccards, calibrate, cases_of,
 };
 use ventriform::evaluate::sample::Sample;
 use ventriform::progress::Plan;
-use ventriform::reader::ReaderOffset;
+use ventriform::reader::{Learnt, ReaderLevel, ReaderOffset};
 
 /// Learn how a reader draws the wall, from scans and the reader's masks
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform calibrate cohort -o reader.json
   ventriform segment scan.nii.gz --model auto --reader reader.json -o out
-COHORT holds a folder for each case, with spect.nii.gz (or .nii, .dcm) and the reader's mask. The profile
-holds three distances in millimetres from the fitted wall (endocardium, epicardium, rim), drawn towards
-zero the more the fewer masks there are, and hashes of the files: no names. The table printed says what
-the profile is worth: held-out figures are of profiles learnt without the case, in-sample figures are of
+COHORT holds a folder for each case, with spect.nii.gz (or .nii, .dcm) and the reader's mask. Readers are of
+two kinds: edge (three distances in millimetres from the fitted wall: endocardium, epicardium, rim) and level
+(the share of the polar map's reference that the image has where the reader ends the wall). Both are learnt;
+the kind is chosen by figures of masks left out. The profile holds it, drawn towards no change (a level:
+towards half) the more the fewer masks there are, and hashes of the files: no names. The table printed says
+what the profile is worth: held-out figures are of profiles learnt without the case, in-sample figures are of
 the profile that has seen it.")]
 pub struct CalibrateArgs {
     /// Folder of the cases
@@ -72,20 +74,12 @@ const TABLE_COLUMNS: [Column; 4] = [
 fn table(made: &Calibration) -> String {
     let masks = made.profile.masks();
     let edge = made.profile.edge.as_str();
-    let mut text = format!("profile of {masks} masks, from the {edge} wall, mm:\n");
-    let names = [
-        "endocardium, outward",
-        "epicardium, outward",
-        "rim, towards the base",
-    ];
-    for (name, offset) in names.iter().zip(made.profile.offsets) {
-        let ReaderOffset {
-            value,
-            mean,
-            spread,
-        } = offset;
-        text += &format!("  {name:<22} {value:>6.2} (mean {mean:.2}, spread {spread:.2})\n");
-    }
+    let mut text = format!(
+        "profile of {masks} masks, kind {}, from the {edge} wall:\n",
+        made.kind().as_str()
+    );
+    text += &learnt(&made.profile.learnt);
+    text += &choice(made);
     let samples = [Sample::HeldOut, Sample::InSample];
     let [held_out, in_sample] = samples.map(Sample::as_str);
     for (what, figure, decimals) in TABLE_COLUMNS {
@@ -94,7 +88,7 @@ fn table(made: &Calibration) -> String {
             "without"
         );
         for row in &made.rows {
-            let judged = samples.map(|sample| Calibration::figures(row, sample));
+            let judged = samples.map(|sample| made.figures(row, sample));
             text += &format!("  {:<14}", row.case);
             for figures in [Some(row.without)].into_iter().chain(judged) {
                 let cell = figures.map(|f| format!("{:.decimals$}", figure(&f)));
@@ -110,6 +104,52 @@ fn table(made: &Calibration) -> String {
         text += &gain(made, sample);
     }
     text
+}
+
+fn learnt(learnt: &Learnt) -> String {
+    match learnt {
+        Learnt::Edge(offsets) => {
+            let names = [
+                "endocardium, outward",
+                "epicardium, outward",
+                "rim, towards the base",
+            ];
+            let line = |(name, offset): (&&str, &ReaderOffset)| {
+                let ReaderOffset {
+                    value,
+                    mean,
+                    spread,
+                } = offset;
+                format!("  {name:<22} {value:>6.2} mm (mean {mean:.2}, spread {spread:.2})\n")
+            };
+            names.iter().zip(offsets).map(line).collect()
+        }
+        Learnt::Level(ReaderLevel {
+            value,
+            mean,
+            spread,
+        }) => format!(
+            "  level {value:.3} of the polar map's reference (mean {mean:.3}, spread {spread:.3})\n"
+        ),
+    }
+}
+
+/// Why the profile is of its kind.
+fn choice(made: &Calibration) -> String {
+    let MeanJaccards {
+        without,
+        edge,
+        level,
+    } = made.mean_jaccards();
+    let learnt_on = if made.rows.len() > 1 {
+        "learnt on the other masks"
+    } else {
+        "with one mask learnt on none: no distances, the usual level"
+    };
+    format!(
+        "  mean E_J, {learnt_on}: by distances {edge:.3}, by a level {level:.3}; without a profile {without:.3}. A level is \
+         chosen where it is better by more than {LEVEL_MARGIN_E_J}\n"
+    )
 }
 
 /// The changes by the profile, as a line.

@@ -10,7 +10,8 @@ pub fn profile(endocardium: f64) -> Value {
     let offset = |value: f64| json!({"value": value, "mean": value, "spread": 0.0});
     json!({
         "format": "ventriform-reader-profile",
-        "version": 1,
+        "version": 2,
+        "kind": "edge",
         "edge": "apparent",
         "masks": 1,
         "offsets_mm": {
@@ -34,6 +35,8 @@ async fn a_profile_is_stored_once_listed_used_and_erased() {
     assert_eq!(reader["name"], "anna");
     assert_eq!(reader["summary"]["offsets_mm"]["endocardium"], 1.25);
     assert_eq!(reader["summary"]["masks"], 1);
+    assert_eq!(reader["summary"]["kind"], "edge");
+    assert_eq!(reader["summary"]["level"], Value::Null);
     assert_eq!(app.json(&path).await, reader);
     let again = post("", &profile(1.25)).await.unwrap();
     assert_eq!(again.status(), StatusCode::OK);
@@ -82,7 +85,9 @@ async fn what_is_no_profile_is_refused_with_its_field() {
     for (body, field) in [
         (json!({}), Value::Null),
         (json!([1]), Value::Null),
-        (changed("/version", json!(2)), json!("version")),
+        (changed("/version", json!(3)), json!("version")),
+        (changed("/kind", json!("level")), json!("offsets_mm")),
+        (changed("/kind", json!("both")), json!("kind")),
         (changed("/edge", json!("both")), json!("edge")),
         (changed("/masks", json!(7)), json!("masks")),
         (

@@ -13,6 +13,7 @@ use ventriform::evaluate::calibration::{calibrate as learn, cases_of};
 use ventriform::evaluate::normals::{self, BuildError, NormalsOptions};
 use ventriform::evaluate::parameters::InSample;
 use ventriform::evaluate::rows::Variant;
+use ventriform::evaluate::sample::Sample;
 use ventriform::evaluate::{
     Cohort, EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep,
     evaluate as judge,
@@ -64,8 +65,8 @@ fn cases_table(made: &Calibration) -> String {
             "case": row.case,
             "reader_ml": row.reader_ml,
             "without": figures(&row.without),
-            "held_out": row.held_out.as_ref().map(figures),
-            "in_sample": figures(&row.in_sample),
+            "held_out": made.figures(row, Sample::HeldOut).as_ref().map(figures),
+            "in_sample": made.figures(row, Sample::InSample).as_ref().map(figures),
         })
     });
     json!({

@@ -1,11 +1,13 @@
 //! A reader's profile from a folder of scans and masks, with figures that say what it is worth.
 //!
 //! 1. [`cases_of`]: the folders that hold a scan and a mask.
-//! 2. Every scan is segmented as `segment` does, without a profile, and the distances to its mask are
-//!    measured ([`crate::reader::measure()`]).
-//! 3. The profile is learnt on all masks.
-//! 4. Every case is judged three times: without a profile; by a profile learnt on the *other* masks
-//!    (held-out); by the profile itself, which has seen the case (in-sample).
+//! 2. Every scan is segmented as `segment` does, without a profile; the distances to its mask and the level of the image
+//!    at its mask are measured ([`crate::reader::measure()`], [`crate::reader::measure_level()`]).
+//! 3. Every case is judged without a profile, and for both kinds of reader by what the *other* masks teach (held-out; of
+//!    one mask there are no others, so that a level is the usual one and distances are zero) and by what all masks teach
+//!    (in-sample, they have seen the case).
+//! 4. The kind is chosen by the held-out figures: a level where it agrees better by more than [`LEVEL_MARGIN_E_J`].
+//! 5. The profile is learnt on all masks.
 //!
 //! Guaranteed: the same files give the same profile and figures, on any number of threads.
 
@@ -18,8 +20,10 @@ use crate::geometry::frame::VoxelToPatient;
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::parameters::FitParameters;
-use crate::progress::Monitor;
-use crate::reader::{self, LearntOn, ReaderOffset, ReaderOffsets, ReaderProfile};
+use crate::progress::{Cancelled, Monitor};
+use crate::reader::{
+    self, Learnt, LearntOn, ReaderDrawing, ReaderKind, ReaderOffsets, ReaderProfile, WallImage,
+};
 use crate::segmentation::{SegmentationOrder, from_files};
 use crate::volume::{ReadLimits, VolumeFile};
 use rayon::prelude::*;
@@ -69,6 +73,19 @@ pub struct CaseFigures {
     pub cavity_ml: f64,
 }
 
+/// Held-out agreement (E_J) by which a level must be better than distances to be chosen. Readers of either kind differ by
+/// more than ten times as much.
+pub const LEVEL_MARGIN_E_J: f64 = 0.01;
+
+/// Agreement by what was learnt of one kind of reader.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KindFigures {
+    /// Learnt on the other masks. `None` if there are none and the kind is the edge, which is then drawn as it is.
+    pub held_out: Option<CaseFigures>,
+    /// Learnt on all masks.
+    pub in_sample: CaseFigures,
+}
+
 /// One case of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationRow {
@@ -76,14 +93,26 @@ pub struct CalibrationRow {
     pub case: String,
     /// The distances measured on its mask.
     pub measured: ReaderOffsets,
+    /// The level measured on its mask, a share of the polar map's reference.
+    pub level: f64,
     /// Volume of the reader's wall, ml.
     pub reader_ml: f64,
     /// Without a profile.
     pub without: CaseFigures,
-    /// By the profile learnt on the other masks, if there are any.
-    pub held_out: Option<CaseFigures>,
-    /// By the profile learnt on all masks.
-    pub in_sample: CaseFigures,
+    /// By distances.
+    pub by_edge: KindFigures,
+    /// By a level.
+    pub by_level: KindFigures,
+}
+
+impl CalibrationRow {
+    /// The figures of a kind.
+    pub fn by(&self, kind: ReaderKind) -> KindFigures {
+        match kind {
+            ReaderKind::Edge => self.by_edge,
+            ReaderKind::Level => self.by_level,
+        }
+    }
 }
 
 /// A profile with its figures.
@@ -98,22 +127,63 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// The figures of a row judged on that sample.
-    pub fn figures(row: &CalibrationRow, sample: Sample) -> Option<CaseFigures> {
+    /// The kind of the profile.
+    pub fn kind(&self) -> ReaderKind {
+        self.profile.learnt.kind()
+    }
+
+    /// The figures of a row by the profile's kind, judged on that sample.
+    pub fn figures(&self, row: &CalibrationRow, sample: Sample) -> Option<CaseFigures> {
+        let own = row.by(self.kind());
         match sample {
-            Sample::InSample => Some(row.in_sample),
-            Sample::HeldOut => row.held_out,
+            Sample::InSample => Some(own.in_sample),
+            Sample::HeldOut => own.held_out,
         }
     }
 
     /// Change of E_J by the profile, from the figures of that sample.
     pub fn gain(&self, sample: Sample) -> Option<PairedDifference> {
-        let gains: Vec<f64> = self
-            .rows
-            .iter()
-            .filter_map(|row| Some(Self::figures(row, sample)?.jaccard - row.without.jaccard))
+        let gains: Vec<f64> = (self.rows.iter())
+            .filter_map(|row| Some(self.figures(row, sample)?.jaccard - row.without.jaccard))
             .collect();
         PairedDifference::of(&gains)
+    }
+
+    /// Mean E_J of the cases without a profile, and held-out by each kind.
+    pub fn mean_jaccards(&self) -> MeanJaccards {
+        MeanJaccards::of(&self.rows)
+    }
+}
+
+/// Mean E_J over the cases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeanJaccards {
+    /// Without a profile.
+    pub without: f64,
+    /// By distances learnt on the other masks.
+    pub edge: f64,
+    /// By a level learnt on the other masks.
+    pub level: f64,
+}
+
+impl MeanJaccards {
+    fn of(rows: &[CalibrationRow]) -> Self {
+        let mean = |of: fn(&CalibrationRow) -> CaseFigures| {
+            rows.iter().map(|row| of(row).jaccard).sum::<f64>() / rows.len().max(1) as f64
+        };
+        Self {
+            without: mean(|row| row.without),
+            edge: mean(|row| row.by_edge.held_out.unwrap_or(row.without)),
+            level: mean(|row| row.by_level.held_out.unwrap_or(row.without)),
+        }
+    }
+
+    fn kind(self) -> ReaderKind {
+        if self.level > self.edge + LEVEL_MARGIN_E_J {
+            ReaderKind::Level
+        } else {
+            ReaderKind::Edge
+        }
     }
 }
 
@@ -166,6 +236,7 @@ pub fn calibrate(
         }
     }
     let measured: Vec<ReaderOffsets> = usable.iter().map(|(_, c)| c.measured).collect();
+    let levels: Vec<f64> = usable.iter().map(|(_, c)| c.level).collect();
     let Some(offsets) = reader::learn(&measured) else {
         let named = problems.iter().map(|(case, why)| format!("{case}: {why}"));
         let mut reasons: Vec<String> = named.collect();
@@ -174,35 +245,44 @@ pub fn calibrate(
         }
         return Err(CalibrationError::NoMask { reasons });
     };
-    let rows = usable
+    let by_edge = Learnt::Edge(offsets);
+    let by_level = Learnt::Level(reader::learn_level(&levels));
+    let rows: Vec<CalibrationRow> = usable
         .par_iter()
         .enumerate()
         .with_max_len(1)
         .map(|(place, (name, case))| {
-            let others: Vec<ReaderOffsets> = (0..measured.len())
-                .filter(|other| *other != place)
-                .map(|other| measured[other])
-                .collect();
-            let judged = |offsets: [ReaderOffset; 3]| {
-                case.judged(&ReaderOffsets::from_array(offsets.map(|o| o.value)))
-            };
+            let judged = |learnt: Learnt| case.judged(&learnt.drawing());
+            let other_offsets = reader::learn(&without_one(&measured, place));
+            let other_level = reader::learn_level(&without_one(&levels, place));
             CalibrationRow {
                 case: name.clone(),
                 measured: case.measured,
+                level: case.level,
                 reader_ml: case.reader_ml,
-                without: case.judged(&ReaderOffsets::default()),
-                held_out: reader::learn(&others).map(judged),
-                in_sample: judged(offsets),
+                without: case.judged(&ReaderDrawing::Edge(ReaderOffsets::default())),
+                by_edge: KindFigures {
+                    held_out: other_offsets.map(|offsets| judged(Learnt::Edge(offsets))),
+                    in_sample: judged(by_edge),
+                },
+                by_level: KindFigures {
+                    held_out: Some(judged(Learnt::Level(other_level))),
+                    in_sample: judged(by_level),
+                },
             }
         })
         .collect();
+    let learnt = match MeanJaccards::of(&rows).kind() {
+        ReaderKind::Edge => by_edge,
+        ReaderKind::Level => by_level,
+    };
     // Not in the order of the folders' names, which may be those of patients.
     let mut learnt_on: Vec<LearntOn> = usable.iter().map(|(_, c)| c.learnt_on.clone()).collect();
     learnt_on.sort();
     Ok(Calibration {
         profile: ReaderProfile {
             edge: parameters.deform.edge,
-            offsets,
+            learnt,
             learnt_on,
         },
         rows,
@@ -210,12 +290,23 @@ pub fn calibrate(
     })
 }
 
+/// All values but one.
+fn without_one<T: Copy>(values: &[T], left_out: usize) -> Vec<T> {
+    let others = values.iter().enumerate();
+    others
+        .filter(|(place, _)| *place != left_out)
+        .map(|(_, value)| *value)
+        .collect()
+}
+
 /// A case's fit and mask.
 struct ReadCase {
     fit: FittedModel,
+    image: WallImage,
     drawn: Mask,
     frame: VoxelToPatient,
     measured: ReaderOffsets,
+    level: f64,
     reader_ml: f64,
     learnt_on: LearntOn,
 }
@@ -237,10 +328,16 @@ impl ReadCase {
         let volume = &made.reading.volume;
         let drawn = mask_on(&case.mask, &parameters.mask, volume);
         let drawn = drawn.map_err(|error| format!("its mask: {error}"))?;
+        let reference = made.segmentation.polar.as_ref().map(|map| map.reference);
+        let reference = reference.ok_or("the fit has no polar map")?;
         let fit = made.segmentation.fit.model;
         let frame = volume.frame.clone();
         let measured = reader::measure(&fit, &made.segmentation.mask, &drawn, &frame)
             .ok_or("its mask and the fitted wall have too little in common")?;
+        let cancelled = |error: Cancelled| error.to_string();
+        let image = WallImage::about(&fit, volume, reference, &monitor).map_err(cancelled)?;
+        let (level, _) =
+            reader::measure_level(&fit, &image, &drawn, &frame, &monitor).map_err(cancelled)?;
         let learnt_on = LearntOn {
             scan: sha256(&case.scan).map_err(|error| error.to_string())?,
             mask: sha256(&case.mask).map_err(|error| error.to_string())?,
@@ -248,18 +345,20 @@ impl ReadCase {
         Ok(Self {
             reader_ml: drawn.count() as f64 * frame.voxel_volume() / 1000.0,
             fit,
+            image,
             drawn,
             frame,
             measured,
+            level,
             learnt_on,
         })
     }
 
-    /// The fit with `offsets`, against the reader's mask.
-    fn judged(&self, offsets: &ReaderOffsets) -> CaseFigures {
+    /// The fit as `drawing` has it, against the reader's mask.
+    fn judged(&self, drawing: &ReaderDrawing) -> CaseFigures {
         let monitor = Monitor::silent();
         // Nobody cancels.
-        let moved = reader::drawn(self.fit.clone(), offsets, &monitor);
+        let moved = reader::drawn(self.fit.clone(), drawing, &self.image, &monitor);
         let fit = moved.map_or_else(|_| self.fit.clone(), |moved| moved.0);
         let mask = voxelise(&fit.mesh, self.drawn.shape, &self.frame);
         let agreement = compare(&mask, &self.drawn, self.frame.spacing(), &monitor).ok();

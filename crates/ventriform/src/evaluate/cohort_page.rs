@@ -13,6 +13,7 @@ use super::table::{Evaluation, OF_MODELS, table1};
 use crate::draw::chart::{self, Series};
 use crate::draw::document::HtmlDocument;
 use crate::draw::text::data_uri;
+use crate::reader::ReaderDrawing;
 use crate::segmentation::slices;
 
 /// The page.
@@ -308,16 +309,22 @@ fn reader(evaluation: &Evaluation) -> Markup {
     let Some(made) = &evaluation.reader else {
         return html! {};
     };
-    let offsets = made.profile.offsets();
+    let learnt = match made.profile.drawing() {
+        ReaderDrawing::Edge(offsets) => format!(
+            "endocardium {:+.2}, epicardium {:+.2} mm outward, rim {:+.2} mm towards the base",
+            offsets.endocardium, offsets.epicardium, offsets.rim
+        ),
+        ReaderDrawing::Level(level) => {
+            format!("{:.0} % of the polar map's reference", 100.0 * level)
+        }
+    };
     let figure = |f: &CaseFigures| format!("{:.3} / {:.3}", f.jaccard, f.contour);
     html! {
         section {
             h2 { "The reader's profile" }
             p {
-                "Learnt on " (made.profile.masks()) " masks: endocardium "
-                (format_args!("{:+.2}", offsets.endocardium)) ", epicardium "
-                (format_args!("{:+.2}", offsets.epicardium)) " mm outward, rim "
-                (format_args!("{:+.2}", offsets.rim)) " mm towards the base. E_J / E_CD of the built-in "
+                "Learnt on " (made.profile.masks()) " masks, kind " (made.kind().as_str()) ": " (learnt) ". "
+                "E_J / E_CD of the built-in "
                 "model without a profile, by a profile learnt on the other masks (held-out), and by the "
                 "one that has seen the case (in-sample)."
             }
@@ -332,8 +339,11 @@ fn reader(evaluation: &Evaluation) -> Markup {
                         tr {
                             th scope="row" { (row.case) }
                             td.n { (figure(&row.without)) }
-                            td.n { @if let Some(f) = &row.held_out { (figure(f)) } @else { "-" } }
-                            td.n { (figure(&row.in_sample)) }
+                            @for sample in [Sample::HeldOut, Sample::InSample] {
+                                td.n {
+                                    @if let Some(f) = &made.figures(row, sample) { (figure(f)) } @else { "-" }
+                                }
+                            }
                         }
                     }
                 }

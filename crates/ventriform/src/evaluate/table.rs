@@ -366,17 +366,21 @@ fn reader_json(made: &Calibration) -> Value {
                 "case": row.case,
                 "reader_wall_ml": rounded(row.reader_ml),
                 "without": figures(&row.without),
-                "held-out": row.held_out.as_ref().map(figures),
-                "in-sample": figures(&row.in_sample),
+                "held-out": made.figures(row, Sample::HeldOut).as_ref().map(figures),
+                "in-sample": made.figures(row, Sample::InSample).as_ref().map(figures),
             })
         })
         .collect();
     let gain = |sample| made.gain(sample).as_ref().map(difference_json);
-    let offsets = made.profile.offsets();
+    let drawing = made.profile.drawing();
+    let means = made.mean_jaccards();
     json!({
         "masks": made.profile.masks(),
-        "offsets_mm": {
-            "endocardium": offsets.endocardium, "epicardium": offsets.epicardium, "rim": offsets.rim,
+        "kind": made.kind().as_str(),
+        "offsets_mm": drawing.offsets(),
+        "level": drawing.level(),
+        "mean_jaccard": {
+            "without": rounded(means.without), "edge": rounded(means.edge), "level": rounded(means.level),
         },
         "cases": rows,
         "gain_in_jaccard": {

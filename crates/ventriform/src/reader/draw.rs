@@ -1,5 +1,7 @@
 //! A fitted wall as a reader would draw it.
 //!
+//! By a level of the image, every node moves along its normal ([`super::level`]). By distances:
+//!
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
 //!    wall would get thinner than [`MIN_THICKNESS_MM`], both move less.
@@ -8,7 +10,8 @@
 //!
 //! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
 
-use super::profile::ReaderOffsets;
+use super::level::{self, WallImage};
+use super::profile::{ReaderDrawing, ReaderOffsets};
 use crate::deform::{FittedModel, base_plane};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
@@ -17,31 +20,45 @@ use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 use crate::progress::{Cancelled, Monitor};
 
 /// The thickness that is left at least, mm.
-const MIN_THICKNESS_MM: f64 = 3.0;
+pub(super) const MIN_THICKNESS_MM: f64 = 3.0;
 
-/// `fit` with the shown wall moved by `offsets`, and the share of them that was applied: 1, or less
-/// where the whole would make the surface intersect itself. Its two measured walls
+/// `fit` with the shown wall moved by `drawing`, and the share of it that was applied: 1, or less
+/// where the whole would make the surface intersect itself. `image` is read for a level. The two measured walls
 /// ([`FittedModel::surfaces`]) stay. Organs other than ventricles stay as they are.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn drawn(
     fit: FittedModel,
-    offsets: &ReaderOffsets,
+    drawing: &ReaderDrawing,
+    image: &WallImage,
     monitor: &Monitor,
 ) -> Result<(FittedModel, f64), Cancelled> {
     let (Some(cup), Some(orientation), Some(wall)) = (fit.cup, fit.patient_orientation, &fit.wall)
     else {
         return Ok((fit, 0.0));
     };
-    if offsets.to_array() == [0.0; 3] {
+    if drawing.is_none() {
         return Ok((fit, 1.0));
     }
     let superior = &orientation.superior;
-    let moved = |share: f64| {
-        let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
-        let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
-        base_plane::extended(&mesh, &cup, superior, offsets.rim)
+    let displacements = match drawing {
+        ReaderDrawing::Edge(_) => Vec::new(),
+        ReaderDrawing::Level(level) => level::displacements(&fit.mesh, wall, image, *level),
+    };
+    let moved = |share: f64| match drawing {
+        ReaderDrawing::Edge(offsets) => {
+            let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
+            let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
+            base_plane::extended(&mesh, &cup, superior, offsets.rim)
+        }
+        ReaderDrawing::Level(_) => {
+            let mut mesh = fit.mesh.clone();
+            for (node, by) in mesh.vertices.iter_mut().zip(&displacements) {
+                *node += by * share;
+            }
+            mesh
+        }
     };
     // A fit that intersects itself already must not do so more often.
     let before = self_intersections(&fit.mesh).len();
@@ -75,10 +92,10 @@ fn with_surfaces_moved(mesh: &TriMesh, wall: &VentricleWall, offsets: &ReaderOff
 
 /// Beginning and end of the wall on each ray, mm; rays beyond the rim have those of the next ray of
 /// their column.
-struct WallEdges(Vec<[f64; 2]>);
+pub(super) struct WallEdges(Vec<[f64; 2]>);
 
 impl WallEdges {
-    fn of(wall: &VentricleWall) -> Self {
+    pub(super) fn of(wall: &VentricleWall) -> Self {
         let mut edges = vec![[0.0, 0.0]; RAY_ROWS * RAY_COLUMNS];
         for column in 0..RAY_COLUMNS {
             let mut last = None;
@@ -91,6 +108,12 @@ impl WallEdges {
             }
         }
         Self(edges)
+    }
+
+    /// Beginning and end of the wall on the ray through a point.
+    pub(super) fn about(&self, wall: &VentricleWall, point: &Vec3) -> [f64; 2] {
+        let position = wall.position(point);
+        self.at(position.row, position.column)
     }
 
     /// The displacement of a point of the wall by `offsets`, without that of the rim, mm.

@@ -6,8 +6,10 @@
 //! few masks say little about s, [`PRIOR_MASKS`] masks with the spread that is usual ([`MASK_SPREAD_MM`]) are
 //! added to it. A mean that is smaller than its own standard error cannot be told from none and is not
 //! applied.
+//!
+//! Of the level likewise, drawn towards the usual one ([`USUAL_LEVEL`]).
 
-use super::profile::{ReaderOffset, ReaderOffsets};
+use super::profile::{ReaderLevel, ReaderOffset, ReaderOffsets};
 
 /// Distances of readers' edges from the fitted ones, in the order of [`ReaderOffsets`], mm.
 ///
@@ -48,7 +50,39 @@ pub fn learn(measured: &[ReaderOffsets]) -> Option<[ReaderOffset; 3]> {
     }))
 }
 
-/// To a thousandth of a millimetre.
+/// The level of a reader of whom nothing is known: half of the wall's uptake, where the edge of a sharp wall lies after
+/// blur.
+pub const USUAL_LEVEL: f64 = 0.5;
+/// Standard deviation of readers' levels about the usual one, and of the masks of one reader. Both are assumed: two
+/// masks, whose levels were equal to a hundredth, say little of either.
+pub const READER_LEVEL_SD: f64 = 0.1;
+/// See [`READER_LEVEL_SD`].
+pub const MASK_LEVEL_SD: f64 = 0.05;
+
+/// The profile's level, from those of each mask; without a mask the usual one.
+pub fn learn_level(levels: &[f64]) -> ReaderLevel {
+    let n = levels.len() as f64;
+    if levels.is_empty() {
+        return ReaderLevel {
+            value: USUAL_LEVEL,
+            mean: USUAL_LEVEL,
+            spread: 0.0,
+        };
+    }
+    let mean = levels.iter().sum::<f64>() / n;
+    let squares: f64 = levels.iter().map(|level| (level - mean).powi(2)).sum();
+    let usual = MASK_LEVEL_SD * MASK_LEVEL_SD;
+    let variance = (squares + PRIOR_MASKS * usual) / (n - 1.0 + PRIOR_MASKS);
+    let share = n / (n + variance / (READER_LEVEL_SD * READER_LEVEL_SD));
+    let spread = if n > 1.0 { squares / (n - 1.0) } else { 0.0 };
+    ReaderLevel {
+        value: rounded(USUAL_LEVEL + share * (mean - USUAL_LEVEL)),
+        mean: rounded(mean),
+        spread: rounded(spread.sqrt()),
+    }
+}
+
+/// To a thousandth of a millimetre, or of the reference.
 fn rounded(x: f64) -> f64 {
     (1e3 * x).round() / 1e3 + 0.0
 }
@@ -63,6 +97,17 @@ mod tests {
             .map(|v| ReaderOffsets::from_array([*v, 0.0, 0.0]))
             .collect();
         learn(&measured).unwrap()[0]
+    }
+
+    #[test]
+    fn a_level_is_drawn_towards_the_usual_one() {
+        assert_eq!(learn_level(&[]).value, USUAL_LEVEL);
+        let one = learn_level(&[0.6]);
+        assert!((0.55..0.6).contains(&one.value), "{one:?}");
+        let many = learn_level(&[0.6; 30]);
+        assert!((0.598..=0.6).contains(&many.value), "{many:?}");
+        let odd = learn_level(&[0.9, 0.3]);
+        assert!(odd.value < learn_level(&[0.6, 0.6]).value, "{odd:?}");
     }
 
     #[test]

@@ -13,16 +13,26 @@
 //! 4. Between voxels a narrow cavity closes by up to half a millimetre. The medians for the mask of the fitted
 //!    wall itself show by how much, and are subtracted.
 //!
+//! The level ([`measure_level`]) is the one whose drawn wall agrees best with the mask (E_J), sought on a grid of
+//! [`COARSE_LEVEL_STEP`] and then of [`FINE_LEVEL_STEP`]: through the whole way of drawing, so that its smoothing is in
+//! the level.
+//!
 //! A ray that does not start in the mask, or does not leave it within [`MAX_EDGE_DISTANCE_MM`], counts for nothing.
 
-use super::profile::ReaderOffsets;
+use super::level::WallImage;
+use super::profile::{ReaderDrawing, ReaderOffsets};
 use crate::deform::FittedModel;
 use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::{Vec3, triangle};
-use crate::grid::voxelise::Mask;
+use crate::grid::voxelise::{Mask, voxelise};
 use crate::mesh::TriMesh;
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
+use crate::progress::{Cancelled, Monitor};
 
+/// Levels among which that of a mask is sought, and the distances of those tried.
+const SOUGHT_LEVELS: [f64; 2] = [0.2, 0.8];
+const COARSE_LEVEL_STEP: f64 = 0.05;
+const FINE_LEVEL_STEP: f64 = 0.01;
 /// Steps along a ray, mm.
 const RAY_STEP_MM: f64 = 0.25;
 /// Greatest distance of an edge from the middle of the wall, mm.
@@ -45,6 +55,52 @@ pub fn measure(
     Some(ReaderOffsets::from_array(
         [0, 1, 2].map(|which| drawn[which] - own[which]),
     ))
+}
+
+/// The level at which the wall of `fit`, drawn on `image`, agrees best with the mask `drawn` on the grid at `frame`, and
+/// that agreement (E_J).
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn measure_level(
+    fit: &FittedModel,
+    image: &WallImage,
+    drawn: &Mask,
+    frame: &VoxelToPatient,
+    monitor: &Monitor,
+) -> Result<(f64, f64), Cancelled> {
+    let agreement = |step: i32| {
+        let level = f64::from(step) * FINE_LEVEL_STEP;
+        let (made, _) = super::drawn(fit.clone(), &ReaderDrawing::Level(level), image, monitor)?;
+        let mask = voxelise(&made.mesh, drawn.shape, frame);
+        Ok::<_, Cancelled>((step, jaccard(&mask, drawn)))
+    };
+    let coarse = (COARSE_LEVEL_STEP / FINE_LEVEL_STEP).round() as i32;
+    let [low, high] = SOUGHT_LEVELS.map(|level| (level / FINE_LEVEL_STEP).round() as i32);
+    let best_of = |steps: Vec<i32>| {
+        let mut best = (low, f64::MIN);
+        for step in steps {
+            let own = agreement(step)?;
+            if own.1 > best.1 {
+                best = own;
+            }
+        }
+        Ok::<_, Cancelled>(best)
+    };
+    let (near, _) = best_of((low..=high).step_by(coarse as usize).collect())?;
+    let around = (near - coarse + 1).max(low)..(near + coarse).min(high + 1);
+    let (step, found) = best_of(around.collect())?;
+    Ok((f64::from(step) * FINE_LEVEL_STEP, found))
+}
+
+/// E_J of two masks on one grid.
+fn jaccard(a: &Mask, b: &Mask) -> f64 {
+    let (mut both, mut either) = (0usize, 0usize);
+    for (a, b) in a.voxels.iter().zip(&b.voxels) {
+        both += usize::from(*a && *b);
+        either += usize::from(*a || *b);
+    }
+    both as f64 / either.max(1) as f64
 }
 
 /// The medians of the distances from the surface of `fit` to a mask.

@@ -4,6 +4,7 @@ use crate::deform::WallEdge;
 use crate::text::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::ops::RangeInclusive;
 
 /// Distances of a reader's wall from the fitted one, mm.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -33,6 +34,57 @@ impl ReaderOffsets {
     }
 }
 
+/// How a reader's wall is drawn on a fitted one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ReaderDrawing {
+    /// By distances from the fitted edge.
+    Edge(ReaderOffsets),
+    /// Where the image has this share of the polar map's reference.
+    Level(f64),
+}
+
+impl ReaderDrawing {
+    /// Whether it leaves a wall as it is.
+    pub fn is_none(&self) -> bool {
+        *self == Self::Edge(ReaderOffsets::default())
+    }
+
+    /// The distances, mm, of a reader who draws by them.
+    pub fn offsets(&self) -> Option<ReaderOffsets> {
+        match self {
+            Self::Edge(offsets) => Some(*offsets),
+            Self::Level(_) => None,
+        }
+    }
+
+    /// The level, a share of the reference, of a reader who draws by one.
+    pub fn level(&self) -> Option<f64> {
+        match self {
+            Self::Edge(_) => None,
+            Self::Level(level) => Some(*level),
+        }
+    }
+}
+
+/// The kind of a reader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReaderKind {
+    /// Draws the edge that the image shows, some distance off.
+    Edge,
+    /// Draws where the image has a level.
+    Level,
+}
+
+impl ReaderKind {
+    /// `edge` or `level`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+            Self::Level => "level",
+        }
+    }
+}
+
 /// One distance of a reader's profile, mm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = LearntOffset))]
@@ -44,6 +96,48 @@ pub struct ReaderOffset {
     pub mean: f64,
     /// Standard deviation over the masks; 0 for one mask.
     pub spread: f64,
+}
+
+/// The level of a reader's profile, a share of the polar map's reference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = LearntLevel))]
+#[serde(deny_unknown_fields)]
+pub struct ReaderLevel {
+    /// The applied level: the mean, drawn towards the usual level.
+    pub value: f64,
+    /// Mean over the masks.
+    pub mean: f64,
+    /// Standard deviation over the masks; 0 for one mask.
+    pub spread: f64,
+}
+
+/// What was learnt of a reader.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Learnt {
+    /// The distances, in the order of [`ReaderOffsets`].
+    Edge([ReaderOffset; 3]),
+    /// The level.
+    Level(ReaderLevel),
+}
+
+impl Learnt {
+    /// The kind of the reader.
+    pub fn kind(&self) -> ReaderKind {
+        match self {
+            Self::Edge(_) => ReaderKind::Edge,
+            Self::Level(_) => ReaderKind::Level,
+        }
+    }
+
+    /// What is applied.
+    pub fn drawing(&self) -> ReaderDrawing {
+        match self {
+            Self::Edge(offsets) => {
+                ReaderDrawing::Edge(ReaderOffsets::from_array(offsets.map(|o| o.value)))
+            }
+            Self::Level(level) => ReaderDrawing::Level(level.value),
+        }
+    }
 }
 
 /// A scan and its mask that a profile was learnt on.
@@ -60,10 +154,10 @@ pub struct LearntOn {
 /// A reader's profile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReaderProfile {
-    /// The wall that the distances start from.
+    /// The wall that is drawn from.
     pub edge: WallEdge,
-    /// The distances, in the order of [`ReaderOffsets`].
-    pub offsets: [ReaderOffset; 3],
+    /// The reader's distances or level.
+    pub learnt: Learnt,
     /// The masks it was learnt on, one entry each.
     pub learnt_on: Vec<LearntOn>,
 }
@@ -75,7 +169,7 @@ pub enum ProfileError {
     #[error("this is no reader's profile: {0}")]
     Syntax(String),
     /// It was written by a program that knows more.
-    #[error("the profile has version {0}; this program reads version {PROFILE_VERSION}")]
+    #[error("the profile has version {0}; this program reads versions 1 to {PROFILE_VERSION}")]
     Version(u32),
     /// A field holds something that no profile can hold.
     #[error("`{field}`: {reason}")]
@@ -87,12 +181,14 @@ pub enum ProfileError {
     },
 }
 
-/// The version of the JSON.
-const PROFILE_VERSION: u32 = 1;
+/// The version of the JSON. Version 1 has no kind: its readers draw by distances.
+const PROFILE_VERSION: u32 = 2;
 /// The JSON's statement of its format.
 const PROFILE_FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
 const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
+/// The levels that are believed.
+const LEVELS: RangeInclusive<f64> = 0.1..=0.95;
 /// Longest JSON that is read, bytes.
 pub const MOST_BYTES: usize = 1 << 20;
 /// Most masks of a profile.
@@ -105,15 +201,23 @@ const MOST_MASKS: usize = 5000;
 pub struct ProfileDocument {
     /// `ventriform-reader-profile`.
     format: String,
-    /// 1.
+    /// 2, or 1, which has no `kind`.
     #[cfg_attr(feature = "schema", schema(value_type = u64))]
     version: u32,
-    /// The wall that the distances start from: `apparent` or `anatomical`.
+    /// `edge`: the reader draws the edge that the image shows, by the distances `offsets_mm` off. `level`: where the image
+    /// has a share of the polar map's reference.
+    #[serde(default)]
+    kind: Option<String>,
+    /// The wall that is drawn from: `apparent` or `anatomical`.
     edge: String,
     /// Number of masks that it was learnt on: the length of `learnt_on`.
     masks: usize,
-    /// The distances, mm.
-    offsets_mm: LearntOffsets,
+    /// The distances of a reader of kind `edge`, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    offsets_mm: Option<LearntOffsets>,
+    /// The level of a reader of kind `level`, a share of the polar map's reference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    level: Option<ReaderLevel>,
     /// The masks it was learnt on.
     learnt_on: Vec<LearntOn>,
 }
@@ -132,9 +236,9 @@ struct LearntOffsets {
 }
 
 impl ReaderProfile {
-    /// The distances that are applied.
-    pub fn offsets(&self) -> ReaderOffsets {
-        ReaderOffsets::from_array(self.offsets.map(|o| o.value))
+    /// What is applied.
+    pub fn drawing(&self) -> ReaderDrawing {
+        self.learnt.drawing()
     }
 
     /// Number of masks that it was learnt on.
@@ -144,17 +248,25 @@ impl ReaderProfile {
 
     /// The JSON, ending with a line feed.
     pub fn to_json(&self) -> String {
-        let [endocardium, epicardium, rim] = self.offsets;
+        let (offsets_mm, level) = match self.learnt {
+            Learnt::Edge([endocardium, epicardium, rim]) => {
+                let offsets = LearntOffsets {
+                    endocardium,
+                    epicardium,
+                    rim,
+                };
+                (Some(offsets), None)
+            }
+            Learnt::Level(level) => (None, Some(level)),
+        };
         let document = ProfileDocument {
             format: PROFILE_FORMAT.into(),
             version: PROFILE_VERSION,
+            kind: Some(self.learnt.kind().as_str().into()),
             edge: self.edge.as_str().into(),
             masks: self.masks(),
-            offsets_mm: LearntOffsets {
-                endocardium,
-                epicardium,
-                rim,
-            },
+            offsets_mm,
+            level,
             learnt_on: self.learnt_on.clone(),
         };
         let mut text = serde_json::to_string_pretty(&document).expect("finite numbers and texts");
@@ -184,25 +296,14 @@ impl ReaderProfile {
             return Err(ProfileError::Syntax(reason));
         }
         let version = any["version"].as_u64().unwrap_or(0);
-        if version != u64::from(PROFILE_VERSION) {
+        if !(1..=u64::from(PROFILE_VERSION)).contains(&version) {
             let version = u32::try_from(version).unwrap_or(u32::MAX);
             return Err(ProfileError::Version(version));
         }
         let document: ProfileDocument = serde_json::from_value(any).map_err(syntax)?;
         let edge = WallEdge::parse(&document.edge)
             .ok_or_else(|| refused("edge", "it must be apparent or anatomical"))?;
-        let given = document.offsets_mm;
-        let offsets = [given.endocardium, given.epicardium, given.rim];
-        for ((name, most), offset) in MAX_OFFSETS_MM.iter().zip(&offsets) {
-            let within = |x: f64| x.abs() <= *most;
-            if !(within(offset.value)
-                && within(offset.mean)
-                && (0.0..=20.0).contains(&offset.spread))
-            {
-                let reason = format!("it must lie within {most} mm, its spread from 0 to 20 mm");
-                return Err(refused(&format!("offsets_mm.{name}"), reason));
-            }
-        }
+        let learnt = document.learnt()?;
         if document.masks != document.learnt_on.len() || !(1..=MOST_MASKS).contains(&document.masks)
         {
             let reason = format!("it must count the entries of `learnt_on`, 1 to {MOST_MASKS}");
@@ -219,10 +320,61 @@ impl ReaderProfile {
         }
         Ok(Self {
             edge,
-            offsets,
+            learnt,
             learnt_on: document.learnt_on,
         })
     }
+}
+
+impl ProfileDocument {
+    /// The distances or the level, as the kind says.
+    fn learnt(&self) -> Result<Learnt, ProfileError> {
+        let kind = match (self.version, self.kind.as_deref()) {
+            (1, None) => "edge",
+            (1, Some(_)) => return Err(refused("kind", "a profile of version 1 has none")),
+            (_, kind) => kind.unwrap_or_default(),
+        };
+        let (missing, other) = (
+            "it must be there, and is not",
+            "a reader of this kind has none",
+        );
+        match kind {
+            "edge" => {
+                if self.level.is_some() {
+                    return Err(refused("level", other));
+                }
+                let given = self.offsets_mm.as_ref();
+                checked_offsets(given.ok_or_else(|| refused("offsets_mm", missing))?)
+            }
+            "level" => {
+                if self.offsets_mm.is_some() {
+                    return Err(refused("offsets_mm", other));
+                }
+                let level = self.level.ok_or_else(|| refused("level", missing))?;
+                let within = LEVELS.contains(&level.value) && LEVELS.contains(&level.mean);
+                if !(within && (0.0..=1.0).contains(&level.spread)) {
+                    let (least, most) = (LEVELS.start(), LEVELS.end());
+                    let reason =
+                        format!("it must lie from {least} to {most}, its spread from 0 to 1");
+                    return Err(refused("level", reason));
+                }
+                Ok(Learnt::Level(level))
+            }
+            _ => Err(refused("kind", "it must be edge or level")),
+        }
+    }
+}
+
+fn checked_offsets(given: &LearntOffsets) -> Result<Learnt, ProfileError> {
+    let offsets = [given.endocardium, given.epicardium, given.rim];
+    for ((name, most), offset) in MAX_OFFSETS_MM.iter().zip(&offsets) {
+        let within = |x: f64| x.abs() <= *most;
+        if !(within(offset.value) && within(offset.mean) && (0.0..=20.0).contains(&offset.spread)) {
+            let reason = format!("it must lie within {most} mm, its spread from 0 to 20 mm");
+            return Err(refused(&format!("offsets_mm.{name}"), reason));
+        }
+    }
+    Ok(Learnt::Edge(offsets))
 }
 
 fn refused(field: &str, reason: impl Into<String>) -> ProfileError {
@@ -240,11 +392,11 @@ pub(super) mod tests {
     pub fn profile(offsets: [f64; 3]) -> ReaderProfile {
         ReaderProfile {
             edge: WallEdge::Apparent,
-            offsets: offsets.map(|value| ReaderOffset {
+            learnt: Learnt::Edge(offsets.map(|value| ReaderOffset {
                 value,
                 mean: value,
                 spread: 0.0,
-            }),
+            })),
             learnt_on: vec![LearntOn {
                 scan: "a".repeat(64),
                 mask: "b".repeat(64),
@@ -265,18 +417,61 @@ pub(super) mod tests {
         assert_eq!(read.sha256(), written.sha256());
     }
 
+    /// A profile of this level, as if learnt on one mask.
+    fn level(value: f64) -> ReaderProfile {
+        ReaderProfile {
+            learnt: Learnt::Level(ReaderLevel {
+                value,
+                mean: value,
+                spread: 0.0,
+            }),
+            ..profile([0.0; 3])
+        }
+    }
+
+    #[test]
+    fn a_level_reads_back_unchanged_and_has_no_distances() {
+        let written = level(0.5);
+        let text = written.to_json();
+        assert!(text.contains("\"kind\": \"level\"") && !text.contains("offsets"));
+        assert_eq!(ReaderProfile::from_json(text.as_bytes()), Ok(written));
+        for (from, to, field) in [
+            ("\"kind\": \"level\"", "\"kind\": \"edge\"", "level"),
+            ("\"kind\": \"level\"", "\"kind\": \"both\"", "kind"),
+            ("\"value\": 0.5", "\"value\": 1.5", "level"),
+            ("\"version\": 2", "\"version\": 1", "kind"),
+        ] {
+            let changed = text.replacen(from, to, 1);
+            assert_ne!(changed, text);
+            let error = ReaderProfile::from_json(changed.as_bytes()).unwrap_err();
+            let named = format!("`{field}`");
+            assert!(error.to_string().contains(&named), "{error} for {to}");
+        }
+    }
+
+    /// Profiles of version 1 were learnt before there were kinds.
+    #[test]
+    fn a_profile_of_version_1_has_distances() {
+        let written = profile([0.5, -1.25, 3.0]);
+        let text = written
+            .to_json()
+            .replace("\"version\": 2", "\"version\": 1");
+        let text = text.replace("  \"kind\": \"edge\",\n", "");
+        assert_eq!(ReaderProfile::from_json(text.as_bytes()), Ok(written));
+    }
+
     #[test]
     fn what_no_profile_can_hold_is_refused_by_name() {
         let text = profile([0.5, -1.25, 3.0]).to_json();
         for (from, to, field) in [
-            ("\"version\": 1", "\"version\": 2", "version 2"),
+            ("\"version\": 2", "\"version\": 3", "version 3"),
             ("-1.25", "-9.25", "offsets_mm.epicardium"),
             ("-1.25", "1e999", "profile"),
             ("\"masks\": 1", "\"masks\": 2", "masks"),
             ("apparent", "blurred", "edge"),
             ("aaaa", "zzzz", "learnt_on"),
             ("ventriform-reader", "other", "format"),
-            ("\"edge\"", "\"patient\": \"x\", \"edge\"", "patient"),
+            ("\"edge\": ", "\"patient\": \"x\", \"edge\": ", "patient"),
         ] {
             let changed = text.replacen(from, to, 1);
             assert_ne!(changed, text);

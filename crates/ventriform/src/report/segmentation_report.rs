@@ -12,6 +12,7 @@ use super::input::FileFacts;
 use super::json_number::{not_stated, or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
+use super::summaries::edge_kind;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::judge::Fit;
@@ -123,13 +124,20 @@ pub struct AppliedReaderReport {
     pub name: String,
     /// SHA-256 of the profile, hexadecimal.
     pub sha256: String,
-    /// The wall that the distances start from.
+    /// `edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
+    /// reference.
+    #[serde(default = "edge_kind")]
+    pub kind: String,
+    /// The wall that was drawn from.
     pub edge: String,
     /// Number of masks that it was learnt on.
     pub masks: usize,
-    /// The distances, mm.
-    pub offsets_mm: ReaderOffsets,
-    /// Share of the distances that was applied: 1 unless the surface would intersect itself.
+    /// The distances, mm; `null` for a reader of kind `level`.
+    pub offsets_mm: Option<ReaderOffsets>,
+    /// The level, a share of the polar map's reference; `null` for a reader of kind `edge`.
+    #[serde(default)]
+    pub level: Option<f64>,
+    /// Share of the movement that was applied: 1 unless the surface would intersect itself.
     pub share_applied: f64,
 }
 
@@ -278,14 +286,17 @@ impl CandidateReport {
 }
 
 impl AppliedReaderReport {
-    /// The profile called `name`, by whose distances the wall was moved, reduced to the share `applied`.
+    /// The profile called `name`, by which the wall was moved, reduced to the share `applied`.
     pub fn new(name: &str, profile: &ReaderProfile, applied: f64) -> Self {
+        let drawing = profile.drawing();
         Self {
             name: name.to_owned(),
             sha256: profile.sha256(),
+            kind: profile.learnt.kind().as_str().to_owned(),
             edge: profile.edge.as_str().to_owned(),
             masks: profile.masks(),
-            offsets_mm: profile.offsets(),
+            offsets_mm: drawing.offsets(),
+            level: drawing.level(),
             share_applied: round(applied),
         }
     }

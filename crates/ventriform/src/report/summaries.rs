@@ -6,7 +6,7 @@ use super::fit_report::FittedVolumes;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
 use crate::normals::{GroupSex, NormalGroup, NormalLimits};
-use crate::reader::{ReaderOffsets, ReaderProfile};
+use crate::reader::{ReaderKind, ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -114,12 +114,19 @@ pub struct TemplateSummary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct ReaderSummary {
-    /// The wall that the distances start from: `apparent` or `anatomical`.
+    /// `edge`: the reader draws by distances from the edge that the image shows. `level`: where the image has a share of the
+    /// polar map's reference.
+    #[serde(default = "edge_kind")]
+    pub kind: String,
+    /// The wall that is drawn from: `apparent` or `anatomical`.
     pub edge: String,
     /// Number of masks that it was learnt on.
     pub masks: usize,
-    /// The distances that are applied, mm.
-    pub offsets_mm: ReaderOffsets,
+    /// The distances that are applied, mm; `null` for a reader of kind `level`.
+    pub offsets_mm: Option<ReaderOffsets>,
+    /// The level that is applied, a share of the polar map's reference; `null` for a reader of kind `edge`.
+    #[serde(default)]
+    pub level: Option<f64>,
 }
 
 /// The main figures of a comparison of rest and stress; the report has all.
@@ -262,12 +269,20 @@ impl BeatSummary {
 impl ReaderSummary {
     /// The main figures of `profile`.
     pub fn of(profile: &ReaderProfile) -> Self {
+        let drawing = profile.drawing();
         Self {
+            kind: profile.learnt.kind().as_str().to_owned(),
             edge: profile.edge.as_str().to_owned(),
             masks: profile.masks(),
-            offsets_mm: profile.offsets(),
+            offsets_mm: drawing.offsets(),
+            level: drawing.level(),
         }
     }
+}
+
+/// The kind of readers in summaries that were stored before there were kinds.
+pub(super) fn edge_kind() -> String {
+    ReaderKind::Edge.as_str().to_owned()
 }
 
 /// A document as a JSON object, its fields in their order.

@@ -12,7 +12,7 @@ use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Monitor, Stage};
-use crate::reader;
+use crate::reader::{self, WallImage};
 use crate::volume::Volume;
 
 /// Parameters of [`segment`].
@@ -64,7 +64,7 @@ pub struct Segmentation {
 pub struct AppliedReader {
     /// The profile.
     pub reader: NamedReader,
-    /// The share of its distances by which the wall moved: 1 unless the surface would intersect itself.
+    /// The share of its movement that was applied: 1 unless the surface would intersect itself.
     pub share: f64,
 }
 
@@ -136,7 +136,9 @@ pub fn segment(
     let (fit, reader) = match &parameters.reader {
         Some(reader) => {
             let Fit { model, judgement } = fit;
-            let (model, share) = reader::drawn(model, &reader.profile.offsets(), monitor)?;
+            let reference = polar.as_ref().map_or(0.0, |map| map.reference);
+            let image = WallImage::about(&model, volume, reference, monitor)?;
+            let (model, share) = reader::drawn(model, &reader.profile.drawing(), &image, monitor)?;
             let reader = reader.clone();
             (
                 Fit { model, judgement },

@@ -14,13 +14,16 @@ use ventriform::grid::voxelise::voxelise;
 use ventriform::model::Organ;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
-use ventriform::reader::{LearntOn, ReaderOffset, ReaderOffsets, ReaderProfile, drawn, measure};
+use ventriform::reader::{
+    Learnt, LearntOn, ReaderDrawing, ReaderKind, ReaderLevel, ReaderOffset, ReaderOffsets,
+    ReaderProfile, WallImage, drawn, measure,
+};
 use ventriform::report::{SegmentationReport, object};
 use ventriform::segmentation::{
     NamedReader, SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
 };
 use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, VolumeFile};
 
 fn write(path: &Path, volume: &Volume, stored: StoredType) {
@@ -42,11 +45,11 @@ fn scan(path: &Path, seed: u64) {
 fn profile(offsets: [f64; 3]) -> ReaderProfile {
     ReaderProfile {
         edge: WallEdge::Apparent,
-        offsets: offsets.map(|value| ReaderOffset {
+        learnt: Learnt::Edge(offsets.map(|value| ReaderOffset {
             value,
             mean: value,
             spread: 0.0,
-        }),
+        })),
         learnt_on: vec![LearntOn {
             scan: "0".repeat(64),
             mask: "1".repeat(64),
@@ -83,20 +86,156 @@ fn cohort(seeds: &[u64], offsets: &ReaderOffsets) -> TempDir {
         scan(&path, *seed);
         let made = segmented(&path, None, &FitParameters::default()).unwrap();
         let volume = &made.reading.volume;
-        let (fit, share) = drawn(made.segmentation.fit.model, offsets, &Monitor::silent()).unwrap();
+        let drawing = ReaderDrawing::Edge(*offsets);
+        let fit = made.segmentation.fit.model;
+        let image = WallImage::about(&fit, volume, 1.0, &Monitor::silent()).unwrap();
+        let (fit, share) = drawn(fit, &drawing, &image, &Monitor::silent()).unwrap();
         assert_eq!(share, 1.0);
         let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
-        let mask = Volume {
-            voxels: mask
-                .voxels
-                .iter()
-                .map(|v| f32::from(u8::from(*v)))
-                .collect(),
-            ..volume.clone()
-        };
-        write(&case.join("lv_expert_img.nii.gz"), &mask, StoredType::Uint8);
+        write_mask(&case, &mask.voxels, volume);
     }
     folder
+}
+
+fn write_mask(case: &Path, mask: &[bool], volume: &Volume) {
+    let mask = Volume {
+        voxels: mask.iter().map(|v| f32::from(u8::from(*v))).collect(),
+        ..volume.clone()
+    };
+    write(&case.join("lv_expert_img.nii.gz"), &mask, StoredType::Uint8);
+}
+
+/// Greatest distance from the known wall at which a reader of levels draws, mm.
+const LEVEL_READER_REACH_MM: f64 = 8.0;
+
+/// Scans of these seeds and the masks of a reader who sets every voxel near the wall that has `level` of the brightest
+/// quarter of the wall, with the reader's own variation from scan to scan and from side to side.
+fn level_cohort(seeds: &[u64], level: f64) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for seed in seeds {
+        let case = folder.path().join(format!("case{seed}"));
+        let parameters = PhantomParameters {
+            shape: [64; 3],
+            spacing_mm: [4.0; 3],
+            seed: *seed,
+            ..PhantomParameters::default()
+        };
+        let made = phantom(&parameters, &Monitor::silent()).unwrap();
+        let volume = &made.volume;
+        write(&case.join("spect.nii.gz"), volume, StoredType::Int16);
+        let [nx, ny, _] = volume.shape;
+        let place = |index: usize| [index % nx, index / nx % ny, index / (nx * ny)];
+        let wall: Vec<usize> = (0..volume.voxels.len())
+            .filter(|index| made.truth.voxels[*index] > 0.5)
+            .collect();
+        let mut uptake: Vec<f32> = wall.iter().map(|index| volume.voxels[*index]).collect();
+        uptake.sort_by(f32::total_cmp);
+        let brightest = &uptake[uptake.len() * 3 / 4..];
+        let reference = f64::from(brightest.iter().sum::<f32>()) / brightest.len() as f64;
+        let reach = (LEVEL_READER_REACH_MM / parameters.spacing_mm[0]) as usize;
+        let mut near = vec![false; volume.voxels.len()];
+        for index in &wall {
+            let [i, j, k] = place(*index);
+            for (i, j, k) in (i - reach..=i + reach)
+                .flat_map(|i| (j - reach..=j + reach).map(move |j| (i, j)))
+                .flat_map(|(i, j)| (k - reach..=k + reach).map(move |k| (i, j, k)))
+            {
+                near[i + nx * (j + ny * k)] = true;
+            }
+        }
+        let of_scan = level + 0.02 * ((*seed % 3) as f64 - 1.0);
+        let drawn: Vec<bool> = (0..volume.voxels.len())
+            .map(|index| {
+                let [i, j, _] = place(index);
+                let own = of_scan + 0.03 * (0.2 * (i + j) as f64).sin();
+                near[index] && f64::from(volume.voxels[index]) >= own * reference
+            })
+            .collect();
+        write_mask(&case, &drawn, volume);
+    }
+    folder
+}
+
+#[test]
+fn a_reader_who_draws_a_level_is_told_from_one_who_draws_the_edge() {
+    for (seeds, level) in [(&[11, 12, 13, 14][..], 0.42), (&[15][..], 0.4)] {
+        let made = calibrated(level_cohort(seeds, level).path());
+        assert_eq!(made.kind(), ReaderKind::Level, "{:?}", made.mean_jaccards());
+        let means = made.mean_jaccards();
+        assert!(means.level > means.without + 0.02, "{means:?}");
+        assert!(means.level > 0.87, "{means:?}");
+        let Learnt::Level(learnt) = made.profile.learnt else {
+            panic!("a level");
+        };
+        // The polar map's reference is that of the fitted wall, the reader's that of the known one.
+        assert!((learnt.mean - level).abs() < 0.08, "{learnt:?}");
+        let text = made.profile.to_json();
+        assert_eq!(ReaderProfile::from_json(text.as_bytes()), Ok(made.profile));
+    }
+}
+
+/// A level leaves everything as it is but the wall that is drawn, and dark wall keeps its fitted edge.
+#[test]
+fn a_level_draws_mask_and_mesh_alike_and_keeps_infarcts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.nii.gz");
+    let parameters = PhantomParameters {
+        shape: [64; 3],
+        spacing_mm: [4.0; 3],
+        seed: 21,
+        defects: [10, 11, 16]
+            .map(|segment| PerfusionDefect {
+                segment,
+                severity: 0.9,
+            })
+            .into(),
+        ..PhantomParameters::default()
+    };
+    let known = phantom(&parameters, &Monitor::silent()).unwrap();
+    write(&path, &known.volume, StoredType::Int16);
+    let defaults = FitParameters::default();
+    let plain = segmented(&path, None, &defaults).unwrap();
+    let by_level = ReaderProfile {
+        learnt: Learnt::Level(ReaderLevel {
+            value: 0.5,
+            mean: 0.5,
+            spread: 0.0,
+        }),
+        ..profile([0.0; 3])
+    };
+    let made = segmented(&path, Some(by_level), &defaults).unwrap();
+    let [report, without] = [&made, &plain].map(SegmentedVolume::report);
+    let reader = report.reader.as_ref().unwrap();
+    assert_eq!((reader.kind.as_str(), reader.level), ("level", Some(0.5)));
+    assert_eq!((reader.offsets_mm, reader.share_applied), (None, 1.0));
+    assert_eq!(report.volumes_ml.apparent, without.volumes_ml.apparent);
+    assert_eq!(report.volumes_ml.anatomical, without.volumes_ml.anatomical);
+    let [mesh, fitted] = [&made, &plain].map(|made| &made.segmentation.fit.model.mesh);
+    assert_eq!(mesh.triangles, fitted.triangles);
+    let volume = &made.reading.volume;
+    let own = voxelise(mesh, volume.shape, &volume.frame);
+    assert_eq!(own.voxels, made.segmentation.mask.voxels);
+    // Dark wall stays wall: of the known wall as much is in the mask as by the fit.
+    let share = |mask: &[bool]| {
+        let wall = || (0..mask.len()).filter(|index| known.truth.voxels[*index] > 0.5);
+        let map = plain.segmentation.polar.as_ref().unwrap();
+        let dark = |index: &usize| f64::from(volume.voxels[*index]) < 0.4 * map.reference;
+        let infarct: Vec<usize> = wall().filter(dark).collect();
+        (
+            infarct.iter().filter(|index| mask[**index]).count(),
+            infarct.len(),
+        )
+    };
+    let (drawn, all) = share(&made.segmentation.mask.voxels);
+    let (by_fit, _) = share(&plain.segmentation.mask.voxels);
+    assert!(
+        all > 20 && drawn * 10 >= by_fit * 9,
+        "{drawn} {by_fit} of {all}"
+    );
+    let quiet = Monitor::silent();
+    let page = made.page(&made.files(&[Format::Stl], None, &quiet).unwrap(), None);
+    let page = String::from_utf8(page.bytes).unwrap();
+    assert!(page.contains("drawn as reader one: at 50 % of the wall's brightest uptake"));
 }
 
 fn calibrated(folder: &Path) -> Calibration {
@@ -115,20 +254,18 @@ fn calibration_recovers_the_distances_that_masks_were_drawn_by() {
     let made = calibrated(folder.path());
     assert_eq!(made.problems, []);
     let tolerance = [0.25, 0.25, 0.8];
-    for ((found, known), tolerance) in made
-        .profile
-        .offsets
-        .iter()
-        .zip(known.to_array())
-        .zip(tolerance)
-    {
+    assert_eq!(made.kind(), ReaderKind::Edge, "{:?}", made.mean_jaccards());
+    let Learnt::Edge(offsets) = made.profile.learnt else {
+        panic!("distances");
+    };
+    for ((found, known), tolerance) in offsets.iter().zip(known.to_array()).zip(tolerance) {
         assert!((found.mean - known).abs() < tolerance, "{:?}", made.profile);
         // Four masks are believed, but not wholly.
         assert!(found.value.abs() < found.mean.abs(), "{found:?}");
     }
     assert_eq!(made.profile.masks(), 4);
     for row in &made.rows {
-        let held_out = row.held_out.unwrap();
+        let held_out = row.by_edge.held_out.unwrap();
         assert!(held_out.jaccard > row.without.jaccard, "{row:?}");
         assert!(held_out.contour < row.without.contour, "{row:?}");
         let off = |ml: f64| (ml - row.reader_ml).abs();
@@ -164,7 +301,7 @@ fn a_profile_learnt_on_one_mask_helps_another_of_that_reader() {
     let made = calibrated(cohort(&[5, 6], &known).path());
     for row in &made.rows {
         assert!(
-            row.held_out.unwrap().jaccard > row.without.jaccard,
+            row.by_edge.held_out.unwrap().jaccard > row.without.jaccard,
             "{row:?}"
         );
     }
@@ -205,7 +342,7 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
     let report = made.report();
     let reader = report.reader.as_ref().unwrap();
     assert_eq!(reader.name, "one");
-    assert_eq!(reader.offsets_mm.epicardium, -0.5);
+    assert_eq!(reader.offsets_mm.unwrap().epicardium, -0.5);
     assert_eq!(reader.share_applied, 1.0);
     let plain = without.report();
     assert_eq!(plain.reader, None);
