@@ -50,8 +50,7 @@ pub fn fit_at(
     let setup = FitSetup::new(position, volume, template, parameters, monitor)?;
     let fit_from = |setup: &FitSetup| -> Result<Fit, DeformError> {
         let model = deform::fit(setup, template, parameters, monitor)?;
-        let (organ, edge) = (template.organ, parameters.edge);
-        let judgement = judge(&model, setup, volume, organ, edge, monitor)?;
+        let judgement = judge(&model, setup, volume, template.organ, parameters, monitor)?;
         Ok(Fit { model, judgement })
     };
     let mut fit = fit_from(&setup)?;

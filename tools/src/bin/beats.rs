@@ -82,7 +82,7 @@ fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> R
     let fit = FitParameters::default();
     let order = SegmentationParameters {
         deform: fit
-            .on(&study.sum, reading.facts.affine_source)
+            .on(&study.sum, reading.facts.affine_source, None)
             .map_err(|error| anyhow!("{}", error.message))?,
         polar: fit.polar,
         ..SegmentationParameters::default()

@@ -59,8 +59,18 @@ export interface components {
         };
         /** @description The reader's profile that a wall was drawn by. */
         AppliedReader: {
-            /** @description The wall that the distances start from. */
+            /** @description The wall that was drawn from. */
             edge: string;
+            /**
+             * @description `edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
+             *     reference.
+             */
+            kind?: string;
+            /**
+             * Format: double
+             * @description The level, a share of the polar map's reference; `null` for a reader of kind `edge`.
+             */
+            level?: number | null;
             /**
              * Format: int64
              * @description Number of masks that it was learnt on.
@@ -68,13 +78,12 @@ export interface components {
             masks: number;
             /** @description Its name. */
             name: string;
-            /** @description The distances, mm. */
-            offsets_mm: components["schemas"]["ReaderOffsets"];
+            offsets_mm?: components["schemas"]["ReaderOffsets"] | null;
             /** @description SHA-256 of the profile, hexadecimal. */
             sha256: string;
             /**
              * Format: double
-             * @description Share of the distances that was applied: 1 unless the surface would intersect itself.
+             * @description Share of the movement that was applied: 1 unless the surface would intersect itself.
              */
             share_applied: number;
         };
@@ -280,6 +289,12 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
+             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -367,7 +382,7 @@ export interface components {
              */
             torsion_stiffness?: number;
             /**
-             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @description The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have
              * @example Tc-99m tetrofosmin
              */
             tracer?: string;
@@ -880,6 +895,12 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
+             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -973,7 +994,7 @@ export interface components {
              */
             torsion_stiffness?: number;
             /**
-             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @description The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have
              * @example Tc-99m tetrofosmin
              */
             tracer?: string;
@@ -1602,7 +1623,8 @@ export interface components {
             active_sensors: number;
             /**
              * Format: double
-             * @description Confidence that the fit is right, 0 to 1.
+             * @description Chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of 0.75 or more, calibrated on
+             *     simulated scans, 0 to 1; of other organs, half the share of the surface that sees an edge.
              */
             confidence: number;
             /** @description How far each vertex moved, mm. */
@@ -2220,6 +2242,24 @@ export interface components {
              * @description Number of voxels with that value.
              */
             voxels: number;
+        };
+        /** @description The level of a reader's profile, a share of the polar map's reference. */
+        LearntLevel: {
+            /**
+             * Format: double
+             * @description Mean over the masks.
+             */
+            mean: number;
+            /**
+             * Format: double
+             * @description Standard deviation over the masks; 0 for one mask.
+             */
+            spread: number;
+            /**
+             * Format: double
+             * @description The applied level: the mean, drawn towards the usual level.
+             */
+            value: number;
         };
         /** @description One distance of a reader's profile, mm. */
         LearntOffset: {
@@ -2978,6 +3018,12 @@ export interface components {
              */
             narrowing?: number;
             /**
+             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
+            /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
              */
@@ -3124,6 +3170,12 @@ export interface components {
              * @default 0.85
              */
             narrowing?: number;
+            /**
+             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
             /**
              * @description Sigma of the Gaussian that smooths the image for the polar map, millimetres
              * @default 3
@@ -3699,36 +3751,50 @@ export interface components {
         };
         /** @description A reader's profile, as `ventriform calibrate` writes it. */
         ReaderProfile: {
-            /** @description The wall that the distances start from: `apparent` or `anatomical`. */
+            /** @description The wall that is drawn from: `apparent` or `anatomical`. */
             edge: string;
             /** @description `ventriform-reader-profile`. */
             format: string;
+            /**
+             * @description `edge`: the reader draws the edge that the image shows, by the distances `offsets_mm` off. `level`: where the image
+             *     has a share of the polar map's reference.
+             */
+            kind?: string | null;
             /** @description The masks it was learnt on. */
             learnt_on: components["schemas"]["LearntOn"][];
+            level?: components["schemas"]["LearntLevel"] | null;
             /**
              * Format: int64
              * @description Number of masks that it was learnt on: the length of `learnt_on`.
              */
             masks: number;
-            /** @description The distances, mm. */
-            offsets_mm: components["schemas"]["LearntOffsets"];
+            offsets_mm?: components["schemas"]["LearntOffsets"] | null;
             /**
              * Format: int64
-             * @description 1.
+             * @description 2, or 1, which has no `kind`.
              */
             version: number;
         };
         /** @description Content of a reader's profile. */
         ReaderSummary: {
-            /** @description The wall that the distances start from: `apparent` or `anatomical`. */
+            /** @description The wall that is drawn from: `apparent` or `anatomical`. */
             edge: string;
+            /**
+             * @description `edge`: the reader draws by distances from the edge that the image shows. `level`: where the image has a share of the
+             *     polar map's reference.
+             */
+            kind?: string;
+            /**
+             * Format: double
+             * @description The level that is applied, a share of the polar map's reference; `null` for a reader of kind `edge`.
+             */
+            level?: number | null;
             /**
              * Format: int64
              * @description Number of masks that it was learnt on.
              */
             masks: number;
-            /** @description The distances that are applied, mm. */
-            offsets_mm: components["schemas"]["ReaderOffsets"];
+            offsets_mm?: components["schemas"]["ReaderOffsets"] | null;
         };
         /** @description Whether the service can accept work. */
         Ready: {
@@ -3986,6 +4052,8 @@ export interface components {
             referring_physician?: string | null;
             /** @description `rest` or `stress`. */
             rest_or_stress?: string | null;
+            /** @description Scan Arc (0018,1143): by how many degrees the camera turned. */
+            scan_arc?: string | null;
             /** @description Series Description (0008,103E). */
             series_description?: string | null;
             /** @description Series Number (0020,0011). */
@@ -4280,6 +4348,12 @@ export interface components {
             /** @description Id of normal limits to compare the wall's uptake with */
             normals?: string;
             /**
+             * @description How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on
+             * @default auto
+             * @enum {string}
+             */
+            orbit?: "auto" | "none" | "180" | "360";
+            /**
              * @description Organ that the model shows. All but the left ventricle are searched for as the largest bright region and have no polar map
              * @default left_ventricle
              * @enum {string}
@@ -4378,7 +4452,7 @@ export interface components {
              */
             torsion_stiffness?: number;
             /**
-             * @description The scan's tracer, as the normal limits name it. Default: the only one that they have
+             * @description The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have
              * @example Tc-99m tetrofosmin
              */
             tracer?: string;
@@ -5317,6 +5391,7 @@ export type Key = components['schemas']['Key'];
 export type KeyList = components['schemas']['KeyList'];
 export type KeyState = components['schemas']['KeyState'];
 export type LabelCount = components['schemas']['LabelCount'];
+export type LearntLevel = components['schemas']['LearntLevel'];
 export type LearntOffset = components['schemas']['LearntOffset'];
 export type LearntOffsets = components['schemas']['LearntOffsets'];
 export type LearntOn = components['schemas']['LearntOn'];

@@ -49,7 +49,7 @@ pub mod setup;
 pub use error::DeformError;
 pub use fitted_model::{FittedModel, WallSurface, WallSurfaces};
 pub use organ_position::OrganPosition;
-pub use parameters::{DeformParameters, WallEdge};
+pub use parameters::{DeformParameters, Orbit, WallEdge};
 
 use crate::model::Template;
 use crate::progress::{Monitor, Stage};

@@ -7,6 +7,7 @@ use super::sensors::SensorKind;
 use crate::geometry::Vec3;
 use crate::locate::Hints;
 use crate::locate::patient_orientation::Superior;
+use std::ops::RangeInclusive;
 
 /// Parameters of [`fit`](super::fit()).
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +46,8 @@ pub struct DeformParameters {
     /// The image's resolution (full width of a point at half its maximum, motion and filter
     /// included), mm, 0..=30, for the anatomical wall. Default `None`: by calibration.
     pub resolution: Option<f64>,
+    /// How the camera turned, by which motion of the patient is judged. Default [`Orbit::Auto`].
+    pub orbit: Orbit,
     /// The kind of motion.
     pub motion: Motion,
 }
@@ -65,7 +68,44 @@ impl Default for DeformParameters {
             margin: 0.0,
             edge: WallEdge::Apparent,
             resolution: None,
+            orbit: Orbit::Auto,
             motion: Motion::default(),
+        }
+    }
+}
+
+/// How the camera turned about the patient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Orbit {
+    /// As the scan's header says; unknown where it does not.
+    Auto,
+    /// Not at all: it saw all angles at once. No view is later than another, so that a patient who moves blurs all.
+    None,
+    /// By half a turn.
+    Half,
+    /// By a whole turn.
+    Full,
+}
+
+/// Scan arcs of half a turn, degrees; greater ones are whole turns, smaller ones none that is known.
+const HALF_TURN_DEG: RangeInclusive<f64> = 90.0..=270.0;
+
+impl Orbit {
+    /// The orbit of a scan arc, degrees; `None` if no camera turns so.
+    pub fn of_arc(degrees: f64) -> Option<Self> {
+        match degrees {
+            0.0 => Some(Self::None),
+            arc if HALF_TURN_DEG.contains(&arc) => Some(Self::Half),
+            arc if arc > *HALF_TURN_DEG.end() && arc <= 720.0 => Some(Self::Full),
+            _ => None,
+        }
+    }
+
+    /// The orbit, or that which the header states if it is to be looked up.
+    pub fn or_stated(self, stated: Option<Self>) -> Self {
+        match self {
+            Self::Auto => stated.unwrap_or(Self::Auto),
+            _ => self,
         }
     }
 }

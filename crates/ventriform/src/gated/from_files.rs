@@ -65,7 +65,11 @@ pub fn from_files(
     let parameters = order.parameters.clone();
     let fit = SegmentationParameters {
         deform: parameters
-            .on(&study.sum, reading.facts.affine_source)
+            .on(
+                &study.sum,
+                reading.facts.affine_source,
+                reading.provenance(),
+            )
             .map_err(crate::segmentation::SegmentationError::from)?,
         polar: parameters.polar,
         kept_model: parameters.kept_model.clone(),

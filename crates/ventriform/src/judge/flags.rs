@@ -14,7 +14,8 @@ pub enum Flag {
     },
     /// The chance of a good fit is below 0.7.
     #[error(
-        "the chance that an expert's mask agrees with this one (Jaccard index 0.75 or more) is {:.0} %: \
+        "the chance that a reader who draws the visible edge agrees with this mask (Jaccard index 0.75 or more; calibrated on \
+         simulated scans) is {:.0} %: \
          edges along {:.0} % of the surface, {residual:.1} mm off in the mean, strain {:.0} %, the \
          wall's thickness scatters by {thickness_spread:.1} mm, its distance from the axis by {:.0} %, \
          hollow by {hollowness:.2}",
@@ -67,13 +68,19 @@ pub enum Flag {
     },
     /// The apical wall is too dark to be seen.
     #[error(
-        "the apical wall takes up {:.0} % as much as the basal one: the length of the model is \
-         that of a mean heart of this breadth",
-        100.0 * uptake
+        "the apical wall takes up {:.0} % as much as the {}",
+        100.0 * uptake,
+        if *length_assumed {
+            "basal one: the length of the model is that of a mean heart of this breadth"
+        } else {
+            "brightest, all round: the model may end short of the apex, its cavity and wall be too small"
+        }
     )]
     DarkApex {
-        /// Uptake of the apical wall relative to the basal wall.
+        /// Uptake of the apical wall relative to the basal wall, or to the brightest.
         uptake: f64,
+        /// Whether the length comes from the breadth. Otherwise it is that of the wall that shows.
+        length_assumed: bool,
     },
     /// The motion did not come to rest.
     #[error("the model did not come to rest: {}", reason.as_str())]
@@ -104,6 +111,16 @@ pub enum Flag {
     Mirrored {
         /// Angle of the long axis to the plane between left and right, degrees to the right.
         degrees: f64,
+    },
+    /// The image ends in the wall.
+    #[error(
+        "the image ends in the wall: over {area_cm2:.0} cm² beside it, values stop at the volume's border, or at voxels that hold \
+         nothing (missing, or one constant). Volumes and the polar map are wrong there by an unknown part: send the whole field \
+         of view"
+    )]
+    FieldOfView {
+        /// Area of the cut near the wall, cm².
+        area_cm2: f64,
     },
     /// Nodes lie at or beyond the border of the volume.
     #[error("{share:.0} % of the model's nodes lie at or beyond the volume's border")]
@@ -159,6 +176,7 @@ impl Flag {
             Flag::Folded { .. } => "folded",
             Flag::PoorContrast { .. } => "poor_contrast",
             Flag::Mirrored { .. } => "mirrored",
+            Flag::FieldOfView { .. } => "field_of_view",
             Flag::TouchesBorder { .. } => "touches_border",
             Flag::ImplausibleShape { .. } => "implausible_shape",
             Flag::ValvePlane { .. } => "valve_plane",

@@ -17,7 +17,9 @@
 pub mod calibration;
 pub mod confidence;
 pub mod consensus;
+mod dark_apex;
 pub mod evidence;
+mod field_of_view;
 mod fit;
 mod flag_rules;
 pub mod flags;
@@ -37,7 +39,7 @@ pub use flags::Flag;
 pub use uncertainty::{NodeEvidence, WallUncertainty};
 
 use crate::deform::setup::FitSetup;
-use crate::deform::{FittedModel, WallEdge};
+use crate::deform::{DeformParameters, FittedModel};
 use crate::grid::Volume;
 use crate::locate::patient_orientation::OrientationSource;
 use crate::model::Organ;
@@ -48,8 +50,8 @@ use motion::Views;
 /// The chance that a fitted model is right, its reasons, and warnings.
 #[derive(Debug, Clone)]
 pub struct Judgement {
-    /// Of a ventricle, the chance that the mask agrees with an expert's by a Jaccard index of 0.75
-    /// or more ([`confidence::of_agreement`]). Of other organs, half the share of the surface that
+    /// Of a ventricle, the chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of 0.75
+    /// or more, calibrated on simulated scans ([`confidence::of_agreement`]). Of other organs, half the share of the surface that
     /// sees an edge, at most 0.5.
     pub confidence: f64,
     /// Confidence of the model's position, 0 (a guess) to 1 ([`confidence::of_position`]).
@@ -64,7 +66,7 @@ pub struct Judgement {
     pub flags: Vec<Flag>,
 }
 
-/// Judges `model`, fitted from `setup` to the `organ` in `volume`, whose wall with this `edge` is shown.
+/// Judges `model`, fitted from `setup` by `parameters` to the `organ` in `volume`.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -73,18 +75,19 @@ pub fn judge(
     setup: &FitSetup,
     volume: &Volume,
     organ: Organ,
-    edge: WallEdge,
+    parameters: &DeformParameters,
     monitor: &Monitor,
 ) -> Result<Judgement, Cancelled> {
     let evidence = evidence_of(model, setup, volume, monitor)?;
     let position_confidence = confidence::of_position(model);
     let chance = match &evidence {
-        Some(evidence) => confidence::of_agreement(evidence, edge),
+        Some(evidence) => confidence::of_agreement(evidence, parameters.edge),
         None => position_confidence.min(0.5),
     };
     let chance = confidence::in_view_of_search(chance, model);
     let ventricle = organ == Organ::LeftVentricle;
-    let flags = flag_rules::flags(model, evidence.as_ref(), chance, volume, ventricle);
+    let judged = (evidence.as_ref(), chance);
+    let flags = flag_rules::flags(model, judged, volume, ventricle, parameters.orbit);
     let confidence = flag_rules::limited(chance, &flags);
     let nodes = match (&model.sensed_wall, &model.localisation) {
         (Some(wall), Some(_)) => {

@@ -23,7 +23,14 @@ pub(super) fn ball() -> (Volume, Fit) {
     let position = OrganPosition::find(&volume, &template, &parameters, &silent).unwrap();
     let setup = FitSetup::new(&position, &volume, &template, &parameters, &silent).unwrap();
     let model = deform::fit(&setup, &template, &parameters, &silent).unwrap();
-    let edge = parameters.edge;
-    let judgement = judge(&model, &setup, &volume, Organ::Generic, edge, &silent).unwrap();
+    let judgement = judge(
+        &model,
+        &setup,
+        &volume,
+        Organ::Generic,
+        &parameters,
+        &silent,
+    )
+    .unwrap();
     (volume, Fit { model, judgement })
 }

@@ -1,7 +1,7 @@
 //! The parameters of a fit.
 
 use super::ParameterError;
-use crate::deform::DeformParameters;
+use crate::deform::{DeformParameters, Orbit};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::locate::Hints;
@@ -10,7 +10,7 @@ use crate::model::Organ;
 use crate::normals::ScanKind;
 use crate::polar::PolarParameters;
 use crate::volume::given_mask::MaskChoice;
-use crate::volume::{AffineSource, Volume};
+use crate::volume::{AffineSource, Provenance, Volume};
 
 /// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,11 +140,14 @@ impl FitParameters {
         &self,
         volume: &Volume,
         source: AffineSource,
+        scan: Option<&Provenance>,
     ) -> Result<DeformParameters, ParameterError> {
         let deform = self.deform.clone();
         let untold = !source.states_orientation() && deform.superior == Superior::Body;
         Ok(DeformParameters {
             hints: self.position.hints(volume)?,
+            orbit: (deform.orbit)
+                .or_stated(scan.and_then(|scan| Orbit::of_arc(scan.scan_arc_deg()?))),
             superior: if untold && deform.anterior.is_none() {
                 Superior::Untold
             } else {
@@ -380,8 +383,11 @@ mod tests {
 
     #[test]
     fn hints_are_millimetres_within_the_volume() {
-        let hinted =
-            |list: &[(&str, &str)]| pairs(list).unwrap().on(&volume(), AffineSource::Caller);
+        let hinted = |list: &[(&str, &str)]| {
+            pairs(list)
+                .unwrap()
+                .on(&volume(), AffineSource::Caller, None)
+        };
         let seeded = hinted(&[("seed_point", "0,0,0")]).unwrap();
         assert_eq!(seeded.hints.centre, Some(Vec3::new(-9.0, -19.0, -29.0)));
         assert_eq!(seeded.margin, 0.0);

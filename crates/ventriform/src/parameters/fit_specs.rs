@@ -2,8 +2,8 @@
 
 use super::table::{choice, integer, number, optional};
 use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters};
-use crate::deform::WallEdge;
 use crate::deform::sensors::SensorKind;
+use crate::deform::{Orbit, WallEdge};
 use crate::geometry::Vec3;
 use crate::locate::patient_orientation::Superior;
 use crate::mesh_files::{MeshFrame, MeshUnit};
@@ -224,7 +224,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "tracer",
         tracer,
         "Tc-99m tetrofosmin",
-        "The scan's tracer, as the normal limits name it. Default: the only one that they have"
+        "The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have"
     ),
     ParameterSpec {
         name: "attenuation_corrected",
@@ -454,6 +454,18 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "Resolution of the image, if it is known: full width at half maximum of a point, including \
          motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes \
          a wall look thicker. Default: by calibration on simulated hearts"
+    ),
+    choice!(
+        "orbit",
+        deform.orbit,
+        "auto",
+        "How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the \
+         patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); \
+         where it does not, motion is flagged only from a chance of one half on",
+        "auto" => Orbit::Auto,
+        "none" => Orbit::None,
+        "180" => Orbit::Half,
+        "360" => Orbit::Full,
     ),
     number!(
         "spring_stiffness",

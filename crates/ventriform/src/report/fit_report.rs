@@ -51,7 +51,8 @@ pub struct Posture {
 pub struct FitReport {
     /// Why the motion ended.
     pub reason: String,
-    /// Confidence that the fit is right, 0 to 1.
+    /// Chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of 0.75 or more, calibrated on
+    /// simulated scans, 0 to 1; of other organs, half the share of the surface that sees an edge.
     pub confidence: f64,
     /// Steps of the motion.
     pub iterations: usize,

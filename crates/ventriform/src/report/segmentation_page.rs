@@ -115,13 +115,21 @@ fn origin(report: &SegmentationReport) -> String {
 /// By which reader's profile the wall was drawn.
 fn drawn_by(reader: &AppliedReaderReport) -> String {
     let name = &reader.name;
-    let moved = [
-        ("endocardium", reader.offsets_mm.endocardium, "outward"),
-        ("epicardium", reader.offsets_mm.epicardium, "outward"),
-        ("rim", reader.offsets_mm.rim, "towards the base"),
-    ]
-    .map(|(what, by, where_to)| format!("{what} {by:+.2} mm {where_to}"));
-    format!("drawn as reader {name}: {}", moved.join(", "))
+    let moved = reader.offsets_mm.map(|offsets| {
+        [
+            ("endocardium", offsets.endocardium, "outward"),
+            ("epicardium", offsets.epicardium, "outward"),
+            ("rim", offsets.rim, "towards the base"),
+        ]
+        .map(|(what, by, where_to)| format!("{what} {by:+.2} mm {where_to}"))
+        .join(", ")
+    });
+    let at_level = reader.level.map(|level| {
+        let percent = number(100.0 * level, 0);
+        format!("at {percent} % of the wall's brightest uptake")
+    });
+    let how: Vec<String> = moved.into_iter().chain(at_level).collect();
+    format!("drawn as reader {name}: {}", how.join(", "))
 }
 
 /// The things that could be flagged, each with whether it is in order.
@@ -165,7 +173,7 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
             (
                 "uncertain_fit",
                 format!(
-                    "Chance that an expert's mask agrees: {} %",
+                    "Chance that a reader who draws the visible edge agrees (calibrated on simulated scans): {} %",
                     percent(fit.confidence)
                 ),
             ),
@@ -181,6 +189,10 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
             (
                 "mirrored",
                 "The apex does not point to the patient's right".to_owned(),
+            ),
+            (
+                "field_of_view",
+                "The image does not end in the wall".to_owned(),
             ),
             (
                 "implausible_shape",

@@ -95,7 +95,11 @@ pub fn from_files(
         })
         .transpose()?;
     let fit = SegmentationParameters {
-        deform: parameters.on(&reading.volume, reading.facts.affine_source)?,
+        deform: parameters.on(
+            &reading.volume,
+            reading.facts.affine_source,
+            reading.provenance.as_ref(),
+        )?,
         polar: parameters.polar,
         kept_model: parameters.kept_model.clone(),
         segments_from: parameters.segments_from,

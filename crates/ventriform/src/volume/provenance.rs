@@ -124,9 +124,20 @@ provenance! {
     reconstruction_method,
     /// Convolution Kernel (0018,1210).
     convolution_kernel,
+    /// Scan Arc (0018,1143): by how many degrees the camera turned.
+    scan_arc,
 }
 
 impl Provenance {
+    /// By how many degrees the camera turned; `None` where the header does not say. Rings of PET see all angles at once: 0.
+    pub fn scan_arc_deg(&self) -> Option<f64> {
+        if self.modality.as_deref().map(str::trim) == Some("PT") {
+            return Some(0.0);
+        }
+        let arc: f64 = self.scan_arc.as_deref()?.trim().parse().ok()?;
+        arc.is_finite().then_some(arc.abs())
+    }
+
     /// Whether attenuation was corrected; `None` where the header does not say.
     pub fn attenuation_corrected(&self) -> Option<bool> {
         let corrections = self.corrected_image.as_deref()?;

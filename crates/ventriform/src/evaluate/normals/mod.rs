@@ -42,7 +42,7 @@ pub const LEAST_CONFIDENCE: f64 = 0.5;
 
 /// Flags of a fit that speak against its uptake or its place. Others, such as those of the septum's shape, are raised
 /// for one healthy heart in seven.
-const FLAGS_OF_NO_NORMAL: [&str; 9] = [
+const FLAGS_OF_NO_NORMAL: [&str; 10] = [
     "mirrored",
     "uncertain_place",
     "motion",
@@ -50,6 +50,7 @@ const FLAGS_OF_NO_NORMAL: [&str; 9] = [
     "dark_apex",
     "folded",
     "poor_contrast",
+    "field_of_view",
     "touches_border",
     "implausible_shape",
 ];

@@ -50,6 +50,7 @@ const DETECTOR_PATH: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
 /// The first R-R interval of a gated acquisition.
 const GATED_DATA: &[Tag] = &[Tag(0x0054, 0x0062), Tag(0x0054, 0x0063)];
+const ROTATION_PATH: &[Tag] = &[Tag(0x0054, 0x0052)];
 const PHARMACEUTICAL_PATH: &[Tag] = &[Tag(0x0054, 0x0016)];
 const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
 const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
@@ -191,6 +192,7 @@ attributes! {
     REAL_WORLD_INTERCEPT = REAL_WORLD, 0x0040, 0x9224, "Real World Value Intercept (0040,9224)";
     REAL_WORLD_SLOPE = REAL_WORLD, 0x0040, 0x9225, "Real World Value Slope (0040,9225)";
     PHARMACEUTICAL_NAME = PHARMACEUTICAL_PATH, 0x0018, 0x0031, "Radiopharmaceutical (0018,0031)";
+    SCAN_ARC = ROTATION_PATH, 0x0018, 0x1143, "Scan Arc (0018,1143)";
     INJECTED_DOSE = PHARMACEUTICAL_PATH, 0x0018, 0x1074, "Radionuclide Total Dose (0018,1074)";
     INJECTION_TIME = PHARMACEUTICAL_PATH, 0x0018, 0x1072, "Radiopharmaceutical Start Time (0018,1072)";
     PHARMACEUTICAL_MEANING = PHARMACEUTICAL_CODE, 0x0008, 0x0104, "Code Meaning (0008,0104)";

@@ -524,6 +524,10 @@ fn provenance_tells_how_the_scan_was_made() {
         ((0x08, 0x103e), ("LO", Text("MYOCARDIUM STRESS [Recon]"))),
         ((0x20, 0x52), ("UI", Text("1.2.9"))),
         ((0x54, 0x16), ("SQ", Items(vec![drug]))),
+        (
+            (0x54, 0x52),
+            ("SQ", Items(vec![item((0x18, 0x1143), "DS", Text("180"))])),
+        ),
     ]);
     let given = [VolumeFile::in_memory(
         "nm",
@@ -541,10 +545,12 @@ fn provenance_tells_how_the_scan_was_made() {
         ("radionuclide", "^99m^Technetium"),
         ("radiopharmaceutical", "Tc-99m tetrofosmin"),
         ("rest_or_stress", "stress"),
+        ("scan_arc", "180"),
     ] {
         assert!(stated.contains(&pair), "{pair:?} {stated:?}");
     }
     assert_eq!(from.patient_id, None);
+    assert_eq!(from.scan_arc_deg(), Some(180.0));
     assert_eq!(from.slice_frames, [1, 2, 3, 4]);
     elements.insert((0x08, 0x103e), ("LO", Text("rest/stress")));
     let given = [VolumeFile::in_memory(
