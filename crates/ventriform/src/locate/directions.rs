@@ -1,5 +1,7 @@
 //! Evenly spread directions, and which of them is nearest to an offset.
 
+use std::sync::LazyLock;
+
 use crate::geometry::Vec3;
 
 /// Number of directions.
@@ -30,8 +32,13 @@ impl Compass {
     /// spacing.
     const CELLS_PER_SIDE: usize = 18;
 
-    /// The compass of [`directions`].
-    pub fn new() -> Self {
+    /// The compass of [`directions`]. It is made once in the life of the process.
+    pub fn of_directions() -> &'static Self {
+        static MADE: LazyLock<Compass> = LazyLock::new(Compass::new);
+        &MADE
+    }
+
+    fn new() -> Self {
         let table = directions();
         let side = Self::CELLS_PER_SIDE;
         let cells = (0..6 * side * side)
@@ -66,11 +73,5 @@ impl Compass {
         let at =
             (face * Self::CELLS_PER_SIDE + cell(axis + 1)) * Self::CELLS_PER_SIDE + cell(axis + 2);
         usize::from(self.cells[at])
-    }
-}
-
-impl Default for Compass {
-    fn default() -> Self {
-        Self::new()
     }
 }

@@ -60,12 +60,7 @@ impl Cups {
         hints: &Hints,
         monitor: &Monitor,
     ) -> Result<Self, LocateError> {
-        let field = cup_search::picture(volume, None, monitor)?;
-        let brightest = field.values().iter().fold(0f32, |a, b| a.max(*b));
-        let darkest = field.values().iter().fold(f32::INFINITY, |a, b| a.min(*b));
-        if !(brightest > 0.0 && brightest > darkest) {
-            return Err(LocateError::Blank);
-        }
+        let (field, brightest) = picture(volume, monitor)?;
         let search = CupSearch::new(&field, hints);
         let found = search.everywhere(f64::from(brightest), monitor)?;
         if found.is_empty() {
@@ -74,6 +69,21 @@ impl Cups {
         Ok(Self {
             field,
             hints: hints.clone(),
+            found,
+        })
+    }
+
+    /// The one cup that a search from `centre` (LPS mm) finds in `volume`.
+    ///
+    /// # Errors
+    /// [`LocateError::Blank`] or [`LocateError::Cancelled`].
+    fn around(volume: &Volume, centre: Vec3, monitor: &Monitor) -> Result<Self, LocateError> {
+        let (field, _) = picture(volume, monitor)?;
+        let hints = Hints::default();
+        let found = vec![CupSearch::new(&field, &hints).around(centre)];
+        Ok(Self {
+            field,
+            hints,
             found,
         })
     }
@@ -168,6 +178,34 @@ fn report(best: &ScoredCup, elsewhere: Option<&ScoredCup>) -> Localisation {
 pub fn of_model(volume: &Volume, monitor: &Monitor) -> Result<Localisation, LocateError> {
     let cups = Cups::everywhere(volume, &Hints::default(), monitor)?;
     Ok(cups.localisation(cups.best(|_| true)?))
+}
+
+/// As [`of_model`] for a model whose cavity lies about `middle` (LPS mm): the search starts there alone, which takes
+/// a fortieth of the time. Where the cup that it finds is not [clear](super::CLEAR_CORRELATION), the whole picture is searched.
+///
+/// # Errors
+/// [`LocateError`].
+pub fn of_model_about(
+    volume: &Volume,
+    middle: Vec3,
+    monitor: &Monitor,
+) -> Result<Localisation, LocateError> {
+    let cups = Cups::around(volume, middle, monitor)?;
+    match cups.best(|_| true) {
+        Ok(best) if best.correlation >= super::CLEAR_CORRELATION => Ok(cups.localisation(best)),
+        _ => of_model(volume, monitor),
+    }
+}
+
+/// The picture for cups of the whole of `volume`, and its greatest value.
+fn picture(volume: &Volume, monitor: &Monitor) -> Result<(Field, f32), LocateError> {
+    let field = cup_search::picture(volume, None, monitor)?;
+    let brightest = field.values().iter().fold(0f32, |a, b| a.max(*b));
+    let darkest = field.values().iter().fold(f32::INFINITY, |a, b| a.min(*b));
+    if !(brightest > 0.0 && brightest > darkest) {
+        return Err(LocateError::Blank);
+    }
+    Ok((field, brightest))
 }
 
 /// Moves `cup` to the nearest best agreement with `field`.

@@ -100,7 +100,7 @@ pub fn find<'v>(
     let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
     let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
     let decision = match proposal {
-        Some(cavity) if is_clear(volume, hints, cavity, monitor)? => Decision::Rays(cavity.clone()),
+        Some(cavity) if is_clear(volume, hints, &cavity, monitor)? => Decision::Rays(cavity),
         _ => {
             let mut cups = Cups::everywhere(volume, hints, monitor)?;
             let clear = |best: &ScoredCup| best.correlation >= CLEAR_CORRELATION;
@@ -162,14 +162,14 @@ impl Heart<'_> {
             }
         };
         let best = self.rays.best(within(SAME_HEART));
-        if best.is_some_and(|b| b.score >= UNCERTAIN_SCORE) {
-            return Ok(best.cloned());
+        if best.as_ref().is_some_and(|b| b.score >= UNCERTAIN_SCORE) {
+            return Ok(best);
         }
         // A wall that is nowhere brighter than where it meets the liver is never a part by itself.
         let starts = within(SAME_HEART + rays::MAX_CENTRE_SHIFT_MM);
         let scanned = self.rays.lattice(starts, within(SAME_HEART), monitor)?;
-        let better = scanned.as_ref().map(|s| s.score) > best.map(|b| b.score);
-        Ok(if better { scanned } else { best.cloned() })
+        let better = scanned.as_ref().map(|s| s.score) > best.as_ref().map(|b| b.score);
+        Ok(if better { scanned } else { best })
     }
 
     /// The cup with its length, and how sure it is.

@@ -63,6 +63,35 @@ pub struct Cavity {
     pub score: f64,
 }
 
+/// A centre that was judged. The distances in all directions ([`fill`]) take as long as the judgement, and only those
+/// of the one that is chosen are needed.
+#[derive(Debug, Clone)]
+struct Candidate {
+    /// Middle of the cavity, as in [`Cavity`].
+    centre: Vec3,
+    /// For each direction, the distance of the ray's peak, mm.
+    peaks: Vec<f64>,
+    /// Mean of those that are `seen`, mm.
+    mean: f64,
+    /// For each direction, whether a wall was seen.
+    seen: Vec<bool>,
+    level: f64,
+    score: f64,
+}
+
+impl Candidate {
+    /// The cavity, with the distances in the directions of `table`.
+    fn cavity(&self, table: &[Vec3]) -> Cavity {
+        Cavity {
+            centre: self.centre,
+            distances: fill(table, &self.peaks, &self.seen, self.mean),
+            seen: self.seen.clone(),
+            level: self.level,
+            score: self.score,
+        }
+    }
+}
+
 /// Score from which on a candidate that starts at a part counts as a ventricle.
 pub const PLAUSIBLE_SCORE: f64 = 0.2;
 /// The same for candidates of the lattice, of which there are many more to be wrong.
@@ -80,7 +109,7 @@ pub(super) struct RaySearch<'v> {
     blocks: GreyBlocks<'v>,
     directions: Vec<Vec3>,
     /// The candidates that start at bright parts, from the highest threshold down.
-    cavities: Vec<Cavity>,
+    candidates: Vec<Candidate>,
 }
 
 impl<'v> RaySearch<'v> {
@@ -99,16 +128,17 @@ impl<'v> RaySearch<'v> {
         let mut search = Self {
             blocks,
             directions: directions(),
-            cavities: Vec::new(),
+            candidates: Vec::new(),
         };
-        search.cavities = search.judge_all(&parts, monitor)?;
+        search.candidates = search.judge_all(&parts, monitor)?;
         Ok(search)
     }
 
     /// The candidate of the highest score, of equals the first, among those whose centre is
     /// `admitted` (millimetres along the array's axes).
-    pub fn best(&self, admitted: impl Fn(&Vec3) -> bool) -> Option<&Cavity> {
-        best(self.cavities.iter().filter(|c| admitted(&c.centre)))
+    pub fn best(&self, admitted: impl Fn(&Vec3) -> bool) -> Option<Cavity> {
+        let found = best(self.candidates.iter().filter(|c| admitted(&c.centre)));
+        found.map(|candidate| candidate.cavity(&self.directions))
     }
 
     /// The best candidate that starts at a point of the lattice and whose centre is `admitted`,
@@ -128,11 +158,12 @@ impl<'v> RaySearch<'v> {
         }
         let found = self.judge_all(&self.lattice_points(starts), monitor)?;
         let found = best(found.iter().filter(|c| admitted(&c.centre)));
-        Ok(found.filter(|c| c.score >= PLAUSIBLE_ON_LATTICE).cloned())
+        let found = found.filter(|c| c.score >= PLAUSIBLE_ON_LATTICE);
+        Ok(found.map(|candidate| candidate.cavity(&self.directions)))
     }
 
-    fn judge_all(&self, parts: &[Part], monitor: &Monitor) -> Result<Vec<Cavity>, Cancelled> {
-        let judged: Vec<Option<Cavity>> = parts
+    fn judge_all(&self, parts: &[Part], monitor: &Monitor) -> Result<Vec<Candidate>, Cancelled> {
+        let judged: Vec<Option<Candidate>> = parts
             .par_iter()
             .map(|part| {
                 monitor.check()?;
@@ -182,9 +213,9 @@ impl<'v> RaySearch<'v> {
     }
 }
 
-/// The cavity of the highest score; of equals the first.
-fn best<'c>(cavities: impl Iterator<Item = &'c Cavity>) -> Option<&'c Cavity> {
-    cavities.fold(None, |best: Option<&Cavity>, c| match best {
+/// The candidate of the highest score; of equals the first.
+fn best<'c>(candidates: impl Iterator<Item = &'c Candidate>) -> Option<&'c Candidate> {
+    candidates.fold(None, |best: Option<&Candidate>, c| match best {
         Some(b) if b.score >= c.score => Some(b),
         _ => Some(c),
     })
@@ -250,9 +281,9 @@ fn fit_sphere(points: &[Vec3]) -> Option<(Vec3, f64)> {
     Some((mean + offset, (offset.norm_squared() + spread).sqrt()))
 }
 
-fn judge(blocks: &GreyBlocks, table: &[Vec3], part: &Part) -> Option<Cavity> {
+fn judge(blocks: &GreyBlocks, table: &[Vec3], part: &Part) -> Option<Candidate> {
     let mut centre = part.centroid;
-    let mut best: Option<Cavity> = None;
+    let mut best: Option<Candidate> = None;
     for _ in 0..4 {
         let walls: Vec<RayHit> = table
             .iter()
@@ -292,7 +323,7 @@ fn near(value: f64, best: f64, width: f64) -> f64 {
 }
 
 /// Scores a centre, or `None` where fewer than a quarter of the rays meet a wall.
-fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> Option<Cavity> {
+fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> Option<Candidate> {
     let hits: Vec<&RayHit> = walls.iter().filter(|w| w.weight > 0.0).collect();
     if hits.len() < DIRECTION_COUNT / 4 {
         return None;
@@ -345,9 +376,10 @@ fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> 
         * contrast.clamp(0.0, 0.7)
         / 0.7
         * (-off_centre * off_centre).exp();
-    Some(Cavity {
+    Some(Candidate {
         centre,
-        distances: fill(table, walls, &seen, mean),
+        peaks: walls.iter().map(|w| w.distance).collect(),
+        mean,
         seen,
         level: bright,
         score,
@@ -355,14 +387,14 @@ fn rate(blocks: &GreyBlocks, table: &[Vec3], centre: Vec3, walls: &[RayHit]) -> 
 }
 
 /// Distances in every direction: the median of the seen ones within 40 degrees.
-fn fill(table: &[Vec3], walls: &[RayHit], seen: &[bool], mean: f64) -> Vec<f64> {
+fn fill(table: &[Vec3], peaks: &[f64], seen: &[bool], mean: f64) -> Vec<f64> {
     let cosine = 40f64.to_radians().cos();
     table
         .iter()
         .map(|d| {
-            let mut close: Vec<f64> = (0..walls.len())
+            let mut close: Vec<f64> = (0..peaks.len())
                 .filter(|&n| seen[n] && table[n].dot(d) > cosine)
-                .map(|n| walls[n].distance)
+                .map(|n| peaks[n])
                 .collect();
             close.sort_by(f64::total_cmp);
             if close.len() < 3 {

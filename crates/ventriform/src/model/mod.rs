@@ -17,7 +17,7 @@ pub mod wall;
 mod wall_parts;
 
 pub use organ::Organ;
-pub use template::{Template, TemplateError};
+pub use template::{Template, TemplateError, cup_about_middle};
 pub use wall_parts::wall_parts;
 
 use crate::mesh::TriMesh;

@@ -13,6 +13,7 @@ use crate::grid::Volume;
 use crate::grid::field::Field;
 use crate::grid::voxelise::voxelise;
 use crate::locate::cup::Cup;
+use crate::locate::localisation::Localisation;
 use crate::locate::{LocateError, localisation};
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, MeshDefect};
@@ -82,24 +83,13 @@ impl Template {
     /// # Errors
     /// [`TemplateError`].
     pub fn new(mesh: TriMesh, organ: Organ, monitor: &Monitor) -> Result<Self, TemplateError> {
-        let finite = |p: &Vec3| p.iter().all(|x| x.is_finite());
-        if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)) {
-            return Err(TemplateError::NotFinite { vertex });
-        }
-        if mesh.vertices.len() > MAX_NODES {
-            return Err(TemplateError::TooLarge {
-                vertices: mesh.vertices.len(),
-                limit: MAX_NODES,
-            });
-        }
-        topology::check(&mesh)?;
-        let volume_ml = mesh.volume() / 1000.0;
-        // The voxel picture below takes memory by the size of the mesh.
-        if !(volume_ml > 0.1 && volume_ml < 10_000.0) {
-            return Err(TemplateError::NoVolume { volume_ml });
-        }
+        check(&mesh)?;
         let (cup, struts) = match organ {
-            Organ::LeftVentricle => (Some(cup_of(&mesh, monitor)?), struts(&mesh, monitor)?),
+            Organ::LeftVentricle => {
+                let found = |picture: &Volume| localisation::of_model(picture, monitor);
+                let cup = cup_of(&mesh, found, monitor)?;
+                (Some(cup), struts(&mesh, monitor)?)
+            }
             Organ::Liver | Organ::Kidney | Organ::Generic => (None, Vec::new()),
         };
         Ok(Self {
@@ -126,9 +116,47 @@ impl Template {
     }
 }
 
-/// Finds the cup in the model by the same search as in patients, so that centre, axis and length
-/// are defined alike in both.
-fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
+/// Refuses a mesh that cannot be fitted, whatever organ it shows.
+fn check(mesh: &TriMesh) -> Result<(), TemplateError> {
+    let finite = |p: &Vec3| p.iter().all(|x| x.is_finite());
+    if let Some(vertex) = mesh.vertices.iter().position(|p| !finite(p)) {
+        return Err(TemplateError::NotFinite { vertex });
+    }
+    if mesh.vertices.len() > MAX_NODES {
+        return Err(TemplateError::TooLarge {
+            vertices: mesh.vertices.len(),
+            limit: MAX_NODES,
+        });
+    }
+    topology::check(mesh)?;
+    let volume_ml = mesh.volume() / 1000.0;
+    // The voxel picture of `cup_of` takes memory by the size of the mesh.
+    if !(volume_ml > 0.1 && volume_ml < 10_000.0) {
+        return Err(TemplateError::NoVolume { volume_ml });
+    }
+    Ok(())
+}
+
+/// The cup of `mesh`, a ventricle's wall, as [`Template::new`] finds it but for the search's last steps (a millimetre,
+/// a few degrees): the search starts at the middle of the mesh alone.
+///
+/// # Errors
+/// [`TemplateError`], as [`Template::new`].
+pub fn cup_about_middle(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
+    check(mesh)?;
+    let bounds = Aabb::of(&mesh.vertices);
+    let middle = (bounds.min + bounds.max) / 2.0;
+    let found = |picture: &Volume| localisation::of_model_about(picture, middle, monitor);
+    cup_of(mesh, found, monitor)
+}
+
+/// Finds the cup in the model by `search` of its picture, the same search as in patients, so that centre, axis and
+/// length are defined alike in both.
+fn cup_of(
+    mesh: &TriMesh,
+    search: impl FnOnce(&Volume) -> Result<Localisation, LocateError>,
+    monitor: &Monitor,
+) -> Result<Cup, TemplateError> {
     const NODE_SPACING_MM: f64 = 3.25;
     let bounds = Aabb::of(&mesh.vertices);
     let size = bounds.max - bounds.min;
@@ -153,7 +181,7 @@ fn cup_of(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
         frame,
         integral: false,
     };
-    match localisation::of_model(&picture, monitor) {
+    match search(&picture) {
         Ok(found) if found.correlation > 0.6 => {
             let mut sharper = Field::coarse(&picture, None, NODE_SPACING_MM, monitor)?;
             sharper.blur(5.5, monitor)?;

@@ -16,7 +16,7 @@ pub mod starts;
 use crate::export::{Metadata, VertexField};
 use crate::mesh::TriMesh;
 use crate::mesh::part::Part;
-use crate::model::{Organ, Template, TemplateError, wall_parts};
+use crate::model::{TemplateError, cup_about_middle, wall_parts};
 use crate::optimise::{OptimiseError, Reference};
 use crate::parameters::{ModelParameters, Parameters};
 use crate::progress::{Cancelled, Monitor, Stage};
@@ -250,6 +250,19 @@ fn from_volume(
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
+    // The stages take hundreds of short parallel steps. From a thread outside of the pool each of them would be
+    // handed to a thread of the pool and waited for.
+    rayon::scope(|_| stages(volume, facts, parameters, told_apart, read_ms, monitor))
+}
+
+fn stages(
+    volume: &Volume,
+    facts: &VolumeFacts,
+    parameters: &ModelParameters,
+    told_apart: Option<i64>,
+    read_ms: f64,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
     let mut laps = Laps::new(read_ms, monitor);
     let mut extracted = parameters.surface.clone();
     if told_apart.is_some() {
@@ -312,14 +325,10 @@ fn parts(
         return Ok(Vec::new());
     }
     // The long axis is found in the model alone, as that of a template is. A model without one has no parts.
-    let cup = match Template::new(mesh.clone(), Organ::LeftVentricle, monitor) {
-        Ok(template) => template.cup,
+    let parts = match cup_about_middle(mesh, monitor) {
+        Ok(cup) => wall_parts(mesh, &cup, monitor)?,
         Err(TemplateError::Cancelled(cancelled)) => return Err(cancelled),
         Err(_) => None,
-    };
-    let parts = match &cup {
-        Some(cup) => wall_parts(mesh, cup, monitor)?,
-        None => None,
     };
     Ok(parts.unwrap_or_default())
 }

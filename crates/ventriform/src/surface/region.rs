@@ -35,7 +35,7 @@ const REFERENCE_DISTANCE_MM: f64 = 12.0;
 pub struct WallShell<'a> {
     volume: &'a Volume,
     cavity: &'a Cavity,
-    compass: Compass,
+    compass: &'static Compass,
     spacing: [f64; 3],
     origin: [usize; 3],
     extent: [usize; 3],
@@ -94,7 +94,7 @@ impl<'a> WallShell<'a> {
         let mut wall = Self {
             volume,
             cavity,
-            compass: Compass::new(),
+            compass: Compass::of_directions(),
             spacing,
             origin,
             extent,
