@@ -180,8 +180,8 @@ pub fn of_model(volume: &Volume, monitor: &Monitor) -> Result<Localisation, Loca
     Ok(cups.localisation(cups.best(|_| true)?))
 }
 
-/// As [`of_model`] for a model whose cavity lies about `middle` (LPS mm): the search starts there alone, which takes
-/// a fortieth of the time. Where the cup that it finds is not [clear](super::CLEAR_CORRELATION), the whole picture is searched.
+/// As [`of_model`] for a model whose cavity lies about `middle` (LPS mm): the search starts there alone. Where the cup that
+/// it finds is not [clear](super::CLEAR_CORRELATION), the whole picture is searched.
 ///
 /// # Errors
 /// [`LocateError`].

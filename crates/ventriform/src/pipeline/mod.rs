@@ -250,19 +250,6 @@ fn from_volume(
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
-    // The stages take hundreds of short parallel steps. From a thread outside of the pool each of them would be
-    // handed to a thread of the pool and waited for.
-    rayon::scope(|_| stages(volume, facts, parameters, told_apart, read_ms, monitor))
-}
-
-fn stages(
-    volume: &Volume,
-    facts: &VolumeFacts,
-    parameters: &ModelParameters,
-    told_apart: Option<i64>,
-    read_ms: f64,
-    monitor: &Monitor,
-) -> Result<Model, PipelineError> {
     let mut laps = Laps::new(read_ms, monitor);
     let mut extracted = parameters.surface.clone();
     if told_apart.is_some() {

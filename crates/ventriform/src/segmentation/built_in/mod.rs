@@ -170,6 +170,7 @@ fn sound<T, E: std::fmt::Debug>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{cup_about_middle, wall_parts};
     use crate::progress::{CancelToken, Silent};
 
     #[test]
@@ -196,6 +197,31 @@ mod tests {
         }
         assert!((100.0..260.0).contains(&sizes[0]), "{sizes:?}");
         assert!(sizes[1] < sizes[0] && sizes[0] < sizes[2], "{sizes:?}");
+    }
+
+    /// The search from the middle of a model finds the cup that the search of its whole picture finds.
+    #[test]
+    fn a_search_from_the_middle_finds_the_cup_of_the_whole_picture() {
+        let monitor = Monitor::silent();
+        for NamedTemplate { name, template, .. } in templates(&monitor).unwrap() {
+            let everywhere = template.cup.unwrap();
+            let near = cup_about_middle(&template.mesh, &monitor).unwrap();
+            let shift = (near.centre - everywhere.centre).norm();
+            let turn = near.axis.angle(&everywhere.axis).to_degrees();
+            let stretch = (near.length / everywhere.length - 1.0).abs();
+            assert!(
+                shift < 2.0 && turn < 3.0 && stretch < 0.03,
+                "{name}: {shift} {turn} {stretch}"
+            );
+            let parts = |cup| wall_parts(&template.mesh, cup, &monitor).unwrap().unwrap();
+            let (own, whole) = (parts(&near), parts(&everywhere));
+            let moved = own.iter().zip(&whole).filter(|(a, b)| a != b).count();
+            assert!(
+                moved * 20 <= whole.len(),
+                "{name}: {moved} of {}",
+                whole.len()
+            );
+        }
     }
 
     #[test]
