@@ -5,7 +5,7 @@
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
 #                              pygeodesic, schemathesis, the page in a browser, the Python package, generated clients, kills, DICOM, Orthanc,
-#                              licences and SBOM)
+#                              licences and SBOM, the site of the docs)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -171,5 +171,6 @@ fi
 [ -n "${PYTHON:-}" ] && check "attacks of one client under a limit of memory" \
   "$PYTHON" scripts/check_limits.py --program target/debug/ventriform --patience 3
 check "page in a browser" scripts/check_page.sh --bundle
+check "site of the docs: links, search, nothing from elsewhere" scripts/site.sh --check
 check "demo" scripts/check_demo.sh
 finish
