@@ -22,7 +22,7 @@ use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 
-use super::draw::{MIN_THICKNESS_MM, WallEdges};
+use super::wall_edges::{MIN_THICKNESS_MM, WallEdges};
 
 /// Greatest distance of the drawn surface from the fitted one, mm.
 pub const BAND_MM: f64 = 8.0;

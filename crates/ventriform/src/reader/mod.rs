@@ -21,6 +21,7 @@ pub mod learn;
 pub mod level;
 pub mod measure;
 pub mod profile;
+mod wall_edges;
 
 pub use draw::drawn;
 pub use learn::{learn, learn_level};

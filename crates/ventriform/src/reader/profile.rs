@@ -83,6 +83,11 @@ impl ReaderKind {
             Self::Level => "level",
         }
     }
+
+    /// The name of the kind that documents have which were written before there were kinds.
+    pub fn of_old_documents() -> String {
+        Self::Edge.as_str().to_owned()
+    }
 }
 
 /// One distance of a reader's profile, mm.

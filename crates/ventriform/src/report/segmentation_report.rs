@@ -12,12 +12,11 @@ use super::input::FileFacts;
 use super::json_number::{not_stated, or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
-use super::summaries::edge_kind;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::judge::Fit;
 use crate::polar::PolarSummary;
-use crate::reader::{ReaderOffsets, ReaderProfile};
+use crate::reader::{ReaderKind, ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -126,7 +125,7 @@ pub struct AppliedReaderReport {
     pub sha256: String,
     /// `edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
     /// reference.
-    #[serde(default = "edge_kind")]
+    #[serde(default = "ReaderKind::of_old_documents")]
     pub kind: String,
     /// The wall that was drawn from.
     pub edge: String,

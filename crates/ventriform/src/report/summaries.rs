@@ -116,7 +116,7 @@ pub struct TemplateSummary {
 pub struct ReaderSummary {
     /// `edge`: the reader draws by distances from the edge that the image shows. `level`: where the image has a share of the
     /// polar map's reference.
-    #[serde(default = "edge_kind")]
+    #[serde(default = "ReaderKind::of_old_documents")]
     pub kind: String,
     /// The wall that is drawn from: `apparent` or `anatomical`.
     pub edge: String,
@@ -278,11 +278,6 @@ impl ReaderSummary {
             level: drawing.level(),
         }
     }
-}
-
-/// The kind of readers in summaries that were stored before there were kinds.
-pub(super) fn edge_kind() -> String {
-    ReaderKind::Edge.as_str().to_owned()
 }
 
 /// A document as a JSON object, its fields in their order.
