@@ -16,7 +16,7 @@
 //!
 //! Not guaranteed: the thickness of the wall, which the image does not tell. Its mean is assumed, or comes from a known
 //! volume of muscle; a millimetre moves the ejection fraction by about 1.5 points. Where the wall is dark, its motion
-//! is assumed to be small. There are no normal limits.
+//! is assumed to be small.
 
 mod calibration;
 mod carried;
