@@ -336,7 +336,7 @@ impl ReadCase {
             .ok_or("its mask and the fitted wall have too little in common")?;
         let cancelled = |error: Cancelled| error.to_string();
         let image = WallImage::about(&fit, volume, reference, &monitor).map_err(cancelled)?;
-        let (level, _) =
+        let level =
             reader::measure_level(&fit, &image, &drawn, &frame, &monitor).map_err(cancelled)?;
         let learnt_on = LearntOn {
             scan: sha256(&case.scan).map_err(|error| error.to_string())?,

@@ -80,31 +80,44 @@ pub fn compare(
             b: b.shape,
         }));
     }
-    let (mut na, mut nb, mut both) = (0usize, 0usize, 0usize);
-    for (x, y) in a.voxels.iter().zip(&b.voxels) {
-        na += usize::from(*x);
-        nb += usize::from(*y);
-        both += usize::from(*x && *y);
-    }
-    let either = na + nb - both;
-    let share = |part: usize, whole: usize| {
-        if whole == 0 {
-            1.0
-        } else {
-            part as f64 / whole as f64
-        }
-    };
+    let [na, nb, both] = counts(a, b);
     let voxel_ml = spacing.iter().product::<f64>() / 1000.0;
     let contours = match na > 0 && nb > 0 {
         true => Some(contour_distances(a, b, spacing, monitor)?),
         false => None,
     };
     Ok(Agreement {
-        jaccard: share(both, either),
+        jaccard: share(both, na + nb - both),
         dice: share(2 * both, na + nb),
         contours,
         volumes_ml: [na as f64 * voxel_ml, nb as f64 * voxel_ml],
     })
+}
+
+/// The Jaccard index (E_J) of two masks on one grid, without the distances that [`compare`] takes most of its time for.
+pub fn jaccard(a: &Mask, b: &Mask) -> f64 {
+    let [na, nb, both] = counts(a, b);
+    share(both, na + nb - both)
+}
+
+/// Voxels of `a`, of `b`, and of both.
+fn counts(a: &Mask, b: &Mask) -> [usize; 3] {
+    let mut counts = [0; 3];
+    for (x, y) in a.voxels.iter().zip(&b.voxels) {
+        counts[0] += usize::from(*x);
+        counts[1] += usize::from(*y);
+        counts[2] += usize::from(*x && *y);
+    }
+    counts
+}
+
+/// 1 where both masks are empty.
+fn share(part: usize, whole: usize) -> f64 {
+    if whole == 0 {
+        1.0
+    } else {
+        part as f64 / whole as f64
+    }
 }
 
 fn contour_distances(

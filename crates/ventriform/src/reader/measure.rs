@@ -24,6 +24,7 @@ use super::profile::{ReaderDrawing, ReaderOffsets};
 use crate::deform::FittedModel;
 use crate::geometry::frame::VoxelToPatient;
 use crate::geometry::{Vec3, triangle};
+use crate::grid::agreement::jaccard;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::mesh::TriMesh;
 use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};
@@ -57,8 +58,7 @@ pub fn measure(
     ))
 }
 
-/// The level at which the wall of `fit`, drawn on `image`, agrees best with the mask `drawn` on the grid at `frame`, and
-/// that agreement (E_J).
+/// The level at which the wall of `fit`, drawn on `image`, agrees best with the mask `drawn` on the grid at `frame` (E_J).
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -68,7 +68,7 @@ pub fn measure_level(
     drawn: &Mask,
     frame: &VoxelToPatient,
     monitor: &Monitor,
-) -> Result<(f64, f64), Cancelled> {
+) -> Result<f64, Cancelled> {
     let agreement = |step: i32| {
         let level = f64::from(step) * FINE_LEVEL_STEP;
         let (made, _) = super::drawn(fit.clone(), &ReaderDrawing::Level(level), image, monitor)?;
@@ -85,22 +85,12 @@ pub fn measure_level(
                 best = own;
             }
         }
-        Ok::<_, Cancelled>(best)
+        Ok::<_, Cancelled>(best.0)
     };
-    let (near, _) = best_of((low..=high).step_by(coarse as usize).collect())?;
+    let near = best_of((low..=high).step_by(coarse as usize).collect())?;
     let around = (near - coarse + 1).max(low)..(near + coarse).min(high + 1);
-    let (step, found) = best_of(around.collect())?;
-    Ok((f64::from(step) * FINE_LEVEL_STEP, found))
-}
-
-/// E_J of two masks on one grid.
-fn jaccard(a: &Mask, b: &Mask) -> f64 {
-    let (mut both, mut either) = (0usize, 0usize);
-    for (a, b) in a.voxels.iter().zip(&b.voxels) {
-        both += usize::from(*a && *b);
-        either += usize::from(*a || *b);
-    }
-    both as f64 / either.max(1) as f64
+    let step = best_of(around.collect())?;
+    Ok(f64::from(step) * FINE_LEVEL_STEP)
 }
 
 /// The medians of the distances from the surface of `fit` to a mask.
