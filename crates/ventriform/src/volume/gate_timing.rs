@@ -2,7 +2,7 @@
 
 use super::facts::GateFacts;
 
-/// What a file says of the beats that were gated. Parts that it leaves out are `None`.
+/// What a file says of the beats of one R-R interval that were gated. Parts that it leaves out are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GateTiming {
     /// Length of a gate, ms: Frame Time (0018,1063).
@@ -22,12 +22,16 @@ pub struct GateTiming {
 }
 
 impl GateTiming {
-    /// Facts about a study of `volumes` gates of all R-R intervals.
-    pub(super) fn facts(&self, volumes: usize) -> GateFacts {
-        let number = self.gates_of_interval(volumes);
-        // What a file states first is of its first interval, and another one may be taken.
-        let unknown = Self::default();
-        let known = if number < volumes { &unknown } else { self };
+    /// Facts about a study of `volumes` gates of all R-R intervals, of which a file states `timings`.
+    pub(super) fn facts(timings: &[Self], volumes: usize) -> GateFacts {
+        let stated = timings.first().cloned().unwrap_or_default();
+        let number = stated.gates_of_interval(volumes);
+        // Which interval is taken depends on the counts, which are not read here.
+        let known = if number < volumes {
+            Self::default()
+        } else {
+            stated
+        };
         GateFacts {
             number,
             intervals: volumes / number.max(1),

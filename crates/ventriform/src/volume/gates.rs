@@ -19,7 +19,7 @@ pub struct GatedReading {
     pub gates: Vec<Volume>,
     /// The volume of the file that is the first gate, or the file, counted from 0: the others follow it.
     pub first_frame: usize,
-    /// What the file says of the beats.
+    /// What the file says of the beats that were taken.
     pub timing: GateTiming,
     /// Facts about the file, or that of the first gate, with warnings of all.
     pub facts: VolumeFacts,
@@ -35,8 +35,8 @@ impl GatedReading {
         self.scans.first()
     }
 
-    /// The gates that were read one by one.
-    pub(super) fn of(readings: Vec<Reading>, mut timing: GateTiming) -> Result<Self, VolumeError> {
+    /// The gates that were read one by one, and what their file says of the beats of each R-R interval.
+    pub(super) fn of(readings: Vec<Reading>, timings: &[GateTiming]) -> Result<Self, VolumeError> {
         let mut readings = readings.into_iter();
         let first = readings.next().ok_or(VolumeError::NoFile)?.usable()?;
         let mut facts = first.facts;
@@ -52,6 +52,7 @@ impl GatedReading {
             scans.push(reading.provenance);
         }
         let mut first_frame = 0;
+        let mut timing = timings.first().cloned().unwrap_or_default();
         let each = timing.gates_of_interval(gates.len());
         if each < gates.len() {
             let counts: Vec<f64> = (gates.chunks(each))
@@ -80,10 +81,7 @@ impl GatedReading {
             gates.truncate(each);
             scans = scans.split_off(first_frame);
             scans.truncate(each);
-            if main > 0 {
-                // The sequence's first item, which was read, is that of the first interval.
-                timing = GateTiming::default();
-            }
+            timing = timings.get(main).cloned().unwrap_or_default();
         }
         Ok(Self {
             gates,

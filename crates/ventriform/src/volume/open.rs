@@ -97,9 +97,9 @@ pub(super) trait OpenVolume {
         None
     }
 
-    /// What the file says of the beats of gated volumes.
-    fn gate_timing(&self) -> GateTiming {
-        GateTiming::default()
+    /// What the file says of the beats of gated volumes, for each R-R interval; empty if it says nothing.
+    fn gate_timings(&self) -> Vec<GateTiming> {
+        Vec::new()
     }
 
     /// The segments of a DICOM Segmentation; empty for all others.
@@ -242,7 +242,9 @@ pub(super) fn read(
 fn gates_of(file: &dyn OpenVolume) -> Option<GateFacts> {
     let header = file.header();
     let frames = header.frames;
-    header.gated.then(|| file.gate_timing().facts(frames))
+    header
+        .gated
+        .then(|| GateTiming::facts(&file.gate_timings(), frames))
 }
 
 /// `error` with the reason why the volumes are not summed.

@@ -3,7 +3,6 @@
 use super::array_file::ArrayFile;
 use super::dicom::DicomFile;
 use super::gate_files::{GateFiles, order_of};
-use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
@@ -76,7 +75,7 @@ pub fn read_gates(
             Err(error) if !matches!(error, VolumeError::Cancelled(_)) => {
                 Err(opened.err().unwrap_or(error))
             }
-            read => GatedReading::of(read?, GateTiming::default()),
+            read => GatedReading::of(read?, &[]),
         };
     }
     let mut opened = opened?;
@@ -95,14 +94,14 @@ pub fn read_gates(
     if voxels > limits.voxels {
         return Err(too_many_voxels(header.file, voxels, limits));
     }
-    let timing = opened.file.gate_timing();
+    let timings = opened.file.gate_timings();
     let one = |frame: usize| {
         let options = ReadOptions { frame: Some(frame) };
         open::read(&mut *opened.file, options, &monitor.part(frame, frames))
     };
     let mut readings: Vec<Reading> = (0..frames).map(one).collect::<Result<_, _>>()?;
     readings[0].facts.warnings.append(&mut opened.notes);
-    GatedReading::of(readings, timing)
+    GatedReading::of(readings, &timings)
 }
 
 /// Whether `files` are a volume of several frames that are the gates of a heart beat, by the header or because

@@ -48,8 +48,12 @@ const SEGMENT_SEQUENCE: Tag = Tag(0x0062, 0x0002);
 
 const DETECTOR_PATH: &[Tag] = &[Tag(0x0054, 0x0022)];
 const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
-/// The first R-R interval of a gated acquisition.
-const GATED_DATA: &[Tag] = &[Tag(0x0054, 0x0062), Tag(0x0054, 0x0063)];
+/// Gated Information Sequence.
+const GATED_INFORMATION: Tag = Tag(0x0054, 0x0062);
+/// Data Information Sequence, with an item for each R-R interval.
+const DATA_INFORMATION: Tag = Tag(0x0054, 0x0063);
+/// The R-R intervals of a gated acquisition, which are counted like frames.
+const GATED_DATA: &[Tag] = &[GATED_INFORMATION, DATA_INFORMATION];
 const ROTATION_PATH: &[Tag] = &[Tag(0x0054, 0x0052)];
 const PHARMACEUTICAL_PATH: &[Tag] = &[Tag(0x0054, 0x0016)];
 const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
@@ -266,9 +270,15 @@ impl Attribute {
     }
 
     /// The needed attribute with `tag` inside the sequences `open`, each with the number of items
-    /// begun, and the frame or segment to which the value belongs, from 0; `None` for a value that
-    /// belongs to the data set or to all frames.
+    /// begun, and the frame, segment or R-R interval to which the value belongs, from 0; `None` for a value
+    /// that belongs to the data set or to all frames.
     pub(super) fn find(open: &[(Tag, usize)], tag: Tag) -> Option<(Self, Option<usize>)> {
+        // Some writers give every interval a Gated Information of its own.
+        if let [(GATED_INFORMATION, outer), (DATA_INFORMATION, inner)] = *open {
+            let interval = (outer.min(inner) == 1).then(|| outer.max(inner) - 1)?;
+            let mut of_interval = WANTED_ATTRIBUTES.iter().filter(|a| a.path == GATED_DATA);
+            return Some((*of_interval.find(|a| a.tag == tag)?, Some(interval)));
+        }
         let (frame, outer) = match open.first() {
             Some((many @ (PER_FRAME_GROUPS | SEGMENT_SEQUENCE), items)) => {
                 (Some(items.checked_sub(1)?), Some(*many))
@@ -390,7 +400,9 @@ impl Attributes {
 
     /// Number of frames that the functional groups describe by attributes that are kept.
     pub(super) fn frames_described(&self) -> usize {
-        let frames = self.values.keys().filter_map(|(.., frame)| *frame);
+        let of_frames = |path: &[Tag]| path.first() == Some(&PER_FRAME_GROUPS);
+        let described = (self.values.keys()).filter(|(path, ..)| of_frames(path));
+        let frames = described.filter_map(|(.., frame)| *frame);
         frames.max().map_or(0, |last| last + 1)
     }
 

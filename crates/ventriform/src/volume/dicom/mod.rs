@@ -71,6 +71,7 @@ use super::{Provenance, Segment, VolumeError};
 use crate::progress::{Monitor, Stage};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::mem;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// DICOM files whose attributes have been read and checked.
@@ -84,8 +85,8 @@ pub(super) struct DicomFile {
     volumes: usize,
     /// Whether the volumes are gates of one heart beat.
     gated: bool,
-    /// What the file says of the beats, if it is gated.
-    timing: GateTiming,
+    /// What the file says of the beats of each R-R interval, if it is gated.
+    timings: Vec<GateTiming>,
     shape: [usize; 3],
     placement: Placement,
     provenance: Provenance,
@@ -238,8 +239,8 @@ impl DicomFile {
         warnings.extend(attenuation_warning(a));
         let enhanced_gates = scan.kind == Kind::Enhanced && timing::has_gates(a, pixels.frames);
         let gated = volumes > 1 && (scan.kind == Kind::Nuclear { gated: true } || enhanced_gates);
-        let timing = if enhanced_gates {
-            timing::of_frames(a)?
+        let timings = if enhanced_gates {
+            vec![timing::of_frames(a)?]
         } else {
             timing::of(a)?
         };
@@ -258,7 +259,7 @@ impl DicomFile {
             content,
             volumes,
             gated,
-            timing,
+            timings,
             shape: [columns, rows, slices],
             placement,
             provenance: Provenance::of(a),
@@ -319,10 +320,10 @@ impl DicomFile {
             ));
         }
         let gated = volumes > 1 && series.gated;
-        let timing = if gated {
-            first.timing?
+        let timings = if gated {
+            series.timings_of(&stack)?
         } else {
-            GateTiming::default()
+            Vec::new()
         };
         let mut warnings = first.warnings;
         warnings.extend(series.warnings(&stack, volumes));
@@ -348,7 +349,7 @@ impl DicomFile {
             content: Content::Slices(stored.collect()),
             volumes,
             gated,
-            timing,
+            timings,
             shape: [extent[0], extent[1], stack.slices],
             placement: stack.placement,
             provenance: first.provenance,
@@ -514,8 +515,6 @@ struct First {
     warnings: Vec<String>,
     /// The distance of slices that it states, in millimetres.
     gap: Option<f64>,
-    /// What it says of the beats; an error counts only where the series is gated.
-    timing: Result<GateTiming, VolumeError>,
 }
 
 /// The files of a series found so far.
@@ -525,6 +524,8 @@ struct Series {
     located: Vec<Located>,
     /// SOP Instance UID of each part.
     instances: Vec<String>,
+    /// What each part says of the beats; an error counts only where the series is gated.
+    timings: Vec<Result<GateTiming, VolumeError>>,
     /// The part of each SOP Instance UID.
     known: BTreeMap<String, usize>,
     /// Every series by its UID.
@@ -601,7 +602,6 @@ impl Series {
                 provenance: Provenance::of(a),
                 warnings: Provenance::warnings(a),
                 gap: stated_gap(a)?,
-                timing: timing::of_slice(a),
             });
         }
         if timing::is_of_gates(a) {
@@ -617,6 +617,7 @@ impl Series {
         }
         self.located.push(located);
         self.instances.push(instance);
+        self.timings.push(timing::of_slice(a));
         self.parts.push(pixels);
         Ok(None)
     }
@@ -688,6 +689,20 @@ impl Series {
             ));
         }
         warnings
+    }
+
+    /// The timing of each R-R interval, as the first slice of its first gate states it.
+    fn timings_of(&mut self, stack: &Stack) -> Result<Vec<GateTiming>, VolumeError> {
+        let volumes = stack.order.len() / stack.slices;
+        let mut timings = Vec::new();
+        let mut gate = 0;
+        while gate < volumes {
+            let part = stack.order[gate * stack.slices];
+            let stated = mem::replace(&mut self.timings[part], Ok(GateTiming::default()))?;
+            gate += stated.gates_of_interval(volumes);
+            timings.push(stated);
+        }
+        Ok(timings)
     }
 
     /// The parts and instances in the given order.
@@ -762,8 +777,8 @@ impl OpenVolume for DicomFile {
         }
     }
 
-    fn gate_timing(&self) -> GateTiming {
-        self.timing.clone()
+    fn gate_timings(&self) -> Vec<GateTiming> {
+        self.timings.clone()
     }
 
     fn provenance(&self, frame: usize) -> Option<Provenance> {

@@ -365,21 +365,26 @@ fn gates_are_volumes_of_their_own() {
     );
 }
 
-/// Two gates of two slices, of one R-R interval or of two, and what the file says of the beats.
-fn gates_with_timing(intervals: Vec<u16>, slots: Vec<u16>) -> Vec<u8> {
-    let mut elements = gated();
-    elements.insert((0x54, 0x60), ("US", Shorts(intervals)));
-    elements.insert((0x54, 0x70), ("US", Shorts(slots)));
-    let data = BTreeMap::from([
-        ((0x18, 0x1062), ("IS", Text("850"))),
+/// What a file says of the beats of an R-R interval of about `nominal` ms.
+fn said_of_interval(nominal: &'static str) -> Elements {
+    BTreeMap::from([
+        ((0x18, 0x1062), ("IS", Text(nominal))),
         ((0x18, 0x1063), ("DS", Text("212.5"))),
         ((0x18, 0x1081), ("IS", Text("700"))),
         ((0x18, 0x1082), ("IS", Text("1000"))),
         ((0x18, 0x1083), ("IS", Text("300"))),
         ((0x18, 0x1084), ("IS", Text("100"))),
-    ]);
-    let gate = BTreeMap::from([((0x54, 0x63), ("SQ", Items(vec![data])))]);
-    elements.insert((0x54, 0x62), ("SQ", Items(vec![gate])));
+    ])
+}
+
+/// Gates of two slices, of one R-R interval or of two, with the items of the Gated Information Sequence.
+fn gates_with_timing(intervals: Vec<u16>, slots: Vec<u16>, said: Vec<Vec<Elements>>) -> Vec<u8> {
+    let mut elements = gated();
+    elements.insert((0x54, 0x60), ("US", Shorts(intervals)));
+    elements.insert((0x54, 0x70), ("US", Shorts(slots)));
+    let gate = |data| BTreeMap::from([((0x54, 0x63), ("SQ", Items(data)))]);
+    let gates = said.into_iter().map(gate).collect();
+    elements.insert((0x54, 0x62), ("SQ", Items(gates)));
     Encoding::Explicit.file(&elements)
 }
 
@@ -390,7 +395,8 @@ fn every_gate_is_read_with_the_timing_of_the_beats() {
         let limits = ReadLimits::default();
         crate::volume::read_gates(&files, false, &limits, &Monitor::silent()).unwrap()
     };
-    let one = gates_with_timing(vec![1; 8], vec![1, 1, 2, 2, 3, 3, 4, 4]);
+    let said = vec![vec![said_of_interval("850")]];
+    let one = gates_with_timing(vec![1; 8], vec![1, 1, 2, 2, 3, 3, 4, 4], said);
     let reading = read(&one);
     assert_eq!(reading.gates.len(), 4);
     for (index, gate) in reading.gates.iter().enumerate() {
@@ -407,8 +413,24 @@ fn every_gate_is_read_with_the_timing_of_the_beats() {
         (Some(700.0), Some(1000.0))
     );
     assert_eq!(timing.rejected_share(), Some(0.25));
-    // Of two intervals that with the most counts is taken, and the other is named.
-    let two = gates_with_timing(vec![1, 1, 1, 1, 2, 2, 2, 2], vec![1, 1, 2, 2, 1, 1, 2, 2]);
+    // Of two intervals that with the most counts is taken, with its own timing, and the other is named.
+    let two = |said| {
+        gates_with_timing(
+            vec![1, 1, 1, 1, 2, 2, 2, 2],
+            vec![1, 1, 2, 2, 1, 1, 2, 2],
+            said,
+        )
+    };
+    let [shorter, longer] = ["850", "990"].map(said_of_interval);
+    let forms = [
+        (vec![vec![shorter.clone(), longer.clone()]], Some(990.0)),
+        (vec![vec![shorter.clone()], vec![longer]], Some(990.0)),
+        (vec![vec![shorter.clone()]], None),
+    ];
+    for (said, rr_ms) in forms {
+        assert_eq!(read(&two(said)).timing.rr_ms, rr_ms);
+    }
+    let two = two(vec![vec![shorter]]);
     let reading = read(&two);
     let later = [2, 3].map(|frame| read_frame(two.clone(), Some(frame)).unwrap().volume.voxels);
     let found: Vec<_> = reading

@@ -1,8 +1,9 @@
 //! What gated images say of the beats, and whether volumes are gates.
 //!
-//! In: the attributes of a file. Out: [`GateTiming`], of which the file may leave out any part. Nuclear Medicine images
-//! have it in the Gated Information Sequence (PS3.3 C.8.4.9), images of a PET series beside the slice (C.8.9.4), Enhanced
-//! images in the Cardiac Synchronization functional group (C.7.6.16.2.7).
+//! In: the attributes of a file. Out: [`GateTiming`] of each R-R interval, of which the file may leave out any part.
+//! Nuclear Medicine images have it in the Gated Information Sequence (PS3.3 C.8.4.9), with an item of the Data Information
+//! Sequence for each interval, images of a PET series beside the slice (C.8.9.4), Enhanced images in the Cardiac
+//! Synchronization functional group (C.7.6.16.2.7).
 
 use super::super::VolumeError;
 use super::super::gate_timing::GateTiming;
@@ -12,28 +13,33 @@ use super::attributes::{
     FRAME_TRIGGER_DELAY, GATE_FRAME_TIME, GATE_HIGH_RR, GATE_INTERVALS_ACQUIRED,
     GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, HEART_RATE, HIGH_RR_VALUE,
     INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL,
-    OLD_TRIGGER_TIME, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
+    OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
 };
 
 /// Milliseconds of a minute.
 const MINUTE_MS: f64 = 60_000.0;
 
-/// The timing of the first R-R interval of a Nuclear Medicine image.
+/// The timing of each R-R interval of a Nuclear Medicine image, in their order.
 ///
 /// # Errors
 /// [`VolumeError::Field`] if a part is not a number, or is negative.
-pub(super) fn of(a: &Attributes) -> Result<GateTiming, VolumeError> {
+pub(super) fn of(a: &Attributes) -> Result<Vec<GateTiming>, VolumeError> {
     let slots = a.shorts(TIME_SLOT_VECTOR).into_iter().max();
     let stated = a.shorts(TIME_SLOTS).first().copied();
-    Ok(GateTiming {
-        frame_time_ms: duration(a, GATE_FRAME_TIME, None)?,
-        rr_ms: duration(a, GATE_NOMINAL_INTERVAL, None)?,
-        low_rr_ms: duration(a, GATE_LOW_RR, None)?,
-        high_rr_ms: duration(a, GATE_HIGH_RR, None)?,
-        beats_accepted: number(a, GATE_INTERVALS_ACQUIRED, None)?,
-        beats_rejected: number(a, GATE_INTERVALS_REJECTED, None)?,
-        gates_per_interval: slots.or(stated).map(usize::from),
-    })
+    let intervals = a.shorts(RR_INTERVAL_VECTOR).into_iter().max();
+    let of_interval = |interval| {
+        let own = Some(usize::from(interval));
+        Ok(GateTiming {
+            frame_time_ms: duration(a, GATE_FRAME_TIME, own)?,
+            rr_ms: duration(a, GATE_NOMINAL_INTERVAL, own)?,
+            low_rr_ms: duration(a, GATE_LOW_RR, own)?,
+            high_rr_ms: duration(a, GATE_HIGH_RR, own)?,
+            beats_accepted: number(a, GATE_INTERVALS_ACQUIRED, own)?,
+            beats_rejected: number(a, GATE_INTERVALS_REJECTED, own)?,
+            gates_per_interval: slots.or(stated).map(usize::from),
+        })
+    };
+    (0..intervals.unwrap_or(1)).map(of_interval).collect()
 }
 
 /// The timing that a slice of a gated PET series states.

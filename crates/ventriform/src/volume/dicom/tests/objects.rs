@@ -670,6 +670,28 @@ fn a_series_of_gated_pet_is_read_gate_by_gate() {
     }
 }
 
+#[test]
+fn gated_pet_of_several_intervals_has_the_timing_of_the_one_with_the_most_counts() {
+    let told = |gate: usize, slice: usize| {
+        let mut said = item(
+            (0x54, 0x1330),
+            "US",
+            Shorts(vec![(2 * gate + slice + 1) as u16]),
+        );
+        said.insert((0x54, 0x61), ("US", Shorts(vec![2])));
+        if gate >= 8 {
+            said.insert((0x18, 0x1062), ("IS", Text("1050")));
+        }
+        said
+    };
+    let slices = gated_pet(16, told);
+    let limits = ReadLimits::default();
+    let reading =
+        crate::volume::read_gates(&files(&slices), false, &limits, &Monitor::silent()).unwrap();
+    assert_eq!((reading.gates.len(), reading.first_frame), (8, 8));
+    assert_eq!(reading.timing.rr_ms, Some(1050.0));
+}
+
 /// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was made
 /// of single ones, their Trigger Time.
 #[test]
