@@ -259,6 +259,23 @@ async fn segmentations_and_beats_stand_for_their_volumes_and_keys_for_one_job() 
     let other = app.post("/v1/comparisons").header("prefer", "wait=30");
     let other = other.header(ACCEPT, "model/stl").json(&order).send().await;
     problem(other.unwrap(), 406, "not-acceptable").await;
+    // What was corrected of a fit is kept, each scan's own, unless the request says otherwise.
+    let fit = app.post("/v1/segmentations?center=1,2,3&base=4,5,6");
+    let fit = fit.body(words("brief stress")).send().await.unwrap();
+    let fit = (app.until(&fit.json().await.unwrap(), &["succeeded"])).await;
+    for (stated, base) in [
+        (json!({}), json!([4.0, 5.0, 6.0])),
+        (json!({"stress_base": [7, 8, 9]}), json!([7.0, 8.0, 9.0])),
+    ] {
+        let order =
+            json!({"stress": fit["segmentation"], "rest": beat["id"], "parameters": stated});
+        let filed = app.post_json("/v1/comparisons", order).await;
+        let filed: Value = filed.json().await.unwrap();
+        let parameters = &filed["parameters"];
+        assert_eq!(parameters["stress_base"], base, "{filed}");
+        assert_eq!(parameters["stress_center"], json!([1.0, 2.0, 3.0]));
+        assert!(parameters["rest_center"].is_null());
+    }
     // A form with both files is a comparison too.
     let part = |said: &str| Part::bytes(words(said)).file_name("scan.nii");
     let form = Form::new()

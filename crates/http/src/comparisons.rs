@@ -21,6 +21,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use ventriform::comparison::WhichScan;
+use ventriform::parameters::ComparisonChoice;
 use ventriform::rest_stress::{FILE_NAMES, mesh_of};
 use ventriform_service::records::{Product, Resource, Tenant};
 
@@ -122,7 +123,8 @@ const FIELDS: [&str; 10] = [
 /// Compare rest and stress
 ///
 /// `stress` and `rest` are volumes, or segmentations or beats, whose volumes are then compared: both are fitted anew by one
-/// model, as beats if both are gated. `normals` names normal limits, by which both are scored. Or the body is a form with
+/// model, as beats if both are gated. What was corrected of a segmentation or a beat (`center`, `axis`, `base`,
+/// `segments_from`) is kept unless `parameters` say otherwise (`stress_center`, `rest_axis`, ...). `normals` names normal limits, by which both are scored. Or the body is a form with
 /// the files `stress` and `rest`; everything else is then a query parameter. The service files a job and answers 202 with
 /// it. With `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200 with what `Accept` asks for: the
 /// report (`application/json`), or slices of stress above those of rest.
@@ -172,10 +174,13 @@ pub async fn create_comparison(
         Resource::Comparison.noun(),
         None,
     )?;
-    let stress = volume_of(&app, &caller.tenant, &object, "stress").await?;
+    let stress = scan_of(&app, &caller.tenant, &object, WhichScan::Stress).await?;
     let mut parameters = parameters_of(&object)?.clone();
-    let rest = volume_of(&app, &caller.tenant, &object, "rest").await?;
-    add(&mut parameters, "rest", rest)?;
+    let rest = scan_of(&app, &caller.tenant, &object, WhichScan::Rest).await?;
+    add(&mut parameters, "rest", rest.volume)?;
+    for (name, correction) in stress.corrections.into_iter().chain(rest.corrections) {
+        parameters.entry(name).or_insert(correction);
+    }
     if let Some(normals) = text(&object, "normals")? {
         add(&mut parameters, "normals", normals.to_owned())?;
     }
@@ -184,7 +189,7 @@ pub async fn create_comparison(
     order.webhook = webhook_of(&app, &object).await?;
     let filed = app
         .service
-        .file_job(work, Some(stress), parameters, order, &counting)
+        .file_job(work, Some(stress.volume), parameters, order, &counting)
         .await?;
     filing::answer(&app, filed, patience, &headers, &offers()).await
 }
@@ -219,13 +224,22 @@ fn add(parameters: &mut Map<String, Value>, name: &str, value: String) -> Answer
     }
 }
 
-/// The volume that a field names: itself, or that of the segmentation or the beat which the field names.
-async fn volume_of(
+/// A scan that a request names.
+struct NamedScan {
+    /// The id of its volume.
+    volume: String,
+    /// What was corrected of the fit that the request names, as parameters of the comparison.
+    corrections: Map<String, Value>,
+}
+
+/// The scan that a field names: a volume, or that of the segmentation or the beat which the field names.
+async fn scan_of(
     app: &App,
     tenant: &Tenant,
     object: &Map<String, Value>,
-    field: &'static str,
-) -> Answer<String> {
+    scan: WhichScan,
+) -> Answer<NamedScan> {
+    let field = scan.as_str();
     let Some(id) = text(object, field)? else {
         let missing = format!("`{field}` is missing.");
         return Err(Problem::invalid_field(field, missing)
@@ -234,12 +248,19 @@ async fn volume_of(
     match Resource::of(id) {
         Some(Resource::Segmentation | Resource::Beat) => {
             let product = app.service.items().catalogue().product(tenant, id).await?;
-            match product.and_then(|product| product.item.volume) {
-                Some(volume) => Ok(volume),
-                None => Err(app.service.names_nothing(tenant, field, id).await?.into()),
+            let fit = product.map(|product| (product.item.volume, product.item.parameters));
+            match fit {
+                Some((Some(volume), parameters)) => Ok(NamedScan {
+                    volume,
+                    corrections: ComparisonChoice::corrections_of(&parameters, scan),
+                }),
+                _ => Err(app.service.names_nothing(tenant, field, id).await?.into()),
             }
         }
-        Some(Resource::Volume) => Ok(id.to_owned()),
+        Some(Resource::Volume) => Ok(NamedScan {
+            volume: id.to_owned(),
+            corrections: Map::new(),
+        }),
         _ => {
             let other = format!("`{field}` is no id of a volume, a segmentation or a beat.");
             Err(Problem::invalid_field(field, other)

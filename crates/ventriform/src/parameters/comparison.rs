@@ -1,12 +1,14 @@
 //! The parameters of a comparison: its own, and those of the fits to both scans.
 
-use super::fit_specs::{NAME_PATTERN, scan_name};
+use super::fit_specs::{NAME_PATTERN, direction, point, scan_name};
 use super::with_fit::{BesideFit, WithFit};
-use super::{Kind, ParameterError, ParameterSpec, Parameters};
-use serde_json::json;
+use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
+use crate::comparison::WhichScan;
+use crate::geometry::Vec3;
+use serde_json::{Map, Value, json};
 
 /// The parameters of a comparison beside those of the fits to both scans.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct ComparisonChoice {
     /// Id of the volume with the scan at rest, where a service stores it.
     pub rest: Option<String>,
@@ -19,6 +21,58 @@ pub struct ComparisonChoice {
     pub gated: bool,
     /// Whether the scans are of one patient although the headers say otherwise. Default `false`.
     pub same_patient: bool,
+    /// What the user corrects of the fit to the scan at stress.
+    pub stress_correction: Correction,
+    /// What the user corrects of the fit to the scan at rest.
+    pub rest_correction: Correction,
+}
+
+/// What a user corrects of the fit to one scan. All places are in its frame, LPS mm.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Correction {
+    /// A point in the cavity.
+    pub center: Option<Vec3>,
+    /// Direction from base to apex, of any length.
+    pub axis: Option<Vec3>,
+    /// A point of the ventricle's base.
+    pub base: Option<Vec3>,
+    /// Direction from the long axis to the wall that segments are counted from as the anterior one.
+    pub segments_from: Option<Vec3>,
+}
+
+impl Correction {
+    /// The parameters of a fit that a correction states, by their names in its table.
+    const NAMES: [&str; 4] = ["center", "axis", "base", "segments_from"];
+
+    /// Puts the correction into the parameters of the fit to its scan.
+    pub fn correct(&self, parameters: &mut FitParameters) {
+        let position = &mut parameters.position;
+        position.centre = self.center.or(position.centre);
+        position.axis = self.axis.or(position.axis);
+        parameters.deform.base = self.base.or(parameters.deform.base);
+        parameters.segments_from = self.segments_from.or(parameters.segments_from);
+    }
+}
+
+impl ComparisonChoice {
+    /// The correction of the fit to a scan.
+    pub fn correction(&self, scan: WhichScan) -> &Correction {
+        match scan {
+            WhichScan::Stress => &self.stress_correction,
+            WhichScan::Rest => &self.rest_correction,
+        }
+    }
+
+    /// The corrections among the parameters of an earlier `fit` to a scan, as parameters of a comparison.
+    pub fn corrections_of(fit: &Map<String, Value>, scan: WhichScan) -> Map<String, Value> {
+        let stated = |name: &str| {
+            Some(fit.get(name)?)
+                .filter(|value| !value.is_null())
+                .cloned()
+        };
+        let of_scan = |name: &str| Some((format!("{}_{name}", scan.as_str()), stated(name)?));
+        Correction::NAMES.into_iter().filter_map(of_scan).collect()
+    }
 }
 
 impl Parameters for ComparisonChoice {
@@ -29,6 +83,28 @@ impl Parameters for ComparisonChoice {
     fn finish(choice: Self) -> Result<Self, ParameterError> {
         Ok(choice)
     }
+}
+
+/// A row for a place or a direction in one scan: name, field, how the numbers are read, summary.
+macro_rules! in_scan {
+    ($name:literal, $($field:ident).+, $read:expr, $summary:literal) => {
+        ParameterSpec {
+            name: $name,
+            kind: Kind::Numbers { count: 3 },
+            default: "",
+            summary: $summary,
+            read: |d, v| {
+                d.$($field).+ = Some($read(v.numbers())?);
+                Ok(())
+            },
+            write: |p| json!(p.$($field).+.map(|v| [v.x, v.y, v.z])),
+        }
+    };
+}
+
+/// A point that any three numbers are.
+fn stated_point(list: &[f64]) -> Result<Vec3, String> {
+    Ok(point(list))
 }
 
 /// Every parameter that only a comparison has.
@@ -99,10 +175,65 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
         },
         write: |p| json!(p.same_patient),
     },
+    in_scan!(
+        "stress_center",
+        stress_correction.center,
+        stated_point,
+        "A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart \
+         is searched for"
+    ),
+    in_scan!(
+        "stress_axis",
+        stress_correction.axis,
+        direction,
+        "Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 degrees of it"
+    ),
+    in_scan!(
+        "stress_base",
+        stress_correction.base,
+        stated_point,
+        "A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put there. Default: \
+         where image and anatomy put it"
+    ),
+    in_scan!(
+        "stress_segments_from",
+        stress_correction.segments_from,
+        direction,
+        "Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. Default: the \
+         anterior wall"
+    ),
+    in_scan!(
+        "rest_center",
+        rest_correction.center,
+        stated_point,
+        "A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart \
+         is searched for"
+    ),
+    in_scan!(
+        "rest_axis",
+        rest_correction.axis,
+        direction,
+        "Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 degrees of it"
+    ),
+    in_scan!(
+        "rest_base",
+        rest_correction.base,
+        stated_point,
+        "A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put there. Default: \
+         where image and anatomy put it"
+    ),
+    in_scan!(
+        "rest_segments_from",
+        rest_correction.segments_from,
+        direction,
+        "Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. Default: the \
+         anterior wall"
+    ),
 ];
 
 const NO_EXPERT: &str = "a comparison has no expert's mask";
-const ONE_SCAN: &str = "the heart lies elsewhere in each of both scans";
+const ONE_SCAN: &str =
+    "the heart lies elsewhere in each of both scans: `stress_center`, `rest_center` and their like";
 
 impl BesideFit for ComparisonChoice {
     const WORK: &'static str = "a comparison";
@@ -120,6 +251,7 @@ impl BesideFit for ComparisonChoice {
         ("seed_point", ONE_SCAN),
         ("box", ONE_SCAN),
         ("axis", ONE_SCAN),
+        ("base", ONE_SCAN),
         ("segments_from", ONE_SCAN),
         (
             "protocol",
@@ -143,6 +275,8 @@ mod tests {
             &[("gated", "true"), ("same_patient", "true")],
             &[("rest", "vol_0123"), ("rest_protocol", "rest 2 d")],
             &[("stress_protocol", "stress")],
+            &[("stress_center", "1,2,3"), ("rest_base", "0,-1,2.5")],
+            &[("rest_axis", "0,0,2"), ("stress_segments_from", "0,-1,0")],
         ]);
         checks::table_states_defaults::<ComparisonChoice>();
         let given = [("same_patient", "true"), ("superior", "0,0,1")];
@@ -151,6 +285,33 @@ mod tests {
             ComparisonParameters::from_json(&both.to_json()).unwrap(),
             both
         );
+    }
+
+    #[test]
+    fn corrections_of_earlier_fits_are_those_of_the_comparison() {
+        let corrected = [
+            ("center", "1,2,3"),
+            ("axis", "0,0,2"),
+            ("base", "0,-1,2.5"),
+            ("segments_from", "0,1,0"),
+        ];
+        let fit = FitParameters::from_pairs(corrected).unwrap();
+        for scan in [WhichScan::Stress, WhichScan::Rest] {
+            let given = ComparisonChoice::corrections_of(&fit.to_json(), scan);
+            assert_eq!(given.len(), corrected.len());
+            let read = ComparisonParameters::from_json(&given).unwrap();
+            let mut again = FitParameters::default();
+            read.choice.correction(scan).correct(&mut again);
+            assert_eq!(again, fit);
+            let other = match scan {
+                WhichScan::Stress => WhichScan::Rest,
+                WhichScan::Rest => WhichScan::Stress,
+            };
+            assert_eq!(read.choice.correction(other), &Correction::default());
+        }
+        let none =
+            ComparisonChoice::corrections_of(&FitParameters::default().to_json(), WhichScan::Rest);
+        assert!(none.is_empty());
     }
 
     #[test]

@@ -574,7 +574,7 @@ pub(super) fn scan_name(text: &str) -> Result<String, String> {
     Ok(name.to_owned())
 }
 
-fn direction(list: &[f64]) -> Result<Vec3, String> {
+pub(super) fn direction(list: &[f64]) -> Result<Vec3, String> {
     let direction = point(list);
     match direction.norm() {
         length if length > 1e-6 && length.is_finite() => Ok(direction),
@@ -582,6 +582,6 @@ fn direction(list: &[f64]) -> Result<Vec3, String> {
     }
 }
 
-fn point(list: &[f64]) -> Vec3 {
+pub(super) fn point(list: &[f64]) -> Vec3 {
     Vec3::new(list[0], list[1], list[2])
 }

@@ -89,7 +89,7 @@ fn fitted(
     monitor: &Monitor<'_>,
 ) -> Result<ComparedHeart, ComparisonError> {
     let own = order.parameters.fit.clone();
-    let parameters = FitParameters {
+    let mut parameters = FitParameters {
         kept_model: kept.map(str::to_owned).or(own.kept_model),
         scan: ScanKind {
             protocol: order.protocol(scan),
@@ -97,6 +97,11 @@ fn fitted(
         },
         ..own
     };
+    order
+        .parameters
+        .choice
+        .correction(scan)
+        .correct(&mut parameters);
     let (auto, models) = (order.auto, order.models.clone());
     if gated {
         let own = GatedOrder {

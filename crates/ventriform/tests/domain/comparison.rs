@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use ventriform::comparison::REVERSIBLE_POINTS;
+use ventriform::geometry::Vec3;
 use ventriform::parameters::ComparisonParameters;
 use ventriform::progress::Monitor;
 use ventriform::rest_stress::{ComparedHearts, ComparisonError, ComparisonOrder, from_files};
@@ -35,6 +36,14 @@ fn file(volume: &Volume) -> Vec<VolumeFile> {
 }
 
 fn compared(stress: &Volume, rest: &Volume) -> Result<ComparedHearts, ComparisonError> {
+    compared_with(&ComparisonParameters::default(), stress, rest)
+}
+
+fn compared_with(
+    parameters: &ComparisonParameters,
+    stress: &Volume,
+    rest: &Volume,
+) -> Result<ComparedHearts, ComparisonError> {
     let (stress, rest) = (file(stress), file(rest));
     let order = ComparisonOrder {
         stress: &stress,
@@ -42,7 +51,7 @@ fn compared(stress: &Volume, rest: &Volume) -> Result<ComparedHearts, Comparison
         auto: true,
         models: Vec::new(),
         normals: None,
-        parameters: &ComparisonParameters::default(),
+        parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }
@@ -107,6 +116,38 @@ fn a_factor_changes_no_figure() {
     let percent = |made: &ComparedHearts| made.change.reversible_percent;
     assert!((percent(&brighter) - percent(&made)).abs() < 0.1);
     assert!((brighter.tid() - made.tid()).abs() < 1e-3);
+}
+
+/// A base that is put 8 mm towards the apex in one scan shortens that heart alone.
+#[test]
+fn a_correction_is_of_its_own_scan() {
+    let (stress, rest) = (scan(1, 0.0), scan(2, 0.0));
+    let made = compared(&stress, &rest).unwrap();
+    let model = made.stress.template();
+    for (scan, own) in [("stress", 0), ("rest", 1)] {
+        let fit = &[&made.stress, &made.rest][own].segmentation().fit.model;
+        let axis = fit.cup.unwrap().axis;
+        let along = |vertex: &&Vec3| axis.dot(vertex);
+        let vertices = fit.mesh.vertices.iter();
+        let rim = vertices
+            .min_by(|a, b| along(a).total_cmp(&along(b)))
+            .unwrap();
+        let base = rim + axis * 8.0;
+        let base = format!("{},{},{}", base.x, base.y, base.z);
+        let given = [
+            (format!("{scan}_base"), base),
+            ("kept_model".to_owned(), model.to_owned()),
+        ];
+        let given = given
+            .iter()
+            .map(|(name, value)| (name.as_str(), value.as_str()));
+        let parameters = ComparisonParameters::from_pairs(given).unwrap();
+        let corrected = compared_with(&parameters, &stress, &rest).unwrap();
+        let cavities = |made: &ComparedHearts| [made.stress.cavity_ml(), made.rest.cavity_ml()];
+        let (before, after) = (cavities(&made), cavities(&corrected));
+        assert!(after[own] < 0.95 * before[own], "{before:?} {after:?}");
+        assert!((after[1 - own] / before[1 - own] - 1.0).abs() < 0.02);
+    }
 }
 
 #[test]
