@@ -58,7 +58,8 @@ pub struct LeastSquaresParameters {
     /// Weight of keeping the vertices in place, as a fraction of the weight of the distances
     /// spread over the vertices, (0, 1]. Default 0.0005.
     pub damping: f64,
-    /// Samples of the surface per triangle of the model, 4..=200. Default 16.
+    /// Samples of the surface per triangle of the model, 4..=200. Default 16. A model whose triangles are smaller than
+    /// the surface's own has fewer, at least 6.
     pub samples_per_triangle: usize,
     /// Number of further flips, 0..=4, that the fit tries after each flip to move irregular
     /// vertices until they cancel; each takes several times as long as the one before. Default 3.

@@ -306,7 +306,8 @@ pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
         optimise.fit.samples_per_triangle,
         4..=200,
         "16",
-        "Samples of the surface per triangle of the model in the fit"
+        "Samples of the surface per triangle of the model in the fit; fewer, at least 6, where the surface's own \
+         triangles are larger"
     ),
     integer!(
         "fit_glide",

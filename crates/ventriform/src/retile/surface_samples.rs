@@ -1,12 +1,16 @@
 //! The vertices of the surface as weighted samples, as many as N cells need.
 //!
-//! In: the surface S and its smoothed twin W, which share their triangles. Out: their vertices,
-//! after as many midpoint subdivisions as are needed, with neighbours and the area around each.
+//! In: the surface S and its smoothed twin W, which share their triangles. Out: their vertices and the
+//! midpoints of as many of the longest edges as are needed, with neighbours and the area around each.
 //! Subdivision changes neither surface: every new vertex is the midpoint of an edge.
 
 use crate::geometry::Vec3;
 use crate::geometry::triangle::area_normal;
 use rayon::prelude::*;
+
+/// Number of wanted samples from which on only the longest edges are split. Fewer samples take little time, and models
+/// of few points are better the more samples a cell has.
+const PARTLY_SPLIT_FROM_SAMPLES: usize = 6000;
 
 /// The vertices of S and W with neighbours and areas.
 #[derive(Debug, Clone)]
@@ -25,12 +29,14 @@ pub(super) struct WeightedSamples {
 }
 
 impl WeightedSamples {
-    /// Samples of the surface with at least `wanted` vertices, subdivided no more often than
-    /// needed for that.
+    /// Samples of the surface with at least `wanted` vertices: from [`PARTLY_SPLIT_FROM_SAMPLES`] on no more than that but
+    /// for edges of one length, below as many as splitting every edge makes.
     pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
         let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
         while samples.len() < wanted {
-            samples = samples.subdivided();
+            let missing = wanted - samples.len();
+            let all = wanted < PARTLY_SPLIT_FROM_SAMPLES;
+            samples = samples.subdivided(if all { usize::MAX } else { missing });
         }
         samples
     }
@@ -65,17 +71,28 @@ impl WeightedSamples {
         &self.neighbours[self.first[v] as usize..self.first[v + 1] as usize]
     }
 
-    /// The samples with every triangle split in four.
-    fn subdivided(&self) -> Self {
+    /// The samples and the midpoints of their `count` longest edges on W, of all edges if there are no more.
+    fn subdivided(&self, count: usize) -> Self {
         let old = self.len() as u32;
+        let length_squared =
+            |a: u32, b: u32| (self.working[a as usize] - self.working[b as usize]).norm_squared();
+        let shortest = {
+            let ends = (0..old).flat_map(|a| self.around(a as usize).iter().map(move |b| (a, *b)));
+            let edges = ends.filter(|(a, b)| a < b);
+            let mut lengths: Vec<f64> = edges.map(|(a, b)| length_squared(a, b)).collect();
+            let last = count.min(lengths.len()).saturating_sub(1);
+            *lengths
+                .select_nth_unstable_by(last, |a, b| b.total_cmp(a))
+                .1
+        };
         // Edges are numbered by the half-edge that leaves their lower vertex; their midpoints get
         // the next free vertex numbers in that order.
-        let mut middle = vec![0u32; self.neighbours.len()];
+        let mut middle = vec![NOT_SPLIT; self.neighbours.len()];
         let (mut surface, mut working) = (self.surface.clone(), self.working.clone());
         for a in 0..old {
             for h in self.first[a as usize]..self.first[a as usize + 1] {
                 let b = self.neighbours[h as usize];
-                if a < b {
+                if a < b && length_squared(a, b) >= shortest {
                     middle[h as usize] = working.len() as u32;
                     working.push((self.working[a as usize] + self.working[b as usize]) / 2.0);
                     surface.push((self.surface[a as usize] + self.surface[b as usize]) / 2.0);
@@ -88,16 +105,46 @@ impl WeightedSamples {
             let place = self.around(low as usize).iter().position(|&v| v == high);
             middle[start + place.expect("a triangle's edge joins neighbours")]
         };
+        let is_shorter = |[a, b]: [u32; 2], [c, d]: [u32; 2]| {
+            let length =
+                |p: u32, q: u32| (working[p as usize] - working[q as usize]).norm_squared();
+            length(a, b) <= length(c, d)
+        };
         let triangles = self
             .triangles
             .par_iter()
             .with_min_len(4096)
             .flat_map_iter(|&[a, b, c]| {
-                let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
-                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                let middles = [between(a, b), between(b, c), between(c, a)];
+                let (parts, count) = split([a, b, c], middles, is_shorter);
+                parts.into_iter().take(count)
             })
             .collect();
         Self::of(surface, working, triangles)
+    }
+}
+
+/// Stands for the midpoint of an edge that is not split.
+const NOT_SPLIT: u32 = u32::MAX;
+
+/// The parts of a triangle whose edges, from its first corner on, have these midpoints, and their number. Where two
+/// edges are split, the shorter diagonal divides what they leave of the triangle.
+fn split(
+    [a, b, c]: [u32; 3],
+    [ab, bc, ca]: [u32; 3],
+    is_shorter: impl Fn([u32; 2], [u32; 2]) -> bool,
+) -> ([[u32; 3]; 4], usize) {
+    let none = [a, b, c];
+    // With the first edge split, and the second one if there are two.
+    match [ab, bc, ca].map(|middle| middle != NOT_SPLIT) {
+        [false, false, false] => ([none; 4], 1),
+        [true, true, true] => ([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]], 4),
+        [true, false, false] => ([[a, ab, c], [ab, b, c], none, none], 2),
+        [true, true, false] if is_shorter([a, bc], [ab, c]) => {
+            ([[ab, b, bc], [a, ab, bc], [a, bc, c], none], 3)
+        }
+        [true, true, false] => ([[ab, b, bc], [a, ab, c], [ab, bc, c], none], 3),
+        _ => split([b, c, a], [bc, ca, ab], is_shorter),
     }
 }
 
@@ -142,6 +189,47 @@ mod tests {
         let (a, b): (f64, f64) = (coarse.area.iter().sum(), fine.area.iter().sum());
         assert!((a - b).abs() < 1e-9 * a);
         assert!((a - mesh.area()).abs() < 1e-9 * a);
+    }
+
+    /// Whatever the number of new samples, the longest edges are those that are split, and the surface stays closed.
+    #[test]
+    fn the_longest_edges_are_split() {
+        let mut mesh = shapes::torus(9.0, 3.0, 14, 9);
+        // No two edges of one length.
+        for (n, vertex) in mesh.vertices.iter_mut().enumerate() {
+            *vertex *= 1.0 + 0.05 * (7.0 * n as f64).sin();
+        }
+        let coarse = WeightedSamples::new(&mesh.vertices, &mesh.vertices, &mesh.triangles, 0);
+        let length =
+            |[a, b]: [u32; 2]| (mesh.vertices[a as usize] - mesh.vertices[b as usize]).norm();
+        let mut lengths: Vec<f64> = (mesh.triangles.iter())
+            .flat_map(|t| (0..3).map(|k| [t[k], t[(k + 1) % 3]]))
+            .filter(|[a, b]| a < b)
+            .map(length)
+            .collect();
+        lengths.sort_by(|a, b| b.total_cmp(a));
+        for more in [1, 17, 60, 126, 300, lengths.len()] {
+            let fine = coarse.subdivided(more);
+            assert_eq!(fine.len(), coarse.len() + more);
+            let as_mesh = TriMesh {
+                vertices: fine.surface.clone(),
+                triangles: fine.triangles.clone(),
+            };
+            assert_eq!(topology::check(&as_mesh).unwrap().euler_characteristic, 0);
+            assert!((as_mesh.area() - mesh.area()).abs() < 1e-9 * mesh.area());
+            let longest = as_mesh
+                .triangles
+                .iter()
+                .flat_map(|t| (0..3).map(|k| [t[k], t[(k + 1) % 3]]));
+            let longest = longest
+                .filter(|edge| edge.iter().all(|v| (*v as usize) < coarse.len()))
+                .map(length)
+                .fold(0.0, f64::max);
+            assert!(
+                longest < lengths[more - 1] - 1e-9 || more == lengths.len(),
+                "{more}"
+            );
+        }
     }
 
     /// W is here S, stretched and moved: subdivision keeps that, and all areas are of W.

@@ -41,6 +41,21 @@ use crate::progress::{Cancelled, Monitor, Stage};
 /// Number of last rounds without momentum.
 const ROUNDS_WITHOUT_MOMENTUM: usize = 5;
 
+/// Samples of the surface for each of its own triangles above which more say nothing new.
+const SAMPLES_PER_SURFACE_TRIANGLE: usize = 2;
+/// Samples that each triangle of the model has nevertheless.
+const LEAST_SAMPLES_PER_TRIANGLE: usize = 6;
+/// Samples of the whole surface that take too little time to spare any.
+const FEW_SAMPLES: usize = 10_000;
+
+/// The number of samples for a model of `faces` triangles on a surface of `surface` triangles: as many for each of the
+/// model's as `asked`, as long as they are few or not denser than the surface itself.
+fn sample_count(faces: usize, surface: usize, asked: usize) -> usize {
+    let least = asked.min(LEAST_SAMPLES_PER_TRIANGLE) * faces;
+    let enough = least.max(SAMPLES_PER_SURFACE_TRIANGLE * surface);
+    (asked * faces).min(enough.max(FEW_SAMPLES))
+}
+
 /// The model between two rounds, and what it is fitted to.
 struct FitState<'a> {
     vertices: Vec<Vec3>,
@@ -85,7 +100,11 @@ pub fn fit(
     parameters: &LeastSquaresParameters,
     monitor: &Monitor,
 ) -> Result<FittedMesh, Cancelled> {
-    let count = parameters.samples_per_triangle * half_edges.face_count();
+    let count = sample_count(
+        half_edges.face_count(),
+        reference.mesh.triangles.len(),
+        parameters.samples_per_triangle,
+    );
     let lengths = reference.lengths(half_edges.face_count());
     let mut state = FitState {
         vertices: start.to_vec(),
@@ -189,6 +208,24 @@ mod tests {
             start,
             reference(jolted(shapes::cup(60.0, 30.0, 10.0, 90), 0.6)),
         )
+    }
+
+    #[test]
+    fn samples_are_no_denser_than_the_surface_where_there_are_many() {
+        // Few, more than the surface has triangles; as many as asked; limited by the surface; at least six; fewer asked.
+        let cases = [
+            (296, 1000, 16, 4736),
+            (2000, 19_000, 16, 32_000),
+            (10_000, 19_000, 16, 60_000),
+        ];
+        let limited = [
+            (4000, 19_000, 16, 38_000),
+            (40_000, 19_000, 4, 160_000),
+            (40_000, 19_000, 200, 240_000),
+        ];
+        for (faces, surface, asked, expected) in cases.into_iter().chain(limited) {
+            assert_eq!(sample_count(faces, surface, asked), expected);
+        }
     }
 
     #[test]
