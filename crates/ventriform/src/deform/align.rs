@@ -8,7 +8,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::sensors::{self, SensorReading, SensorSettings};
+use super::sensors::{self, Density, SensorReading, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::locate::cup::perpendicular;
@@ -21,6 +21,8 @@ type Coefficients = SVector<f64, PARAMETER_COUNT>;
 
 /// Rounds of Gauss-Newton.
 const GAUSS_NEWTON_ROUNDS: usize = 12;
+/// Last rounds in which all sensors are read: the position in the rounds before need not be exact.
+const ROUNDS_WITH_ALL_SENSORS: usize = 2;
 
 /// Aligns `mesh` with the edges in `field`; `axis` is the long axis, any direction for organs
 /// other than ventricles. The sensors' reach falls from `settings.reach` to `last_reach`, mm.
@@ -39,12 +41,13 @@ pub fn align(
     let shares = area_shares(&mesh);
     for round in 0..GAUSS_NEWTON_ROUNDS {
         let reach = reach_in(round, settings.reach, last_reach);
-        let readings = sensors::read(
-            &mesh,
-            field,
-            &SensorSettings { reach, ..*settings },
-            monitor,
-        )?;
+        let density = if round + ROUNDS_WITH_ALL_SENSORS < GAUSS_NEWTON_ROUNDS {
+            Density::Third
+        } else {
+            Density::Full
+        };
+        let settings = SensorSettings { reach, ..*settings };
+        let readings = sensors::read_some(&mesh, field, &settings, density, monitor)?;
         let centre: Vec3 = mesh.vertices.iter().zip(&shares).map(|(p, s)| p * *s).sum();
         let basis = Basis {
             axis: *axis,

@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Sensors are read before every step. Their reach falls step by step; when it has reached its
-//! least value, readings are averaged, and after 12 of them the mean is fixed. The implicit step
+//! least value, readings are averaged, sensors that hardly move keep the edge that they saw, and after 12 readings the
+//! mean is fixed. The implicit step
 //! is stable for any dt, so the motion ends at rest, where it stalls, or at the limit of steps
 //! ([`StopReason`]).
 
@@ -116,6 +117,7 @@ pub fn run(
 ) -> Result<MotionResult, Cancelled> {
     let mut state = MotionState::new(start, body, motion);
     let mut mean = SensorMean::default();
+    let mut known = Vec::new();
     let mut reach = settings.reach;
     let mut energies: Vec<f64> = Vec::new();
     let mut lowest = (f64::INFINITY, 0);
@@ -125,15 +127,13 @@ pub fn run(
         monitor.check()?;
         let settled = reach <= motion.last_reach;
         if !mean.is_fixed() {
-            mean.add(
-                sensors::read(
-                    &state.mesh,
-                    field,
-                    &SensorSettings { reach, ..*settings },
-                    monitor,
-                )?,
-                settled,
-            );
+            let settings = SensorSettings { reach, ..*settings };
+            let readings = if settled {
+                sensors::read_again(&state.mesh, field, &settings, &mut known, monitor)?
+            } else {
+                sensors::read(&state.mesh, field, &settings, monitor)?
+            };
+            mean.add(readings, settled);
         }
         let readings = mean.readings(&state.mesh);
         let energy =
