@@ -5,7 +5,7 @@
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
 #                              pygeodesic, schemathesis, the page in a browser, the Python package, generated clients, kills, DICOM, Orthanc,
-#                              licences and SBOM, the site of the docs)
+#                              commands of the docs, licences and SBOM, the site of the docs)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -143,6 +143,7 @@ if wait "${running[install]}"; then
   start proxy scripts/check_proxy.sh
   start pgbouncer scripts/check_pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
+  start commands "$PYTHON" scripts/check_commands.py target/debug/ventriform
   start dependencies "$PYTHON" scripts/dependencies.py check
   collect python "Python package: tests, types, notebooks"
   collect formats "formats read by trimesh, vtk and the glTF validator"
@@ -161,6 +162,7 @@ if wait "${running[install]}"; then
   collect proxy "service behind nginx"
   collect pgbouncer "service on PostgreSQL behind PgBouncer"
   collect alerts "alerts of Prometheus"
+  collect commands "commands of the README and the docs"
   collect dependencies "licences, sources and bill of materials"
 else
   cat "$tools/install.log"
