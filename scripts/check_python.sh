@@ -4,6 +4,7 @@
 #   scripts/check_python.sh            everything
 #   scripts/check_python.sh --build    only the wheel and its environment, which scripts/test.sh does beforehand: it needs cargo's lock
 #   scripts/check_python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
+#   scripts/check_python.sh --notebooks    only the notebooks, whose copies with outputs scripts/site.sh shows
 #   scripts/check_python.sh --write    writes the generated stubs anew
 #
 # The wheel has the dev profile, in which the library is optimised. VENTRIFORM_WHEEL: a wheel to test instead.
@@ -31,18 +32,27 @@ build() {
   "$venv/bin/pip" install -q --no-deps --force-reinstall "$wheel"
 }
 
+# The repository's notebooks have no outputs; the copies are kept with the sums of what was run.
+run_notebooks() {
+  rm -rf "$tools/notebooks"
+  mkdir -p "$tools/notebooks"
+  cp python/examples/*.ipynb "$tools/notebooks"
+  "$venv/bin/python" -m pytest -q -p no:cacheprovider --nbmake --overwrite "$tools/notebooks"
+  sha256sum python/examples/*.ipynb >"$tools/notebooks/sources"
+}
+
 run_tests() {
   [ -x "$VENTRIFORM_PROGRAM" ] || cargo build --quiet --bins --test layering
   "$venv/bin/python" -m pytest -q -p no:cacheprovider python/tests
   "$venv/bin/python" -m mypy --strict --cache-dir "$tools/mypy" -p ventriform
   "$venv/bin/python" -m mypy.stubtest ventriform --allowlist python/stubtest_allowlist.txt
-  [ -z "$(ls python/examples/*.ipynb 2>/dev/null)" ] ||
-    "$venv/bin/python" -m pytest -q -p no:cacheprovider --nbmake python/examples
+  run_notebooks
 }
 
 case ${1:-} in
   --build) build ;;
   --test) run_tests ;;
+  --notebooks) run_notebooks ;;
   --write)
     python3 scripts/python_types.py write reports
     build

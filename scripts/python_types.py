@@ -2,12 +2,13 @@
 
     python scripts/python_types.py check     the committed files are those that would be written
     python scripts/python_types.py write     writes them anew
+    python scripts/python_types.py reference FILE     writes signatures and docstrings as JSON, for the site
 
 `python/ventriform/reports.py` has the reports' classes, from openapi/ventriform.json; `_functions.pyi` the signatures of
 the functions that take parameters, from the tables of the installed package (so install it first, or run
 scripts/check_python.sh --write, which does).
 """
-import ast, json, keyword, pathlib, sys, textwrap
+import ast, inspect, json, keyword, pathlib, sys, textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python/ventriform"
@@ -171,10 +172,28 @@ def argument(arg, default):
     return f"{arg.arg}{kind}" + (f" = {ast.unparse(default)}" if default is not None else "")
 
 
+def reference():
+    """The functions that take parameters, as `help` shows them in the installed package."""
+    import ventriform
+
+    def shown(parameter):
+        default = None if parameter.default is parameter.empty else repr(parameter.default)
+        return {"name": parameter.name, "kind": parameter.kind.description, "annotation": parameter.annotation, "default": default}
+
+    taking = {name: made for name, made in vars(ventriform).items() if hasattr(made, "__signature__")}
+    return {
+        name: {"docstring": made.__doc__, "parameters": [shown(p) for p in inspect.signature(made).parameters.values()]}
+        for name, made in taking.items()
+    }
+
+
 SCHEMAS = json.loads((ROOT / "openapi/ventriform.json").read_text())["components"]["schemas"]
 
 
 def main():
+    if sys.argv[1:2] == ["reference"]:
+        pathlib.Path(sys.argv[2]).write_text(json.dumps(reference()))
+        return
     made = {PACKAGE / "reports.py": reports}
     if sys.argv[2:] != ["reports"]:
         made[PACKAGE / "_functions.pyi"] = stub
