@@ -1,4 +1,4 @@
-"""Work beside the interpreter: progress, Ctrl-C, threads, processes, memory."""
+"""Work beside the interpreter: progress, Ctrl-C, threads, processes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import concurrent.futures
 import multiprocessing
 import os
 import pathlib
-import resource
 import signal
 import subprocess
 import sys
 import textwrap
 import threading
 import time
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -139,29 +137,6 @@ def test_a_fit_travels_from_a_process(scan: pathlib.Path, fit: vf.Fit) -> None:
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         made = pool.submit(vf.segment, str(scan)).result(timeout=120)
     assert dict(made.files) == dict(fit.files)
-
-
-def test_repeated_work_keeps_no_memory() -> None:
-    volume = vf.phantom(size=32, spacing_mm=8.0).volume
-    array = volume.array
-
-    def work() -> None:
-        made = vf.Volume(array, volume.affine)
-        vf.generate(made, points=60).to_bytes("glb")
-        with pytest.raises(vf.InputError):
-            vf.generate(made, points=3)
-
-    for _ in range(10):
-        work()
-    tracemalloc.start()
-    before = tracemalloc.take_snapshot()
-    resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for _ in range(40):
-        work()
-    grown = sum(difference.size_diff for difference in tracemalloc.take_snapshot().compare_to(before, "filename"))
-    tracemalloc.stop()
-    assert grown < 300_000
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - resident < 40_000
 
 
 def test_the_import_is_quick_and_brings_no_numpy() -> None:
