@@ -1,13 +1,13 @@
 //! `ventriform beat`: one model in motion of a gated study.
 
+use super::Bar;
 use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
 use super::normals::{NormalLimitArgs, normals_line};
 use super::output::note;
-use super::parameter_args::{TableArgs, with_fit};
+use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
 use super::volume_args::volume_files;
-use super::{Bar, FitArgs};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
@@ -54,7 +54,7 @@ pub struct BeatArgs {
     #[command(flatten)]
     choice: TableArgs<BeatChoice>,
     #[command(flatten)]
-    fit: FitArgs,
+    fit: FitArgsOf<BeatChoice>,
     #[command(flatten)]
     normals: NormalLimitArgs,
     #[command(flatten)]

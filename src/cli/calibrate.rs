@@ -1,7 +1,8 @@
 //! `ventriform calibrate`: [`ventriform::evaluate::calibration`] on the command line.
 
+use super::Bar;
 use super::output::{note, say, write_file};
-use super::{Bar, FitArgs, UnusableArgument};
+use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use ventriform::evaluate::calibration::{
     Calibration, CalibrationError, CaseFigures, LEVEL_MARGIN_E_J, MeanJaccards, calibrate, cases_of,
 };
 use ventriform::evaluate::sample::Sample;
+use ventriform::parameters::CalibrationChoice;
 use ventriform::progress::Plan;
 use ventriform::reader::{Learnt, ReaderLevel, ReaderOffset};
 
@@ -35,7 +37,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "NAME", default_value = "lv_expert_img")]
     mask: String,
     #[command(flatten)]
-    fit: FitArgs,
+    fit: FitArgsOf<CalibrationChoice>,
 }
 
 /// Runs the command.
@@ -43,7 +45,7 @@ pub struct CalibrateArgs {
 /// # Errors
 /// If no mask can be learnt from, or the profile cannot be written.
 pub fn run(args: &CalibrateArgs) -> Result<()> {
-    let parameters = args.fit.parameters().map_err(UnusableArgument::from)?;
+    let parameters = with_fit(&TableArgs::default(), &args.fit)?.fit;
     let cases = cases_of(&args.cohort, &args.mask).map_err(|error| CalibrationError::Folder {
         folder: args.cohort.clone(),
         error,

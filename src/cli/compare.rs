@@ -4,10 +4,10 @@ use super::dicom_args::DicomArgs;
 use super::limit_args::LimitArgs;
 use super::normals::NormalLimitArgs;
 use super::output::note;
-use super::parameter_args::{TableArgs, with_fit};
+use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use super::segment::{MODEL_AUTO, chosen_models, parse_format, write_all};
 use super::volume_args::volume_files;
-use super::{Bar, FitArgs, UnusableArgument};
+use super::{Bar, UnusableArgument};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
@@ -57,7 +57,7 @@ pub struct CompareArgs {
     #[command(flatten)]
     choice: TableArgs<ComparisonChoice>,
     #[command(flatten)]
-    fit: FitArgs,
+    fit: FitArgsOf<ComparisonChoice>,
     #[command(flatten)]
     dicom: DicomArgs,
     #[command(flatten)]

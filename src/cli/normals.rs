@@ -1,9 +1,9 @@
 //! `ventriform normals`: limits from healthy people's scans; and the arguments of commands that compare with them.
 
+use super::UnusableArgument;
 use super::limit_args::LimitArgs;
 use super::output::note;
-use super::parameter_args::{TableArgs, with_fit};
-use super::{FitArgs, UnusableArgument};
+use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ struct BuildArgs {
     #[command(flatten)]
     choice: TableArgs<NormalsChoice>,
     #[command(flatten)]
-    fit: FitArgs,
+    fit: FitArgsOf<NormalsChoice>,
     #[command(flatten)]
     limits: LimitArgs,
 }

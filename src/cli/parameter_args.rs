@@ -57,15 +57,42 @@ impl<P: Parameters> TableArgs<P> {
     }
 }
 
+/// The flags of the parameters of the fits of some work. Those that it has no use for are not in its help; they are
+/// taken, so that [`with_fit`] refuses them with the reason.
+#[derive(Debug, Clone)]
+pub struct FitArgsOf<C>(FitArgs, PhantomData<C>);
+
+impl<C: BesideFit> Args for FitArgsOf<C> {
+    fn augment_args(command: Command) -> Command {
+        let used: Vec<_> = WithFit::<C>::fit_specs().map(|spec| spec.name).collect();
+        command
+            .args(rows::<FitParameters>().map(|spec| flag(spec).hide(!used.contains(&spec.name))))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl<C> FromArgMatches for FitArgsOf<C> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Self(FitArgs::from_arg_matches(matches)?, PhantomData))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        self.0.update_from_arg_matches(matches)
+    }
+}
+
 /// The parameters of work that fits models, from its own flags and those of its fits.
 ///
 /// # Errors
 /// The first flag that cannot be used.
 pub fn with_fit<C: BesideFit>(
     own: &TableArgs<C>,
-    fit: &FitArgs,
+    fit: &FitArgsOf<C>,
 ) -> Result<WithFit<C>, UnusableArgument> {
-    let pairs = own.pairs().iter().chain(fit.pairs());
+    let pairs = own.pairs().iter().chain(fit.0.pairs());
     Ok(WithFit::from_pairs(
         pairs.map(|(name, text)| (*name, text.as_str())),
     )?)

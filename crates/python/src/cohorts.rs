@@ -2,7 +2,7 @@
 
 use crate::errors::{Stopped, broken, refused, stopped};
 use crate::run::{Tell, abandonable, run};
-use crate::values::{table, with_fit};
+use crate::values::with_fit;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
@@ -19,7 +19,7 @@ use ventriform::evaluate::{
     evaluate as judge,
 };
 use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
-use ventriform::parameters::FitParameters;
+use ventriform::parameters::CalibrationChoice;
 use ventriform::progress::Plan;
 use ventriform::volume::ReadLimits;
 use ventriform::volume::given_mask::MaskChoice;
@@ -34,7 +34,7 @@ pub fn calibrate(
     parameters: &Bound<'_, PyDict>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String)> {
-    let parameters: FitParameters = table(parameters)?;
+    let parameters = with_fit::<CalibrationChoice>(parameters)?.fit;
     abandonable(py, progress, move |tell: &Tell| {
         let no_cohort = |error: &dyn std::fmt::Display| {
             let fix = "Give a folder with a folder for each case, which holds a scan and a mask.";

@@ -5,8 +5,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde_json::{Map, Number, Value};
 use ventriform::parameters::{
-    BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, ComparisonChoice, FIT_SPECS, Kind,
-    NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec, Parameters, SPECS, WithFit,
+    BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, CalibrationChoice, ComparisonChoice,
+    FIT_SPECS, Kind, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec, Parameters,
+    SPECS, WithFit,
 };
 use ventriform_service::work::problems::Explain;
 
@@ -114,7 +115,8 @@ pub fn parameter_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let tables = PyDict::new(py);
     tables.set_item("generate", rows(py, SPECS)?)?;
     tables.set_item("segment", rows(py, FIT_SPECS)?)?;
-    tables.set_item("calibrate", rows(py, FIT_SPECS)?)?;
+    let calibrate = rows(py, WithFit::<CalibrationChoice>::fit_specs())?;
+    tables.set_item("calibrate", calibrate)?;
     let beat = rows(py, BEAT_SPECS)?;
     extend(&beat, &rows(py, WithFit::<BeatChoice>::fit_specs())?)?;
     tables.set_item("beat", beat)?;

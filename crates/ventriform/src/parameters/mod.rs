@@ -7,6 +7,7 @@
 //! range, or a [`ParameterError`] with the name of the first invalid parameter.
 
 mod beat;
+mod calibration;
 #[cfg(test)]
 mod checks;
 mod comparison;
@@ -23,6 +24,7 @@ mod table;
 mod with_fit;
 
 pub use beat::{BEAT_SPECS, BeatChoice, GatedParameters, MASS_G, RR_MS};
+pub use calibration::{CalibrationChoice, CalibrationParameters};
 pub use comparison::{COMPARISON_SPECS, ComparisonChoice, ComparisonParameters};
 pub use fit::{FitParameters, KnownPosition, MaskGrid};
 pub use fit_specs::FIT_SPECS;
