@@ -4,6 +4,10 @@
 #
 #   scripts/release.sh              x86_64; also aarch64 where rustup has that target
 #
+# Not made: an image of the container, which needs an engine (docker compose build makes it from the Dockerfile).
+#
+# First scripts/check_semver.sh compares the library's interface with the newest release's.
+#
 # Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same commit
 # gives the same bytes: paths are mapped, times are the commit's, and archives are sorted. What was changed since is refused,
 # unless DIRTY=1.
@@ -20,6 +24,7 @@ if [ -n "$(git status --porcelain)" ] && [ -z "${DIRTY:-}" ]; then
   echo "there are changes that no commit has; commit them, or set DIRTY=1"
   exit 1
 fi
+scripts/check_semver.sh
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 umask 022
@@ -34,7 +39,11 @@ export RUSTFLAGS="--remap-path-prefix=$root=. --remap-path-prefix=${CARGO_HOME:-
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_DIST_STRIP=symbols
 
 targets=(x86_64-unknown-linux-gnu)
-[ -d "$(rustc --print sysroot)/lib/rustlib/aarch64-unknown-linux-gnu" ] && targets+=(aarch64-unknown-linux-gnu)
+if [ -d "$(rustc --print sysroot)/lib/rustlib/aarch64-unknown-linux-gnu" ]; then
+  targets+=(aarch64-unknown-linux-gnu)
+else
+  echo "without aarch64: rustup target add aarch64-unknown-linux-gnu"
+fi
 
 # archive FOLDER FILE: packs a folder beside it, sorted, with the commit's time and without owners.
 archive() {
