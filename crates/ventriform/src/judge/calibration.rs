@@ -56,33 +56,45 @@ pub const HEART_FITTED: Logistic = Logistic {
 
 /// A good fit of the apparent wall, by the fits of several models, without projections.
 pub const GOOD_SET_APPARENT: Logistic = Logistic {
-    intercept: -0.236,
-    terms: &[Term::new("mean log odds", 0.0, 1.0, 1.096)],
+    intercept: -0.355,
+    terms: &[
+        Term::new("mean log odds", 0.0, 1.0, 1.045),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -0.769),
+        Term::new("its square", 0.0, 1.0, 0.142),
+    ],
 };
 
 /// A good fit of the anatomical wall, likewise.
 pub const GOOD_SET_ANATOMICAL: Logistic = Logistic {
-    intercept: 0.05,
-    terms: &[Term::new("mean log odds", 0.0, 1.0, 0.953)],
+    intercept: -0.096,
+    terms: &[
+        Term::new("mean log odds", 0.0, 1.0, 1.002),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.13),
+        Term::new("its square", 0.0, 1.0, -0.359),
+    ],
 };
 
 /// A good fit of the apparent wall, by the fits of several models and the projections.
 pub const GOOD_SET_APPARENT_BY_PROJECTIONS: Logistic = Logistic {
-    intercept: -3.413,
+    intercept: -6.279,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 0.444),
-        Term::new("ln gain", 0.0, 1.0, -1.207),
+        Term::new("mean log odds", 0.0, 1.0, 0.792),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.269),
+        Term::new("its square", 0.0, 1.0, -0.634),
+        Term::new("dark", 0.0, 1.0, -3.564),
+        Term::new("ln gain", 0.0, 1.0, -2.177),
     ],
 };
 
-/// A good fit of the anatomical wall, likewise and by the size of the cavity: the thin wall of a large heart agrees less
-/// with a fitted one that lies off by as much.
+/// A good fit of the anatomical wall, likewise.
 pub const GOOD_SET_ANATOMICAL_BY_PROJECTIONS: Logistic = Logistic {
-    intercept: 2.683,
+    intercept: -4.387,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 0.84),
-        Term::new("ln gain", 0.0, 1.0, -0.95),
-        Term::new("ln cavity / ml", 0.0, 1.0, -1.537),
+        Term::new("mean log odds", 0.0, 1.0, 0.756),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.428),
+        Term::new("its square", 0.0, 1.0, -0.893),
+        Term::new("dark", 0.0, 1.0, -5.264),
+        Term::new("ln gain", 0.0, 1.0, -1.553),
     ],
 };
 

