@@ -829,8 +829,6 @@ export interface components {
              * @enum {string}
              */
             attenuation_corrected?: "yes" | "no";
-            /** @description A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there (moved by at most 20 mm towards the apex or 40 mm away from it). Default: where image and anatomy put it */
-            base?: number[];
             /**
              * @description Sigma of the Gaussian that smooths the image for the sensors, millimetres
              * @default 3
@@ -930,11 +928,19 @@ export interface components {
             resolution?: number;
             /** @description Id of the volume with the scan at rest */
             rest?: string;
+            /** @description Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
+            rest_axis?: number[];
+            /** @description A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put there. Default: where image and anatomy put it */
+            rest_base?: number[];
+            /** @description A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart is searched for */
+            rest_center?: number[];
             /**
              * @description The protocol of the scan at rest. Default: the only one with the word rest in its name
              * @example rest
              */
             rest_protocol?: string;
+            /** @description Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. Default: the anterior wall */
+            rest_segments_from?: number[];
             /**
              * @description Rotation of the model about the long axis, in degrees, in addition to the smallest rotation that aligns the axes
              * @default 0
@@ -961,11 +967,19 @@ export interface components {
              * @default 2.5
              */
             spring_stiffness?: number;
+            /** @description Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 degrees of it */
+            stress_axis?: number[];
+            /** @description A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put there. Default: where image and anatomy put it */
+            stress_base?: number[];
+            /** @description A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart is searched for */
+            stress_center?: number[];
             /**
              * @description The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word stress in its name
              * @example stress
              */
             stress_protocol?: string;
+            /** @description Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. Default: the anterior wall */
+            stress_segments_from?: number[];
             /**
              * @description Which direction is superior in the patient, from which the segments of the polar map are counted: body (from the outline of the body, if enough of it is in view, else as the volume's frame states), frame (as the frame states) or the direction itself, x,y,z in the LPS frame of the volume
              * @default body
@@ -2592,7 +2606,7 @@ export interface components {
             /** @description Rounds of the least-squares fit; 0 leaves the points on the surface (default for refined: 10, for paper: 0) */
             fit_rounds?: number;
             /**
-             * @description Samples of the surface per triangle of the model in the fit
+             * @description Samples of the surface per triangle of the model in the fit; fewer, at least 6, where the surface's own triangles are larger
              * @default 16
              */
             fit_samples?: number;
