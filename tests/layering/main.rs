@@ -121,6 +121,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
             "deform",
             "polar",
             "normals",
+            "comparison",
         ],
     ),
     (
