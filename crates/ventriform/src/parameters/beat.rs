@@ -115,7 +115,7 @@ pub type GatedParameters = WithFit<BeatChoice>;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FIT_SPECS, checks};
+    use super::super::checks;
     use super::*;
 
     fn pairs(list: &[(&str, &str)]) -> Result<GatedParameters, ParameterError> {
@@ -139,14 +139,7 @@ mod tests {
 
     #[test]
     fn what_a_beat_has_no_use_for_is_refused_and_not_written() {
-        let written = GatedParameters::default().to_json();
-        for (name, why) in BeatChoice::WITHOUT_USE {
-            assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
-            assert!(!written.contains_key(*name), "{name}");
-            let refused = pairs(&[(name, "1")]).unwrap_err();
-            assert_eq!(refused.field, *name);
-            assert!(refused.message.contains(why), "{refused}");
-        }
+        checks::refuses_what_it_has_no_use_for::<BeatChoice>();
     }
 
     #[test]

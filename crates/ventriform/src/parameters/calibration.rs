@@ -38,17 +38,11 @@ pub type CalibrationParameters = WithFit<CalibrationChoice>;
 
 #[cfg(test)]
 mod tests {
-    use super::super::FIT_SPECS;
+    use super::super::checks;
     use super::*;
 
     #[test]
     fn what_a_profile_has_no_use_for_is_refused_and_not_written() {
-        let written = CalibrationParameters::default().to_json();
-        for (name, why) in CalibrationChoice::WITHOUT_USE {
-            assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
-            assert!(!written.contains_key(*name), "{name}");
-            let refused = CalibrationParameters::from_pairs([(*name, "1")]).unwrap_err();
-            assert!(refused.message.contains(why), "{refused}");
-        }
+        checks::refuses_what_it_has_no_use_for::<CalibrationChoice>();
     }
 }

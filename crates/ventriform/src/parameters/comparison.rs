@@ -265,7 +265,7 @@ pub type ComparisonParameters = WithFit<ComparisonChoice>;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FIT_SPECS, checks};
+    use super::super::checks;
     use super::*;
 
     #[test]
@@ -316,13 +316,6 @@ mod tests {
 
     #[test]
     fn what_a_comparison_has_no_use_for_is_refused_and_not_written() {
-        let written = ComparisonParameters::default().to_json();
-        for (name, why) in ComparisonChoice::WITHOUT_USE {
-            assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
-            assert!(!written.contains_key(*name), "{name}");
-            let refused = ComparisonParameters::from_pairs([(*name, "1")]).unwrap_err();
-            assert_eq!(refused.field, *name);
-            assert!(refused.message.contains(why), "{refused}");
-        }
+        checks::refuses_what_it_has_no_use_for::<ComparisonChoice>();
     }
 }

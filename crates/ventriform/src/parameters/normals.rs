@@ -116,7 +116,7 @@ pub type NormalsParameters = WithFit<NormalsChoice>;
 
 #[cfg(test)]
 mod tests {
-    use super::super::{FIT_SPECS, checks};
+    use super::super::checks;
     use super::*;
 
     #[test]
@@ -127,12 +127,6 @@ mod tests {
 
     #[test]
     fn what_limits_have_no_use_for_is_refused_and_not_written() {
-        let written = NormalsParameters::default().to_json();
-        for (name, why) in NormalsChoice::WITHOUT_USE {
-            assert!(FIT_SPECS.iter().any(|spec| spec.name == *name), "{name}");
-            assert!(!written.contains_key(*name), "{name}");
-            let refused = NormalsParameters::from_pairs([(*name, "1")]).unwrap_err();
-            assert!(refused.message.contains(why), "{refused}");
-        }
+        checks::refuses_what_it_has_no_use_for::<NormalsChoice>();
     }
 }
