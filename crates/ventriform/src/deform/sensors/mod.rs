@@ -214,20 +214,18 @@ fn read_sensors(
             let index = readings.len();
             let is_near =
                 |known: &KnownEdge| (place - known.place).norm_squared() < SAME_PLACE_MM.powi(2);
-            let seen = match known.get(index) {
-                Some(seen) if is_near(seen) => *seen,
-                _ => {
-                    let normal = (sides[0] * w[0] + sides[1] * w[1] + sides[2] * w[2])
-                        .try_normalize(0.0)
-                        .unwrap_or_else(Vec3::zeros);
-                    let seen = read(place, normal);
-                    match known.get_mut(index) {
-                        Some(known) => *known = seen,
-                        None => known.push(seen),
-                    }
-                    seen
+            if !known.get(index).is_some_and(is_near) {
+                let normal = (sides[0] * w[0] + sides[1] * w[1] + sides[2] * w[2])
+                    .try_normalize(0.0)
+                    .unwrap_or_else(Vec3::zeros);
+                let seen = read(place, normal);
+                if index < known.len() {
+                    known[index] = seen;
+                } else {
+                    known.push(seen);
                 }
-            };
+            }
+            let seen = known[index];
             let mut edge = seen.seen_from(&place);
             if settings.blind.is_some_and(|sector| sector.holds(&place)) {
                 edge.score = 0.0;
