@@ -307,6 +307,14 @@ fn a_profile_learnt_on_one_mask_helps_another_of_that_reader() {
     }
 }
 
+/// How far the mask drawn by a profile lies from the one without it: endocardium, epicardium, rim, mm.
+fn moved_by(without: &SegmentedVolume, made: &SegmentedVolume) -> [f64; 3] {
+    let masks = [without, made].map(|made| &made.segmentation.mask);
+    let fit = &without.segmentation.fit.model;
+    let found = measure(fit, masks[0], masks[1], &made.reading.volume.frame);
+    found.unwrap().to_array()
+}
+
 #[test]
 fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not() {
     let folder = tempfile::tempdir().unwrap();
@@ -327,19 +335,24 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
     }
     let offsets = [1.5, -0.5, 3.0];
     let made = segmented(&path, Some(profile(offsets)), &defaults).unwrap();
-    let frame = &made.reading.volume.frame;
-    let fit = &without.segmentation.fit.model;
-    let found = measure(
-        fit,
-        &without.segmentation.mask,
-        &made.segmentation.mask,
-        frame,
-    )
-    .unwrap();
-    // Few voxels are beyond the rim.
-    let sure = [0.3, 0.3, 0.5];
-    for ((found, wanted), sure) in found.to_array().iter().zip(offsets).zip(sure) {
-        assert!((found - wanted).abs() < sure, "{found} for {wanted}");
+    // A rim of few voxels is measured to half a millimetre; the mean of several scans is surer.
+    let mut moved = vec![moved_by(&without, &made)];
+    for seed in [8, 9] {
+        scan(&path, seed);
+        let drawn = |profile| segmented(&path, profile, &defaults).unwrap();
+        moved.push(moved_by(&drawn(None), &drawn(Some(profile(offsets)))));
+    }
+    for (which, wanted) in offsets.into_iter().enumerate() {
+        let each = moved.iter().map(|found| found[which]);
+        assert!(
+            each.clone().all(|found| (found - wanted).abs() < 0.5),
+            "{moved:?}"
+        );
+        let mean = each.sum::<f64>() / moved.len() as f64;
+        assert!(
+            (mean - wanted).abs() < 0.3,
+            "{mean} for {wanted}: {moved:?}"
+        );
     }
     let report = made.report();
     let reader = report.reader.as_ref().unwrap();
