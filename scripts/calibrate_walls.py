@@ -2,14 +2,15 @@
 """Estimates the constants of rims, walls and nodes from tables of features.
 
     calibrate_walls.py --check              compare an estimate from the tables with the constants as committed
-    calibrate_walls.py --write              write the files with the constants estimated from the tables
+    calibrate_walls.py --write [NAME...]    write the files with the constants (of these names) estimated from the tables
     calibrate_walls.py --layout             write the files again with the constants as they are
 
 The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs. The
-tables (scripts/calibration/{rims,rays,nodes}.csv, --tables for another folder) are made by
+tables (scripts/calibration/{rims,rays,nodes,smoothness}.csv, --tables for another folder) are made by
 
     make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
     cargo run --release -p ventriform-tools --bin wall_features -- TABLES COHORT CASES/SET...
+    cargo run --release -p ventriform-tools --bin smoothness_features -- TABLES/smoothness.csv COHORT CASES/SET...
 
 - RIM_SHAPE: mean and inverse covariance of the harmonics of the true rims, each by least squares, over the heart's length.
 - RIM_CORRECTION: least squares of the distance from the sensed to the true rim, by the distance of the sensed rim from its
@@ -18,11 +19,15 @@ tables (scripts/calibration/{rims,rays,nodes}.csv, --tables for another folder) 
   in which no such distance has a median beyond 6 mm.
 - NARROW_CAVITY_SHIFT, CAVITY_SIZE_SHIFT: least squares of what those leave in the mean of a heart, by the size of the cavity.
   The size from which a cavity is narrow is chosen.
+- SMOOTHNESS_SHIFT: least squares of what all those leave in the mean of a fit, by the logarithm of the image's smoothness. Each
+  heart has three fits: as it is and behind two further filters. The usual smoothness is the mean of the scans as they are, the
+  range that of all fits.
 - APPARENT_TERMS, ANATOMICAL_TERMS: quantile regression (68 %) of the logarithm of the distance of nodes from the wall.
 
 {reproduced}
 """
 import argparse
+import collections
 import csv
 import pathlib
 import re
@@ -38,18 +43,21 @@ TABLES = ROOT / "scripts/calibration"
 REPRODUCED = """\
 The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with 42 scans
 of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and 2104 with 14 of all
-kinds. docs/evaluation.md says how far the estimate is from the committed constants, and why: do not --write it without judging
+kinds. smoothness.csv has the cohort and every third scan of the first 118 of seed 5001. docs/evaluation.md says how far the estimate is from the committed constants, and why: do not --write it without judging
 the fits anew, since every result depends on them."""
 
 # Sets of the simulator, by the seed that they were made with. "cohort" is the cohort of 19 hearts.
 RIM_SETS = ["cohort", "411", "701"]
 RAY_SETS = ["cohort", "411", "701"]
 SIZE_SETS = ["2101", "2104"]
+SMOOTHNESS_SETS = ["cohort", "5001"]
 NODE_SETS = ["cohort", "411", "701", "702", "703", "704"]
 
 DIRECTIONS = 30
+FILTERS = 3  # fits of each heart in smoothness.csv
 OUTLIER_MM, CORRELATED, ROUNDS = 4.0, 3.0, 30  # as in deform/base_plane.rs
 LOST_MM = 6.0
+LOST_MEAN_MM = 3.0  # of a whole surface, from where it is expected
 SPREAD_OFFSET_MM = 0.3
 SHARE = 0.68
 LEAST_DISTANCE_MM = 0.01
@@ -69,6 +77,7 @@ TERMS = {
     "NARROW_CAVITY_SHIFT": (WALLS, "SizeShift", "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as the blur\n"
                             "/// hardly moves its edge any more when it shrinks."),
     "CAVITY_SIZE_SHIFT": (WALLS, "SizeShift", "Distance by which the outer surface moves outward of that, the more, the smaller the cavity looks."),
+    "SMOOTHNESS_SHIFT": (WALLS, "SmoothnessShift", "Distances by which both surfaces move outward of that, where the image is smoother than usual."),
     "APPARENT_TERMS": (NODES, "NodeTerms", "Distance from an expert's mask."),
     "ANATOMICAL_TERMS": (NODES, "NodeTerms", "Distance from the true wall."),
 }
@@ -79,7 +88,7 @@ WALLS_HEADER = """\
 //! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
 //! the distances from the apparent to the anatomical wall.
 
-use super::ray_terms::{RayTerms, SizeShift};
+use super::ray_terms::{RayTerms, SizeShift, SmoothnessShift};
 use super::rim_model::{RimCorrection, RimHarmonic, RimShape};
 """
 NODES_HEADER = """\
@@ -106,13 +115,17 @@ def committed():
             mean = re.findall(rf"cosine: {NUMBER},\s+sine: {NUMBER}", shape)
             rows = re.findall(r"\[(-?[0-9][^\[\]]*)\]", shape)
             found["RIM_SHAPE"] = dict(mean=np.array(mean, float).ravel(), precision=np.array([row.split(", ") for row in rows], float))
-            found["RIM_CORRECTION"]["range_mm"] = [float(x) for x in re.search(rf"range_mm: \[{NUMBER}, {NUMBER}\]", text).groups()]
+            ranges = re.findall(rf"range_mm: \[{NUMBER}, {NUMBER}\]", text)
+            for name, values in zip(("RIM_CORRECTION", "SMOOTHNESS_SHIFT"), ranges, strict=True):
+                found[name]["range_mm"] = [float(x) for x in values]
         else:
             found["MEDIAN_SPREAD_MM"] = float(re.search(rf"MEDIAN_SPREAD_MM: f64 = {NUMBER};", text)[1])
     return found
 
 
 def literal(x, digits=3):
+    if isinstance(x, list):
+        return f"[{', '.join(literal(value, digits) for value in x)}]"
     text = f"{x:.{digits}f}".rstrip("0")
     text = text + "0" if text.endswith(".") else text
     return "0.0" if text == "-0.0" else text
@@ -124,12 +137,11 @@ def layout(constants):
     harmonics = "".join(f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n        }},\n"
                         for c, s in zip(shape["mean"][::2], shape["mean"][1::2]))
     rows = "".join("        [" + ", ".join(literal(round(x), 1) for x in row) + "],\n" for row in shape["precision"])
-    low, high = (literal(x) for x in correction["range_mm"])
     text = {WALLS: WALLS_HEADER, NODES: NODES_HEADER}
     text[WALLS] += ("\n/// Shape of the rims of hearts.\npub const RIM_SHAPE: RimShape = RimShape {\n"
                     f"    mean: [\n{harmonics}    ],\n    precision: [\n{rows}    ],\n}};\n"
                     "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: RimCorrection = RimCorrection {\n"
-                    + "".join(f"    {field}: {literal(correction[field])},\n" for field in CORRECTION_FIELDS) + f"    range_mm: [{low}, {high}],\n}};\n")
+                    + "".join(f"    {field}: {literal(correction[field])},\n" for field in [*CORRECTION_FIELDS, "range_mm"]) + "};\n")
     for name, (file, kind, doc) in TERMS.items():
         fields = "".join(f"    {field}: {literal(value)},\n" for field, value in constants[name].items())
         text[file] += f"\n/// {doc}\npub const {name}: {kind} = {kind} {{\n{fields}}};\n"
@@ -221,6 +233,54 @@ def quantile_regression(x, y, share):
     return beta
 
 
+def of_size(rows, constants, surface):
+    """The distances of a surface that the size of the cavity adds."""
+    size = np.log(np.maximum(column(rows, "cavity_ml"), 1.0))
+    narrow, any_size = constants["NARROW_CAVITY_SHIFT"], constants["CAVITY_SIZE_SHIFT"]
+    if surface == "inner":
+        return -narrow["per_log_mm"] * np.maximum(np.log(narrow["cavity_ml"]) - size, 0)
+    return any_size["per_log_mm"] * (np.log(any_size["cavity_ml"]) - size)
+
+
+def filtered(tables, constants):
+    """Rows of the hearts whose fits all found the wall, and the means of their numbers in the order of RAY_FIELDS. `constants` tell
+    where the true surfaces are expected."""
+    rows = table(tables / "smoothness.csv", SMOOTHNESS_SETS)
+    rest = [left(rows, numbers(rows), constants, surface) for surface in ("inner", "outer")]
+    lost = {(row["set"], row["case"]) for row, distances in zip(rows, zip(*rest)) if max(np.abs(distances)) > LOST_MEAN_MM}
+    fits = collections.Counter((row["set"], row["case"]) for row in rows)
+    rows = [row for row in rows if (row["set"], row["case"]) not in lost and fits[row["set"], row["case"]] == FILTERS]
+    return rows, numbers(rows)
+
+
+def numbers(rows):
+    """The numbers of smoothness.csv in the order of RAY_FIELDS."""
+    return np.column_stack([np.ones(len(rows)), *(column(rows, field) for field in RAY_FIELDS[1:])])
+
+
+def left(rows, x, constants, surface):
+    """What the constants but SMOOTHNESS_SHIFT leave of the distances of a surface."""
+    return column(rows, f"{surface}_mm") - linear(constants[f"{surface.upper()}_SHIFT_MM"], x) - of_size(rows, constants, surface)
+
+
+def smoothness_shift(tables, constants):
+    rows, x = filtered(tables, constants)
+    smoothness = np.log(column(rows, "smoothness_mm"))
+    usual = smoothness[column(rows, "added_mm") == 0].mean()
+    terms = np.column_stack([np.ones(len(rows)), smoothness - usual])
+    inner, outer = (least_squares(terms, left(rows, x, constants, surface))[1] for surface in ("inner", "outer"))
+    bounds = np.exp([smoothness.min(), smoothness.max()]).tolist()
+    return dict(usual_mm=np.exp(usual), inner_per_log_mm=inner, outer_per_log_mm=outer, range_mm=bounds)
+
+
+def by_added_filter(rows, values):
+    """Deviation among the scans as they are, and mean change behind each further filter."""
+    added = column(rows, "added_mm")
+    as_is = values[added == 0]
+    changes = [f"{(values[added == filter] - as_is).mean():+.2f} behind {filter:g} mm" for filter in sorted(set(added)) if filter]
+    return f"deviation {as_is.std():.3f} mm as it is, mean change {', '.join(changes)}"
+
+
 def nodes(tables, wall):
     """Numbers of the nodes in the order of NODE_FIELDS, and the distances from that wall, mm."""
     rows = table(tables / "nodes.csv", NODE_SETS)
@@ -231,8 +291,8 @@ def nodes(tables, wall):
     return rows, x, np.abs(column(rows, f"{wall}_mm")).clip(LEAST_DISTANCE_MM)
 
 
-def estimate(tables, chosen):
-    """Constants from the tables. What is no estimate is as in `chosen`."""
+def estimate(tables, chosen, names=()):
+    """Constants (of these `names`; all, if there are none) from the tables. What is no estimate is as in `chosen`."""
     made = {}
     rows = table(tables / "rims.csv", RIM_SETS)
     of_true = [least_squares(BASIS, rim)[1:] / row["true_length_mm"] for row, rim in zip(rows, heights(rows, "true"))]
@@ -257,6 +317,11 @@ def estimate(tables, chosen):
         rows, x, distance = nodes(tables, wall)
         made[name] = dict(zip(NODE_FIELDS, quantile_regression(x, np.log(distance), SHARE)))
     made["MEDIAN_SPREAD_MM"] = float(np.median(column(rows, "spread_mm")))
+    if names:
+        made = chosen | {name: made[name] for name in names if name in made}
+    # Of what the others leave, as they will stand beside it.
+    if not names or "SMOOTHNESS_SHIFT" in names:
+        made["SMOOTHNESS_SHIFT"] = smoothness_shift(tables, made)
     return made
 
 
@@ -286,21 +351,26 @@ def compare(tables, before, after):
           f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation {np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n")
     for sets in (RAY_SETS, SIZE_SETS):
         rows, x, both = rays(tables, sets)
-        log_size = np.log(np.maximum(column(rows, "cavity_ml"), 1.0))
-        for surface, y in zip(("INNER", "OUTER"), both):
+        for surface, y in zip(("inner", "outer"), both):
+            name = f"{surface.upper()}_SHIFT_MM"
             if sets is RAY_SETS:
-                show(f"{surface}_SHIFT_MM", before[f"{surface}_SHIFT_MM"], after[f"{surface}_SHIFT_MM"])
-            shift = []
-            for c in (before, after):
-                narrow, of_size = c["NARROW_CAVITY_SHIFT"], c["CAVITY_SIZE_SHIFT"]
-                more = (-narrow["per_log_mm"] * np.maximum(np.log(narrow["cavity_ml"]) - log_size, 0) if surface == "INNER"
-                        else of_size["per_log_mm"] * (np.log(of_size["cavity_ml"]) - log_size))
-                shift.append(linear(c[f"{surface}_SHIFT_MM"], x) + more)
+                show(name, before[name], after[name])
+            shift = [linear(c[name], x) + of_size(rows, c, surface) for c in (before, after)]
             print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} left by committed, "
                   f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm (rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
                   f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n")
     for name in ("NARROW_CAVITY_SHIFT", "CAVITY_SIZE_SHIFT"):
         show(name, before[name], after[name])
+    show("SMOOTHNESS_SHIFT", before["SMOOTHNESS_SHIFT"], after["SMOOTHNESS_SHIFT"])
+    rows, x = filtered(tables, before)
+    smoothness = np.log(column(rows, "smoothness_mm"))
+    for surface in ("inner", "outer"):
+        print(f"  {len(rows)} fits, {surface} surface, without it: {by_added_filter(rows, left(rows, x, before, surface))}")
+        for which, c in (("committed", before), ("estimated", after)):
+            shift = c["SMOOTHNESS_SHIFT"]
+            rest = left(rows, x, c, surface) - shift[f"{surface}_per_log_mm"] * (smoothness - np.log(shift["usual_mm"]))
+            print(f"    {which}: {by_added_filter(rows, rest)}")
+    print()
     for name, wall in (("APPARENT_TERMS", "apparent"), ("ANATOMICAL_TERMS", "anatomical")):
         show(name, before[name], after[name])
         _, x, distance = nodes(tables, wall)
@@ -322,15 +392,18 @@ def main():
     parser.add_argument("--tables", type=pathlib.Path, default=TABLES, help="folder of the tables of features (CSV)")
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--check", action="store_true", help="compare the estimate with the constants as committed; 1 if a file is not laid out as --layout would")
-    action.add_argument("--write", action="store_true", help="write the estimated constants")
+    action.add_argument("--write", nargs="*", metavar="NAME", help="write the estimated constants: those of these names, or all")
     action.add_argument("--layout", action="store_true", help="write the committed constants again")
     a = parser.parse_args()
     before = committed()
     if a.layout:
         write(layout(before))
         return 0
-    after = estimate(a.tables, before)
-    if a.write:
+    unknown = set(a.write or ()) - before.keys()
+    if unknown:
+        parser.error(f"no constant is called {', '.join(sorted(unknown))}; there are {', '.join(before)}")
+    after = estimate(a.tables, before, a.write or ())
+    if a.write is not None:
         write(layout(after))
         return 0
     compare(a.tables, before, after)

@@ -8,7 +8,8 @@
 //! 1. Each ray of the wall is described by eleven numbers (`describe`): thickness and inner radius
 //!    of the whole wall, thickness, radius and uptake at the ray, and the way from apex to base.
 //! 2. Two linear functions of these numbers ([`INNER_SHIFT_MM`], [`OUTER_SHIFT_MM`]) are the distances by which the
-//!    two surfaces move along the ray.
+//!    two surfaces move along the ray. In an image smoother than usual ([`smoothness`](crate::grid::smoothness)), both
+//!    move farther ([`SMOOTHNESS_SHIFT`]).
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
@@ -25,8 +26,10 @@
 //! left out): hollowness, uptake, thickness, strength of the edges and the like.
 
 use super::blur_correction;
-use super::calibration::{CAVITY_SIZE_SHIFT, INNER_SHIFT_MM, NARROW_CAVITY_SHIFT, OUTER_SHIFT_MM};
-use super::ray_terms::RayTerms;
+use super::calibration::{
+    CAVITY_SIZE_SHIFT, INNER_SHIFT_MM, NARROW_CAVITY_SHIFT, OUTER_SHIFT_MM, SMOOTHNESS_SHIFT,
+};
+use super::ray_terms::{RayTerms, SmoothnessShift};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
@@ -40,18 +43,23 @@ const MIN_THICKNESS_MM: f64 = 4.0;
 /// Standard deviations of the smoothing of thickness, radius and uptake, rows and columns.
 const SMOOTHING_SIGMA_RAYS: [f64; 2] = [1.5, 3.0];
 
-/// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall. `image` is
-/// the blurred image about it. If the image's `resolution` is known (full width of a point at half its
-/// maximum, mm), the mean loss of thickness is what a slab under that blur gains
+/// An image about a wall, and what is known of its blur.
+#[derive(Debug, Clone, Copy)]
+pub struct BlurredImage<'a> {
+    /// The image, blurred further for the sensors.
+    pub field: &'a Field,
+    /// Its smoothness, mm.
+    pub smoothness_mm: Option<f64>,
+    /// The image's resolution (full width of a point at half its maximum, mm), if it is stated.
+    pub resolution_mm: Option<f64>,
+}
+
+/// `mesh`, whose apparent wall is `wall`, with its surfaces moved to the anatomical wall. If the resolution of the
+/// `image` is stated, the mean loss of thickness is what a slab under that blur gains
 /// ([`blur_correction::excess`]); otherwise it comes from the calibration. Where a direction has no
 /// wall at all, the mesh stays.
-pub fn anatomical_mesh(
-    mesh: &TriMesh,
-    wall: &VentricleWall,
-    image: &Field,
-    resolution: Option<f64>,
-) -> TriMesh {
-    let Some(shifts) = WallShifts::of(wall, image, resolution) else {
+pub fn anatomical_mesh(mesh: &TriMesh, wall: &VentricleWall, image: &BlurredImage<'_>) -> TriMesh {
+    let Some(shifts) = WallShifts::of(wall, image) else {
         return mesh.clone();
     };
     let moved = |share: f64| {
@@ -78,20 +86,21 @@ struct WallShifts {
 }
 
 impl WallShifts {
-    fn of(wall: &VentricleWall, image: &Field, resolution: Option<f64>) -> Option<Self> {
+    fn of(wall: &VentricleWall, image: &BlurredImage<'_>) -> Option<Self> {
         let [inner, outer] = sides(wall)?;
-        let rays = describe(&inner, &outer, &uptake(wall, [&inner, &outer], image));
+        let rays = describe(&inner, &outer, &uptake(wall, [&inner, &outer], image.field));
         let shift =
             |coefficients: &RayTerms| RayMap::from_fn(|index| coefficients.of(&rays[index]));
         let (mut inner_shift, mut outer_shift) = (shift(&INNER_SHIFT_MM), shift(&OUTER_SHIFT_MM));
         let of_size = shifts_of_size(wall.cavity_ml);
+        let of_smoothness = image.smoothness_mm.map_or([0.0; 2], shifts_of_smoothness);
         for (shift, more) in [&mut inner_shift, &mut outer_shift]
             .into_iter()
-            .zip(of_size)
+            .zip(of_size.into_iter().zip(of_smoothness))
         {
-            shift.0.iter_mut().for_each(|x| *x += more);
+            shift.0.iter_mut().for_each(|x| *x += more.0 + more.1);
         }
-        if let Some(resolution) = resolution {
+        if let Some(resolution) = image.resolution_mm {
             let loss = mean_difference(&inner_shift, &outer_shift);
             let known = blur_correction::excess(mean_difference(&outer, &inner), resolution);
             let factor = if loss > 1e-3 { known / loss } else { 1.0 };
@@ -141,6 +150,18 @@ fn shifts_of_size(cavity: f64) -> [f64; 2] {
         -NARROW_CAVITY_SHIFT.per_log_mm * (NARROW_CAVITY_SHIFT.cavity_ml.ln() - size).max(0.0),
         CAVITY_SIZE_SHIFT.per_log_mm * (CAVITY_SIZE_SHIFT.cavity_ml.ln() - size),
     ]
+}
+
+/// By how much more the inner and the outer surface move outward in an image of this smoothness, mm.
+fn shifts_of_smoothness(smoothness_mm: f64) -> [f64; 2] {
+    let SmoothnessShift {
+        usual_mm,
+        inner_per_log_mm,
+        outer_per_log_mm,
+        range_mm: [least, greatest],
+    } = SMOOTHNESS_SHIFT;
+    let smoother = (smoothness_mm.clamp(least, greatest) / usual_mm).ln();
+    [inner_per_log_mm * smoother, outer_per_log_mm * smoother]
 }
 
 fn mean_difference(a: &RayMap, b: &RayMap) -> f64 {
@@ -478,10 +499,15 @@ mod tests {
         let centre = Vec3::new(0.0, 0.0, -30.0);
         let frame = VoxelToPatient::centred([40; 3], [3.0; 3], centre).unwrap();
         let image = Field::new(&Volume::sampled([40; 3], frame, |_| 1.0), None, 0.0);
-        let of = |thickness: f64, resolution: Option<f64>| {
+        let of = |thickness: f64, resolution_mm: Option<f64>| {
             let mesh = shapes::cup(70.0, 30.0, thickness, 48);
             let wall = VentricleWall::new(&mesh, &cup, &Vec3::y(), &Monitor::silent()).unwrap();
-            WallShifts::of(&wall, &image, resolution).unwrap()
+            let image = BlurredImage {
+                field: &image,
+                smoothness_mm: None,
+                resolution_mm,
+            };
+            WallShifts::of(&wall, &image).unwrap()
         };
         for resolution in [8.0, 12.0] {
             let shifts = of(16.0, Some(resolution));
@@ -501,6 +527,22 @@ mod tests {
                 "{left} of {before}"
             );
         }
+    }
+
+    /// The smoother the image, the more of the wall is blur, as far as was calibrated.
+    #[test]
+    fn a_smoother_image_takes_more_of_the_wall() {
+        let loss = |smoothness_mm: f64| {
+            let [inner, outer] = shifts_of_smoothness(smoothness_mm);
+            inner - outer
+        };
+        let [least, greatest] = SMOOTHNESS_SHIFT.range_mm;
+        let usual = SMOOTHNESS_SHIFT.usual_mm;
+        assert!(least < usual && usual < greatest);
+        assert!(loss(least) < 0.0 && loss(greatest) > 0.0);
+        assert_eq!(loss(usual), 0.0);
+        assert_eq!(loss(2.0 * greatest), loss(greatest));
+        assert_eq!(loss(0.0), loss(least));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Runs of the motion, repeated with a stiffer model while the result is folded.
 
+use super::anatomical::BlurredImage;
 use super::base_plane::{self, rim_heights};
 use super::dynamics::{self, MotionResult};
 use super::elastic::Elastic;
@@ -131,10 +132,12 @@ impl Attempt {
                     wall,
                     wall_ml,
                 };
-                let resolution = parameters.resolution;
-                let image = &setup.field;
-                let both =
-                    WallSurfaces::new(apparent, cup, &orientation, image, resolution, monitor)?;
+                let image = BlurredImage {
+                    field: &setup.field,
+                    smoothness_mm: setup.smoothness_mm,
+                    resolution_mm: parameters.resolution,
+                };
+                let both = WallSurfaces::new(apparent, cup, &orientation, &image, monitor)?;
                 let shown = both.of(parameters.edge).clone();
                 ((shown.mesh, Some(shown.wall), shown.wall_ml), Some(both))
             }
@@ -152,6 +155,7 @@ impl Attempt {
             surfaces,
             sensed_wall,
             sensed_rim_mm,
+            smoothness_mm: setup.smoothness_mm,
             readings: self.moved.readings,
             scale: setup.pose.scale(),
             rotation: *setup.pose.rotation(),

@@ -3,7 +3,7 @@
 //! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
 //! the distances from the apparent to the anatomical wall.
 
-use super::ray_terms::{RayTerms, SizeShift};
+use super::ray_terms::{RayTerms, SizeShift, SmoothnessShift};
 use super::rim_model::{RimCorrection, RimHarmonic, RimShape};
 
 /// Shape of the rims of hearts.
@@ -83,4 +83,12 @@ pub const NARROW_CAVITY_SHIFT: SizeShift = SizeShift {
 pub const CAVITY_SIZE_SHIFT: SizeShift = SizeShift {
     cavity_ml: 68.0,
     per_log_mm: 0.435,
+};
+
+/// Distances by which both surfaces move outward of that, where the image is smoother than usual.
+pub const SMOOTHNESS_SHIFT: SmoothnessShift = SmoothnessShift {
+    usual_mm: 8.991,
+    inner_per_log_mm: 4.379,
+    outer_per_log_mm: -1.164,
+    range_mm: [6.992, 12.157],
 };

@@ -1,11 +1,10 @@
 //! A template fitted to a patient: shape, position, and the figures of the motion.
 
-use super::anatomical::anatomical_mesh;
+use super::anatomical::{BlurredImage, anatomical_mesh};
 use super::dynamics::StopReason;
 use super::parameters::WallEdge;
 use super::sensors::SensorReading;
 use crate::geometry::Vec3;
-use crate::grid::field::Field;
 use crate::locate::cup::Cup;
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::{PatientOrientation, Superior};
@@ -35,8 +34,8 @@ pub struct WallSurfaces {
 }
 
 impl WallSurfaces {
-    /// Both walls of the ventricle whose apparent one is `apparent`, with its long axis along `cup`; `image` is the
-    /// blurred image about it.
+    /// Both walls of the ventricle whose apparent one is `apparent`, with its long axis along `cup`; `image` is that
+    /// about it.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -44,11 +43,10 @@ impl WallSurfaces {
         apparent: WallSurface,
         cup: &Cup,
         orientation: &PatientOrientation,
-        image: &Field,
-        resolution: Option<f64>,
+        image: &BlurredImage<'_>,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let mesh = anatomical_mesh(&apparent.mesh, &apparent.wall, image, resolution);
+        let mesh = anatomical_mesh(&apparent.mesh, &apparent.wall, image);
         let anatomical = WallSurface {
             wall: VentricleWall::new(&mesh, cup, &orientation.superior, monitor)?,
             wall_ml: mesh.volume() / 1000.0,
@@ -94,6 +92,8 @@ pub struct FittedModel {
     /// Height of its rim in each of [`RIM_DIRECTIONS`](super::base_plane::RIM_DIRECTIONS) directions, mm from the
     /// cup's centre towards the apex; `None` without a rim in every direction.
     pub sensed_rim_mm: Option<Vec<f64>>,
+    /// The smoothness of the image about it, mm; ventricles only.
+    pub smoothness_mm: Option<f64>,
     /// The sensors' readings when the motion ended, [`PER_TRIANGLE`](super::sensors::PER_TRIANGLE) of each triangle.
     pub readings: Vec<SensorReading>,
     /// Isotropic scale of the pose against the template.

@@ -2,13 +2,24 @@
 
 use super::error::DeformError;
 use super::parameters::DeformParameters;
+use crate::geometry::Vec3;
+use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
+use crate::grid::field::Field;
+use crate::grid::smoothness::smoothness_mm;
 use crate::locate;
 use crate::locate::body::{self, Blob};
 use crate::locate::localisation::Localisation;
 use crate::locate::patient_orientation::PatientOrientation;
 use crate::model::Template;
-use crate::progress::{Monitor, Stage};
+use crate::progress::{Cancelled, Monitor, Stage};
+
+/// Half the side of the cube about a ventricle's centre whose smoothness is measured, mm.
+const SMOOTHNESS_REACH_MM: f64 = 75.0;
+/// Multiple of the wall's uptake at which that cube is clipped: large hot neighbours, such as a liver, are smooth.
+const SMOOTHNESS_CEILING: f64 = 1.3;
+/// Gaussian blur of that cube, which takes its noise away, sigma in mm.
+const SMOOTHNESS_BLUR_MM: f64 = 5.0;
 
 /// The position of an organ in a volume: the same for all templates of the organ.
 #[derive(Debug, Clone)]
@@ -19,6 +30,8 @@ pub enum OrganPosition {
         found: Localisation,
         /// The patient's orientation in the frame.
         orientation: PatientOrientation,
+        /// The smoothness of the image about it, mm ([`smoothness`](crate::grid::smoothness)).
+        smoothness_mm: Option<f64>,
     },
     /// Any other organ.
     Body {
@@ -52,7 +65,11 @@ impl OrganPosition {
                     Some(stated) => stated,
                     None => PatientOrientation::observed(volume, cup, superior, monitor)?,
                 };
-                OrganPosition::Ventricle { found, orientation }
+                OrganPosition::Ventricle {
+                    smoothness_mm: smoothness_about(&found, volume, monitor)?,
+                    found,
+                    orientation,
+                }
             }
             None => {
                 let mask = body::one_label(volume, &parameters.hints, monitor)?;
@@ -73,6 +90,14 @@ impl OrganPosition {
         }
     }
 
+    /// The smoothness of the image about a ventricle, mm; `None` for other organs.
+    pub(super) fn smoothness_mm(&self) -> Option<f64> {
+        match self {
+            OrganPosition::Ventricle { smoothness_mm, .. } => *smoothness_mm,
+            OrganPosition::Body { .. } => None,
+        }
+    }
+
     /// The image to fit to, where it is not the volume itself.
     pub(super) fn mask(&self) -> Option<&Volume> {
         match self {
@@ -80,4 +105,21 @@ impl OrganPosition {
             OrganPosition::Body { mask, .. } => mask.as_ref(),
         }
     }
+}
+
+/// The smoothness of the image about the ventricle that was found, mm.
+fn smoothness_about(
+    found: &Localisation,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<f64>, Cancelled> {
+    let reach = Vec3::repeat(SMOOTHNESS_REACH_MM);
+    let region = Aabb::of(&[found.cup.centre - reach, found.cup.centre + reach]);
+    let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let ceiling = (SMOOTHNESS_CEILING * found.wall) as f32;
+    let clipped = cube.values().iter().map(|value| value.min(ceiling));
+    let clipped = clipped.collect();
+    let mut cube = cube.with_values(clipped);
+    cube.blur(SMOOTHNESS_BLUR_MM, monitor)?;
+    Ok(smoothness_mm(cube.values(), cube.shape(), cube.spacing()))
 }

@@ -63,3 +63,16 @@ pub struct SizeShift {
     /// Its change with the logarithm of the size, mm.
     pub per_log_mm: f64,
 }
+
+/// Distances that depend on the smoothness of the image.
+#[derive(Debug)]
+pub struct SmoothnessShift {
+    /// The smoothness at which they are 0, mm.
+    pub usual_mm: f64,
+    /// Change of the inner surface's distance with the logarithm of the smoothness, mm.
+    pub inner_per_log_mm: f64,
+    /// Change of the outer surface's distance with the logarithm of the smoothness, mm.
+    pub outer_per_log_mm: f64,
+    /// Least and greatest smoothness that were calibrated, mm.
+    pub range_mm: [f64; 2],
+}

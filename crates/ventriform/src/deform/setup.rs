@@ -28,6 +28,15 @@ fn edge_shift(sensor: SensorKind) -> [f64; 3] {
     }
 }
 
+/// The part of the image that a fit of a model with these `vertices` looks at, LPS mm.
+pub fn fit_region(vertices: &[Vec3], parameters: &DeformParameters) -> Aabb {
+    let mut region = Aabb::of(vertices);
+    let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
+    region.min -= border;
+    region.max += border;
+    region
+}
+
 /// The posed template, and the image to fit it to.
 #[derive(Clone)]
 pub struct FitSetup {
@@ -43,6 +52,8 @@ pub struct FitSetup {
     pub axis: Vec3,
     /// The blurred image about the posed template.
     pub field: Field,
+    /// The smoothness of the image about a ventricle, mm; `None` for other organs.
+    pub smoothness_mm: Option<f64>,
     /// Ends of the line that the inner surface faces, LPS mm.
     cavity_axis: [Vec3; 2],
     /// Typical value of the organ.
@@ -68,7 +79,12 @@ impl FitSetup {
         monitor: &Monitor,
     ) -> Result<Self, DeformError> {
         let (localisation, pose, axis, cavity_axis, uptake) = match (position, &template.cup) {
-            (OrganPosition::Ventricle { found, orientation }, Some(from)) => {
+            (
+                OrganPosition::Ventricle {
+                    found, orientation, ..
+                },
+                Some(from),
+            ) => {
                 let to = found.cup;
                 let roll = parameters.roll.to_radians();
                 let turn = if orientation.source.is_stated() {
@@ -89,10 +105,7 @@ impl FitSetup {
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
-        let mut region = Aabb::of(&posed.vertices);
-        let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
-        region.min -= border;
-        region.max += border;
+        let region = fit_region(&posed.vertices, parameters);
         let picture = position.mask().unwrap_or(volume);
         let field = Field::cut_out(picture, Some(&region), parameters.blur, monitor)?;
         Ok(Self {
@@ -104,6 +117,7 @@ impl FitSetup {
             cavity_axis,
             uptake,
             field,
+            smoothness_mm: position.smoothness_mm(),
             blind: None,
         })
     }
