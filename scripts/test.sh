@@ -15,8 +15,9 @@ log=$PWD/target/test-log.txt
 mkdir -p "$tools"
 : >"$log"
 passed=0 failed=0 skipped=0
+failures=() failed_logs=()
 
-say() { printf '\n== %s\n' "$*"; }
+say() { printf '\n== %s (after %d s)\n' "$*" "$SECONDS"; }
 
 # count NAME STATUS: prints the result of a check and counts it as passed or failed.
 count() {
@@ -24,6 +25,7 @@ count() {
     passed=$((passed + 1)) && echo "ok: $1"
   else
     failed=$((failed + 1)) && echo "FAILED: $1"
+    failures+=("$1")
   fi
 }
 
@@ -47,10 +49,17 @@ collect() {
   say "$2"
   cat "$tools/$1.log"
   count "$2" $status
+  [ "$status" -eq 0 ] || failed_logs+=("$tools/$1.log")
 }
 
+# Names all that failed once more, with what it printed: the end of a long log is read first.
 finish() {
   echo
+  local failed_log
+  for failed_log in "${failed_logs[@]}"; do tail -n 60 "$failed_log"; done
+  # The second of cargo's two lists for each program, after "failures:", has names alone.
+  awk '/^failures:$/ { shown = 1 } /^test result:/ { shown = 0 } shown' "$log"
+  [ ${#failures[@]} -eq 0 ] || printf 'FAILED: %s\n' "${failures[@]}"
   echo "$passed passed, $failed failed, $skipped skipped"
   [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]
   exit
@@ -115,7 +124,8 @@ read -r p f i < <(awk '/^test result:/ { p += $4; f += $6; i += $8 } END { print
 # A test without its data prints `skipped: why` and returns. The harness counts it as passed.
 s=$(grep -c '^skipped: ' "$log")
 passed=$((passed + p - s)) failed=$((failed + f)) skipped=$((skipped + i + s))
-if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then failed=$((failed + 1)); fi
+mapfile -t -O "${#failures[@]}" failures < <(sed -n 's/^test \(.*\) \.\.\. FAILED$/\1/p' "$log")
+if [ "$cargo_status" -ne 0 ] && [ "$f" -eq 0 ]; then count "cargo test" 1; fi
 
 # --- external checks --------------------------------------------------------------------
 if [ "$quick" = --quick ]; then finish; fi
