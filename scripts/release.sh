@@ -9,8 +9,8 @@
 # First scripts/check_semver.sh compares the library's interface with the newest release's.
 #
 # Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same commit
-# gives the same bytes: paths are mapped, times are the commit's, and archives are sorted. What was changed since is refused,
-# unless DIRTY=1.
+# gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. What was changed since
+# the commit is refused, unless DIRTY=1.
 #
 # WHEELS, PROGRAM: a folder of wheels and a program to pack instead of building them, to try this script.
 set -euo pipefail
@@ -27,6 +27,8 @@ fi
 scripts/check_semver.sh
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
+# The order of file names is that of the locale.
+export LC_ALL=C.UTF-8
 umask 022
 
 if ! [ -x "$venv/bin/cargo-zigbuild" ]; then
@@ -34,12 +36,13 @@ if ! [ -x "$venv/bin/cargo-zigbuild" ]; then
   "$venv/bin/pip" install -q maturin==1.16.0 ziglang==0.17.1 cargo-zigbuild==0.24.1
 fi
 export PATH=$venv/bin:$PATH
+sysroot=$(rustc --print sysroot)
 # Also in place of the flags of a developer's own configuration.
-export RUSTFLAGS="--remap-path-prefix=$root=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo --remap-path-prefix=$(rustc --print sysroot)=rust"
+export RUSTFLAGS="--remap-path-prefix=$root=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo --remap-path-prefix=$sysroot=rust"
 export CARGO_INCREMENTAL=0 CARGO_PROFILE_DIST_STRIP=symbols
 
 targets=(x86_64-unknown-linux-gnu)
-if [ -d "$(rustc --print sysroot)/lib/rustlib/aarch64-unknown-linux-gnu" ]; then
+if [ -d "$sysroot/lib/rustlib/aarch64-unknown-linux-gnu" ]; then
   targets+=(aarch64-unknown-linux-gnu)
 else
   echo "without aarch64: rustup target add aarch64-unknown-linux-gnu"
@@ -96,7 +99,7 @@ Package: ventriform
 Version: $version
 Architecture: $3
 Maintainer: The developers of ventriform <ventriform@localhost>
-Installed-Size: $(du -sk --apparent-size "$tree" | cut -f 1)
+Installed-Size: $(find "$tree" -printf '%y %s\n' | awk '{ kib += $1 == "f" ? int(($2 + 1023) / 1024) : 1 } END { print kib }')
 Depends: libc6 (>= 2.17), adduser, procps
 Recommends: ca-certificates
 Section: science
@@ -132,7 +135,8 @@ set -e
 if [ "$1" = purge ] && [ -d /var/lib/ventriform ]; then echo "ventriform: /var/lib/ventriform was kept; remove it yourself"; fi
 POSTRM
   chmod 0755 "$tree/DEBIAN/postinst" "$tree/DEBIAN/prerm" "$tree/DEBIAN/postrm"
-  dpkg-deb --root-owner-group -Zxz --build "$tree" "$dist/ventriform_${version}_$3.deb" >/dev/null
+  # Several threads compress to other bytes than one.
+  dpkg-deb --root-owner-group -Zxz --threads-max=1 --build "$tree" "$dist/ventriform_${version}_$3.deb" >/dev/null
 }
 
 work=$(mktemp -d)
