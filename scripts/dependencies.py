@@ -2,17 +2,19 @@
 
     python scripts/dependencies.py check     licences, bans and sources; the bill is valid and up to date
     python scripts/dependencies.py write     writes ventriform.cdx.json anew
+    python scripts/dependencies.py python            prints the bill of the Python package
+    python scripts/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of scripts/image.sh
 
-The bill is CycloneDX 1.6. It holds what the program of the image is built of: every crate that the default
-features need at run time or at build time on Linux, the C libraries inside of them, and the npm packages inside
-of the page. It has no date, so
-that the same Cargo.lock gives the same bytes. Needs cyclonedx-python-lib[json-validation]; no network beyond
-what cargo needs to have the crates.
+The bill is CycloneDX 1.6. It holds what the program is built of: every crate that the default features need at run
+time or at build time on Linux, the C libraries inside of them, and the npm packages inside of the page. That of the
+Python package has no page; NumPy, which it needs, is not inside of it. That of an image has the program's and the Debian
+packages. None has a date, so that the same Cargo.lock gives the same bytes. Needs
+cyclonedx-python-lib[json-validation]; no network beyond what cargo needs to have the crates.
 
 `cargo deny check` judges by the same deny.toml and by the advisories of rustsec.org as well; it needs
 cargo-deny and the network.
 """
-import json, pathlib, re, subprocess, sys, tomllib, uuid
+import json, pathlib, re, subprocess, sys, tomllib, urllib.parse, uuid
 
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
@@ -75,14 +77,32 @@ def bundled(package):
     raise SystemExit(f"{package['name']}: no version of {name} in {header}")
 
 
-def bill():
-    """The bill of materials as text."""
+def debian(packages):
+    """The Debian packages of an image, as components. In: lines of name, version, architecture, source and its version.
+
+    Debian's notices of faults name sources, so a source that is called otherwise stands in the purl, as syft writes it.
+    """
+    suite = re.search(r"^FROM debian:([a-z]+)", (ROOT / "Dockerfile").read_text(), re.M)[1]
+    for line in packages.read_text().splitlines():
+        name, version, architecture, source, source_version = line.split()
+        qualifiers = {"arch": architecture, "distro": suite}
+        if (source, source_version) != (name, version):
+            qualifiers["upstream"] = source if source_version == version else f"{source}@{source_version}"
+        quoted = [urllib.parse.quote(text, safe="") for text in (name, version)]
+        purl = f"pkg:deb/debian/{quoted[0]}@{quoted[1]}?{urllib.parse.urlencode(qualifiers)}"
+        yield {"type": "library", "bom-ref": purl, "name": name, "version": version, "purl": purl}
+
+
+def bill(of="program", installed=None):
+    """The bill of materials of the program, of the Python package (`python`), or of an image with Debian packages, as text."""
     graph = metadata("--filter-platform", PLATFORM)
     packages = {package["id"]: package for package in graph["packages"]}
     nodes = {node["id"]: node for node in graph["resolve"]["nodes"]}
     checksums = {(p["name"], p["version"]): p.get("checksum")
                  for p in tomllib.loads((ROOT / "Cargo.lock").read_text())["package"]}
     root = graph["resolve"]["root"]
+    if of == "python":
+        root = next(package["id"] for package in graph["packages"] if package["name"] == "ventriform-python")
 
     def needs(node):
         return sorted(dep["pkg"] for dep in nodes[node]["deps"]
@@ -114,9 +134,10 @@ def bill():
 
     # What the page is built of, apart from its tools: web/dist holds it.
     locked = json.loads((ROOT / "web/package-lock.json").read_text())["packages"]
-    page = [{"type": "library", "bom-ref": f"pkg:npm/{name}@{of['version']}", "name": name, "version": of["version"],
-             "licenses": [{"expression": of["license"]}], "purl": f"pkg:npm/{name}@{of['version']}"}
-            for name, of in ((name, locked[f"node_modules/{name}"]) for name in sorted(locked[""]["dependencies"]))]
+    page = [{"type": "library", "bom-ref": f"pkg:npm/{name}@{one['version']}", "name": name, "version": one["version"],
+             "licenses": [{"expression": one["license"]}], "purl": f"pkg:npm/{name}@{one['version']}"}
+            for name, one in ((name, locked[f"node_modules/{name}"]) for name in sorted(locked[""]["dependencies"]))]
+    page = [] if of == "python" else page
 
     libraries = sorted((packages[i] for i in reached - {root}), key=lambda p: (p["name"], p["version"]))
     document = {
@@ -124,23 +145,40 @@ def bill():
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
         "version": 1,
-        "metadata": {"component": component(packages[root], "application")},
+        "metadata": {"component": component(packages[root], "library" if of == "python" else "application")},
         "components": [component(package, "library") for package in libraries] + page,
         "dependencies": [{"ref": purl(packages[i]), "dependsOn": sorted(purl(packages[d]) for d in needs(i))}
                          for i in sorted(reached, key=lambda i: purl(packages[i]))],
     }
+    subject = document["metadata"]["component"]
+    if of == "python":
+        wheel = f"pkg:pypi/ventriform@{subject['version']}"
+        document = json.loads(json.dumps(document).replace(json.dumps(subject["purl"]), json.dumps(wheel)))
+        document["metadata"]["component"]["name"] = "ventriform"
+    if of == "image":
+        image = f"ventriform:{subject['version']}"
+        document["metadata"]["component"] = {
+            "type": "container", "bom-ref": image, "name": "ventriform", "version": subject["version"],
+            "description": "Image of a container: the program on Debian's essential packages"}
+        inside = list(debian(installed))
+        document["components"] = [subject, *document["components"], *inside]
+        document["dependencies"].append({"ref": image, "dependsOn": [subject["bom-ref"], *(one["bom-ref"] for one in inside)]})
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(document, sort_keys=True))
     document["serialNumber"] = f"urn:uuid:{serial}"
     return json.dumps(document, indent=1) + "\n"
 
 
 def main():
-    text = bill()
+    command, *rest = sys.argv[1:]
+    text = bill(command, pathlib.Path(rest[0])) if command == "image" else bill("python" if command == "python" else "program")
     invalid = JsonStrictValidator(SchemaVersion.V1_6).validate_str(text)
     if invalid:
         sys.exit(f"the bill is not valid: {invalid}")
-    if sys.argv[1:] == ["write"]:
+    if command == "write":
         BILL.write_text(text)
+        return
+    if command in ("python", "image"):
+        print(text, end="")
         return
     faults = list(judge())
     if not BILL.exists() or BILL.read_text() != text:

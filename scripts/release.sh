@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz and as a Debian
-# package, the bill of materials, licence texts, and the checksums of all.
+# package, the bill of materials of each, licence texts, and the checksums of all.
 #
 #   scripts/release.sh              x86_64; also aarch64 where rustup has that target
 #
@@ -31,10 +31,8 @@ export SOURCE_DATE_EPOCH
 export LC_ALL=C.UTF-8
 umask 022
 
-if ! [ -x "$venv/bin/cargo-zigbuild" ]; then
-  python3 -m venv "$venv"
-  "$venv/bin/pip" install -q maturin==1.16.0 ziglang==0.17.1 cargo-zigbuild==0.24.1
-fi
+[ -d "$venv" ] || python3 -m venv "$venv"
+"$venv/bin/pip" install -q maturin==1.16.0 ziglang==0.17.1 cargo-zigbuild==0.24.1 "$(grep '^cyclonedx' scripts/requirements.txt)"
 export PATH=$venv/bin:$PATH
 sysroot=$(rustc --print sysroot)
 # Also in place of the flags of a developer's own configuration.
@@ -144,12 +142,15 @@ trap 'rm -rf "$work"' EXIT
 rm -rf "$dist"
 mkdir "$dist"
 
+# maturin's own bill has the paths of this machine, so pyproject.toml turns it off.
+python3 scripts/dependencies.py python >"$dist/ventriform-python.cdx.json"
 maturin sdist --out "$dist" >"$work/sdist.log" 2>&1 || { cat "$work/sdist.log"; exit 1; }
 for target in "${targets[@]}"; do
   if [ -n "${WHEELS:-}" ]; then
     cp "$WHEELS"/*.whl "$dist"
   else
-    maturin build --quiet --locked --profile dist --zig --target "$target" --compatibility manylinux2014 --out "$dist"
+    maturin build --quiet --locked --profile dist --zig --target "$target" --compatibility manylinux2014 \
+      --sbom-include dist/ventriform-python.cdx.json --out "$dist"
   fi
   program=${PROGRAM:-}
   if [ -z "$program" ]; then
