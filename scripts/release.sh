@@ -1,16 +1,17 @@
 #!/usr/bin/env bash
-# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz and as a Debian
-# package, the bill of materials of each, licence texts, and the checksums of all.
+# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a Debian
+# package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
 #
 #   scripts/release.sh              x86_64; also aarch64 where rustup has that target
 #
-# Not made: an image of the container, which needs an engine (docker compose build makes it from the Dockerfile).
+# The image is for x86_64; scripts/image.sh makes it, which needs root.
 #
 # First scripts/check_semver.sh compares the library's interface with the newest release's.
 #
 # Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same commit
-# gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. What was changed since
-# the commit is refused, unless DIRTY=1.
+# gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. Only the image has
+# Debian's packages of the day, which its bill of materials lists, and depends on the version of buildah. What was changed since the
+# commit is refused, unless DIRTY=1.
 #
 # WHEELS, PROGRAM: a folder of wheels and a program to pack instead of building them, to try this script.
 set -euo pipefail
@@ -166,7 +167,16 @@ for target in "${targets[@]}"; do
   accompany "$work/$name"
   archive "$work/$name" "$dist/$name.tar.gz"
   case $target in
-    x86_64-*) debian "$program" "$work/helpers" amd64 ;;
+    x86_64-*)
+      debian "$program" "$work/helpers" amd64
+      if [ "$(id -u)" = 0 ]; then
+        scripts/image.sh "$program" "$work/$name/THIRD-PARTY" "$work/ventriform-$version-x86_64"
+        mv "$work/ventriform-$version-x86_64.image.tar.gz" "$dist"
+        python3 scripts/dependencies.py image "$work/ventriform-$version-x86_64.image.packages" >"$dist/ventriform-image.cdx.json"
+      else
+        echo "without an image: call this as root"
+      fi
+      ;;
     aarch64-*) debian "$program" "$work/helpers" arm64 ;;
   esac
 done
