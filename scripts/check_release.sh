@@ -5,7 +5,11 @@
 #
 # Needs root and Debian's packages, of which mmdebstrap makes a chroot. Checked: checksums; the Debian package installs, its
 # program makes and measures a model, its user and folders exist, its unit is well formed, and it can be removed; the archive's
-# program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan; the library needs no newer glibc than 2.17.
+# program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan, and has its bill of materials; the
+# library and the program need no newer glibc than 2.17; the image's service makes a model as the image's user.
+#
+# The image is tried by scripts/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
+# runs its program in a chroot, with the image's user and environment; its health check is then run by this script.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 suite=${1:-trixie}
@@ -15,7 +19,16 @@ dist=$PWD/dist
 command -v mmdebstrap >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends mmdebstrap; }
 
 out=$(mktemp -d)
-trap 'umount "$out/root/proc" 2>/dev/null || true; rm -rf "$out"' EXIT
+service=
+clean() {
+  if [ -n "$service" ]; then
+    kill "$service" || true
+    wait "$service" || true
+  fi
+  umount "$out/root/proc" 2>/dev/null || true
+  rm -rf "$out"
+}
+trap clean EXIT
 mmdebstrap --quiet --variant=minbase --include=python3-venv,python3-pip,adduser,procps,systemd "$suite" "$out/root"
 mount -t proc proc "$out/root/proc"
 # NumPy comes from this machine's index, so that nothing inside needs the network.
@@ -55,9 +68,46 @@ assert vf.measure(fit, "phantom/lv_truth.nii.gz").jaccard > 0.6
 print(fit)
 PYTHON
 TRY
-chroot "$out/root" bash /try.sh
+# Without the settings of this machine, such as those of pip.
+chroot "$out/root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 bash /try.sh
 
 python3 -m zipfile -e "$dist"/ventriform-*_x86_64.whl "$out/wheel"
-newest=$(objdump -T "$out/wheel/ventriform/_native.abi3.so" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1)
-echo "the wheel's library needs $newest"
-[ "$(printf '%s\n' "$newest" GLIBC_2.17 | sort -V | tail -n 1)" = GLIBC_2.17 ]
+cmp "$dist/ventriform-python.cdx.json" "$out"/wheel/ventriform-*.dist-info/sboms/ventriform-python.cdx.json
+tar -xzf "$dist"/ventriform-*-x86_64-unknown-linux-gnu.tar.gz -C "$out" --strip-components 1
+for file in "$out/wheel/ventriform/_native.abi3.so" "$out/ventriform"; do
+  newest=$(objdump -T "$file" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1)
+  echo "$(basename "$file") needs $newest"
+  [ "$(printf '%s\n' "$newest" GLIBC_2.17 | sort -V | tail -n 1)" = GLIBC_2.17 ]
+done
+
+if docker version >/dev/null 2>&1; then
+  scripts/check_container.sh "$dist"/ventriform-*.image.tar.gz
+  exit
+fi
+command -v buildah >/dev/null ||
+  { apt-get update -qq && apt-get install -y -qq --no-install-recommends buildah golang-github-containers-common netavark; }
+buildah=(buildah --root "$out/storage" --runroot "$out/run" --storage-driver vfs)
+gunzip -c "$dist"/ventriform-*.image.tar.gz >"$out/image.tar"
+container=$("${buildah[@]}" from "docker-archive:$out/image.tar" 2>"$out/log") || { cat "$out/log"; exit 1; }
+inside=("${buildah[@]}" run --isolation chroot)
+# What the image says of itself, in the words of its configuration: entry point and command, health check, user.
+said=$("${buildah[@]}" inspect --format '{{with .Docker.Config}}{{.Entrypoint}} {{.Cmd}} {{.Healthcheck.Test}} {{.User}}{{end}}' "$container")
+echo "the image: $said"
+[ "$said" = '[ventriform] [serve] [CMD ventriform healthcheck] 10001:10001' ]
+# shellcheck disable=SC2016 # the image's shell expands it
+"${inside[@]}" "$container" -- sh -euc '[ "$(id -u):$(id -g)" = 10001:10001 ] && ! touch /usr/local/bin/x 2>/dev/null && touch /data/x && rm /data/x'
+# buildah leaves the network as it is, so the port is one that is free here; loopback needs no key.
+port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
+"${inside[@]}" --env "VENTRIFORM_LISTEN=127.0.0.1:$port" "$container" -- ventriform serve >"$out/log" 2>&1 &
+service=$!
+for _ in $(seq 60); do
+  if "${inside[@]}" --env "VENTRIFORM_LISTEN=127.0.0.1:$port" "$container" -- ventriform healthcheck 2>/dev/null; then healthy=yes; break; fi
+  sleep 0.5
+done
+[ -n "${healthy:-}" ] || { cat "$out/log"; exit 1; }
+"${inside[@]}" "$container" -- ventriform phantom -o /data/phantom --size 64 --spacing 6.4
+"${inside[@]}" "$container" -- cat /data/phantom/spect.nii.gz >"$out/spect.nii.gz"
+curl -fsS --data-binary @"$out/spect.nii.gz" -H 'Prefer: wait=60' \
+  -H 'Accept: model/gltf-binary' "http://127.0.0.1:$port/v1/models?points=150" -o "$out/lv.glb"
+[ "$(head -c 4 "$out/lv.glb")" = glTF ]
+echo "ok: packages installed, image unpacked, its service made a model"
