@@ -243,32 +243,26 @@ def of_size(rows, constants, surface):
 
 
 def filtered(tables, constants):
-    """Rows of the hearts whose fits all found the wall, and the means of their numbers in the order of RAY_FIELDS. `constants` tell
-    where the true surfaces are expected."""
+    """Rows of smoothness.csv of the hearts whose fits all found the wall. `constants` tell where the true surfaces are expected."""
     rows = table(tables / "smoothness.csv", SMOOTHNESS_SETS)
-    rest = [left(rows, numbers(rows), constants, surface) for surface in ("inner", "outer")]
+    rest = [left(rows, constants, surface) for surface in ("inner", "outer")]
     lost = {(row["set"], row["case"]) for row, distances in zip(rows, zip(*rest)) if max(np.abs(distances)) > LOST_MEAN_MM}
     fits = collections.Counter((row["set"], row["case"]) for row in rows)
-    rows = [row for row in rows if (row["set"], row["case"]) not in lost and fits[row["set"], row["case"]] == FILTERS]
-    return rows, numbers(rows)
+    return [row for row in rows if (row["set"], row["case"]) not in lost and fits[row["set"], row["case"]] == FILTERS]
 
 
-def numbers(rows):
-    """The numbers of smoothness.csv in the order of RAY_FIELDS."""
-    return np.column_stack([np.ones(len(rows)), *(column(rows, field) for field in RAY_FIELDS[1:])])
-
-
-def left(rows, x, constants, surface):
+def left(rows, constants, surface):
     """What the constants but SMOOTHNESS_SHIFT leave of the distances of a surface."""
+    x = np.column_stack([np.ones(len(rows)), *(column(rows, field) for field in RAY_FIELDS[1:])])
     return column(rows, f"{surface}_mm") - linear(constants[f"{surface.upper()}_SHIFT_MM"], x) - of_size(rows, constants, surface)
 
 
 def smoothness_shift(tables, constants):
-    rows, x = filtered(tables, constants)
+    rows = filtered(tables, constants)
     smoothness = np.log(column(rows, "smoothness_mm"))
     usual = smoothness[column(rows, "added_mm") == 0].mean()
     terms = np.column_stack([np.ones(len(rows)), smoothness - usual])
-    inner, outer = (least_squares(terms, left(rows, x, constants, surface))[1] for surface in ("inner", "outer"))
+    inner, outer = (least_squares(terms, left(rows, constants, surface))[1] for surface in ("inner", "outer"))
     bounds = np.exp([smoothness.min(), smoothness.max()]).tolist()
     return dict(usual_mm=np.exp(usual), inner_per_log_mm=inner, outer_per_log_mm=outer, range_mm=bounds)
 
@@ -362,13 +356,13 @@ def compare(tables, before, after):
     for name in ("NARROW_CAVITY_SHIFT", "CAVITY_SIZE_SHIFT"):
         show(name, before[name], after[name])
     show("SMOOTHNESS_SHIFT", before["SMOOTHNESS_SHIFT"], after["SMOOTHNESS_SHIFT"])
-    rows, x = filtered(tables, before)
+    rows = filtered(tables, before)
     smoothness = np.log(column(rows, "smoothness_mm"))
     for surface in ("inner", "outer"):
-        print(f"  {len(rows)} fits, {surface} surface, without it: {by_added_filter(rows, left(rows, x, before, surface))}")
+        print(f"  {len(rows)} fits, {surface} surface, without it: {by_added_filter(rows, left(rows, before, surface))}")
         for which, c in (("committed", before), ("estimated", after)):
             shift = c["SMOOTHNESS_SHIFT"]
-            rest = left(rows, x, c, surface) - shift[f"{surface}_per_log_mm"] * (smoothness - np.log(shift["usual_mm"]))
+            rest = left(rows, c, surface) - shift[f"{surface}_per_log_mm"] * (smoothness - np.log(shift["usual_mm"]))
             print(f"    {which}: {by_added_filter(rows, rest)}")
     print()
     for name, wall in (("APPARENT_TERMS", "apparent"), ("ANATOMICAL_TERMS", "anatomical")):

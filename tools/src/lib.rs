@@ -1,6 +1,7 @@
 //! What the instruments share.
 
 pub mod statistics;
+pub mod walls;
 
 use std::io;
 use std::path::{Path, PathBuf};

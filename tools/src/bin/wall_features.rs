@@ -14,40 +14,27 @@
 //! - `nodes.csv`, a row for every [`NODE_STRIDE`]th node: the figures behind its uncertainty, and its distance from the
 //!   expert's mask and of its anatomical counterpart from the true wall, mm.
 
-use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde_json::Value;
 use ventriform::TriMesh;
 use ventriform::deform::WallEdge;
-use ventriform::deform::anatomical::ray_terms;
 use ventriform::deform::base_plane::rim_heights;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::bvh::{Aabb, Bvh};
-use ventriform::grid::field::Field;
 use ventriform::judge::confidence::log_odds;
-use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
-use ventriform::model::wall::crossing;
 use ventriform::parameters::FitParameters;
 use ventriform::progress::Monitor;
 use ventriform::report::MeasuredSurface;
 use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform_tools::walls::{Result, true_shifts, true_wall};
 use ventriform_tools::{cases, name_of};
 
 /// Rays from one row of the table to the next. It has no factor in common with the rays of a row.
 const RAY_STRIDE: usize = 157;
 /// Nodes from one row of the table to the next.
 const NODE_STRIDE: usize = 11;
-/// Width of the image about the wall, mm.
-const BORDER_MM: f64 = 25.0;
-/// Most bytes of a mesh.
-const MAX_MESH_BYTES: u64 = 1 << 28;
-
-type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 /// The rows of one case.
 #[derive(Default)]
@@ -93,21 +80,13 @@ fn main() -> Result<()> {
 }
 
 fn rows(set: &str, case: &Path) -> Result<CaseRows> {
-    let params = std::fs::read(case.join("params.json"))?;
-    let params: Value = serde_json::from_slice(&params)?;
-    if params["made"] == "none" {
+    let Some(truth) = true_wall(case)? else {
         return Ok(CaseRows::default());
-    }
+    };
     let both = [WallEdge::Apparent, WallEdge::Anatomical];
     let [Ok(apparent), Ok(anatomical)] = both.map(|edge| segmented(case, edge)) else {
         return Ok(CaseRows::default());
     };
-    let stated = MeshStatement {
-        unit: Some(MeshUnit::Millimetre),
-        frame: Some(MeshFrame::Ras),
-    };
-    let bytes = std::fs::read(case.join("lv_surface.ply"))?;
-    let truth = mesh_files::read(&bytes, &stated, MAX_MESH_BYTES)?.mesh;
     let name = format!("{set},{}", name_of(case));
     Ok(CaseRows {
         rims: rims(&name, &apparent, &truth)?,
@@ -149,22 +128,10 @@ fn rays(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
         return Ok(String::new());
     };
     let apparent = &both.apparent;
-    let mut region = Aabb::of(&apparent.mesh.vertices);
-    region.min -= Vec3::repeat(BORDER_MM);
-    region.max += Vec3::repeat(BORDER_MM);
-    let blur = FitParameters::default().deform.blur;
-    let image = Field::new(&made.reading.volume, Some(&region), blur);
-    let terms = ray_terms(&apparent.wall, &image).ok_or("a direction without a wall")?;
-    let tree = Bvh::new(&truth.vertices, &truth.triangles);
     let mut rows = String::new();
-    for index in (0..terms.len()).step_by(RAY_STRIDE) {
-        let ray = &apparent.wall.rays[index];
-        let real = crossing(truth, &tree, &ray.start, &ray.direction);
-        let (Some([inner, outer]), Some([real_inner, real_outer])) = (ray.wall, real) else {
-            continue;
-        };
+    let scan = &made.reading.volume;
+    for (of, [inner, outer]) in true_shifts(apparent, scan, truth, RAY_STRIDE)? {
         write!(rows, "{name},{:.2}", apparent.wall.cavity_ml)?;
-        let of = &terms[index];
         let numbers = [
             of.thickness,
             of.ln_radius,
@@ -176,7 +143,6 @@ fn rays(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
         for number in numbers {
             write!(rows, ",{number:.3}")?;
         }
-        let (inner, outer) = (real_inner - inner, real_outer - outer);
         writeln!(rows, ",{inner:.2},{outer:.2}")?;
     }
     Ok(rows)

@@ -28,15 +28,6 @@ fn edge_shift(sensor: SensorKind) -> [f64; 3] {
     }
 }
 
-/// The part of the image that a fit of a model with these `vertices` looks at, LPS mm.
-pub fn fit_region(vertices: &[Vec3], parameters: &DeformParameters) -> Aabb {
-    let mut region = Aabb::of(vertices);
-    let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
-    region.min -= border;
-    region.max += border;
-    region
-}
-
 /// The posed template, and the image to fit it to.
 #[derive(Clone)]
 pub struct FitSetup {
@@ -105,7 +96,10 @@ impl FitSetup {
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
-        let region = fit_region(&posed.vertices, parameters);
+        let mut region = Aabb::of(&posed.vertices);
+        let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
+        region.min -= border;
+        region.max += border;
         let picture = position.mask().unwrap_or(volume);
         let field = Field::cut_out(picture, Some(&region), parameters.blur, monitor)?;
         Ok(Self {
