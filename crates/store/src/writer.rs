@@ -28,12 +28,15 @@ use std::ops::{Deref, DerefMut};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::{Mutex, MutexGuard};
-use tokio::time::{Instant, timeout_at};
+use tokio::time::{Instant, sleep, timeout_at};
 use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// How long SQLite itself waits for the database's lock before [`Writer::begin`] looks at the
 /// time and asks again.
 const LOCK_POLL: Duration = Duration::from_millis(100);
+
+/// Pause before the database is opened again after it was locked, which SQLite may say at once.
+const CONNECT_POLL: Duration = Duration::from_millis(10);
 
 /// The connection that writes.
 pub(super) struct Writer {
@@ -77,7 +80,7 @@ impl Writer {
         loop {
             let mut connection = match place.take() {
                 Some(connection) => connection,
-                None => self.options.connect().await.map_err(faults::of_sqlite)?,
+                None => self.connected_by(deadline).await?,
             };
             match sqlx::query("BEGIN IMMEDIATE")
                 .execute(&mut connection)
@@ -113,7 +116,22 @@ impl Writer {
 
     /// A connection of its own, beside the one that writes.
     pub async fn connect(&self) -> StoreResult<SqliteConnection> {
-        self.options.connect().await.map_err(faults::of_sqlite)
+        self.connected_by(Instant::now() + self.wait).await
+    }
+
+    /// A new connection. Opening one reads the database, which nobody can while another connection, such as that of a failed
+    /// write, is being closed: that is waited for until the `deadline`.
+    async fn connected_by(&self, deadline: Instant) -> StoreResult<SqliteConnection> {
+        loop {
+            let error = match self.options.connect().await {
+                Ok(connection) => return Ok(connection),
+                Err(error) => faults::of_sqlite(error),
+            };
+            if error.cause() != StoreFault::Busy || Instant::now() >= deadline {
+                return Err(error);
+            }
+            sleep(CONNECT_POLL).await;
+        }
     }
 
     /// Moves the write-ahead log into the database and empties it. `false` if a reader was in the
@@ -125,7 +143,7 @@ impl Writer {
             .map_err(|_| busy("other writes take too long"))?;
         let mut connection = match place.take() {
             Some(connection) => connection,
-            None => self.options.connect().await.map_err(faults::of_sqlite)?,
+            None => self.connected_by(deadline).await?,
         };
         let row = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
             .fetch_one(&mut connection)
@@ -276,6 +294,36 @@ mod tests {
         assert_eq!(done.unwrap(), 1);
         assert!(!writer.is_suspect());
         assert_eq!(seen_by_others(&writer).await, 1);
+    }
+
+    #[tokio::test]
+    async fn a_database_that_nobody_can_open_is_waited_for() {
+        use sqlx::Connection;
+        let folder = tempfile::tempdir().unwrap();
+        let seed = writer(folder.path(), 1000).await;
+        seed.close().await;
+        let options = seed.options.clone();
+        let mut other = options
+            .locking_mode(sqlx::sqlite::SqliteLockingMode::Exclusive)
+            .connect()
+            .await
+            .unwrap();
+        sqlx::query("INSERT INTO t VALUES (1)")
+            .execute(&mut other)
+            .await
+            .unwrap();
+        let impatient = Writer::new(&seed.options, Duration::from_millis(300));
+        let refused = impatient.begin().await.err().unwrap();
+        assert_eq!(refused.cause(), StoreFault::Busy);
+        let waiting = Writer::new(&seed.options, Duration::from_secs(60));
+        let write = sqlx::query("INSERT INTO t VALUES (2)").write(&waiting);
+        let end = async {
+            sleep(Duration::from_millis(500)).await;
+            other.close().await.unwrap();
+        };
+        let (written, ()) = tokio::join!(write, end);
+        assert_eq!(written.unwrap(), 1);
+        assert_eq!(seen_by_others(&waiting).await, 2);
     }
 
     #[tokio::test]
