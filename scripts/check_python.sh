@@ -2,7 +2,8 @@
 # Builds the Python package's wheel, installs it into an environment of its own and tests it there.
 #
 #   scripts/check_python.sh            everything
-#   scripts/check_python.sh --build    only the wheel and its environment, which scripts/test.sh does beforehand: it needs cargo's lock
+#   scripts/check_python.sh --install  only the environment of the tests
+#   scripts/check_python.sh --build    only the wheel in it, which scripts/test.sh does beforehand: it needs cargo's lock
 #   scripts/check_python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
 #   scripts/check_python.sh --notebooks    only the notebooks, whose copies with outputs scripts/site.sh shows
 #   scripts/check_python.sh --write    writes the generated stubs anew
@@ -16,12 +17,16 @@ venv=$tools/python-package
 wheels=$tools/wheels
 export PYTHONDONTWRITEBYTECODE=1 VENTRIFORM_PROGRAM=$PWD/target/debug/ventriform
 
-build() {
+install_environment() {
   if ! cmp -s python/requirements-test.txt "$venv/requirements.done"; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install -q -r python/requirements-test.txt
     cp python/requirements-test.txt "$venv/requirements.done"
   fi
+}
+
+build() {
+  install_environment
   local wheel=${VENTRIFORM_WHEEL:-}
   if [ -z "$wheel" ]; then
     rm -rf "$wheels"
@@ -50,6 +55,7 @@ run_tests() {
 }
 
 case ${1:-} in
+  --install) install_environment ;;
   --build) build ;;
   --test) run_tests ;;
   --notebooks) run_notebooks ;;

@@ -91,6 +91,7 @@ install_external_tools() {
       "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
       cp scripts/requirements.txt "$tools/python.done"
   fi
+  scripts/check_python.sh --install || return
   if ! cmp -s scripts/package.json "$tools/node.done"; then
     cp scripts/package.json "$tools/package.json" &&
       npm install --silent --no-fund --no-audit --prefix "$tools" &&
