@@ -102,6 +102,8 @@ fn a_model_of_a_scan_segments_it_with_stable_names() {
     assert!(number(&report["measures"]["contour_distance_voxels"]) < 0.6);
     assert!((140.0..165.0).contains(&number(&report["volumes_ml"]["wall"])));
     assert!((61.0..75.0).contains(&number(&report["volumes_ml"]["cavity"])));
+    let interval = &report["volumes_ml"]["anatomical_interval"]["wall"];
+    assert!(number(&interval[0]) < 125.0 && 125.0 < number(&interval[1]));
     assert!(report["flags"].is_array());
 
     let measured = succeeds(here, "measure out/mask.nii.gz truth.nii.gz");

@@ -5,7 +5,7 @@ import { useState } from "preact/hooks";
 import { type Kind, type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
-import type { Agreement, BeatReport, Evidence, ModelSummary, SegmentationReport } from "../generated/openapi";
+import type { Agreement, BeatReport, Evidence, ModelSummary, SegmentationReport, VolumeIntervals } from "../generated/openapi";
 import type { Loaded } from "./loaded";
 
 /** Name, figure, digits, unit; for some, the interval that holds the truth in nine of ten hearts. */
@@ -15,12 +15,17 @@ const of = (read: (report: SegmentationReport) => number | null | undefined) => 
 const summary = (name: keyof ModelSummary) => (loaded: Loaded) => loaded.result.summary[name];
 const measure = (name: keyof Agreement) => of(report => report.measures?.[name]);
 
+const interval = (read: (of: VolumeIntervals) => number[]) => (loaded: Loaded) => {
+  const found = loaded.report?.volumes_ml.anatomical_interval;
+  return found && read(found);
+};
+
 const beat = <T,>(read: (report: BeatReport) => T) => (loaded: Loaded) => loaded.beat && read(loaded.beat.report);
 
 const FIT: [string, Row[]][] = [
   ["", [
-    ["Cavity", of(r => r.volumes_ml.anatomical?.cavity ?? r.volumes_ml.cavity), 0, "ml"],
-    ["Wall", of(r => r.volumes_ml.anatomical?.wall ?? r.volumes_ml.wall), 0, "ml"],
+    ["Cavity", of(r => r.volumes_ml.anatomical?.cavity ?? r.volumes_ml.cavity), 0, "ml", interval(of => of.cavity)],
+    ["Wall", of(r => r.volumes_ml.anatomical?.wall ?? r.volumes_ml.wall), 0, "ml", interval(of => of.wall)],
     ["Mass", of(r => r.mass_g), 0, "g"],
     ["Thickness", of(r => r.thickness_mm?.anatomical.mean), 1, "mm"],
     ["Below the threshold", of(r => r.polar?.extent_percent), 1, "%"],

@@ -1,8 +1,8 @@
-//! Constants of the intervals about the figures of a beat. Written by `scripts/calibrate_beats.py`: do not edit.
+//! Constants of the intervals about the figures of a beat. Written by `scripts/calibrate_intervals.py`: do not edit.
 //!
 //! In: figures of fits to simulated gated studies, and the true ones. Out: mean and deviation of the error.
 
-use super::error_terms::ErrorTerms;
+use crate::numeric::error_terms::ErrorTerms;
 
 /// Error of the ejection fraction, points.
 pub(super) const EF_ERROR: ErrorTerms = ErrorTerms {

@@ -6,14 +6,8 @@
 //! what noise, blur and the unknown thickness of the wall do; they know nothing of an axis or a rim that lies wrong.
 
 use super::calibration::{EDV_ERROR, EF_ERROR, ESV_ERROR};
-use super::error_terms::ErrorTerms;
 
-/// Share of hearts whose true figure lies within an interval, per cent.
-pub const COVERAGE_PERCENT: f64 = 90.0;
-/// Smallest sum of 1, bias and deviation that a relative error may leave.
-const MIN_RATIO: f64 = 0.2;
-
-/// Intervals that hold the true figures of [`COVERAGE_PERCENT`] of hearts.
+/// Intervals that hold the true figures of nine of ten hearts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intervals {
     /// Of the end-diastolic volume, ml.
@@ -27,15 +21,11 @@ pub struct Intervals {
 impl Intervals {
     /// About volumes that were found, ml, where `dark_share` of the wall is too dark to show its motion.
     pub fn about(edv_ml: f64, esv_ml: f64, dark_share: f64) -> Self {
-        let relative = |found: f64, error: &ErrorTerms| {
-            let [least, greatest] = error.ends(edv_ml, dark_share);
-            [greatest, least].map(|error| found / (1.0 + error).max(MIN_RATIO))
-        };
         let ef_percent = 100.0 * (1.0 - esv_ml / edv_ml);
         let [least, greatest] = EF_ERROR.ends(edv_ml, dark_share);
         Self {
-            edv_ml: relative(edv_ml, &EDV_ERROR),
-            esv_ml: relative(esv_ml, &ESV_ERROR),
+            edv_ml: EDV_ERROR.interval(edv_ml, edv_ml, dark_share),
+            esv_ml: ESV_ERROR.interval(esv_ml, edv_ml, dark_share),
             ef_percent: [greatest, least].map(|error| (ef_percent - error).clamp(0.0, 100.0)),
         }
     }

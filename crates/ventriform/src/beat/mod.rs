@@ -23,7 +23,6 @@ mod carried;
 pub mod counts;
 mod curvature;
 mod error;
-mod error_terms;
 mod fields;
 pub mod figures;
 pub mod fit;

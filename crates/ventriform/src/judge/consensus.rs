@@ -58,6 +58,7 @@ pub fn judgement(
         position_confidence: alone.position_confidence,
         evidence: Some(*evidence),
         uncertainty: WallUncertainty::of_model(&fit.model, &nodes, confidence),
+        volumes: alone.volumes,
         nodes,
         flags: flag_rules::with_chance(alone.flags.clone(), confidence, evidence),
     }

@@ -6,7 +6,8 @@
 //! 1. [`evidence`]: figures of the wall as the sensors left it, before its base plane was put;
 //!    [`motion`]: whether the projections of the image show the wall in two positions.
 //! 2. [`confidence`]: the chances of a good fit, of motion and of a heart, by calibrated logistic models.
-//! 3. [`flags`]: the warnings, by [`flag_rules`]; [`uncertainty`]: how far each node may be off.
+//! 3. [`flags`]: the warnings, by [`flag_rules`]; [`uncertainty`] and [`volume_intervals`]: how far each node and the
+//!    volumes may be off.
 //! 4. [`septum`]: whether the fit is to be made again without the septum's sensors; [`refusal`]: whether it is a
 //!    heart at all.
 //! 5. [`consensus`]: of several models' fits to one volume, the judgement of the chosen one by all of them.
@@ -32,11 +33,14 @@ pub mod septum;
 mod test_fits;
 pub mod uncertainty;
 mod uncertainty_calibration;
+mod volume_calibration;
+pub mod volume_intervals;
 
 pub use evidence::Evidence;
 pub use fit::Fit;
 pub use flags::Flag;
 pub use uncertainty::{NodeEvidence, WallUncertainty};
+pub use volume_intervals::VolumeIntervals;
 
 use crate::deform::setup::FitSetup;
 use crate::deform::{DeformParameters, FittedModel};
@@ -62,6 +66,8 @@ pub struct Judgement {
     pub nodes: Vec<NodeEvidence>,
     /// Standard deviation of each node's distance from both walls, mm; ventricles only.
     pub uncertainty: Option<WallUncertainty>,
+    /// Intervals about the volumes of the anatomical wall; ventricles only.
+    pub volumes: Option<VolumeIntervals>,
     /// Warnings.
     pub flags: Vec<Flag>,
 }
@@ -95,11 +101,20 @@ pub fn judge(
         }
         _ => Vec::new(),
     };
+    let volumes = model
+        .surfaces
+        .as_ref()
+        .zip(evidence.as_ref())
+        .map(|(both, evidence)| {
+            let anatomical = &both.anatomical;
+            VolumeIntervals::about(anatomical.wall_ml, anatomical.wall.cavity_ml, evidence.dark)
+        });
     Ok(Judgement {
         confidence,
         position_confidence,
         evidence,
         uncertainty: WallUncertainty::of_model(model, &nodes, confidence),
+        volumes,
         nodes,
         flags,
     })

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::beat_report::{BeatReport, SegmentMotionReport};
-use super::page_parts::{flags_headline, polar_maps, short, volume_line};
+use super::page_parts::{flags_headline, polar_maps, short, volume_line, with_interval};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -131,14 +131,6 @@ fn verdict(report: &BeatReport) -> Markup {
 }
 
 fn figures(report: &BeatReport) -> Markup {
-    let within = |label: &str, interval: Option<[f64; 2]>, decimals| match interval {
-        Some([low, high]) => format!(
-            "{label}; 90 %: {} to {}",
-            number(low, decimals),
-            number(high, decimals)
-        ),
-        None => label.to_owned(),
-    };
     let figure = |value: Option<f64>, decimals, unit, label: String| {
         Some(HeadlineFigure {
             value: number(value?, decimals),
@@ -154,19 +146,19 @@ fn figures(report: &BeatReport) -> Markup {
             report.ef_percent,
             0,
             "%",
-            within("ejection fraction", report.ef_interval_percent, 0),
+            with_interval("ejection fraction", report.ef_interval_percent, 0),
         ),
         figure(
             Some(report.edv_ml),
             0,
             "ml",
-            within("end-diastolic volume", Some(report.edv_interval_ml), 0),
+            with_interval("end-diastolic volume", Some(report.edv_interval_ml), 0),
         ),
         figure(
             Some(report.esv_ml),
             0,
             "ml",
-            within("end-systolic volume", Some(report.esv_interval_ml), 0),
+            with_interval("end-systolic volume", Some(report.esv_interval_ml), 0),
         ),
         plain(Some(report.sv_ml), 0, "ml", "stroke volume"),
         plain(Some(report.mass_g), 0, "g", "mass of the wall (1.05 g/ml)"),

@@ -105,6 +105,9 @@ pub struct FittedVolumes {
     /// Of the wall corrected for the blur; ventricles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub anatomical: Option<WallVolumes>,
+    /// Of nine of ten hearts, the true volumes of the wall corrected for the blur lie within these; ventricles only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub anatomical_interval: Option<VolumeIntervalsReport>,
 }
 
 /// Volumes of one wall, millilitres.
@@ -115,6 +118,16 @@ pub struct WallVolumes {
     pub wall: f64,
     /// Of the cavity.
     pub cavity: f64,
+}
+
+/// Least and greatest volumes of one wall, millilitres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = VolumeIntervals))]
+pub struct VolumeIntervalsReport {
+    /// Of the wall.
+    pub wall: [f64; 2],
+    /// Of the cavity.
+    pub cavity: [f64; 2],
 }
 
 /// Thickness of both walls, mm.
@@ -270,7 +283,7 @@ impl LongAxis {
 }
 
 impl FittedVolumes {
-    pub(super) fn of(fit: &FittedModel) -> Self {
+    pub(super) fn of(fit: &FittedModel, judgement: &Judgement) -> Self {
         let [apparent, anatomical] = match &fit.surfaces {
             Some(both) => [&both.apparent, &both.anatomical].map(|surface| {
                 Some(WallVolumes {
@@ -285,6 +298,10 @@ impl FittedVolumes {
             cavity: fit.wall.as_ref().map(|wall| round(wall.cavity_ml)),
             apparent,
             anatomical,
+            anatomical_interval: judgement.volumes.map(|of| VolumeIntervalsReport {
+                wall: of.wall_ml.map(round),
+                cavity: of.cavity_ml.map(round),
+            }),
         }
     }
 }

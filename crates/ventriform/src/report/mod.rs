@@ -55,7 +55,7 @@ pub use comparison_report::{
 pub use distance_pictures::vertex_colours;
 pub use fit_report::{
     EvidenceReport, FitReport, FittedVolumes, LocalisationReport, LongAxis, Posture, Thickness,
-    Thicknesses, Uncertainties, Uncertainty, WallVolumes,
+    Thicknesses, Uncertainties, Uncertainty, VolumeIntervalsReport, WallVolumes,
 };
 pub use input::{FileFacts, IntensityFacts, Scaling};
 pub use measure::{MeasureParameters, Measures, measure};

@@ -28,6 +28,18 @@ pub(super) fn flags_headline(flags: usize, result: &str) -> (Sign, String) {
     }
 }
 
+/// A figure's `label`, with the interval that holds the true figure of nine of ten hearts.
+pub(super) fn with_interval(label: &str, interval: Option<[f64; 2]>, decimals: usize) -> String {
+    match interval {
+        Some([low, high]) => format!(
+            "{label}; 90 %: {} to {}",
+            number(low, decimals),
+            number(high, decimals)
+        ),
+        None => label.to_owned(),
+    }
+}
+
 /// The polar maps beside each other: of `titles` (file name, title) those that `maps` (file name, SVG) has.
 pub(super) fn polar_maps(
     titles: &[(&'static str, &'static str)],

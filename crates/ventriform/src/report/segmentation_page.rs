@@ -4,7 +4,7 @@ use maud::{Markup, html};
 use serde_json::{Value, json};
 
 use super::embedded::Embedded;
-use super::page_parts::{flags_headline, short, volume_line};
+use super::page_parts::{flags_headline, short, volume_line, with_interval};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
@@ -222,30 +222,35 @@ fn figures(report: &SegmentationReport) -> Markup {
     let extent = report.polar.as_ref().map(|polar| polar.extent_percent);
     let mut rows = size_rows(report);
     rows.extend([
-        (extent, 1, "%", "of the wall below the threshold of uptake"),
+        (
+            extent,
+            1,
+            "%",
+            "of the wall below the threshold of uptake".to_owned(),
+        ),
         (
             measures.map(|m| m.jaccard),
             3,
             "of 1",
-            "Jaccard index against the expert (E_J)",
+            "Jaccard index against the expert (E_J)".to_owned(),
         ),
         (
             measures.map(|m| m.dice),
             3,
             "of 1",
-            "Dice index against the expert",
+            "Dice index against the expert".to_owned(),
         ),
         (
             measures.and_then(|m| m.contour_distance_voxels),
             3,
             "voxels",
-            "mean distance of the contours (E_CD)",
+            "mean distance of the contours (E_CD)".to_owned(),
         ),
         (
             measures.and_then(|m| m.hausdorff95_mm),
             1,
             "mm",
-            "95th percentile of the distance between the contours",
+            "95th percentile of the distance between the contours".to_owned(),
         ),
     ]);
     let figures: Vec<HeadlineFigure> = rows
@@ -254,15 +259,18 @@ fn figures(report: &SegmentationReport) -> Markup {
             Some(HeadlineFigure {
                 value: number(value?, decimals),
                 unit,
-                label: label.to_owned(),
+                label,
             })
         })
         .collect();
     document::figures(&figures)
 }
 
+/// A figure, if there is one, with its decimals, unit and label.
+type FigureRow = (Option<f64>, usize, &'static str, String);
+
 /// Volumes, thickness and mass: of both walls of a ventricle where the report has them.
-fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static str, &'static str)> {
+fn size_rows(report: &SegmentationReport) -> Vec<FigureRow> {
     let volumes = report.volumes_ml;
     let (Some(apparent), Some(anatomical)) = (volumes.apparent, volumes.anatomical) else {
         let wall = match report.is_ventricle() {
@@ -270,59 +278,68 @@ fn size_rows(report: &SegmentationReport) -> Vec<(Option<f64>, usize, &'static s
             false => "volume of the organ",
         };
         return vec![
-            (Some(volumes.wall), 1, "ml", wall),
-            (volumes.cavity, 1, "ml", "volume of the cavity"),
+            (Some(volumes.wall), 1, "ml", wall.to_owned()),
+            (volumes.cavity, 1, "ml", "volume of the cavity".to_owned()),
             (
                 report.wall_thickness_mm,
                 1,
                 "mm",
-                "mean thickness of the wall",
+                "mean thickness of the wall".to_owned(),
             ),
         ];
     };
     let thickness = report.thickness_mm.as_ref();
+    let interval = volumes.anatomical_interval;
     vec![
         (
             Some(anatomical.wall),
             1,
             "ml",
-            "anatomical wall: without the blur",
+            with_interval(
+                "anatomical wall: without the blur",
+                interval.map(|of| of.wall),
+                0,
+            ),
         ),
         (
             Some(anatomical.cavity),
             1,
             "ml",
-            "cavity within the anatomical wall",
+            with_interval(
+                "cavity within the anatomical wall",
+                interval.map(|of| of.cavity),
+                0,
+            ),
         ),
         (
             thickness.map(|both| both.anatomical.mean),
             1,
             "mm",
-            "mean thickness of the anatomical wall",
+            "mean thickness of the anatomical wall".to_owned(),
         ),
         (
             report.mass_g,
             0,
             "g",
-            "mass of the anatomical wall (1.05 g/ml)",
+            "mass of the anatomical wall (1.05 g/ml)".to_owned(),
         ),
         (
             Some(apparent.wall),
             1,
             "ml",
-            "apparent wall: as it looks in the image",
+            "apparent wall: as it looks in the image".to_owned(),
         ),
         (
             Some(apparent.cavity),
             1,
             "ml",
-            "cavity within the apparent wall",
+            "cavity within the apparent wall".to_owned(),
         ),
         (
             thickness.map(|both| both.apparent.mean),
             1,
             "mm",
-            "mean thickness of the apparent wall",
+            "mean thickness of the apparent wall".to_owned(),
         ),
     ]
 }

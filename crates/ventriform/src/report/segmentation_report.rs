@@ -212,7 +212,7 @@ impl SegmentationReport {
             posture: fit.patient_orientation.as_ref().map(Posture::of),
             fit: FitReport::of(fit, judgement),
             evidence: EvidenceReport::of(judgement),
-            volumes_ml: FittedVolumes::of(fit),
+            volumes_ml: FittedVolumes::of(fit, judgement),
             mass_g: anatomical
                 .map(|surface| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),

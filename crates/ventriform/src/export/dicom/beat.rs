@@ -12,8 +12,8 @@
 use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::structured_report::{
-    self as sr, Figure, GRAM, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site,
-    group, measured, text, tracking, within,
+    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES, WALL_SEGMENTS, concept, figure,
+    finding_site, group, measured, text, tracking, within,
 };
 use super::uid::Uids;
 use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
@@ -213,9 +213,6 @@ impl<'a> DicomBeat<'a> {
         content
     }
 }
-
-/// How the ranges of uncertainty are meant, which no code says.
-const RANGES: &str = "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
 
 const VOLUMES_PER_SECOND: Code = ucum("{EDV}/s", "end-diastolic volumes per second");
 const MILLISECOND: Code = ucum("ms", "millisecond");

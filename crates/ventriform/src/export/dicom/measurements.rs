@@ -6,13 +6,14 @@
 //! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
 //! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
-//! measured, not at the figure. A figure that the report lacks is left out.
+//! measured, not at the figure. The volumes of the anatomical
+//! wall and cavity have the ends of the interval that holds the true one. A figure that the report lacks is left out.
 
 use super::codes::{CAVITY, Code, MILLIMETRE, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::structured_report::{
-    self as report, Figure, GRAM, MILLILITRE, PERCENT, SeriesReference, WALL_SEGMENTS, concept,
-    figure, finding_site, group, image, mean, measured, text, tracking,
+    self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES, SeriesReference, WALL_SEGMENTS,
+    concept, figure, finding_site, group, image, mean, measured, text, tracking, within,
 };
 use super::{DicomObject, DicomResults};
 use crate::polar::PolarSegment;
@@ -107,7 +108,10 @@ const WALL_FIGURES: [Part; 5] = [
         method: Some(ANATOMICAL),
         site: None,
         figures: &[
-            figure(|r| Some(r.volumes_ml.anatomical?.wall), VOLUME, MILLILITRE),
+            within(
+                figure(|r| Some(r.volumes_ml.anatomical?.wall), VOLUME, MILLILITRE),
+                |r| Some(r.volumes_ml.anatomical_interval?.wall),
+            ),
             mean(
                 |r| Some(r.thickness_mm?.anatomical.mean),
                 THICKNESS,
@@ -119,10 +123,13 @@ const WALL_FIGURES: [Part; 5] = [
         name: "anatomical cavity",
         method: Some(ANATOMICAL),
         site: Some(CAVITY),
-        figures: &[figure(
-            |r| Some(r.volumes_ml.anatomical?.cavity),
-            VOLUME,
-            MILLILITRE,
+        figures: &[within(
+            figure(
+                |r| Some(r.volumes_ml.anatomical?.cavity),
+                VOLUME,
+                MILLILITRE,
+            ),
+            |r| Some(r.volumes_ml.anatomical_interval?.cavity),
         )],
     },
 ];
@@ -208,6 +215,8 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
         let comment = dcm("121106", "Comment");
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
+        let ranges = report.volumes_ml.anatomical_interval.map(|_| RANGES);
+        content.extend(ranges.map(|ranges| text("CONTAINS", comment, ranges)));
     }
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }

@@ -27,6 +27,10 @@ pub(super) struct Figure<T> {
 type Interval<T> = fn(&T) -> Option<[f64; 2]>;
 
 /// How far the true value may lie below a figure, and above it (CID 225).
+/// The comment of a group with intervals: no code says how sure a range is.
+pub(super) const RANGES: &str =
+    "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
+
 const BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
 const ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
 

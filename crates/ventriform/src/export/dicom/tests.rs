@@ -9,7 +9,9 @@ use crate::grid::voxelise::voxelise;
 use crate::mesh::shapes;
 use crate::polar::{PolarSegment, PolarSummary};
 use crate::report::segmentation_report::tests::first_report;
-use crate::report::{RaisedFlag, SegmentationReport, Thickness, Thicknesses, WallVolumes};
+use crate::report::{
+    RaisedFlag, SegmentationReport, Thickness, Thicknesses, VolumeIntervalsReport, WallVolumes,
+};
 use crate::volume::Provenance;
 use dicom_core::Tag;
 use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
@@ -488,6 +490,10 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     let volumes = |wall, cavity| Some(WallVolumes { wall, cavity });
     scene.report.volumes_ml.apparent = volumes(120.5, 40.25);
     scene.report.volumes_ml.anatomical = volumes(101.25, 55.5);
+    scene.report.volumes_ml.anatomical_interval = Some(VolumeIntervalsReport {
+        wall: [90.5, 120.25],
+        cavity: [48.25, 61.75],
+    });
     let thickness = |mean| Thickness { mean, spread: 1.0 };
     scene.report.thickness_mm = Some(Thicknesses {
         apparent: thickness(f64::NAN),
@@ -507,6 +513,24 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     let mut all = Vec::new();
     figures(&set, &mut all, "");
     assert_eq!(all.len(), 4 + 2 + 3 + 2 * 17);
+    let mut found = Vec::new();
+    ranges(&set, &mut found);
+    assert_eq!(found, [10.75, 19.0, 7.25, 6.25]);
+}
+
+/// How far the truth may lie below and above, ml, for each figure that says so.
+fn ranges(set: &InMemDicomObject, into: &mut Vec<f64>) {
+    for child in set
+        .get(tags::CONTENT_SEQUENCE)
+        .and_then(|e| e.items())
+        .unwrap_or_default()
+    {
+        if text(child, tags::RELATIONSHIP_TYPE) == "HAS PROPERTIES" {
+            let value = only(child, tags::MEASURED_VALUE_SEQUENCE);
+            into.extend(numbers(value, tags::NUMERIC_VALUE));
+        }
+        ranges(child, into);
+    }
 }
 
 #[test]
