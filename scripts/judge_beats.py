@@ -49,6 +49,14 @@ def mean_phase(segments, numbers):
     return np.degrees(np.angle(np.mean(np.exp(1j * np.array(turns))))) if turns else np.nan
 
 
+def phase_error(found, true):
+    """Deviation of the errors of the phases of segments that contract, about their median, degrees."""
+    true = {s["segment"]: s["phase_degrees"] for s in true if s["contraction"] > 0.5}
+    pairs = [(s["phase_degrees"], true[s["segment"]]) for s in found if s["phase_degrees"] is not None and true.get(s["segment"]) is not None]
+    errors = np.array([(found - true + 180) % 360 - 180 for found, true in pairs])
+    return np.std(errors - np.median(errors))
+
+
 def lateness(segments, delayed):
     """How much later these segments are than the others, degrees."""
     others = [s["segment"] for s in segments if s["segment"] not in delayed]
@@ -106,7 +114,8 @@ def main():
         made = truth.get("made", "")
         delayed = [s["segment"] for s in result["segments"] if s["delay_degrees"] > 0]
         late = [lateness(of, delayed) for of in (result["segments"], found["segments"])] if delayed else [0, 0]
-        hearts.append((case.name, found["phase"]["sd_degrees"], found["phase"]["reliable"], akinetic, *late))
+        hearts.append((case.name, found["phase"]["sd_degrees"], found["phase"]["reliable"], akinetic, *late,
+                       found["phase"]["noise_degrees"], phase_error(found["segments"], result["segments"])))
         walls = [g["wall_ml"] for g in found["gates"]]
         swing = 100 * (max(walls) - min(walls)) / np.mean(walls)
         rows.append((case.name, made, found["ef_percent"], 100 * result["ef"], found["edv_ml"], result["edv_ml"],
@@ -138,10 +147,18 @@ def main():
         within = [np.corrcoef(of(1)[own], of(2)[own])[0, 1] for name in {h[0] for h in hearts if h[3]}
                   for own in [of(0) == name]]
         line("thickening within hearts with akinesia: r", f"mean {np.mean(within):.2f}, least {min(within):.2f}", ">= .7")
-    still = [h[1] for h in hearts if not h[3] and abs(h[4]) < 10]
-    if still:
-        line("phase SD without delay and akinesia", f"mean {np.mean(still):.1f}, greatest {max(still):.1f}", "<= 8")
-    for name, _, reliable, _, delay, late in hearts:
+    for kind, which in ("", True), (", reliable", False):
+        still = [h[1] for h in hearts if not h[3] and abs(h[4]) < 10 and (which or h[2])]
+        if still:
+            line(f"phase SD without delay and akinesia{kind}", f"mean {np.mean(still):.1f}, greatest {max(still):.1f}, of {len(still)}", "<= 8")
+    noise, error = (np.array([h[at] for h in hearts]) for at in (6, 7))
+    r = np.corrcoef(np.log(noise), np.log(error))[0, 1]
+    line("error of phases over their noise: median", f"{np.median(error / noise):.2f}; r of the logarithms {r:.2f}")
+    reliable = np.array([h[2] for h in hearts])
+    for kind, own in ("reliable", reliable), ("not", ~reliable):
+        if own.any():
+            line(f"error of phases, {kind}, degrees", f"mean {error[own].mean():.1f}, greatest {error[own].max():.1f}, of {own.sum()}")
+    for name, _, reliable, _, delay, late, *_ in hearts:
         if abs(delay) >= 10:
             line(f"delayed wall, {name}", f"{late:.0f} of {delay:.0f} degrees, reliable {reliable}", "within 30 %")
     for name, goal in ("lost", "within 2"), ("rotated", "within .5"):

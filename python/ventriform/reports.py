@@ -651,10 +651,12 @@ class FitnessTerms(Document):
 class FittedVolumes(Document):
     """Volumes of a fitted model, millilitres."""
 
-    _built: ClassVar[dict[str, str]] = {"anatomical": "WallVolumes", "apparent": "WallVolumes"}
+    _built: ClassVar[dict[str, str]] = {"anatomical": "WallVolumes", "anatomical_interval": "VolumeIntervals", "apparent": "WallVolumes"}
 
     anatomical: WallVolumes | None = None
     """Of the wall corrected for the blur; ventricles only."""
+    anatomical_interval: VolumeIntervals | None = None
+    """Of nine of ten hearts, the true volumes of the wall corrected for the blur lie within these; ventricles only."""
     apparent: WallVolumes | None = None
     """Of the wall as the blurred image shows it; ventricles only."""
     cavity: float | None = None
@@ -1284,8 +1286,11 @@ class PhaseReport(Document):
     """Share of the weight in equal bins from 0 to 360 degrees."""
     mean_degrees: float
     """Circular mean."""
+    noise_degrees: float
+    """How far the noise of the gates alone scatters the phases: of the standard deviation, the part that says nothing
+    of the heart."""
     reliable: bool
-    """Whether enough of the wall moves, and the gates are a beat."""
+    """Whether enough of the wall moves, more than noise does, and the gates are a beat."""
     sd_degrees: float
     """Standard deviation."""
 
@@ -2069,6 +2074,18 @@ class VolumeFile(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class VolumeIntervals(Document):
+    """Least and greatest volumes of one wall, millilitres."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    cavity: list[float]
+    """Of the cavity."""
+    wall: list[float]
+    """Of the wall."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class VolumeLinks(Document):
     """Paths of one volume."""
 
@@ -2108,5 +2125,6 @@ register(
     PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
     RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
     Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses,
-    TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeLinks, WallVolumes,
+    TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks,
+    WallVolumes,
 )

@@ -1791,6 +1791,7 @@ export interface components {
         /** @description Volumes of a fitted model, millilitres. */
         FittedVolumes: {
             anatomical?: components["schemas"]["WallVolumes"] | null;
+            anatomical_interval?: components["schemas"]["VolumeIntervals"] | null;
             apparent?: components["schemas"]["WallVolumes"] | null;
             /**
              * Format: double
@@ -3457,7 +3458,12 @@ export interface components {
              * @description Circular mean.
              */
             mean_degrees: number;
-            /** @description Whether enough of the wall moves, and the gates are a beat. */
+            /**
+             * Format: double
+             * @description How far the noise of the gates alone scatters the phases: of the standard deviation, the part that says nothing of the heart.
+             */
+            noise_degrees: number;
+            /** @description Whether enough of the wall moves, more than noise does, and the gates are a beat. */
             reliable: boolean;
             /**
              * Format: double
@@ -5271,6 +5277,13 @@ export interface components {
             /** @description SHA-256 of its content, hexadecimal; also its `ETag`. */
             sha256: string;
         };
+        /** @description Least and greatest volumes of one wall, millilitres. */
+        VolumeIntervals: {
+            /** @description Of the cavity. */
+            cavity: number[];
+            /** @description Of the wall. */
+            wall: number[];
+        };
         VolumeJobRequest: {
             /**
              * @description The id in the caller's own system
@@ -5514,6 +5527,7 @@ export type UptakeChange = components['schemas']['UptakeChange'];
 export type Valence = components['schemas']['Valence'];
 export type Volume = components['schemas']['Volume'];
 export type VolumeFile = components['schemas']['VolumeFile'];
+export type VolumeIntervals = components['schemas']['VolumeIntervals'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
 export type $defs = Record<string, never>;

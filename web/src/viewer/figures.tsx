@@ -70,6 +70,7 @@ const BEAT: [string, Row[]][] = [
   ["Phases of the wall", [
     ["Mean", beat(r => r.phase.mean_degrees), 0, "°"],
     ["Standard deviation", beat(r => r.phase.sd_degrees), 0, "°"],
+    ["By noise alone", beat(r => r.phase.noise_degrees), 0, "°"],
     ["Bandwidth, 95 %", beat(r => r.phase.bandwidth_degrees), 0, "°"],
     ["Entropy", beat(r => r.phase.entropy_percent), 0, "%"],
   ]],

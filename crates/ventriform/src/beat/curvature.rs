@@ -21,6 +21,8 @@ use crate::progress::{Cancelled, Monitor};
 
 /// Share of the curvature at a typical step that is added: no unknown is left without.
 const DAMPING: f64 = 1e-3;
+/// Curvature that every unknown has at least where nothing is added for the sake of steps.
+const LEAST_CURVATURE: f64 = 1e-4;
 /// Reach of the blur that is followed, voxels: 2.4 standard deviations of a width of 12 mm.
 const BLUR_REACH_VOXELS: usize = 3;
 
@@ -30,6 +32,8 @@ pub(super) struct Curvature {
     blocks: Vec<Block>,
     /// The factors of the gates, and the curvature of each.
     gains: Vec<(usize, f64)>,
+    /// The image's part of the curvature of the motion's first harmonic, and of the stretch of the long axis.
+    motion: DMatrix<f64>,
 }
 
 #[derive(Debug)]
@@ -61,8 +65,7 @@ impl Curvature {
         };
         let mut parts = vec![(still_unknowns(layout), &image.still, 1.0)];
         for index in 0..2 * layout.harmonics {
-            let mut own: Vec<usize> = layout.motion(index).collect();
-            own.push(layout.stretch().start + index);
+            let own = harmonic_unknowns(layout, index);
             parts.push((own, &image.motion, mean_square(index)));
         }
         let levels = Levels::of(objective);
@@ -91,7 +94,33 @@ impl Curvature {
         Ok(Self {
             gains: gains.collect(),
             blocks,
+            motion: image.motion * mean_square(0),
         })
+    }
+
+    /// Variance of the motion's first harmonic at each node, mm², in a minimum of `objective` where the image has noise of
+    /// density 1: its sum over `n` voxels has the variance `n`.
+    pub fn motion_variances(&self, objective: &Objective) -> Vec<f64> {
+        let layout = &objective.layout;
+        let unknowns = harmonic_unknowns(layout, 0);
+        let mut matrix = self.motion.clone();
+        add_roughness(&mut matrix, &unknowns, objective, &roughness(objective));
+        Levels::of(objective).add(objective, &unknowns, &mut matrix);
+        for n in 0..unknowns.len() {
+            matrix[(n, n)] += LEAST_CURVATURE;
+        }
+        let Some(factors) = Cholesky::new(matrix) else {
+            return vec![f64::INFINITY; layout.nodes()];
+        };
+        // The gradient's covariance is the image's part of the curvature, by the weight of a voxel in the function.
+        let moved = factors.solve(&self.motion);
+        let covariance = factors.solve(&moved.transpose()) * (2.0 * objective.voxel_weight());
+        covariance
+            .diagonal()
+            .iter()
+            .take(layout.nodes())
+            .copied()
+            .collect()
     }
 
     /// Multiplies by the inverse.
@@ -116,6 +145,12 @@ impl Curvature {
 fn still_unknowns(layout: &Layout) -> Vec<usize> {
     let fields = layout.mid_wall().start..layout.outside().end;
     fields.chain(layout.rim()).chain([layout.blood()]).collect()
+}
+
+/// The motion by one harmonic, and the stretch of the long axis by it.
+fn harmonic_unknowns(layout: &Layout, index: usize) -> Vec<usize> {
+    let stretch = layout.stretch().start + index;
+    layout.motion(index).chain([stretch]).collect()
 }
 
 /// Second derivatives of the roughness of one field.

@@ -113,6 +113,7 @@ impl Beat {
             dark_share: fit.dark_share(),
             esv_ml: end_systole.cavity_ml,
             moving_share: phases.moving_share,
+            phase_noise_degrees: fit.phase_noise_degrees,
             share_outside: fit.share_outside,
             motions: (segments.iter())
                 .map(|segment| (segment.segment, segment.motion_mm))

@@ -26,6 +26,7 @@ use super::error::BeatError;
 use super::fields::{COLUMNS, Layout, Nodes, ROW_SPACING_MM, WallState, gate_harmonics, harmonics};
 use super::image::HeartGrid;
 use super::moment::WallMoment;
+use super::noise;
 use super::objective::{Objective, Observed, Priors};
 use super::order::share_as_smooth;
 use super::start::StillWall;
@@ -95,6 +96,8 @@ pub struct BeatFit {
     pub orders_as_smooth: f64,
     /// Share of the voxels about the wall that lie outside of the volume.
     pub share_outside: f64,
+    /// How far noise alone scatters the phases of the wall, degrees ([`noise`]).
+    pub phase_noise_degrees: f64,
     /// Steps made.
     pub steps: usize,
 }
@@ -221,11 +224,13 @@ pub fn fit(
     let Minimised {
         objective,
         unknowns,
+        phase_noise_degrees,
         steps,
     } = made;
     Ok(BeatFit {
         objective,
         unknowns,
+        phase_noise_degrees,
         row_spacing: wall.row_spacing,
         still,
         first_gate,
@@ -274,6 +279,7 @@ fn share_outside(volume: &Volume, points: &[Vec3], weights: &[f32]) -> f64 {
 struct Minimised {
     objective: Objective,
     unknowns: Vec<f64>,
+    phase_noise_degrees: f64,
     steps: usize,
 }
 
@@ -289,6 +295,7 @@ fn minimise(
     let ef_at = |objective: &Objective, point: &[f64]| {
         ejection_fraction(&curve(objective, point, CURVE_MOMENTS, 0.0))
     };
+    let mut phase_noise_degrees = 0.0;
     let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
     for stage_steps in stages {
         objective.take_motion_off(resolution_mm, &unknowns);
@@ -314,10 +321,14 @@ fn minimise(
         )?;
         unknowns = found.point;
         steps += found.steps;
+        if stage_steps.is_none() {
+            phase_noise_degrees = noise::phase_noise_degrees(&objective, &unknowns, &curvature);
+        }
     }
     monitor.report(Stage::Beat, 1.0)?;
     Ok(Minimised {
         unknowns,
+        phase_noise_degrees,
         steps,
         objective,
     })

@@ -12,6 +12,8 @@ const DARK_SHARE: f64 = 0.03;
 const SMALL_ESV_ML: f64 = 20.0;
 /// Share of the wall that must have a phase.
 const MOVING_SHARE: f64 = 2.0 / 3.0;
+/// Scatter of the phases by noise alone that may be, degrees: a third of a delay of 30 degrees.
+const PHASE_NOISE_DEGREES: f64 = 10.0;
 /// Share of the voxels about the wall that may lie outside of the volume.
 const OUTSIDE_SHARE: f64 = 0.01;
 /// Motion of a segment outward that is told, mm.
@@ -66,14 +68,13 @@ pub enum BeatFlag {
         /// End-systolic volume, ml.
         esv_ml: f64,
     },
-    /// Much of the wall has no phase.
-    #[error(
-        "{:.0} % of the wall moves too little to have a phase; mean, deviation and bandwidth are those of the rest",
-        100.0 * (1.0 - moving_share)
-    )]
+    /// Much of the wall has no phase, or noise scatters the phases.
+    #[error("{}", phase_text(*moving_share, *noise_degrees))]
     PhaseUnreliable {
         /// Share of the wall that has a phase.
         moving_share: f64,
+        /// Scatter of the phases by noise alone, degrees.
+        noise_degrees: f64,
     },
     /// The wall's surroundings leave the volume.
     #[error(
@@ -145,6 +146,8 @@ pub(super) struct FlagFacts<'a> {
     pub esv_ml: f64,
     /// Share of the wall that has a phase.
     pub moving_share: f64,
+    /// Scatter of the phases by noise alone, degrees.
+    pub phase_noise_degrees: f64,
     /// Share of the voxels about the wall outside of the volume.
     pub share_outside: f64,
     /// Segments and their motion inward, mm.
@@ -158,6 +161,7 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
         ef_percent,
         esv_ml,
         moving_share,
+        phase_noise_degrees: noise_degrees,
         ..
     } = *facts;
     let no_beat = orders_as_smooth > ORDERS_AS_SMOOTH || ef_percent < LEAST_EF_PERCENT;
@@ -178,13 +182,34 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
         (!losses.is_empty()).then_some(BeatFlag::CountLoss { losses }),
         (dark > DARK_SHARE).then_some(BeatFlag::DarkWall { share: dark }),
         (esv_ml < SMALL_ESV_ML).then_some(BeatFlag::SmallHeart { esv_ml }),
-        (moving_share < MOVING_SHARE).then_some(BeatFlag::PhaseUnreliable { moving_share }),
+        (moving_share < MOVING_SHARE || noise_degrees > PHASE_NOISE_DEGREES).then_some(
+            BeatFlag::PhaseUnreliable {
+                moving_share,
+                noise_degrees,
+            },
+        ),
         (outside > OUTSIDE_SHARE).then_some(BeatFlag::LeavesField { share: outside }),
         (!outward.is_empty()).then_some(BeatFlag::OutwardMotion { segments: outward }),
     ]
     .into_iter()
     .flatten()
     .collect()
+}
+
+fn phase_text(moving_share: f64, noise_degrees: f64) -> String {
+    let still = (moving_share < MOVING_SHARE).then(|| {
+        format!(
+            "{:.0} % of the wall moves too little to have a phase; mean, deviation and bandwidth are those of the rest",
+            100.0 * (1.0 - moving_share)
+        )
+    });
+    let noisy = (noise_degrees > PHASE_NOISE_DEGREES).then(|| {
+        format!(
+            "the noise of the gates alone scatters the phases by {noise_degrees:.0} degrees: the wall moves too little for so few counts"
+        )
+    });
+    let texts: Vec<String> = still.into_iter().chain(noisy).collect();
+    texts.join("; ")
 }
 
 fn losses_text(losses: &[(usize, f64)]) -> String {

@@ -30,6 +30,7 @@ pub mod flags;
 mod image;
 pub mod intervals;
 pub mod moment;
+mod noise;
 mod objective;
 mod order;
 pub mod phase;

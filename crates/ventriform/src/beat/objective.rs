@@ -143,6 +143,16 @@ impl Objective {
         &self.observed.bases
     }
 
+    /// Share of the wall's area at each node, apical of the rim.
+    pub fn areas(&self) -> &[f64] {
+        &self.areas
+    }
+
+    /// Weight of a voxel of a gate, by which the square of what is left of it counts.
+    pub fn voxel_weight(&self) -> f64 {
+        VALUE_SCALE / self.total_weight
+    }
+
     /// Share of the wall that is too dark to show its motion, 0..=1.
     pub fn dark_share(&self) -> f64 {
         let dark = self.areas.iter().zip(&self.observed.dark);
@@ -194,6 +204,22 @@ impl Objective {
             rim: unknowns[layout.rim()].to_vec(),
             blood: unknowns[layout.blood()].exp(),
         }
+    }
+
+    /// The gates as the unknowns describe them, in units of the wall's uptake.
+    pub fn seen(&self, unknowns: &[f64]) -> Vec<Vec<f32>> {
+        let layout = &self.layout;
+        let activity = self.activity(unknowns);
+        let of = |gate: usize| {
+            let basis = &self.observed.bases[gate];
+            let state = self.conservation.state(layout, unknowns, basis);
+            let gain = unknowns[layout.gains().start + gate].exp() as f32;
+            let samples = self.grid.samples(layout, &state, &activity);
+            let mut seen = self.blur.apply(HeartGrid::paint(&samples));
+            seen.iter_mut().for_each(|value| *value *= gain);
+            seen
+        };
+        (0..layout.gates).into_par_iter().map(of).collect()
     }
 
     /// The value, and the gradient into `gradient`.

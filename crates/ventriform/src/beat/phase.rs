@@ -51,12 +51,7 @@ impl Phases {
         };
         let harmonics: Vec<(Complex<f64>, f64)> = (0..areas.len()).map(harmonic).collect();
         let amplitudes: Vec<f64> = harmonics.iter().map(|(h, _)| h.norm()).collect();
-        let mut on: Vec<f64> = (areas.iter().zip(&amplitudes))
-            .filter(|(area, _)| **area > 0.0)
-            .map(|(_, amplitude)| *amplitude)
-            .collect();
-        on.sort_by(f64::total_cmp);
-        let least = LEAST_AMPLITUDE_SHARE * on.get(on.len() / 2).copied().unwrap_or(0.0);
+        let least = least_amplitude(&amplitudes, areas);
         let moves = |ray: usize| areas[ray] > 0.0 && amplitudes[ray] > least;
         let degrees: Vec<Option<f64>> = (0..areas.len())
             .map(|ray| {
@@ -87,6 +82,16 @@ impl Phases {
             degrees,
         }
     }
+}
+
+/// The amplitude that a part of the wall must exceed to have a phase; parts without area are none of the wall.
+pub(super) fn least_amplitude(amplitudes: &[f64], areas: &[f64]) -> f64 {
+    let mut on: Vec<f64> = (areas.iter().zip(amplitudes))
+        .filter(|(area, _)| **area > 0.0)
+        .map(|(_, amplitude)| *amplitude)
+        .collect();
+    on.sort_by(f64::total_cmp);
+    LEAST_AMPLITUDE_SHARE * on.get(on.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The circular mean of angles with weights, degrees, 0..360; NaN without weight.

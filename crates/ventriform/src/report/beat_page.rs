@@ -103,7 +103,7 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
         ("small_heart", "The cavity is wider than the image blurs"),
         (
             "phase_unreliable",
-            "Enough of the wall moves to have a phase",
+            "The wall moves enough, and more than noise, to have a phase",
         ),
         ("outward_motion", "Every segment moves inward"),
     ]
@@ -225,8 +225,9 @@ fn curves(page: &BeatPage) -> Markup {
                 div.row.even {
                     (picture(page.curve, "Volume of the cavity over the beat", "Volume of the cavity, ml".into()))
                     (picture(page.phase, "Histogram of the wall's phases", format!(
-                        "Phases of the wall: SD {}°, bandwidth {}°, entropy {} %{reliable}",
+                        "Phases of the wall: SD {}° ({}° by noise alone), bandwidth {}°, entropy {} %{reliable}",
                         number(phase.sd_degrees, 0),
+                        number(phase.noise_degrees, 0),
                         number(phase.bandwidth_degrees, 0),
                         number(phase.entropy_percent, 0),
                     )))

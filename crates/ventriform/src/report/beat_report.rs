@@ -4,7 +4,7 @@
 
 use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
-use super::json_number::round;
+use super::json_number::{not_stated, or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{Resolution, SegmentationReport};
@@ -158,7 +158,11 @@ pub struct PhaseReport {
     pub bandwidth_degrees: f64,
     /// Entropy of the histogram as a share of that of an even one, per cent.
     pub entropy_percent: f64,
-    /// Whether enough of the wall moves, and the gates are a beat.
+    /// How far the noise of the gates alone scatters the phases: of the standard deviation, the part that says nothing of the heart.
+    #[serde(default = "not_stated", deserialize_with = "or_nan")]
+    #[cfg_attr(feature = "schema", schema(required))]
+    pub noise_degrees: f64,
+    /// Whether enough of the wall moves, more than noise does, and the gates are a beat.
     pub reliable: bool,
     /// Share of the weight in equal bins from 0 to 360 degrees.
     pub histogram: Vec<f64>,
@@ -283,6 +287,7 @@ impl BeatReport {
                 sd_degrees: round(beat.phases.sd_degrees),
                 bandwidth_degrees: round(beat.phases.bandwidth_degrees),
                 entropy_percent: round(beat.phases.entropy_percent),
+                noise_degrees: round(beat.fit.phase_noise_degrees),
                 reliable,
                 histogram: beat.phases.histogram.iter().copied().map(round).collect(),
                 bin_degrees: round(360.0 / HISTOGRAM_BINS as f64),

@@ -8,6 +8,8 @@ use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, PrimitiveValue, VR};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{DefaultDicomObject, FileMetaTableBuilder, InMemDicomObject, from_reader};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use rayon::ThreadPoolBuilder;
 use ventriform::beat::BeatFlag;
 use ventriform::export::Format;
@@ -20,7 +22,7 @@ use ventriform::grid::blur::{Kernel, blur};
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::parameters::{BeatChoice, FitParameters};
 use ventriform::progress::Monitor;
-use ventriform::report::BeatReport;
+use ventriform::report::{BeatReport, SegmentMotionReport};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{Provenance, ReadLimits, VolumeError, VolumeFile, read_gates};
 
@@ -220,6 +222,83 @@ fn an_even_contraction_is_even_and_in_phase() {
     let mean = all.sum::<f64>() / report.segments.len() as f64;
     assert!((mean - wanted).abs() < 0.3 * wanted, "{mean} of {wanted}");
     assert_eq!(report.segments.len(), 17);
+}
+
+/// The gates with noise of this deviation in every voxel, independent in every gate, blurred by 8 mm.
+fn noisy(deviation: f64, seed: u64) -> Vec<Volume> {
+    const NOISE_MM: f64 = 8.0;
+    let noisy = |(index, gate): (usize, &Volume)| {
+        let mut random = Pcg64Mcg::seed_from_u64(100 * seed + index as u64);
+        let mut normal = || {
+            let [radius, turns] = [(); 2].map(|()| random.random_range(f64::MIN_POSITIVE..1.0));
+            ((-2.0 * radius.ln()).sqrt() * (2.0 * PI * turns).cos()) as f32
+        };
+        let mut noise: Vec<f32> = gate.voxels.iter().map(|_| normal()).collect();
+        let kernel = || Kernel::gaussian(NOISE_MM / 2.3548 / SPACING_MM, 4.0);
+        let kernels = [kernel(), kernel(), kernel()];
+        blur(&mut noise, gate.shape, &kernels, &Monitor::silent()).expect("nobody cancels");
+        let square = noise.iter().map(|n| n * n).sum::<f32>() / noise.len() as f32;
+        let scale = deviation as f32 / square.sqrt();
+        Volume {
+            voxels: (gate.voxels.iter().zip(noise))
+                .map(|(v, n)| v + scale * n)
+                .collect(),
+            ..gate.clone()
+        }
+    };
+    gates().iter().enumerate().map(noisy).collect()
+}
+
+/// Scatter of the segments' phases by noise of this deviation, root mean square over three studies, and what the reports
+/// tell of it, degrees.
+fn phase_errors(deviation: f64) -> [f64; 2] {
+    let clean = whole().report().segments;
+    let (mut squares, mut told, mut count) = (0.0, 0.0, 0.0);
+    for seed in 0..3 {
+        let report = beat_of(&noisy(deviation, seed), BeatChoice::default())
+            .expect("a beat")
+            .report();
+        told += report.phase.noise_degrees.powi(2) / 3.0;
+        let error = |(noisy, clean): (&SegmentMotionReport, &SegmentMotionReport)| {
+            let error = noisy.phase_degrees? - clean.phase_degrees?;
+            Some((error + 180.0).rem_euclid(360.0) - 180.0)
+        };
+        let errors: Vec<f64> = report
+            .segments
+            .iter()
+            .zip(&clean)
+            .filter_map(error)
+            .collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        squares += errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+        count += errors.len() as f64;
+    }
+    [(squares / count).sqrt(), told.sqrt()]
+}
+
+#[test]
+fn the_scatter_of_phases_by_noise_is_told() {
+    let clean = whole().report().phase.noise_degrees;
+    let [few, told_few] = phase_errors(8.0);
+    let [more, told_more] = phase_errors(16.0);
+    assert!(clean < 0.5 * told_few, "{clean}, {told_few}");
+    for (error, told) in [(few, told_few), (more, told_more)] {
+        // The whole wall's noise is told, that of segments is measured.
+        assert!((0.5..1.5).contains(&(error / told)), "{error}, {told}");
+    }
+}
+
+#[test]
+fn phases_that_are_noise_are_not_reliable() {
+    let heart = beat_of(&noisy(40.0, 7), BeatChoice::default()).expect("a beat");
+    let report = heart.report();
+    assert!(
+        report.phase.noise_degrees > 10.0,
+        "{}",
+        report.phase.noise_degrees
+    );
+    assert!(!report.phase.reliable);
+    assert!(codes(&heart).contains(&"phase_unreliable".to_owned()));
 }
 
 /// Blur lets a part of the thickening through; both opinions find it.

@@ -296,6 +296,11 @@ const PHASE_FIGURES: &[Figure<BeatReport>] = &[
         own("PHASE-ENTROPY", "Entropy of the phases"),
         PERCENT,
     ),
+    figure(
+        |r| Some(r.phase.noise_degrees),
+        own("PHASE-NOISE", "Scatter of the phases by noise alone"),
+        DEGREE,
+    ),
 ];
 
 /// Measurements of a segment.
