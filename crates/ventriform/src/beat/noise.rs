@@ -55,18 +55,25 @@ fn density(objective: &Objective, unknowns: &[f64]) -> f64 {
     let observed = &objective.observed;
     let [across, down, deep] = objective.grid.shape;
     let starts = |count: usize| (0..(count + 1).saturating_sub(BLOCK_VOXELS)).step_by(BLOCK_VOXELS);
-    let offsets = || 0..BLOCK_VOXELS;
+    let index = |s: usize, x: usize, y: usize| (s * down + x) * deep + y;
+    let of_block = |n: usize| {
+        let [s, x, y] = [
+            n / BLOCK_VOXELS.pow(2),
+            n / BLOCK_VOXELS % BLOCK_VOXELS,
+            n % BLOCK_VOXELS,
+        ];
+        index(s, x, y)
+    };
     let mut blocks: Vec<Vec<usize>> = Vec::new();
-    for (s, x) in starts(across).flat_map(|s| starts(down).map(move |x| (s, x))) {
-        for y in starts(deep) {
-            let voxels = offsets().flat_map(|i| {
-                offsets().flat_map(move |j| {
-                    offsets().map(move |k| ((s + i) * down + x + j) * deep + y + k)
-                })
-            });
-            let voxels: Vec<usize> = voxels.collect();
-            if voxels.iter().all(|voxel| observed.weights[*voxel] > 0.0) {
-                blocks.push(voxels);
+    for s in starts(across) {
+        for x in starts(down) {
+            for y in starts(deep) {
+                let first = index(s, x, y);
+                let voxels = (0..BLOCK_VOXELS.pow(3)).map(|n| first + of_block(n));
+                let voxels: Vec<usize> = voxels.collect();
+                if voxels.iter().all(|voxel| observed.weights[*voxel] > 0.0) {
+                    blocks.push(voxels);
+                }
             }
         }
     }
