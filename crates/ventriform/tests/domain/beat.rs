@@ -12,6 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::ThreadPoolBuilder;
 use ventriform::beat::BeatFlag;
+use ventriform::beat::phase::behind;
 use ventriform::export::Format;
 use ventriform::export::dicom::Moment;
 use ventriform::gated::{GatedError, GatedHeart, GatedOrder, from_files};
@@ -75,6 +76,13 @@ fn contraction(turns: f64) -> f64 {
     (1.0 - (PI * way).cos()) / 2.0
 }
 
+/// Blurs voxels of [`SPACING_MM`] by a Gaussian of this full width at half maximum.
+fn blur_by(width_mm: f64, voxels: &mut Vec<f32>, shape: [usize; 3]) {
+    let kernel = || Kernel::gaussian(width_mm / 2.3548 / SPACING_MM, 4.0);
+    let kernels = [kernel(), kernel(), kernel()];
+    blur(voxels, shape, &kernels, &Monitor::silent()).expect("nobody cancels");
+}
+
 /// One gate: the mean of five moments.
 fn gate(index: usize) -> Volume {
     let shape = [40; 3];
@@ -112,14 +120,7 @@ fn gate(index: usize) -> Volume {
             .zip(scene.voxels)
             .for_each(|(sum, v)| *sum += v / MOMENTS as f32);
     }
-    let kernel = || Kernel::gaussian(RESOLUTION_MM / 2.3548 / SPACING_MM, 4.0);
-    blur(
-        &mut sum,
-        shape,
-        &[kernel(), kernel(), kernel()],
-        &Monitor::silent(),
-    )
-    .expect("nobody cancels");
+    blur_by(RESOLUTION_MM, &mut sum, shape);
     Volume {
         shape,
         voxels: sum,
@@ -234,9 +235,7 @@ fn noisy(deviation: f64, seed: u64) -> Vec<Volume> {
             ((-2.0 * radius.ln()).sqrt() * (2.0 * PI * turns).cos()) as f32
         };
         let mut noise: Vec<f32> = gate.voxels.iter().map(|_| normal()).collect();
-        let kernel = || Kernel::gaussian(NOISE_MM / 2.3548 / SPACING_MM, 4.0);
-        let kernels = [kernel(), kernel(), kernel()];
-        blur(&mut noise, gate.shape, &kernels, &Monitor::silent()).expect("nobody cancels");
+        blur_by(NOISE_MM, &mut noise, gate.shape);
         let square = noise.iter().map(|n| n * n).sum::<f32>() / noise.len() as f32;
         let scale = deviation as f32 / square.sqrt();
         Volume {
@@ -260,8 +259,7 @@ fn phase_errors(deviation: f64) -> [f64; 2] {
             .report();
         told += report.phase.noise_degrees.powi(2) / 3.0;
         let error = |(noisy, clean): (&SegmentMotionReport, &SegmentMotionReport)| {
-            let error = noisy.phase_degrees? - clean.phase_degrees?;
-            Some((error + 180.0).rem_euclid(360.0) - 180.0)
+            Some(behind(noisy.phase_degrees?, clean.phase_degrees?))
         };
         let errors: Vec<f64> = report
             .segments
