@@ -1,22 +1,35 @@
 #!/usr/bin/env bash
 # Installs what scripts/release.sh made in a bare Debian and tries it there.
 #
-#   scripts/check_release.sh [SUITE]      trixie unless given
+#   scripts/check_release.sh [SUITE [ARCHITECTURE]]      trixie and this machine's unless given
 #
-# Needs root and Debian's packages, of which mmdebstrap makes a chroot. Checked: checksums; the Debian package installs, its
+# Needs root and Debian's packages, of which mmdebstrap makes a chroot; for another architecture qemu runs what is in it. Checked: checksums; the Debian package installs, its
 # program makes and measures a model, its user and folders exist, its unit is well formed, and it can be removed; the archive's
-# program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan, and has its bill of materials; the
+# program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan, and has its bill of materials and its licence texts; the
 # library and the program need no newer glibc than 2.17; the image's service makes a model as the image's user.
 #
-# The image is tried by scripts/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
+# The image, which is for amd64, is tried by scripts/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
 # runs its program in a chroot, with the image's user and environment; its health check is then run by this script.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 suite=${1:-trixie}
+architecture=${2:-$(dpkg --print-architecture)}
+case $architecture in
+  amd64) machine=x86_64 ;;
+  arm64) machine=aarch64 ;;
+  *) echo "releases are for amd64 and arm64, not for $architecture"; exit 2 ;;
+esac
 dist=$PWD/dist
 [ -f "$dist/SHA256SUMS" ] || { echo "run scripts/release.sh first"; exit 1; }
 (cd "$dist" && sha256sum --quiet -c SHA256SUMS)
 command -v mmdebstrap >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends mmdebstrap; }
+if [ "$architecture" != "$(dpkg --print-architecture)" ]; then
+  [ -e /proc/sys/fs/binfmt_misc/register ] || mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc
+  if [ ! -e "/proc/sys/fs/binfmt_misc/qemu-$machine" ]; then
+    apt-get update -qq && apt-get install -y -qq --no-install-recommends qemu-user-static binfmt-support
+    update-binfmts --enable "qemu-$machine"
+  fi
+fi
 
 out=$(mktemp -d)
 service=
@@ -29,18 +42,19 @@ clean() {
   rm -rf "$out"
 }
 trap clean EXIT
-mmdebstrap --quiet --variant=minbase --include=python3-venv,python3-pip,adduser,procps,systemd "$suite" "$out/root"
+mmdebstrap --quiet --variant=minbase --architectures="$architecture" --include=python3-venv,python3-pip,adduser,procps,systemd "$suite" "$out/root"
 mount -t proc proc "$out/root/proc"
 # NumPy comes from this machine's index, so that nothing inside needs the network.
 python=$(chroot "$out/root" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-python3 -m pip download -q --no-deps --only-binary :all: --python-version "$python" --dest "$out/root/numpy" numpy
+python3 -m pip download -q --no-deps --only-binary :all: --python-version "$python" \
+  --platform "manylinux_2_28_$machine" --platform "manylinux_2_27_$machine" --platform "manylinux2014_$machine" --dest "$out/root/numpy" numpy
 mkdir "$out/root/dist"
-cp "$dist"/* "$out/root/dist"
+cp "$dist"/*"_$architecture.deb" "$dist"/*"-$machine-"*.tar.gz "$dist"/*"_$machine.whl" "$out/root/dist"
 
 cat >"$out/root/try.sh" <<'TRY'
 set -euo pipefail
 cd "$(mktemp -d)"
-dpkg -i /dist/ventriform_*_amd64.deb
+dpkg -i /dist/ventriform_*.deb
 ventriform phantom -o phantom --size 64 --spacing 6.4
 ventriform generate phantom/spect.nii.gz -o lv.glb
 ventriform segment phantom/spect.nii.gz --model auto -o out
@@ -53,7 +67,7 @@ bash -n /usr/share/bash-completion/completions/ventriform
 dpkg -r ventriform
 [ ! -e /usr/bin/ventriform ]
 
-tar -xzf /dist/ventriform-*-x86_64-unknown-linux-gnu.tar.gz
+tar -xzf /dist/ventriform-*.tar.gz
 ./ventriform-*/ventriform generate phantom/spect.nii.gz -o again.glb
 cmp lv.glb again.glb
 
@@ -71,15 +85,20 @@ TRY
 # Without the settings of this machine, such as those of pip.
 chroot "$out/root" env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 bash /try.sh
 
-python3 -m zipfile -e "$dist"/ventriform-*_x86_64.whl "$out/wheel"
+python3 -m zipfile -e "$dist"/ventriform-*"_$machine.whl" "$out/wheel"
 cmp "$dist/ventriform-python.cdx.json" "$out"/wheel/ventriform-*.dist-info/sboms/ventriform-python.cdx.json
-tar -xzf "$dist"/ventriform-*-x86_64-unknown-linux-gnu.tar.gz -C "$out" --strip-components 1
+grep -q '^nalgebra ' "$out"/wheel/ventriform-*.dist-info/licenses/LICENSE-THIRD-PARTY
+tar -xzf "$dist"/ventriform-*"-$machine-unknown-linux-gnu.tar.gz" -C "$out" --strip-components 1
 for file in "$out/wheel/ventriform/_native.abi3.so" "$out/ventriform"; do
-  newest=$(objdump -T "$file" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1)
+  newest=$(readelf --version-info --wide "$file" | grep -o 'GLIBC_[0-9.]*' | sort -Vu | tail -n 1)
   echo "$(basename "$file") needs $newest"
   [ "$(printf '%s\n' "$newest" GLIBC_2.17 | sort -V | tail -n 1)" = GLIBC_2.17 ]
 done
 
+if [ "$architecture" != amd64 ]; then
+  echo "ok: packages for $architecture installed"
+  exit
+fi
 if docker version >/dev/null 2>&1; then
   scripts/check_container.sh "$dist"/ventriform-*.image.tar.gz
   exit

@@ -2,8 +2,9 @@
 # Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a Debian
 # package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
 #
-#   scripts/release.sh              x86_64; also aarch64 where rustup has that target
+#   scripts/release.sh              x86_64; also aarch64 where the compiler has that target
 #
+# The target aarch64 comes from `rustup target add`, or beside Debian's compiler rustc-web from libstd-rust-web-dev:arm64.
 # The image is for x86_64; scripts/image.sh makes it, which needs root.
 #
 # First scripts/check_semver.sh compares the library's interface with the newest release's.
@@ -139,13 +140,16 @@ POSTRM
 }
 
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+third_party=$root/LICENSE-THIRD-PARTY
+trap 'rm -rf "$work" "$third_party"' EXIT
 rm -rf "$dist"
 mkdir "$dist"
 
 # maturin's own bill has the paths of this machine, so pyproject.toml turns it off.
 python3 scripts/dependencies.py python >"$dist/ventriform-python.cdx.json"
 maturin sdist --out "$dist" >"$work/sdist.log" 2>&1 || { cat "$work/sdist.log"; exit 1; }
+# The wheel contains the work of others; the sources, above, do not.
+python3 scripts/licences.py ventriform-python >"$third_party"
 for target in "${targets[@]}"; do
   if [ -n "${WHEELS:-}" ]; then
     cp "$WHEELS"/*.whl "$dist"
@@ -181,6 +185,5 @@ for target in "${targets[@]}"; do
   esac
 done
 install -m 0644 ventriform.cdx.json "$dist"
-python3 scripts/licences.py ventriform-python >"$dist/THIRD-PARTY-python"
 (cd "$dist" && sha256sum ./* | sed 's#\./##' >"$work/SHA256SUMS" && mv "$work/SHA256SUMS" .)
 ls -l "$dist"

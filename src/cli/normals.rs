@@ -29,7 +29,7 @@ enum NormalsAction {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   ventriform normals build cohort -o normals.json
-  ventriform segment scan.nii.gz -o out --normals normals.json --sex F --protocol rest
+  ventriform segment scan.nii.gz --model auto -o out --normals normals.json --sex F --protocol rest
 The folder holds cohort.csv with the columns case, file, sex (M or F), protocol, tracer, attenuation_corrected (yes or no),
 healthy (yes or no) and, if a scan at stress has one at rest, rest_case. A group of sex, protocol, tracer and correction needs 12
 cases; 30 or more give steady limits. Files of gates also give limits of EDV, ESV, EF, motion, thickening and phase.")]

@@ -157,7 +157,7 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
         <details open>
           <summary>Beside normal limits</summary>
           <PerfusionTable of={beside} />
-          {beside.slice(0, 1).map(([scan, perfusion]) => <LimitsUsed key={scan} perfusion={perfusion} />)}
+          {beside.slice(0, 1).map(([scan, perfusion]) => <LimitsUsed key={scan} perfusion={{ ...perfusion, flags: [] }} />)}
           {beside.map(([scan, perfusion]) => <details key={scan}><summary>Scores at {scan}</summary><div class="wide" tabIndex={0} role="region" aria-label={`Scores at ${scan}`}><SegmentScores perfusion={perfusion} /></div></details>)}
         </details>
       )}

@@ -21,6 +21,7 @@ const interval = (read: (of: VolumeIntervals) => number[]) => (loaded: Loaded) =
 };
 
 const beat = <T,>(read: (report: BeatReport) => T) => (loaded: Loaded) => loaded.beat && read(loaded.beat.report);
+const reliable = (read: (phase: BeatReport["phase"]) => number) => beat(({ phase }) => (phase.reliable ? read(phase) : undefined));
 
 const FIT: [string, Row[]][] = [
   ["", [
@@ -68,11 +69,11 @@ const BEAT: [string, Row[]][] = [
     ["R-R interval", beat(r => r.rr_ms), 0, "ms"],
   ]],
   ["Phases of the wall", [
-    ["Mean", beat(r => r.phase.mean_degrees), 0, "°"],
-    ["Standard deviation", beat(r => r.phase.sd_degrees), 0, "°"],
+    ["Mean", reliable(phase => phase.mean_degrees), 0, "°"],
+    ["Standard deviation", reliable(phase => phase.sd_degrees), 0, "°"],
     ["By noise alone", beat(r => r.phase.noise_degrees), 0, "°"],
-    ["Bandwidth, 95 %", beat(r => r.phase.bandwidth_degrees), 0, "°"],
-    ["Entropy", beat(r => r.phase.entropy_percent), 0, "%"],
+    ["Bandwidth, 95 %", reliable(phase => phase.bandwidth_degrees), 0, "°"],
+    ["Entropy", reliable(phase => phase.entropy_percent), 0, "%"],
   ]],
 ];
 
@@ -115,7 +116,9 @@ export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean
   const evidence = shown.report?.evidence;
   const heart = shown.report?.template ?? shown.beat?.report.template;
   const known = typeof confidence === "number";
-  const words = known && CONFIDENCE_WORDS.find(([least]) => confidence >= least)?.[1];
+  const words = shown.beat && typeof shown.beat.report.ef_percent !== "number"
+    ? "The gates show no beat: there is no ejection fraction."
+    : known && CONFIDENCE_WORDS.find(([least]) => confidence >= least)?.[1];
   return (
     <div class={flags.length ? "verdict doubt" : "verdict"}>
       {words && <p><b>{words}</b></p>}

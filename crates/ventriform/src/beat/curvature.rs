@@ -53,7 +53,7 @@ impl Curvature {
     ) -> Result<Self, Cancelled> {
         let layout = &objective.layout;
         let image = ImageChanges::of(objective, unknowns, monitor)?;
-        let roughness = roughness(objective);
+        let priors = Priors::of(objective);
         let weights = &objective.observed.gate_weights;
         let all: f64 = weights.iter().sum();
         let mean_square = |index: usize| {
@@ -68,14 +68,12 @@ impl Curvature {
             let own = harmonic_unknowns(layout, index);
             parts.push((own, &image.motion, mean_square(index)));
         }
-        let levels = Levels::of(objective);
         let blocks = parts
             .into_par_iter()
             .map(|(unknowns, image, share)| {
                 monitor.check()?;
                 let mut matrix = image * share;
-                add_roughness(&mut matrix, &unknowns, objective, &roughness);
-                levels.add(objective, &unknowns, &mut matrix);
+                priors.add(objective, &unknowns, &mut matrix);
                 for (n, unknown) in unknowns.iter().enumerate() {
                     matrix[(n, n)] += DAMPING * VALUE_SCALE / typical[*unknown].powi(2);
                 }
@@ -88,7 +86,7 @@ impl Curvature {
         // The factor of a gate changes the gate's whole image.
         let gain = 2.0 * VALUE_SCALE * image.mean_square / layout.gates as f64;
         let gains = (layout.gains()).map(|unknown| {
-            let prior = levels.column(objective, unknown)[unknown];
+            let prior = priors.levels.column(objective, unknown)[unknown];
             (unknown, gain + prior)
         });
         Ok(Self {
@@ -104,8 +102,7 @@ impl Curvature {
         let layout = &objective.layout;
         let unknowns = harmonic_unknowns(layout, 0);
         let mut matrix = self.motion.clone();
-        add_roughness(&mut matrix, &unknowns, objective, &roughness(objective));
-        Levels::of(objective).add(objective, &unknowns, &mut matrix);
+        Priors::of(objective).add(objective, &unknowns, &mut matrix);
         for n in 0..unknowns.len() {
             matrix[(n, n)] += LEAST_CURVATURE;
         }
@@ -167,19 +164,31 @@ fn roughness(objective: &Objective) -> DMatrix<f64> {
     matrix
 }
 
-fn add_roughness(
-    matrix: &mut DMatrix<f64>,
-    unknowns: &[usize],
-    objective: &Objective,
-    roughness: &DMatrix<f64>,
-) {
-    for (range, weight) in objective.smooth_fields() {
-        let Some(first) = unknowns.iter().position(|n| *n == range.start) else {
-            continue;
-        };
-        let count = range.len();
-        let mut own = matrix.view_mut((first, first), (count, count));
-        own += roughness * weight;
+/// Second derivatives of what is known before the image is looked at.
+struct Priors {
+    roughness: DMatrix<f64>,
+    levels: Levels,
+}
+
+impl Priors {
+    fn of(objective: &Objective) -> Self {
+        Self {
+            roughness: roughness(objective),
+            levels: Levels::of(objective),
+        }
+    }
+
+    /// Adds those of `unknowns` to their block.
+    fn add(&self, objective: &Objective, unknowns: &[usize], block: &mut DMatrix<f64>) {
+        for (range, weight) in objective.smooth_fields() {
+            let Some(first) = unknowns.iter().position(|n| *n == range.start) else {
+                continue;
+            };
+            let count = range.len();
+            let mut own = block.view_mut((first, first), (count, count));
+            own += &self.roughness * weight;
+        }
+        self.levels.add(objective, unknowns, block);
     }
 }
 

@@ -75,8 +75,8 @@ pub struct Beat {
     pub end_systole: Extreme,
     /// Share of the end-diastolic volume that is ejected, per cent; `None` if the gates are no beat.
     pub ef_percent: Option<f64>,
-    /// Intervals about the figures; that of EF stands also where there is no beat.
-    pub intervals: Intervals,
+    /// Intervals about the figures; `None` if the gates are no beat.
+    pub intervals: Option<Intervals>,
     /// Rates, or why there are none.
     pub rates: Result<Rates, String>,
     /// Segments 1 to 17; those without wall are left out.
@@ -121,13 +121,16 @@ impl Beat {
         });
         let denied = flags.iter().any(BeatFlag::denies_a_beat);
         Self {
-            rates: rates(&curve, fit.gate_count(), end_systole.turns, rr_ms),
+            rates: if denied {
+                Err("the gates show no beat".into())
+            } else {
+                rates(&curve, fit.gate_count(), end_systole.turns, rr_ms)
+            },
             factors: study.factors.clone(),
-            intervals: Intervals::about(
-                end_diastole.cavity_ml,
-                end_systole.cavity_ml,
-                fit.dark_share(),
-            ),
+            intervals: (!denied).then(|| {
+                let dark = fit.dark_share();
+                Intervals::about(end_diastole.cavity_ml, end_systole.cavity_ml, dark)
+            }),
             ef_percent: (!denied).then_some(ejected),
             fit,
             curve,
@@ -142,9 +145,16 @@ impl Beat {
         }
     }
 
-    /// Volume that is ejected, ml.
-    pub fn stroke_ml(&self) -> f64 {
-        self.end_diastole.cavity_ml - self.end_systole.cavity_ml
+    /// Volume that is ejected, ml; `None` if the gates are no beat.
+    pub fn stroke_ml(&self) -> Option<f64> {
+        let ejected = self.end_diastole.cavity_ml - self.end_systole.cavity_ml;
+        self.ef_percent.map(|_| ejected)
+    }
+
+    /// Whether the gates are a beat, and enough of the wall moves, more than noise does, to have phases.
+    pub fn has_phases(&self) -> bool {
+        let unreliable = |flag: &BeatFlag| matches!(flag, BeatFlag::PhaseUnreliable { .. });
+        self.ef_percent.is_some() && !self.flags.iter().any(unreliable)
     }
 }
 

@@ -18,6 +18,8 @@ const PHASE_NOISE_DEGREES: f64 = 10.0;
 const OUTSIDE_SHARE: f64 = 0.01;
 /// Motion of a segment outward that is told, mm.
 const OUTWARD_MOTION_MM: f64 = -1.0;
+/// Share of a given mass by which that of the wall may differ.
+const MASS_SHARE: f64 = 0.03;
 /// Share of the beats that may be rejected.
 const REJECTED_SHARE: f64 = 0.2;
 
@@ -94,6 +96,27 @@ pub enum BeatFlag {
         /// Share of the beats, 0..=1.
         share: f64,
     },
+    /// The wall did not get the mass that the caller gave.
+    #[error(
+        "the wall was to have {given_g:.0} g and has {found_g:.0} g: for so much or so little muscle it would have to be \
+         thicker or thinner than walls are; make sure that the mass is that of this heart's left ventricle"
+    )]
+    MassNotMet {
+        /// As given, g.
+        given_g: f64,
+        /// Of the wall, g.
+        found_g: f64,
+    },
+    /// A gate has more counts than the others.
+    #[error(
+        "gates have more counts than the others, as after a fault of sorting: {}; each was scaled to the usual counts of a \
+         gate",
+        losses_text(gains)
+    )]
+    CountGain {
+        /// Gates, from 1, and the share that each has too many.
+        gains: Vec<(usize, f64)>,
+    },
     /// Segments move outward.
     #[error(
         "segments move outward from end diastole to end systole: {}",
@@ -116,6 +139,8 @@ impl BeatFlag {
             Self::PhaseUnreliable { .. } => "phase_unreliable",
             Self::LeavesField { .. } => "leaves_field",
             Self::BeatsRejected { .. } => "beats_rejected",
+            Self::MassNotMet { .. } => "mass_not_met",
+            Self::CountGain { .. } => "count_gain",
             Self::OutwardMotion { .. } => "outward_motion",
         }
     }
@@ -123,6 +148,12 @@ impl BeatFlag {
     /// The flag of a study of which the file says that this share of the beats was rejected.
     pub fn of_rejected(share: f64) -> Option<Self> {
         (share > REJECTED_SHARE).then_some(Self::BeatsRejected { share })
+    }
+
+    /// The flag of a wall of `found_g` that was to have `given_g`.
+    pub fn of_mass(given_g: f64, found_g: f64) -> Option<Self> {
+        let off = (found_g / given_g - 1.0).abs();
+        (off > MASS_SHARE).then_some(Self::MassNotMet { given_g, found_g })
     }
 
     /// Whether the gates are no beat, so that no EF is given.
@@ -169,6 +200,10 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
         .filter(|(_, loss)| **loss > COUNT_LOSS_FLAG_SHARE)
         .map(|(gate, loss)| (gate + 1, *loss))
         .collect();
+    let gains: Vec<(usize, f64)> = (facts.losses.iter().enumerate())
+        .filter(|(_, loss)| **loss < -COUNT_LOSS_FLAG_SHARE)
+        .map(|(gate, loss)| (gate + 1, -loss))
+        .collect();
     let dark = facts.dark_share;
     let outside = facts.share_outside;
     let outward: Vec<(usize, f64)> = (facts.motions.iter().copied())
@@ -180,6 +215,7 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
             ef_percent,
         }),
         (!losses.is_empty()).then_some(BeatFlag::CountLoss { losses }),
+        (!gains.is_empty()).then_some(BeatFlag::CountGain { gains }),
         (dark > DARK_SHARE).then_some(BeatFlag::DarkWall { share: dark }),
         (esv_ml < SMALL_ESV_ML).then_some(BeatFlag::SmallHeart { esv_ml }),
         (moving_share < MOVING_SHARE || noise_degrees > PHASE_NOISE_DEGREES).then_some(

@@ -8,8 +8,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
 
-use super::fields::{COLUMNS, Conservation, Layout, ROW_SPACING_MM, StateGradient};
-use super::image::{Activity, ActivityGradient, Blur, HeartGrid};
+use super::fields::{COLUMNS, Conservation, Layout, ROW_SPACING_MM, StateGradient, WallState};
+use super::image::{Activity, ActivityGradient, Blur, HeartGrid, Sample};
 use crate::grid::blur::FWHM_PER_SIGMA;
 use crate::model::wall::RayCoordinates;
 use crate::progress::{Cancelled, Monitor};
@@ -101,6 +101,16 @@ pub(super) struct Observed {
     pub rim: Vec<f64>,
     /// How dark the wall is at every node, 0..=1.
     pub dark: Vec<f64>,
+}
+
+/// A gate as the unknowns describe it.
+struct GateView {
+    state: WallState,
+    /// What the voxels hold of the wall.
+    samples: Vec<Sample>,
+    /// The blurred image, without the gate's factor.
+    seen: Vec<f32>,
+    gain: f32,
 }
 
 impl Objective {
@@ -208,18 +218,26 @@ impl Objective {
 
     /// The gates as the unknowns describe them, in units of the wall's uptake.
     pub fn seen(&self, unknowns: &[f64]) -> Vec<Vec<f32>> {
-        let layout = &self.layout;
         let activity = self.activity(unknowns);
         let of = |gate: usize| {
-            let basis = &self.observed.bases[gate];
-            let state = self.conservation.state(layout, unknowns, basis);
-            let gain = unknowns[layout.gains().start + gate].exp() as f32;
-            let samples = self.grid.samples(layout, &state, &activity);
-            let mut seen = self.blur.apply(HeartGrid::paint(&samples));
-            seen.iter_mut().for_each(|value| *value *= gain);
-            seen
+            let mut view = self.view(gate, unknowns, &activity);
+            view.seen.iter_mut().for_each(|value| *value *= view.gain);
+            view.seen
         };
-        (0..layout.gates).into_par_iter().map(of).collect()
+        (0..self.layout.gates).into_par_iter().map(of).collect()
+    }
+
+    fn view(&self, gate: usize, unknowns: &[f64], activity: &Activity) -> GateView {
+        let layout = &self.layout;
+        let basis = &self.observed.bases[gate];
+        let state = self.conservation.state(layout, unknowns, basis);
+        let samples = self.grid.samples(layout, &state, activity);
+        GateView {
+            seen: self.blur.apply(HeartGrid::paint(&samples)),
+            gain: unknowns[layout.gains().start + gate].exp() as f32,
+            state,
+            samples,
+        }
     }
 
     /// The value, and the gradient into `gradient`.
@@ -238,12 +256,12 @@ impl Objective {
             .map(|gate| {
                 monitor.check()?;
                 let scale = VALUE_SCALE * observed.gate_weights[gate] / self.total_weight;
-                let state = self
-                    .conservation
-                    .state(layout, unknowns, &observed.bases[gate]);
-                let gain = unknowns[layout.gains().start + gate].exp() as f32;
-                let samples = self.grid.samples(layout, &state, &activity);
-                let seen = self.blur.apply(HeartGrid::paint(&samples));
+                let GateView {
+                    state,
+                    samples,
+                    seen,
+                    gain,
+                } = self.view(gate, unknowns, &activity);
                 let (mut value, mut by_gain) = (0.0, 0.0);
                 let by_seen = (0..seen.len())
                     .map(|v| {
@@ -487,12 +505,8 @@ pub(super) mod tests {
         /// The same function, but every gate is what `unknowns` describe.
         pub fn met_by(mut self, unknowns: &[f64]) -> Self {
             let activity = self.activity(unknowns);
-            let images = (self.observed.bases.iter()).map(|basis| {
-                let state = self.conservation.state(&self.layout, unknowns, basis);
-                let samples = self.grid.samples(&self.layout, &state, &activity);
-                self.blur.apply(HeartGrid::paint(&samples))
-            });
-            self.observed.images = images.collect();
+            let seen = |gate| self.view(gate, unknowns, &activity).seen;
+            self.observed.images = (0..self.layout.gates).map(seen).collect();
             self
         }
     }

@@ -56,11 +56,12 @@ impl GatedStudy {
         if let Some(empty) = counts.iter().position(|counts| *counts <= 0.0) {
             return Err(BeatError::EmptyGate { gate: empty + 1 });
         }
-        // The upper half of the gates lost nothing: the mean would be drawn down by those that did.
+        // The upper half of the gates lost nothing: the mean would be drawn down by those that did. Its median is not drawn up
+        // by a gate that has too many.
         let mut sorted = counts.clone();
         sorted.sort_by(f64::total_cmp);
         let upper = &sorted[sorted.len() / 2..];
-        let usual = upper.iter().sum::<f64>() / upper.len() as f64;
+        let usual = f64::midpoint(upper[(upper.len() - 1) / 2], upper[upper.len() / 2]);
         let factors: Vec<f64> = counts.iter().map(|counts| usual / counts).collect();
         // In f64, where the order of the gates does not show after rounding to f32.
         let mut voxels = vec![0.0_f64; first.voxels.len()];

@@ -47,6 +47,15 @@ pub enum ComparisonFlag {
         /// Which scan.
         scan: WhichScan,
     },
+    /// A header does not say what the other one says.
+    NotStated {
+        /// The scan whose header is silent.
+        scan: WhichScan,
+        /// The thing that is not stated.
+        field: &'static str,
+        /// What the other header says.
+        other: String,
+    },
     /// The scans were made in different ways that change uptake a little.
     MadeOtherwise {
         /// The difference.
@@ -65,6 +74,15 @@ pub enum ComparisonFlag {
     Turned {
         /// By how much, degrees.
         degrees: f64,
+    },
+    /// A reason to doubt the comparison with normal limits.
+    OfLimits {
+        /// Of which scan; `None`: of both.
+        scan: Option<WhichScan>,
+        /// The flag's name.
+        code: &'static str,
+        /// The finding.
+        reason: String,
     },
     /// A reason to doubt one of the fits.
     OfScan {
@@ -125,10 +143,11 @@ impl ComparisonFlag {
             Self::TidUncertain { .. } => "tid_uncertain",
             Self::OriginNotStated { .. } => "origin_not_stated",
             Self::RoleNotStated { .. } => "role_not_stated",
+            Self::NotStated { .. } => "not_stated",
             Self::MadeOtherwise { .. } => "made_otherwise",
             Self::ScaleUncertain { .. } => "scale_uncertain",
             Self::Turned { .. } => "turned",
-            Self::OfScan { code, .. } => code,
+            Self::OfScan { code, .. } | Self::OfLimits { code, .. } => code,
         }
     }
 }
@@ -166,7 +185,19 @@ impl fmt::Display for ComparisonFlag {
                 f,
                 "the stress map was turned by {degrees:.0} degrees about the long axis, where both maps agree significantly better"
             ),
-            Self::OfScan { scan, reason, .. } => write!(f, "{scan}: {reason}"),
+            Self::NotStated { scan, field, other } => write!(
+                f,
+                "the {scan} scan's header does not state the {field}, and that of the other scan says: {other}; make sure that they are alike"
+            ),
+            Self::OfLimits {
+                scan: None, reason, ..
+            } => f.write_str(reason),
+            Self::OfScan { scan, reason, .. }
+            | Self::OfLimits {
+                scan: Some(scan),
+                reason,
+                ..
+            } => write!(f, "{scan}: {reason}"),
         }
     }
 }

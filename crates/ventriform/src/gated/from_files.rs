@@ -120,17 +120,24 @@ pub fn from_files(
     })
 }
 
-/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat.
+/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat if the gates are one.
 pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure> {
     let whole = HeartFigure::whole;
     let mut figures = heart_figures(segmentation);
-    figures.extend(beat.ef_percent.map(|ef| whole("ef_percent", ef)));
+    let Some(ef_percent) = beat.ef_percent else {
+        return figures;
+    };
     figures.extend([
+        whole("ef_percent", ef_percent),
         whole("edv_ml", beat.end_diastole.cavity_ml),
         whole("esv_ml", beat.end_systole.cavity_ml),
-        whole("phase_sd_degrees", beat.phases.sd_degrees),
-        whole("phase_bandwidth_degrees", beat.phases.bandwidth_degrees),
     ]);
+    if beat.has_phases() {
+        figures.extend([
+            whole("phase_sd_degrees", beat.phases.sd_degrees),
+            whole("phase_bandwidth_degrees", beat.phases.bandwidth_degrees),
+        ]);
+    }
     for segment in &beat.segments {
         let own = |figure, value| HeartFigure::of_segment(figure, segment.segment, value);
         figures.extend([
@@ -142,6 +149,24 @@ pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure
 }
 
 impl GatedHeart {
+    /// Reasons to look closer by what the file says of the beats, and by what the caller says of the wall.
+    fn stated_flags(&self) -> Vec<BeatFlag> {
+        let walls = self.beat.curve.iter().map(|volumes| volumes.wall_ml);
+        let mean_ml = walls.sum::<f64>() / self.beat.curve.len() as f64;
+        let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean_ml;
+        let given = self.choice.mass_g;
+        let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
+        let mass = given.and_then(|given_g| BeatFlag::of_mass(given_g, found_g));
+        rejected.into_iter().chain(mass).collect()
+    }
+
+    /// Reasons to look closer at the beat.
+    pub fn flags(&self) -> Vec<BeatFlag> {
+        let mut flags = self.stated_flags();
+        flags.extend(self.beat.flags.iter().cloned());
+        flags
+    }
+
     /// The report.
     pub fn report(&self) -> BeatReport {
         let segmentation = &self.segmentation;
@@ -153,7 +178,7 @@ impl GatedHeart {
             fit: self.parameters.clone(),
             choice: self.choice,
         };
-        let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
+        let stated = self.stated_flags();
         let parts = BeatParts {
             segment_names: names,
             first_frame: self.reading.first_frame,
@@ -170,7 +195,7 @@ impl GatedHeart {
             confidence: segmentation.fit.judgement.confidence,
             flags: (segmentation.fit.judgement.flags.iter())
                 .map(|flag| RaisedFlag::new(flag.code(), flag))
-                .chain(rejected.map(|flag| RaisedFlag::new(flag.code(), &flag)))
+                .chain(stated.iter().map(|flag| RaisedFlag::new(flag.code(), flag)))
                 .collect(),
             parameters: parameters.to_json(),
             input: FileFacts::of(&self.reading.facts),

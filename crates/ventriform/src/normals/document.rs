@@ -240,6 +240,29 @@ impl NormalLimits {
         }
     }
 
+    /// The protocol for scans at `stress` or `rest`: the only one whose name has that word in it, or the word itself where
+    /// all names have that of the other kind of scan, so that no group suits. `None` if names do not tell.
+    pub fn protocol_of(&self, role: &str) -> Option<String> {
+        let names = |protocol: &str, role: &str| {
+            let mut words = protocol.split(|c: char| !c.is_alphanumeric());
+            words.any(|word| word.eq_ignore_ascii_case(role))
+        };
+        let protocols: BTreeSet<&str> = (self.groups.iter())
+            .map(|group| group.protocol.as_str())
+            .collect();
+        let own: Vec<&str> = (protocols.iter().copied())
+            .filter(|protocol| names(protocol, role))
+            .collect();
+        let other = if role == "stress" { "rest" } else { "stress" };
+        match own[..] {
+            [only] => Some(only.to_owned()),
+            [] => (protocols.iter())
+                .all(|protocol| names(protocol, other))
+                .then(|| role.to_owned()),
+            _ => None,
+        }
+    }
+
     /// The tracer of the groups that a header's text names: the only one whose name stands in the text, or that the
     /// text is a part of. Headers spell tracers freely ("Tc-99m Tetrofosmin", "TETROFOSMIN").
     pub fn tracer_named(&self, text: &str) -> Option<&str> {

@@ -25,6 +25,11 @@ pub enum NormalsFlag {
         /// The names of the parameters.
         names: Vec<String>,
     },
+    /// The limits were built by another version of the program, whose fits may differ.
+    OtherVersion {
+        /// That version.
+        built: String,
+    },
     /// Much of the base is masked in this scan.
     MaskedBase {
         /// Share of the basal segments' area without limits or muscle, per cent.
@@ -46,6 +51,7 @@ impl NormalsFlag {
             Self::MixedSex => "normals_mixed_sex",
             Self::KindNotStated { .. } => "normals_kind_not_stated",
             Self::OtherParameters { .. } => "normals_other_parameters",
+            Self::OtherVersion { .. } => "normals_other_version",
             Self::MaskedBase { .. } => "normals_base_masked",
             Self::FewMatched { .. } => "normals_scale_uncertain",
         }
@@ -73,6 +79,10 @@ impl fmt::Display for NormalsFlag {
                 f,
                 "the normal limits were built with other parameters: {}",
                 names.join(", ")
+            ),
+            Self::OtherVersion { built } => write!(
+                f,
+                "the normal limits were built by version {built} of this program: build them again, or make sure that its fits are those of this version"
             ),
             Self::MaskedBase { percent } => write!(
                 f,

@@ -415,6 +415,9 @@ fn flags(
         (cases < FEW_CASES).then_some(NormalsFlag::FewCases { cases }),
         (group.sex == GroupSex::Mixed).then_some(NormalsFlag::MixedSex),
         (!fields.is_empty()).then_some(NormalsFlag::KindNotStated { fields }),
+        (limits.program_version != env!("CARGO_PKG_VERSION")).then(|| NormalsFlag::OtherVersion {
+            built: limits.program_version.clone(),
+        }),
         (missing > FLAGGED_BASE_PERCENT).then_some(NormalsFlag::MaskedBase { percent: missing }),
         (found.matched_share < FLAGGED_MATCHED_SHARE).then_some(NormalsFlag::FewMatched {
             percent: 100.0 * found.matched_share,

@@ -3,8 +3,6 @@
 
 /// Standard deviations from the mean to the ends of an interval: the 95th percentile of the normal distribution.
 const HALF_WIDTH_SDS: f64 = 1.645;
-/// Share of hearts whose true figure lies within an interval, per cent.
-pub const COVERAGE_PERCENT: f64 = 90.0;
 /// Smallest sum of 1, bias and deviation that a relative error may leave.
 const MIN_RATIO: f64 = 0.2;
 
@@ -30,15 +28,14 @@ impl ErrorTerms {
         (self.usual.powi(2) + (self.dark * dark_share).powi(2) + small.powi(2)).sqrt()
     }
 
-    /// Least and greatest error of [`COVERAGE_PERCENT`] of hearts with such a cavity, ml, and such a share of dark wall, 0
-    /// to 1.
+    /// Least and greatest error of nine of ten hearts with such a cavity, ml, and such a share of dark wall, 0 to 1.
     pub fn ends(&self, cavity_ml: f64, dark_share: f64) -> [f64; 2] {
         let half = HALF_WIDTH_SDS * self.deviation(cavity_ml, dark_share);
         [self.bias - half, self.bias + half]
     }
 
-    /// The interval about `found` that holds the true figure of [`COVERAGE_PERCENT`] of hearts, where the error is a share of
-    /// the true figure.
+    /// The interval about `found` that holds the true figure of nine of ten hearts, where the error is a share of the
+    /// true figure.
     pub fn interval(&self, found: f64, cavity_ml: f64, dark_share: f64) -> [f64; 2] {
         let [least, greatest] = self.ends(cavity_ml, dark_share);
         [greatest, least].map(|error| found / (1.0 + error).max(MIN_RATIO))

@@ -5,10 +5,10 @@ use super::{Kind, ParameterError, ParameterSpec, Parameters};
 use serde_json::json;
 use std::ops::RangeInclusive;
 
+pub use crate::volume::RR_MS;
+
 /// Masses that a left ventricle's muscle can have, g.
 pub const MASS_G: RangeInclusive<f64> = 20.0..=600.0;
-/// R-R intervals that a heart can have, ms: 200 to 24 beats per minute.
-pub const RR_MS: RangeInclusive<f64> = 300.0..=2500.0;
 
 /// The parameters of a beat beside those of the fit to the gates' sum.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -3,7 +3,10 @@
 use maud::{Markup, html};
 
 use super::beat_report::{BeatReport, SegmentMotionReport};
-use super::page_parts::{flags_headline, polar_maps, short, volume_line, with_interval};
+use super::page_parts::{
+    figure, flags_headline, limits_hint, normal_limits, polar_maps, short, volume_line,
+    with_interval,
+};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -15,8 +18,7 @@ use crate::volume::Provenance;
 
 /// How to read the polar maps.
 const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's wall; motion in \
-    mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle. There is no \
-    normal database behind them.";
+    mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle.";
 
 /// A beat's report with its pictures, all of them SVG.
 #[derive(Debug, Clone, Copy)]
@@ -37,13 +39,15 @@ pub struct BeatPage<'a> {
 
 impl BeatPage<'_> {
     /// The polar maps of a beat, by file name, in their order, each with its title.
-    pub const MAPS: [(&'static str, &'static str); 6] = [
+    pub const MAPS: [(&'static str, &'static str); 8] = [
         ("polar.svg", "Uptake, all gates"),
         ("polar_ed.svg", "Uptake, end diastole"),
         ("polar_es.svg", "Uptake, end systole"),
         ("polar_motion.svg", "Motion inward"),
         ("polar_thickening.svg", "Thickening"),
         ("polar_phase.svg", "Phase"),
+        ("polar_z.svg", "Against normal limits, z"),
+        ("polar_score.svg", "Score by segment"),
     ];
 }
 
@@ -52,6 +56,8 @@ pub fn beat_page(page: &BeatPage) -> String {
     let report = page.report;
     let reasons = report.flags.iter().map(|flag| flag.reason.as_str());
     let [diastole, systole] = page.meshes;
+    let perfusion = report.perfusion.as_ref();
+    let hint = format!("{MAPS_HINT} {}", limits_hint(perfusion));
     HtmlDocument {
         title: "Left ventricle: beat",
         subtitle: &origin(report),
@@ -62,7 +68,8 @@ pub fn beat_page(page: &BeatPage) -> String {
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             (curves(page))
-            (polar_maps(&BeatPage::MAPS, page.maps, MAPS_HINT))
+            (polar_maps(&BeatPage::MAPS, page.maps, &hint))
+            (normal_limits(perfusion))
             section {
                 h2 { "Gates and segments" }
                 div.row.beside { (gates(report)) (segments(report)) }
@@ -97,7 +104,7 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
     let mut checks: Vec<(bool, String)> = [
         ("no_contraction", "The gates are moments of one beat"),
         ("count_loss", "No gate lacks counts"),
-        ("beats_rejected", "Few beats were rejected"),
+        ("count_gain", "No gate has too many counts"),
         ("leaves_field", "The heart lies inside of the volume"),
         ("dark_wall", "The wall takes up enough to show its motion"),
         ("small_heart", "The cavity is wider than the image blurs"),
@@ -109,6 +116,19 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
     ]
     .map(|(code, text)| (!raised(code), text.to_owned()))
     .into();
+    let timing = &report.timing;
+    if timing.beats_accepted.is_some() && timing.beats_rejected.is_some() {
+        let few = "Few beats were rejected".to_owned();
+        checks.push((!raised("beats_rejected"), few));
+    }
+    if report
+        .parameters
+        .get("mass_g")
+        .is_some_and(|mass| !mass.is_null())
+    {
+        let met = "The wall has the mass that was given".to_owned();
+        checks.push((!raised("mass_not_met"), met));
+    }
     checks.push((
         !raised("uncertain_fit"),
         format!(
@@ -131,14 +151,6 @@ fn verdict(report: &BeatReport) -> Markup {
 }
 
 fn figures(report: &BeatReport) -> Markup {
-    let figure = |value: Option<f64>, decimals, unit, label: String| {
-        Some(HeadlineFigure {
-            value: number(value?, decimals),
-            unit,
-            label,
-        })
-    };
-    let plain = |value, decimals, unit, label: &str| figure(value, decimals, unit, label.into());
     let rates = report.rates.as_ref();
     let phase = report.phase.reliable.then_some(&report.phase);
     let all = [
@@ -149,44 +161,44 @@ fn figures(report: &BeatReport) -> Markup {
             with_interval("ejection fraction", report.ef_interval_percent, 0),
         ),
         figure(
-            Some(report.edv_ml),
+            report.edv_ml,
             0,
             "ml",
-            with_interval("end-diastolic volume", Some(report.edv_interval_ml), 0),
+            with_interval("end-diastolic volume", report.edv_interval_ml, 0),
         ),
         figure(
-            Some(report.esv_ml),
+            report.esv_ml,
             0,
             "ml",
-            with_interval("end-systolic volume", Some(report.esv_interval_ml), 0),
+            with_interval("end-systolic volume", report.esv_interval_ml, 0),
         ),
-        plain(Some(report.sv_ml), 0, "ml", "stroke volume"),
-        plain(Some(report.mass_g), 0, "g", "mass of the wall (1.05 g/ml)"),
-        plain(
+        figure(report.sv_ml, 0, "ml", "stroke volume"),
+        figure(report.mass_g, 0, "g", "mass of the wall (1.05 g/ml)"),
+        figure(
             rates.map(|rates| rates.peak_ejection_edv_per_s),
             2,
             "EDV/s",
             "peak ejection rate",
         ),
-        plain(
+        figure(
             rates.map(|rates| rates.peak_filling_edv_per_s),
             2,
             "EDV/s",
             "peak filling rate",
         ),
-        plain(
+        figure(
             rates.map(|rates| rates.time_to_peak_filling_ms),
             0,
             "ms",
             "end systole to peak filling",
         ),
-        plain(
+        figure(
             phase.map(|phase| phase.sd_degrees),
             0,
             "°",
             "standard deviation of the phases",
         ),
-        plain(
+        figure(
             phase.map(|phase| phase.bandwidth_degrees),
             0,
             "°",

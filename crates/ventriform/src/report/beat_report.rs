@@ -22,14 +22,14 @@ pub struct BeatReport {
     pub edv_ml: f64,
     /// End-systolic volume: the smallest of the curve.
     pub esv_ml: f64,
-    /// Stroke volume.
-    pub sv_ml: f64,
+    /// Stroke volume; `null` if the gates are no beat.
+    pub sv_ml: Option<f64>,
     /// Ejection fraction, per cent; `null` if the gates are no beat (flag `no_contraction`).
     pub ef_percent: Option<f64>,
-    /// Interval about EDV that holds the true volume of nine of ten hearts.
-    pub edv_interval_ml: [f64; 2],
+    /// Interval about EDV that holds the true volume of nine of ten hearts; `null` if the gates are no beat.
+    pub edv_interval_ml: Option<[f64; 2]>,
     /// The same about ESV.
-    pub esv_interval_ml: [f64; 2],
+    pub esv_interval_ml: Option<[f64; 2]>,
     /// The same about EF; `null` if there is none.
     pub ef_interval_percent: Option<[f64; 2]>,
     /// Ejection fraction of the largest and the smallest gate, per cent: a gate is a mean over its width.
@@ -76,7 +76,7 @@ pub struct BeatReport {
     pub confidence: f64,
     /// Steps of the joint fit.
     pub steps: usize,
-    /// Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat.
+    /// Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat.
     pub flags: Vec<RaisedFlag>,
     /// Uptake and beat beside normal limits, if some were given.
     #[serde(default)]
@@ -209,7 +209,7 @@ pub struct BeatParts {
     pub template: String,
     /// Confidence of that fit.
     pub confidence: f64,
-    /// Flags of that fit, and of what the file says of the beats.
+    /// Flags of that fit, and of what the file and the caller say of the beat.
     pub flags: Vec<RaisedFlag>,
     /// Uptake and beat beside normal limits.
     pub perfusion: Option<PerfusionReport>,
@@ -232,8 +232,7 @@ impl BeatReport {
             .map_or(f64::NAN, |(most, least)| most - least);
         let cavity = |extreme: &Extreme| beat.gates[extreme.gate].cavity_ml;
         let of_gates = 1.0 - cavity(&beat.end_systole) / cavity(&beat.end_diastole);
-        let codes: Vec<&str> = beat.flags.iter().map(|flag| flag.code()).collect();
-        let reliable = !codes.contains(&"phase_unreliable") && beat.ef_percent.is_some();
+        let intervals = beat.intervals.as_ref();
         let raised = beat
             .flags
             .iter()
@@ -243,13 +242,11 @@ impl BeatReport {
         Self {
             edv_ml: round(beat.end_diastole.cavity_ml),
             esv_ml: round(beat.end_systole.cavity_ml),
-            sv_ml: round(beat.stroke_ml()),
+            sv_ml: beat.stroke_ml().map(round),
             ef_percent: beat.ef_percent.map(round),
-            edv_interval_ml: beat.intervals.edv_ml.map(round),
-            esv_interval_ml: beat.intervals.esv_ml.map(round),
-            ef_interval_percent: beat
-                .ef_percent
-                .map(|_| beat.intervals.ef_percent.map(round)),
+            edv_interval_ml: intervals.map(|of| of.edv_ml.map(round)),
+            esv_interval_ml: intervals.map(|of| of.esv_ml.map(round)),
+            ef_interval_percent: intervals.map(|of| of.ef_percent.map(round)),
             ef_of_gates_percent: beat.ef_percent.map(|_| round(100.0 * of_gates)),
             end_diastole_gate: beat.end_diastole.gate + 1,
             end_systole_gate: beat.end_systole.gate + 1,
@@ -288,7 +285,7 @@ impl BeatReport {
                 bandwidth_degrees: round(beat.phases.bandwidth_degrees),
                 entropy_percent: round(beat.phases.entropy_percent),
                 noise_degrees: round(beat.fit.phase_noise_degrees),
-                reliable,
+                reliable: beat.has_phases(),
                 histogram: beat.phases.histogram.iter().copied().map(round).collect(),
                 bin_degrees: round(360.0 / HISTOGRAM_BINS as f64),
             },

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::comparison_report::{
     ComparedScan, ComparedSegmentReport, ComparisonReport, UptakeChange,
 };
-use super::page_parts::{flags_headline, polar_maps, short};
+use super::page_parts::{figure, flags_headline, polar_maps, short};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
@@ -102,27 +102,33 @@ fn origin(report: &ComparisonReport) -> String {
 
 /// The things that could be flagged, each with whether it is in order.
 fn checks(report: &ComparisonReport) -> Vec<(bool, String)> {
-    let raised = |code: &str| report.flags.iter().any(|flag| flag.code == code);
+    let raised = |codes: &[&str]| {
+        let mut flags = report.flags.iter();
+        flags.any(|flag| codes.contains(&flag.code.as_str()))
+    };
     let mut checks: Vec<(bool, String)> = [
-        ("not_comparable", "Both scans were made alike"),
         (
-            "role_not_stated",
+            &["not_comparable", "not_stated", "origin_not_stated"][..],
+            "The headers say that both scans were made alike",
+        ),
+        (
+            &["role_not_stated", "origin_not_stated"],
             "The headers say which scan is at stress and which at rest",
         ),
         (
-            "made_otherwise",
+            &["made_otherwise", "origin_not_stated"],
             "Camera, unit, position and reconstruction are the same",
         ),
         (
-            "tid_uncertain",
+            &["tid_uncertain"],
             "No large defect blurs the ratio of the cavities",
         ),
         (
-            "scale_uncertain",
+            &["scale_uncertain"],
             "Enough of the wall is alike in both scans",
         ),
     ]
-    .map(|(code, text)| (!raised(code), text.to_owned()))
+    .map(|(codes, text)| (!raised(codes), text.to_owned()))
     .into();
     for (name, scan) in [("stress", &report.stress), ("rest", &report.rest)] {
         checks.push((
@@ -137,36 +143,24 @@ fn checks(report: &ComparisonReport) -> Vec<(bool, String)> {
 }
 
 fn figures(report: &ComparisonReport) -> Markup {
-    let figure = |value: Option<f64>, decimals, unit, label: &str| {
-        Some(HeadlineFigure {
-            value: number(value?, decimals),
-            unit,
-            label: label.to_owned(),
-        })
-    };
     let percent = |at: usize| {
         let share = report.summed_percent.map(|percents| percents[at]);
         share.map_or(String::new(), |share| format!(" ({} %)", number(share, 0)))
     };
     let score = |value: Option<u32>, at: usize, label: &str| {
         let label = format!("{label}{}", percent(at));
-        figure(value.map(f64::from), 0, "of 68", &label)
+        figure(value.map(f64::from), 0, "of 68", label)
     };
     let beat = report.beat.as_ref();
     let all = [
         figure(
-            Some(report.tid),
+            report.tid,
             2,
             "",
             "TID: cavity at stress over that at rest, all gates",
         ),
-        figure(
-            Some(report.reversible_percent),
-            0,
-            "%",
-            "of the wall reversible",
-        ),
-        figure(Some(report.fixed_percent), 0, "%", "of the wall fixed"),
+        figure(report.reversible_percent, 0, "%", "of the wall reversible"),
+        figure(report.fixed_percent, 0, "%", "of the wall fixed"),
         score(report.sss, 0, "SSS, summed stress score"),
         score(report.srs, 1, "SRS, summed rest score"),
         score(report.sds, 2, "SDS, summed difference score"),
@@ -312,7 +306,7 @@ fn scans(report: &ComparisonReport) -> Markup {
     let rows = [
         row("series", &|scan| text(&scan.series_description)),
         row("tracer", &|scan| text(&scan.radiopharmaceutical)),
-        row("total dose, as the header has it", &|scan| {
+        row("total dose by the header, MBq", &|scan| {
             text(&scan.injected_dose)
         }),
         row(

@@ -151,7 +151,7 @@ pub struct ComparedScan {
     pub attenuation_corrected: Option<bool>,
     /// The tracer, if the header names one.
     pub radiopharmaceutical: Option<String>,
-    /// Total dose as the header has it.
+    /// Total dose by the header, MBq.
     pub injected_dose: Option<String>,
     /// Uptake of the wall, by its own reference.
     pub polar: Option<PolarSummary>,

@@ -1,8 +1,9 @@
 //! The parts that the pages of fits have in common.
 
 use super::input::FileFacts;
-use crate::draw::document::Sign;
-use crate::draw::text::{data_uri, number};
+use super::perfusion_report::PerfusionReport;
+use crate::draw::document::{self, HeadlineFigure, Sign};
+use crate::draw::text::{data_uri, number, signed};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
@@ -26,6 +27,20 @@ pub(super) fn flags_headline(flags: usize, result: &str) -> (Sign, String) {
         1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
         n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
     }
+}
+
+/// A headline figure, if there is a `value`.
+pub(super) fn figure(
+    value: impl Into<Option<f64>>,
+    decimals: usize,
+    unit: &'static str,
+    label: impl Into<String>,
+) -> Option<HeadlineFigure> {
+    Some(HeadlineFigure {
+        value: number(value.into()?, decimals),
+        unit,
+        label: label.into(),
+    })
 }
 
 /// A figure's `label`, with the interval that holds the true figure of nine of ten hearts.
@@ -61,6 +76,90 @@ pub(super) fn polar_maps(
                         figure.paper {
                             img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
                             figcaption { (title) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// For the hint at maps of uptake: whether normal limits stand beside them.
+pub(super) fn limits_hint(perfusion: Option<&PerfusionReport>) -> &'static str {
+    match perfusion {
+        None => "There is no normal database behind them.",
+        Some(_) => "Comparison with normal limits: below.",
+    }
+}
+
+/// The wall beside normal limits, if some were given.
+pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
+    let Some(perfusion) = perfusion else {
+        return Markup::default();
+    };
+    let used = &perfusion.normals;
+    let corrected = if used.attenuation_corrected {
+        "with"
+    } else {
+        "without"
+    };
+    let whose = format!(
+        "Limits of {} ({} cases): sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}.",
+        used.people,
+        used.cases,
+        used.sex.as_str(),
+        used.protocol,
+        used.tracer,
+        used.sha256
+    );
+    let figures = [
+        figure(perfusion.deficit_percent, 1, "%", "deficit score"),
+        figure(
+            perfusion.extent_percent,
+            1,
+            "%",
+            format!(
+                "of the wall below the limit, z = -{}",
+                number(perfusion.z_limit, 1)
+            ),
+        ),
+        figure(perfusion.severity, 1, "SD", "mean depth there"),
+        figure(
+            f64::from(perfusion.summed_score),
+            0,
+            "of 68",
+            format!("summed score ({} %)", number(perfusion.summed_percent, 0)),
+        ),
+    ];
+    let figures: Vec<HeadlineFigure> = figures.into_iter().flatten().collect();
+    let z = |z: Option<f64>| z.map_or("–".to_owned(), |z| signed(z, 1));
+    let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
+    html! {
+        section {
+            h2 { "Beside normal limits" }
+            p.hint { (whose) " The " (perfusion.note) "." }
+            (document::figures(&figures))
+            ul.warnings { @for flag in &perfusion.flags { li { (flag.reason) } } }
+            div.scroll tabindex="0" role="group" aria-label="Table of scores, scrollable" {
+                table {
+                    thead {
+                        tr {
+                            th.n scope="col" { "No." }
+                            th scope="col" { "Segment" }
+                            th.n scope="col" { "mean z" }
+                            th.n scope="col" { "score, 0 to 4" }
+                            th.n scope="col" { "below the limit, % of area" }
+                        }
+                    }
+                    tbody {
+                        @for segment in &perfusion.segments {
+                            tr {
+                                td.n { (segment.segment) }
+                                th scope="row" { (segment.name) }
+                                td.n { (z(segment.z)) }
+                                td.n { (score(segment.score)) }
+                                td.n { (number(segment.extent_percent, 1)) }
+                            }
                         }
                     }
                 }

@@ -4,7 +4,9 @@ use maud::{Markup, html};
 use serde_json::{Value, json};
 
 use super::embedded::Embedded;
-use super::page_parts::{flags_headline, short, volume_line, with_interval};
+use super::page_parts::{
+    figure, flags_headline, limits_hint, normal_limits, short, volume_line, with_interval,
+};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
@@ -53,6 +55,7 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             @if let Some(png) = page.slices { (slices(report, png, page.region.is_some())) }
             @if let Some(svg) = page.polar { (polar(report, svg)) }
+            (normal_limits(report.perfusion.as_ref()))
             (agreement(report))
             (views::section("The fitted model", page.mesh, page.uncertainty, !shows_scan(page)))
             (candidates(report))
@@ -222,55 +225,38 @@ fn figures(report: &SegmentationReport) -> Markup {
     let extent = report.polar.as_ref().map(|polar| polar.extent_percent);
     let mut rows = size_rows(report);
     rows.extend([
-        (
-            extent,
-            1,
-            "%",
-            "of the wall below the threshold of uptake".to_owned(),
-        ),
-        (
+        figure(extent, 1, "%", "of the wall below the threshold of uptake"),
+        figure(
             measures.map(|m| m.jaccard),
             3,
             "of 1",
-            "Jaccard index against the expert (E_J)".to_owned(),
+            "Jaccard index against the expert (E_J)",
         ),
-        (
+        figure(
             measures.map(|m| m.dice),
             3,
             "of 1",
-            "Dice index against the expert".to_owned(),
+            "Dice index against the expert",
         ),
-        (
+        figure(
             measures.and_then(|m| m.contour_distance_voxels),
             3,
             "voxels",
-            "mean distance of the contours (E_CD)".to_owned(),
+            "mean distance of the contours (E_CD)",
         ),
-        (
+        figure(
             measures.and_then(|m| m.hausdorff95_mm),
             1,
             "mm",
-            "95th percentile of the distance between the contours".to_owned(),
+            "95th percentile of the distance between the contours",
         ),
     ]);
-    let figures: Vec<HeadlineFigure> = rows
-        .into_iter()
-        .filter_map(|(value, decimals, unit, label)| {
-            Some(HeadlineFigure {
-                value: number(value?, decimals),
-                unit,
-                label,
-            })
-        })
-        .collect();
+    let figures: Vec<HeadlineFigure> = rows.into_iter().flatten().collect();
     document::figures(&figures)
 }
 
-/// A figure, if there is one, with its decimals, unit and label.
-type FigureRow = (Option<f64>, usize, &'static str, String);
-
 /// Volumes, thickness and mass: of both walls of a ventricle where the report has them.
-fn size_rows(report: &SegmentationReport) -> Vec<FigureRow> {
+fn size_rows(report: &SegmentationReport) -> Vec<Option<HeadlineFigure>> {
     let volumes = report.volumes_ml;
     let (Some(apparent), Some(anatomical)) = (volumes.apparent, volumes.anatomical) else {
         let wall = match report.is_ventricle() {
@@ -278,21 +264,21 @@ fn size_rows(report: &SegmentationReport) -> Vec<FigureRow> {
             false => "volume of the organ",
         };
         return vec![
-            (Some(volumes.wall), 1, "ml", wall.to_owned()),
-            (volumes.cavity, 1, "ml", "volume of the cavity".to_owned()),
-            (
+            figure(volumes.wall, 1, "ml", wall),
+            figure(volumes.cavity, 1, "ml", "volume of the cavity"),
+            figure(
                 report.wall_thickness_mm,
                 1,
                 "mm",
-                "mean thickness of the wall".to_owned(),
+                "mean thickness of the wall",
             ),
         ];
     };
     let thickness = report.thickness_mm.as_ref();
     let interval = volumes.anatomical_interval;
     vec![
-        (
-            Some(anatomical.wall),
+        figure(
+            anatomical.wall,
             1,
             "ml",
             with_interval(
@@ -301,8 +287,8 @@ fn size_rows(report: &SegmentationReport) -> Vec<FigureRow> {
                 0,
             ),
         ),
-        (
-            Some(anatomical.cavity),
+        figure(
+            anatomical.cavity,
             1,
             "ml",
             with_interval(
@@ -311,35 +297,30 @@ fn size_rows(report: &SegmentationReport) -> Vec<FigureRow> {
                 0,
             ),
         ),
-        (
+        figure(
             thickness.map(|both| both.anatomical.mean),
             1,
             "mm",
-            "mean thickness of the anatomical wall".to_owned(),
+            "mean thickness of the anatomical wall",
         ),
-        (
+        figure(
             report.mass_g,
             0,
             "g",
-            "mass of the anatomical wall (1.05 g/ml)".to_owned(),
+            "mass of the anatomical wall (1.05 g/ml)",
         ),
-        (
-            Some(apparent.wall),
+        figure(
+            apparent.wall,
             1,
             "ml",
-            "apparent wall: as it looks in the image".to_owned(),
+            "apparent wall: as it looks in the image",
         ),
-        (
-            Some(apparent.cavity),
-            1,
-            "ml",
-            "cavity within the apparent wall".to_owned(),
-        ),
-        (
+        figure(apparent.cavity, 1, "ml", "cavity within the apparent wall"),
+        figure(
             thickness.map(|both| both.apparent.mean),
             1,
             "mm",
-            "mean thickness of the apparent wall".to_owned(),
+            "mean thickness of the apparent wall",
         ),
     ]
 }
@@ -409,8 +390,8 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
             h2 { "Uptake of the wall" }
             p.hint {
                 "Polar map of the 17 segments of the American Heart Association: apex in the "
-                "centre, " (sides) ". In per cent of the hottest quarter of this scan's own wall; "
-                "there is no normal database behind it. The cyan line encloses the wall below the "
+                "centre, " (sides) ". In per cent of the hottest quarter of this scan's own wall. "
+                (limits_hint(report.perfusion.as_ref())) " The cyan line encloses the wall below the "
                 "threshold; grey is outside of the wall."
             }
             div.row.beside {

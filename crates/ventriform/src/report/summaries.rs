@@ -81,7 +81,7 @@ pub struct BeatSummary {
     /// End-systolic volume.
     pub esv_ml: f64,
     /// Stroke volume.
-    pub sv_ml: f64,
+    pub sv_ml: Option<f64>,
     /// Ejection fraction; `null` if the gates are no beat.
     pub ef_percent: Option<f64>,
     /// Standard deviation of the wall's phases, degrees.

@@ -5,6 +5,8 @@ use super::hearts::ComparedHeart;
 use crate::comparison::Change;
 use crate::comparison::MOST_MUSCLE_QUOTIENT;
 use crate::comparison::{ComparisonFlag, Reason, WhichScan};
+use crate::gated::GatedHeart;
+use crate::normals::Perfusion;
 use crate::volume::Provenance;
 
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
@@ -137,6 +139,39 @@ pub(super) fn flags(
             code: flag.code(),
             reason: flag.to_string(),
         }));
+        let of_beat = heart.beat().map(GatedHeart::flags).unwrap_or_default();
+        flags.extend(of_beat.iter().map(|flag| ComparisonFlag::OfScan {
+            scan,
+            code: flag.code(),
+            reason: flag.to_string(),
+        }));
+    }
+    flags.extend(of_limits(stress.perfusion(), rest.perfusion()));
+    flags
+}
+
+/// What makes the comparison of each scan with normal limits doubtful; what both share is told once.
+fn of_limits(stress: Option<&Perfusion>, rest: Option<&Perfusion>) -> Vec<ComparisonFlag> {
+    let told = |perfusion: Option<&Perfusion>| -> Vec<(&'static str, String)> {
+        let flags = perfusion.map(|perfusion| perfusion.flags.as_slice());
+        let flags = flags.unwrap_or_default().iter();
+        flags.map(|flag| (flag.code(), flag.to_string())).collect()
+    };
+    let [of_stress, of_rest] = [stress, rest].map(told);
+    let shared = |flag: &(&'static str, String)| of_stress.contains(flag) && of_rest.contains(flag);
+    let flag = |scan: Option<WhichScan>, (code, reason): &(&'static str, String)| {
+        ComparisonFlag::OfLimits {
+            scan,
+            code,
+            reason: reason.clone(),
+        }
+    };
+    let mut flags = Vec::new();
+    for own in &of_stress {
+        flags.push(flag((!shared(own)).then_some(WhichScan::Stress), own));
+    }
+    for own in of_rest.iter().filter(|own| !shared(own)) {
+        flags.push(flag(Some(WhichScan::Rest), own));
     }
     flags
 }
@@ -148,18 +183,29 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
     if !patient.is_empty() {
         flags.push(ComparisonFlag::NotComparable(Reason::Patient(patient)));
     }
-    if let (Some(at_stress), Some(at_rest)) =
-        (stress.attenuation_corrected(), rest.attenuation_corrected())
-        && at_stress != at_rest
-    {
-        let corrected = if at_stress {
-            WhichScan::Stress
-        } else {
-            WhichScan::Rest
-        };
-        flags.push(ComparisonFlag::NotComparable(
-            Reason::AttenuationCorrection { corrected },
-        ));
+    match (stress.attenuation_corrected(), rest.attenuation_corrected()) {
+        (Some(at_stress), Some(at_rest)) if at_stress != at_rest => {
+            let corrected = if at_stress {
+                WhichScan::Stress
+            } else {
+                WhichScan::Rest
+            };
+            flags.push(ComparisonFlag::NotComparable(
+                Reason::AttenuationCorrection { corrected },
+            ));
+        }
+        // What is stated of neither is no difference: most cameras correct none.
+        (None, Some(true)) => flags.push(ComparisonFlag::NotStated {
+            scan: WhichScan::Stress,
+            field: "attenuation correction",
+            other: "corrected".to_owned(),
+        }),
+        (Some(true), None) => flags.push(ComparisonFlag::NotStated {
+            scan: WhichScan::Rest,
+            field: "attenuation correction",
+            other: "corrected".to_owned(),
+        }),
+        _ => {}
     }
     let differing = |a: &Option<String>, b: &Option<String>| {
         let (a, b) = (a.as_deref()?.trim(), b.as_deref()?.trim());
@@ -176,6 +222,24 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
             rest,
         }));
     }
+    let tracer = |scan: &Provenance| {
+        let named = [&scan.radiopharmaceutical, &scan.radionuclide];
+        let stated = named
+            .into_iter()
+            .flatten()
+            .find(|text| !text.trim().is_empty());
+        stated.map(|text| text.trim().to_owned())
+    };
+    let one_sided = match (tracer(stress), tracer(rest)) {
+        (None, Some(other)) => Some((WhichScan::Stress, other)),
+        (Some(other), None) => Some((WhichScan::Rest, other)),
+        _ => None,
+    };
+    flags.extend(one_sided.map(|(scan, other)| ComparisonFlag::NotStated {
+        scan,
+        field: "tracer",
+        other,
+    }));
     for (field, a, b) in [
         ("the camera", &stress.model_name, &rest.model_name),
         ("the unit of uptake", &stress.units, &rest.units),
@@ -275,10 +339,21 @@ mod tests {
             };
             assert_eq!(codes(&other), expected);
         }
-        // What a header does not say is no difference.
+        // What a header does not say is a difference only where the other one says what is unusual.
         assert_eq!(
             codes(&scan(|s| s.corrected_image = None)),
             Vec::<&str>::new()
         );
+        assert_eq!(
+            codes(&scan(|s| s.radiopharmaceutical = None)),
+            ["not_stated"]
+        );
+        let corrected = scan(|s| s.corrected_image = text("UNIF\\ATTN"));
+        let silent = scan(|s| s.corrected_image = None);
+        for (stress, rest) in [(&corrected, &silent), (&silent, &corrected)] {
+            let flags = of_headers(stress, rest);
+            let codes: Vec<&str> = flags.iter().map(ComparisonFlag::code).collect();
+            assert_eq!(codes, ["not_stated"]);
+        }
     }
 }

@@ -170,22 +170,28 @@ fn maps_of(scan: WhichScan, heart: &ComparedHeart) -> Vec<NamedFile> {
 
 fn segments_csv(report: &ComparisonReport) -> String {
     let mut text = String::from(
-        "segment,name,stress_percent,rest_percent,difference_points,reversible_percent,fixed_percent\n",
+        "segment,name,stress_percent,rest_percent,difference_points,reversible_percent,fixed_percent,\
+         stress_score,rest_score,motion_change_mm,thickening_change_points\n",
     );
     let known = |figure: Option<f64>| figure.map_or_else(String::new, |figure| figure.to_string());
+    let score = |score: Option<u8>| known(score.map(f64::from));
     for segment in &report.segments {
         let uptake = &segment.uptake;
         // Writing into a String cannot fail.
         let _ = writeln!(
             text,
-            "{},\"{}\",{},{},{},{},{}",
+            "{},\"{}\",{},{},{},{},{},{},{},{},{}",
             segment.segment,
             segment.name,
             known(uptake.stress_percent),
             known(uptake.rest_percent),
             known(uptake.difference_points),
             uptake.reversible_percent,
-            uptake.fixed_percent
+            uptake.fixed_percent,
+            score(segment.stress_score),
+            score(segment.rest_score),
+            known(segment.motion_change_mm),
+            known(segment.thickening_change_points)
         );
     }
     text

@@ -27,8 +27,8 @@ pub struct ComparisonOrder<'a> {
 pub type ScanOrder<'a> = &'a [VolumeFile];
 
 impl ComparisonOrder<'_> {
-    /// The protocol of a scan: as the parameters state it, or else the only one of the limits whose name has the word
-    /// `stress` or `rest` in it.
+    /// The protocol of a scan: as the parameters state it, or else that of the limits which is for such scans
+    /// ([`NormalLimits::protocol_of`]).
     pub(super) fn protocol(&self, scan: WhichScan) -> Option<String> {
         let choice = &self.parameters.choice;
         let stated = match scan {
@@ -37,21 +37,6 @@ impl ComparisonOrder<'_> {
         };
         stated
             .clone()
-            .or_else(|| only_protocol(self.normals?, scan))
-    }
-}
-
-fn only_protocol(limits: &NormalLimits, scan: WhichScan) -> Option<String> {
-    let names_role = |protocol: &&String| {
-        let mut words = protocol.split(|c: char| !c.is_alphanumeric());
-        words.any(|word| word.eq_ignore_ascii_case(scan.as_str()))
-    };
-    let groups = limits.groups.iter().map(|group| &group.protocol);
-    let mut named: Vec<&String> = groups.filter(names_role).collect();
-    named.sort();
-    named.dedup();
-    match named[..] {
-        [only] => Some(only.clone()),
-        _ => None,
+            .or_else(|| self.normals?.protocol_of(scan.as_str()))
     }
 }

@@ -10,6 +10,7 @@ use crate::report::{
     ComparisonReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
     UptakeChange,
 };
+use crate::volume::Provenance;
 use serde_json::{Map, Value};
 
 fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
@@ -35,7 +36,7 @@ fn scan_report(heart: &ComparedHeart) -> ComparedScan {
         series_description: scan.and_then(|scan| scan.series_description.clone()),
         attenuation_corrected: scan.and_then(|scan| scan.attenuation_corrected()),
         radiopharmaceutical: scan.and_then(|scan| scan.radiopharmaceutical.clone()),
-        injected_dose: scan.and_then(|scan| scan.injected_dose.clone()),
+        injected_dose: scan.and_then(Provenance::injected_dose_mbq),
         polar: heart.map().map(PolarSummary::of),
         perfusion: (heart.perfusion().zip(heart.map()))
             .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),

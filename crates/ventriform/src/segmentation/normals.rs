@@ -23,8 +23,8 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     ]
 }
 
-/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex, tracer and correction are those of
-/// the scan's header, if the parameters do not state them.
+/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex, protocol, tracer and correction are
+/// those of the scan's header, if the parameters do not state them.
 ///
 /// # Errors
 /// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit
@@ -52,7 +52,8 @@ pub fn judged_by_normals(
         }),
         attenuation_corrected: (parameters.scan.attenuation_corrected)
             .or_else(|| scan?.attenuation_corrected()),
-        ..parameters.scan.clone()
+        protocol: (parameters.scan.protocol.clone())
+            .or_else(|| limits.protocol_of(scan?.rest_or_stress.as_deref()?)),
     };
     let mut perfusion = apply(map, figures, &kind, limits)?;
     let own = parameters.to_json();

@@ -54,14 +54,7 @@ impl GateFiles {
             });
         }
         let mut warnings = first.header().warnings.to_vec();
-        let by = match order.is_sorted() {
-            true => "in the order in which they were given",
-            false => "in the order of the numbers in their names",
-        };
-        warnings.push(format!(
-            "{} files of one volume each were taken for the gates of one heart beat, {by}.",
-            files.len()
-        ));
+        warnings.push(taken_for_gates(&order));
         Ok(Self {
             others: others.to_vec(),
             first,
@@ -159,6 +152,18 @@ impl OpenVolume for GateFiles {
         }
         Ok((tally, warnings))
     }
+}
+
+/// The warning that files of one volume each were taken for gates, in such an order.
+pub(super) fn taken_for_gates(order: &[usize]) -> String {
+    let by = match order.is_sorted() {
+        true => "in the order in which they were given",
+        false => "in the order of the numbers in their names",
+    };
+    format!(
+        "{} files of one volume each were taken for the gates of one heart beat, {by}.",
+        order.len()
+    )
 }
 
 /// The order of files by the numbers in their `names`, or else as they are given, as indices.

@@ -1,6 +1,12 @@
 //! What a file says of the beats that were gated.
 
 use super::facts::GateFacts;
+use std::ops::RangeInclusive;
+
+/// R-R intervals that a heart can have, ms: 200 to 24 beats per minute.
+pub const RR_MS: RangeInclusive<f64> = 300.0..=2500.0;
+/// Share of the R-R interval by which the gates together may last longer or shorter.
+const GATES_APART_SHARE: f64 = 0.2;
 
 /// What a file says of the beats of one R-R interval that were gated. Parts that it leaves out are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -48,15 +54,67 @@ impl GateTiming {
         divides.unwrap_or(volumes)
     }
 
-    /// The R-R interval of `gates` gates, ms: as stated, or of the length of a gate.
+    /// The R-R interval of `gates` gates, ms: as stated, or of the length of a gate; `None` if no heart beats so.
     pub fn rr_of(&self, gates: usize) -> Option<f64> {
-        let of_frames = || self.frame_time_ms.map(|ms| ms * gates as f64);
-        self.rr_ms.or_else(of_frames)
+        let stated = self.rr_ms.or_else(|| self.rr_of_frames(gates));
+        stated.filter(|ms| RR_MS.contains(ms))
+    }
+
+    fn rr_of_frames(&self, gates: usize) -> Option<f64> {
+        self.frame_time_ms.map(|ms| ms * gates as f64)
+    }
+
+    /// Warnings about the R-R interval of `gates` gates: no heart beats so, or the gates last longer or shorter.
+    pub(super) fn warnings(&self, gates: usize) -> Vec<String> {
+        let [least, most] = [RR_MS.start(), RR_MS.end()];
+        let impossible = self.rr_ms.or_else(|| self.rr_of_frames(gates));
+        let impossible = impossible.filter(|ms| !RR_MS.contains(ms)).map(|ms| {
+            format!(
+                "The header's R-R interval of {ms:.0} ms is none of a heart ({least:.0} to {most:.0} ms) and was left out."
+            )
+        });
+        let both = self.rr_ms.zip(self.rr_of_frames(gates));
+        let apart = both.filter(|(rr, frames)| (frames / rr - 1.0).abs() > GATES_APART_SHARE);
+        let apart = apart.map(|(rr, frames)| {
+            format!(
+                "{gates} gates of the header's Frame Time last {frames:.0} ms, and its R-R interval is {rr:.0} ms: the gates may \
+                 not cover the beat, on which EF and phases depend."
+            )
+        });
+        impossible.into_iter().chain(apart).collect()
     }
 
     /// Share of the beats that were rejected, 0..=1.
     pub fn rejected_share(&self) -> Option<f64> {
         let (accepted, rejected) = (self.beats_accepted?, self.beats_rejected?);
         (accepted + rejected > 0.0).then(|| rejected / (accepted + rejected))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// R-R interval and frame time of a header, for eight gates: the interval that is taken, and the number of warnings.
+    #[test]
+    fn intervals_of_no_heart_are_left_out_and_contradictions_told() {
+        for (rr_ms, frame_time_ms, taken, warnings) in [
+            (Some(850.0), None, Some(850.0), 0),
+            (None, Some(100.0), Some(800.0), 0),
+            (Some(850.0), Some(100.0), Some(850.0), 0),
+            (Some(850.0), Some(50.0), Some(850.0), 1),
+            (Some(30_000.0), None, None, 1),
+            (None, Some(8000.0), None, 1),
+            (Some(f64::NAN), None, None, 1),
+            (None, None, None, 0),
+        ] {
+            let timing = GateTiming {
+                rr_ms,
+                frame_time_ms,
+                ..GateTiming::default()
+            };
+            assert_eq!(timing.rr_of(8), taken, "{timing:?}");
+            assert_eq!(timing.warnings(8).len(), warnings, "{timing:?}");
+        }
     }
 }

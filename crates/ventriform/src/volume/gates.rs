@@ -29,6 +29,27 @@ pub struct GatedReading {
     pub stated_grid: Option<StatedGrid>,
 }
 
+/// How a gate's header names another patient or study than that of gate 1; `None` if it does not.
+fn other_scan(first: Option<&Provenance>, scan: Option<&Provenance>) -> Option<String> {
+    let (first, scan) = (first?, scan?);
+    let fields = [
+        (
+            "Patient ID (0010,0020)",
+            &first.patient_id,
+            &scan.patient_id,
+        ),
+        (
+            "Study Instance UID (0020,000D)",
+            &first.study_uid,
+            &scan.study_uid,
+        ),
+    ];
+    fields.into_iter().find_map(|(name, wanted, found)| {
+        let (wanted, found) = (wanted.as_deref()?.trim(), found.as_deref()?.trim());
+        (wanted != found).then(|| format!("has another {name} than gate 1"))
+    })
+}
+
 impl GatedReading {
     /// Whose scan it is; `None` unless the files are DICOM.
     pub fn provenance(&self) -> Option<&Provenance> {
@@ -36,6 +57,9 @@ impl GatedReading {
     }
 
     /// The gates that were read one by one, and what their file says of the beats of each R-R interval.
+    ///
+    /// # Errors
+    /// [`VolumeError::OtherGate`] if their headers name several patients or studies.
     pub(super) fn of(readings: Vec<Reading>, timings: &[GateTiming]) -> Result<Self, VolumeError> {
         let mut readings = readings.into_iter();
         let first = readings.next().ok_or(VolumeError::NoFile)?.usable()?;
@@ -50,6 +74,12 @@ impl GatedReading {
             }
             gates.push(reading.volume);
             scans.push(reading.provenance);
+        }
+        for (index, scan) in scans.iter().enumerate() {
+            if let Some(difference) = other_scan(scans[0].as_ref(), scan.as_ref()) {
+                let gate = index + 1;
+                return Err(VolumeError::OtherGate { gate, difference });
+            }
         }
         let mut first_frame = 0;
         let mut timing = timings.first().cloned().unwrap_or_default();
@@ -83,6 +113,7 @@ impl GatedReading {
             scans.truncate(each);
             timing = timings.get(main).cloned().unwrap_or_default();
         }
+        facts.warnings.extend(timing.warnings(gates.len()));
         Ok(Self {
             gates,
             first_frame,
@@ -91,5 +122,30 @@ impl GatedReading {
             scans: scans.into_iter().collect::<Option<_>>().unwrap_or_default(),
             stated_grid: first.stated_grid,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gates_of_other_patients_and_studies_are_named() {
+        let text = |text: &str| Some(text.to_owned());
+        let first = Provenance {
+            patient_id: text("17"),
+            study_uid: text("1.2.3"),
+            ..Provenance::default()
+        };
+        let told = |change: &dyn Fn(&mut Provenance)| {
+            let mut other = first.clone();
+            change(&mut other);
+            other_scan(Some(&first), Some(&other)).unwrap_or_default()
+        };
+        assert!(told(&|other| other.patient_id = text("18")).contains("Patient ID"));
+        assert!(told(&|other| other.study_uid = text("1.2.4")).contains("Study Instance UID"));
+        assert_eq!(told(&|other| other.patient_id = text("17 ")), "");
+        assert_eq!(told(&|other| other.patient_id = None), "");
+        assert_eq!(other_scan(Some(&first), None), None);
     }
 }

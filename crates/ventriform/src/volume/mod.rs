@@ -80,7 +80,7 @@ pub use facts::{
     VolumeFacts,
 };
 pub use gate_files::order_by_numbers;
-pub use gate_timing::GateTiming;
+pub use gate_timing::{GateTiming, RR_MS};
 pub use gates::GatedReading;
 pub use limits::{ReadLimits, ReadOptions};
 pub use open::{Reading, describe};

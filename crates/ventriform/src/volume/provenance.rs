@@ -102,7 +102,8 @@ provenance! {
     radiopharmaceutical,
     /// Meaning of the Radionuclide Code (0054,0300).
     radionuclide,
-    /// Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images.
+    /// Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images
+    /// ([`Provenance::injected_dose_mbq`]).
     injected_dose,
     /// Radiopharmaceutical Start Time (0018,1072).
     injection_time,
@@ -136,6 +137,22 @@ impl Provenance {
         }
         let arc: f64 = self.scan_arc.as_deref()?.trim().parse().ok()?;
         arc.is_finite().then_some(arc.abs())
+    }
+
+    /// The total dose in MBq, as text; what is no number stays as the header has it.
+    pub fn injected_dose_mbq(&self) -> Option<String> {
+        /// Units of the header in a megabecquerel, in PET images.
+        const BQ_PER_MBQ: f64 = 1e6;
+        let stated = self.injected_dose.as_deref()?.trim();
+        if self.modality.as_deref().map(str::trim) != Some("PT") {
+            return Some(stated.to_owned());
+        }
+        match stated.parse::<f64>() {
+            Ok(becquerels) if becquerels.is_finite() => {
+                Some(format!("{:.0}", becquerels / BQ_PER_MBQ))
+            }
+            _ => Some(stated.to_owned()),
+        }
     }
 
     /// Whether attenuation was corrected; `None` where the header does not say.

@@ -2,7 +2,8 @@
 
 use super::array_file::ArrayFile;
 use super::dicom::DicomFile;
-use super::gate_files::{GateFiles, order_of};
+use super::gate_files::{GateFiles, order_of, taken_for_gates};
+use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
@@ -67,15 +68,24 @@ pub fn read_gates(
         };
     if apart {
         let names: Vec<&str> = files.iter().map(VolumeFile::name).collect();
-        let files: Vec<VolumeFile> = (order_of(&names).into_iter())
-            .map(|at| files[at].clone())
-            .collect();
-        return match one_by_one(&files, limits, monitor) {
+        let order = order_of(&names);
+        let sorted: Vec<VolumeFile> = order.iter().map(|&at| files[at].clone()).collect();
+        return match one_by_one(&sorted, limits, monitor) {
             // What the files are together says more than that one of them is no volume.
             Err(error) if !matches!(error, VolumeError::Cancelled(_)) => {
                 Err(opened.err().unwrap_or(error))
             }
-            read => GatedReading::of(read?, &[]),
+            read => {
+                let stated = open(&sorted[..1], limits, monitor)?.file.gate_timings();
+                let timing = stated.into_iter().next().map(|timing| GateTiming {
+                    gates_per_interval: None,
+                    ..timing
+                });
+                let timings: Vec<GateTiming> = timing.into_iter().collect();
+                let mut gated = GatedReading::of(read?, &timings)?;
+                gated.facts.warnings.push(taken_for_gates(&order));
+                Ok(gated)
+            }
         };
     }
     let mut opened = opened?;
@@ -104,8 +114,8 @@ pub fn read_gates(
     GatedReading::of(readings, &timings)
 }
 
-/// Whether `files` are a volume of several frames that are the gates of a heart beat, by the header or because
-/// `gated` says so. Nothing is decoded.
+/// Whether `files` hold as many gates of a heart beat as a beat can be fitted to, by the header or because `gated` says
+/// that their volumes are gates. Nothing is decoded.
 ///
 /// # Errors
 /// [`VolumeError`].
@@ -117,7 +127,9 @@ pub fn hold_gates(
 ) -> Result<bool, VolumeError> {
     let opened = open(files, limits, monitor)?;
     let header = opened.file.header();
-    Ok(header.frames > 1 && (header.gated || gated))
+    let stated = opened.file.gate_timings().into_iter().next();
+    let each = stated.unwrap_or_default().gates_of_interval(header.frames);
+    Ok(GATES.contains(&each) && (header.gated || gated))
 }
 
 /// Gates that have together more voxels than a volume may.

@@ -15,7 +15,7 @@ use ventriform::beat::BeatFlag;
 use ventriform::beat::phase::behind;
 use ventriform::export::Format;
 use ventriform::export::dicom::Moment;
-use ventriform::gated::{GatedError, GatedHeart, GatedOrder, from_files};
+use ventriform::gated::{GatedError, GatedHeart, GatedOrder, beat_figures, from_files};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::grid::Volume;
@@ -357,9 +357,23 @@ fn gates_that_show_no_beat_have_no_ejection_fraction() {
     let shuffled: Vec<Volume> = [0, 4, 1, 6, 2, 7, 3, 5].map(|n| gates()[n].clone()).into();
     let repeated = vec![gates()[0].clone(); 8];
     for gates in [shuffled, repeated] {
-        let heart = beat_of(&gates, BeatChoice::default()).unwrap();
+        let choice = BeatChoice {
+            rr_ms: Some(850.0),
+            ..BeatChoice::default()
+        };
+        let heart = beat_of(&gates, choice).unwrap();
         assert!(codes(&heart).contains(&"no_contraction".to_owned()));
-        assert_eq!(heart.report().ef_percent, None);
+        let report = heart.report();
+        let none = (report.ef_percent, report.sv_ml, report.rates.as_ref());
+        assert_eq!(none, (None, None, None));
+        assert!(report.no_rates.unwrap().contains("no beat"));
+        let intervals = (report.edv_interval_ml, report.esv_interval_ml);
+        assert_eq!(intervals, (None, None));
+        assert!(!report.phase.reliable);
+        // Normal limits are not built of it, nor compared with it.
+        let figures = beat_figures(&heart.segmentation, &heart.beat);
+        let names: Vec<&str> = figures.iter().map(|own| own.figure).collect();
+        assert_eq!(names, ["cavity_ml", "wall_ml"]);
     }
 }
 
@@ -387,6 +401,42 @@ fn a_flat_study_has_no_ejection_fraction() {
             "noise {noise}"
         );
         assert_eq!(heart.report().ef_percent, None, "noise {noise}");
+    }
+}
+
+/// A gate that has twice its counts is named, and not all the others.
+#[test]
+fn too_many_counts_are_told_of_the_gate_that_has_them() {
+    let mut faulty = gates().to_vec();
+    faulty[7].voxels.iter_mut().for_each(|v| *v *= 2.0);
+    let heart = beat_of(&faulty, BeatChoice::default()).unwrap();
+    let told: Vec<&BeatFlag> = (heart.beat.flags.iter())
+        .filter(|flag| ["count_gain", "count_loss"].contains(&flag.code()))
+        .collect();
+    let [BeatFlag::CountGain { gains }] = told[..] else {
+        panic!("{told:?}");
+    };
+    assert_eq!(gains.len(), 1);
+    assert!(
+        gains[0].0 == 8 && (gains[0].1 - 1.0).abs() < 0.1,
+        "{gains:?}"
+    );
+    let [found, first] = [&heart, whole()].map(|heart| heart.report().ef_percent.unwrap());
+    assert!((found - first).abs() < 2.0, "{found} {first}");
+}
+
+/// No heart of this size has 400 g of muscle: the wall that was fitted says so.
+#[test]
+fn a_mass_that_the_wall_cannot_have_is_told() {
+    let usual_g = whole().report().mass_g;
+    for (mass_g, told) in [(400.0, true), (usual_g, false)] {
+        let choice = BeatChoice {
+            mass_g: Some(mass_g),
+            ..BeatChoice::default()
+        };
+        let heart = beat_of(gates(), choice).unwrap();
+        let found = codes(&heart).contains(&"mass_not_met".to_owned());
+        assert_eq!(found, told, "{mass_g}: {}", heart.report().mass_g);
     }
 }
 
@@ -1000,8 +1050,8 @@ fn a_beat_is_written_as_dicom() {
         report.ef_interval_percent.unwrap(),
     );
     let figures_with_ranges = [
-        (report.edv_ml, report.edv_interval_ml),
-        (report.esv_ml, report.esv_interval_ml),
+        (report.edv_ml, report.edv_interval_ml.unwrap()),
+        (report.esv_ml, report.esv_interval_ml.unwrap()),
         ef,
     ];
     for (code, below) in [("371885007", true), ("371886008", false)] {
@@ -1015,7 +1065,7 @@ fn a_beat_is_written_as_dicom() {
             assert!((found - wanted).abs() < 1e-6, "{code}: {found} of {wanted}");
         }
     }
-    assert_eq!(of("90096001"), [report.sv_ml]);
+    assert_eq!(of("90096001"), [report.sv_ml.unwrap()]);
     assert_eq!(of("70822001"), [report.ef_percent.unwrap()]);
     assert_eq!(of("122447"), [report.mass_g]);
     // Eight gates have no rates.

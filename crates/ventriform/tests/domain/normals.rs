@@ -37,7 +37,7 @@ fn options() -> NormalsOptions {
             choice: NormalsChoice { mixed: true },
             ..NormalsParameters::default()
         },
-        program_version: "0.0.0".to_owned(),
+        program_version: env!("CARGO_PKG_VERSION").to_owned(),
         limits: ReadLimits::default(),
     }
 }

@@ -25,10 +25,8 @@ use crate::normals::{
 };
 use crate::parameters::{BeatChoice, NormalsParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
-use crate::segmentation::{
-    self, Segmentation, SegmentationError, SegmentationOrder, heart_figures,
-};
-use crate::volume::{ReadLimits, VolumeError, VolumeFile};
+use crate::segmentation::{self, Segmentation, SegmentationOrder, heart_figures};
+use crate::volume::{ReadLimits, VolumeFile, hold_gates};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -259,48 +257,11 @@ fn fitted_case(
     };
     let quiet = monitor.without_observer();
     let files: Vec<VolumeFile> = scan.paths.iter().map(VolumeFile::at).collect();
-    let parameters = &options.parameters.fit;
-    let order = SegmentationOrder {
-        volume: &files,
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters,
-    };
-    let made = segmentation::from_files(&order, &options.limits, &quiet);
-    let (segmentation, figures) = match made {
-        Ok(made) => {
-            let figures = heart_figures(&made.segmentation);
-            (made.segmentation, figures)
-        }
-        Err(SegmentationError::Volume(VolumeError::FrameNeeded { .. })) => {
-            let order = GatedOrder {
-                gates: &files,
-                auto: true,
-                models: Vec::new(),
-                normals: None,
-                parameters,
-                choice: BeatChoice {
-                    gated: true,
-                    ..BeatChoice::default()
-                },
-            };
-            match gated::from_files(&order, &options.limits, &quiet) {
-                Ok(made) => {
-                    let figures = beat_figures(&made.segmentation, &made.beat);
-                    (made.segmentation, figures)
-                }
-                Err(error) => {
-                    monitor.check()?;
-                    return Ok(Err(error.to_string()));
-                }
-            }
-        }
-        Err(error) => {
+    let (segmentation, figures) = match fitted(&files, options, &quiet) {
+        Ok(fitted) => fitted,
+        Err(reason) => {
             monitor.check()?;
-            return Ok(Err(error.to_string()));
+            return Ok(Err(reason));
         }
     };
     Ok(usable(&segmentation).map(|(places, cavity_ml)| FittedCase {
@@ -309,6 +270,43 @@ fn fitted_case(
         sha256,
         cavity_ml,
     }))
+}
+
+/// The fit to a scan, or to the sum of its gates, and the figures of the heart, of its beat too if it is gated; or why
+/// there is none.
+fn fitted(
+    files: &[VolumeFile],
+    options: &NormalsOptions,
+    monitor: &Monitor,
+) -> Result<(Segmentation, Vec<HeartFigure>), String> {
+    let (parameters, limits) = (&options.parameters.fit, &options.limits);
+    let refused = |error: &dyn std::fmt::Display| error.to_string();
+    if hold_gates(files, false, limits, monitor).map_err(|error| refused(&error))? {
+        let order = GatedOrder {
+            gates: files,
+            auto: true,
+            models: Vec::new(),
+            normals: None,
+            parameters,
+            choice: BeatChoice::default(),
+        };
+        let made = gated::from_files(&order, limits, monitor).map_err(|error| refused(&error))?;
+        let figures = beat_figures(&made.segmentation, &made.beat);
+        return Ok((made.segmentation, figures));
+    }
+    let order = SegmentationOrder {
+        volume: files,
+        expert: None,
+        auto: true,
+        models: Vec::new(),
+        reader: None,
+        normals: None,
+        parameters,
+    };
+    let made =
+        segmentation::from_files(&order, limits, monitor).map_err(|error| refused(&error))?;
+    let figures = heart_figures(&made.segmentation);
+    Ok((made.segmentation, figures))
 }
 
 /// The wall and the cavity of a fit that limits can stand on, or why they cannot.
@@ -329,4 +327,55 @@ fn usable(segmentation: &Segmentation) -> Result<(ScanPlaces, f64), String> {
     let surfaces = segmentation.fit.model.surfaces.as_ref();
     let surfaces = surfaces.ok_or("the fit has no anatomical wall")?;
     Ok((ScanPlaces::of(map), surfaces.anatomical.wall.cavity_ml))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::nifti::{self, StoredType};
+    use crate::volume::phantom::{PhantomParameters, phantom};
+
+    /// Gates of a heart that becomes smaller and thicker, one file each.
+    fn gates() -> Vec<VolumeFile> {
+        let usual = PhantomParameters::default();
+        let gate = |gate: usize| {
+            let contraction = (1.0 - (std::f64::consts::TAU * gate as f64 / 8.0).cos()) / 2.0;
+            let parameters = PhantomParameters {
+                shape: [40; 3],
+                spacing_mm: [6.0; 3],
+                width_mm: usual.width_mm * (1.0 - 0.12 * contraction),
+                wall_mm: usual.wall_mm * (1.0 + 0.2 * contraction),
+                ..usual.clone()
+            };
+            let made = phantom(&parameters, &Monitor::silent()).unwrap();
+            let bytes = nifti::write(&made.volume, StoredType::Float32, false).unwrap();
+            VolumeFile::in_memory(format!("gate{gate}.nii"), bytes)
+        };
+        (0..8).map(gate).collect()
+    }
+
+    /// Limits of EF, volumes and motion come from gated cases alone.
+    #[test]
+    fn a_gated_case_has_the_figures_of_its_beat() {
+        let options = NormalsOptions {
+            parameters: NormalsParameters::default(),
+            program_version: "0".to_owned(),
+            limits: ReadLimits::default(),
+        };
+        let files = gates();
+        let names = |files: &[VolumeFile]| -> Vec<String> {
+            let (_, figures) = fitted(files, &options, &Monitor::silent()).unwrap();
+            figures.iter().map(|own| own.figure.to_owned()).collect()
+        };
+        let of_beat = ["ef_percent", "edv_ml", "esv_ml", "motion_mm"];
+        let gated = names(&files);
+        for figure in of_beat {
+            assert!(
+                gated.iter().any(|name| name == figure),
+                "{figure}: {gated:?}"
+            );
+        }
+        let still = names(&files[..1]);
+        assert_eq!(still, ["cavity_ml", "wall_ml"]);
+    }
 }

@@ -6,7 +6,7 @@
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
-//! segments. A figure that the report lacks is left out. EDV, ESV and EF have the ends of the interval that holds the
+//! segments, unless the gates are no beat. A figure that the report lacks is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
 use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
@@ -193,13 +193,17 @@ impl<'a> DicomBeat<'a> {
         let flags = self.report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
         groups.push(group("1501", content));
-        for segment in &self.report.segments {
+        let moving = self.report.ef_percent.is_some();
+        for segment in self.report.segments.iter().filter(|_| moving) {
             let number = segment.segment;
             let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
             let Some(site) = site else { continue };
             let mut content = self.beginning(&format!("Segment {number}"), uids);
             content.push(finding_site(*site));
             content.extend(measured(segment, SEGMENT_FIGURES));
+            if self.report.phase.reliable {
+                content.extend(measured(segment, SEGMENT_PHASE));
+            }
             groups.push(group("1501", content));
         }
         groups
@@ -224,7 +228,7 @@ const DIASTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
         loinc("8821-1", "Left Ventricular ED Volume"),
         MILLILITRE,
     ),
-    |r| Some(r.edv_interval_ml),
+    |r| r.edv_interval_ml,
 )];
 
 const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
@@ -233,16 +237,12 @@ const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
         loinc("8823-7", "Left Ventricular ES Volume"),
         MILLILITRE,
     ),
-    |r| Some(r.esv_interval_ml),
+    |r| r.esv_interval_ml,
 )];
 
 /// Measurements over the whole beat. Without a beat there is neither stroke nor ejection.
 const BEAT_FIGURES: &[Figure<BeatReport>] = &[
-    figure(
-        |r| r.ef_percent.map(|_| r.sv_ml),
-        sct("90096001", "Stroke Volume"),
-        MILLILITRE,
-    ),
+    figure(|r| r.sv_ml, sct("90096001", "Stroke Volume"), MILLILITRE),
     within(
         figure(
             |r| r.ef_percent,
@@ -323,9 +323,10 @@ const SEGMENT_FIGURES: &[Figure<SegmentMotionReport>] = &[
         own("THICKENING-COUNT", "Thickening by counts"),
         PERCENT,
     ),
-    figure(
-        |s| s.phase_degrees,
-        own("PHASE", "Phase of the greatest thickness"),
-        DEGREE,
-    ),
 ];
+
+const SEGMENT_PHASE: &[Figure<SegmentMotionReport>] = &[figure(
+    |s| s.phase_degrees,
+    own("PHASE", "Phase of the greatest thickness"),
+    DEGREE,
+)];

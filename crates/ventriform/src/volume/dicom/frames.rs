@@ -22,6 +22,10 @@ pub(super) struct FrameOrder {
     stored: Vec<usize>,
 }
 
+/// The vectors that place the frames of a gated image.
+const VECTORS_OF_GATES: &str =
+    "R-R Interval Vector (0054,0060), Time Slot Vector (0054,0070), Slice Vector (0054,0080)";
+
 impl FrameOrder {
     /// Reads the slice vector of `frames` frames, and the vectors of R-R intervals and time slots if `gated`.
     ///
@@ -63,19 +67,31 @@ impl FrameOrder {
             }
         }
         let mut stored = vec![None; if cells == frames { cells } else { 0 }];
+        let mut alike = None;
         for (frame, &cell) in index.iter().enumerate() {
-            if let Some(place @ None) = stored.get_mut(cell) {
-                *place = Some(frame);
+            match stored.get_mut(cell) {
+                Some(place @ None) => *place = Some(frame),
+                Some(Some(first)) => {
+                    alike.get_or_insert((*first + 1, frame + 1));
+                }
+                None => {}
             }
         }
         let complete: Option<Vec<usize>> = stored.into_iter().collect();
         match complete.filter(|all| all.len() == frames) {
             Some(stored) => Ok(Self { slices, stored }),
-            None => Err(attributes.wrong(
-                SLICE_VECTOR.name,
-                &format!("{:?}", attributes.shorts(SLICE_VECTOR)),
-                format!("the {frames} frames must hold every slice of every gate exactly once"),
-            )),
+            None => {
+                let alike = alike.map_or_else(String::new, |(first, second)| {
+                    format!("; frames {first} and {second} have the same numbers")
+                });
+                Err(attributes.wrong(
+                    if gated { VECTORS_OF_GATES } else { SLICE_VECTOR.name },
+                    &format!("{:?}", attributes.shorts(SLICE_VECTOR)),
+                    format!(
+                        "the {frames} frames must hold every slice of every gate exactly once{alike}"
+                    ),
+                ))
+            }
         }
     }
 

@@ -4,8 +4,9 @@
 //! is not time (`intent_code`, the unit of `pixdim[4]`), that the file has further dimensions, that there
 //! are more volumes than a study is gated into, or that they last longer than a heart beat. Where
 //! nothing contradicts, the volumes are taken for gates, whose sum is what the camera counted over
-//! the whole beat, and a warning says what was taken for what.
+//! the whole beat, and a warning says what was taken for what. A time that it states is the length of a gate.
 
+use super::super::gate_timing::GateTiming;
 use super::header::Header;
 use crate::grid::gates::GATES;
 
@@ -38,24 +39,43 @@ pub(super) fn contradiction(header: &Header) -> Option<String> {
             "dim[4] is {volumes}, more than the {most} gates of a heart beat"
         ));
     }
-    let step = header.pixdim[4].abs();
-    let seconds = match header.xyzt_units & 0x38 {
-        0 => return None,
-        8 => step,
-        16 => step * 1e-3,
-        24 => step * 1e-6,
-        other => {
+    let seconds = match step_seconds(header) {
+        Ok(seconds) => seconds?,
+        Err(unit) => {
             return Some(format!(
-                "xyzt_units states the unit {other} for the fourth dimension, which is not one of time"
+                "xyzt_units states the unit {unit} for the fourth dimension, which is not one of time"
             ));
         }
     };
-    // A step of one unit is what writers state who know of none.
     let whole = seconds * volumes as f64;
-    (step != 1.0 && whole > LONGEST_BEAT).then(|| {
+    (whole > LONGEST_BEAT).then(|| {
         format!(
             "{volumes} volumes of {seconds} s (pixdim[4], xyzt_units) last {whole} s, longer than a \
              heart beat"
         )
     })
+}
+
+/// What the header says of the gates' length; nothing if it states no time.
+pub(super) fn timing(header: &Header) -> Option<GateTiming> {
+    let seconds = step_seconds(header).ok()??;
+    Some(GateTiming {
+        frame_time_ms: Some(1000.0 * seconds),
+        ..GateTiming::default()
+    })
+}
+
+/// Seconds from one volume to the next, if the header states them; the unit that is none of time otherwise.
+fn step_seconds(header: &Header) -> Result<Option<f64>, i32> {
+    let step = header.pixdim[4].abs();
+    let of_unit = match header.xyzt_units & 0x38 {
+        0 => return Ok(None),
+        8 => 1.0,
+        16 => 1e-3,
+        24 => 1e-6,
+        other => return Err(other),
+    };
+    // A step of one unit is what writers state who know of none.
+    let stated = step > 0.0 && step != 1.0 && step.is_finite();
+    Ok(stated.then_some(step * of_unit))
 }

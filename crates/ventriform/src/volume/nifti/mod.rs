@@ -28,6 +28,7 @@ use self::header::Header;
 use self::place::place;
 use super::VolumeError;
 use super::decode::VoxelReader;
+use super::gate_timing::GateTiming;
 use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::{Source, VolumeFile};
@@ -89,6 +90,10 @@ impl NiftiFile {
 }
 
 impl OpenVolume for NiftiFile {
+    fn gate_timings(&self) -> Vec<GateTiming> {
+        gates::timing(&self.header).into_iter().collect()
+    }
+
     fn stated_grid(&self) -> Option<StatedGrid> {
         Some(StatedGrid::of(&self.header))
     }

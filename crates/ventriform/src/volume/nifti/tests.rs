@@ -521,7 +521,8 @@ fn gates_are_summed_and_what_is_none_needs_a_frame() {
     };
     for (gates, time) in gated {
         let file = file(&[4, 3, 1, gates], time);
-        assert!(held(&file, false));
+        // A beat has six gates or more.
+        assert_eq!(held(&file, false), gates >= 6);
         let reading = file.read().unwrap();
         let value = |v: usize, gate: usize| ((v + 12 * gate) % 7) as f32;
         let sums: Vec<f32> = (0..12)
