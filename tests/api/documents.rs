@@ -50,3 +50,28 @@ fn the_page_for_operators_lists_every_setting() {
         "docs/operations.md is out of date; write it anew with {UPDATE}=1 cargo test --test api operators"
     );
 }
+
+/// Every flag that the code can raise has a line on the page of flags.
+#[test]
+fn the_page_of_flags_has_every_flag() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = std::fs::read_to_string(root.join("docs/flags.md")).unwrap();
+    let mut codes = 0;
+    for file in [
+        "judge/flags.rs",
+        "beat/flags.rs",
+        "comparison/flags.rs",
+        "normals/flags.rs",
+    ] {
+        let path = root.join("crates/ventriform/src").join(file);
+        let source = std::fs::read_to_string(path).unwrap();
+        let (_, after) = source.split_once("fn code(&self)").unwrap();
+        let (body, _) = after.split_once("\n    }\n").unwrap();
+        let own = body.split('"').skip(1).step_by(2);
+        for code in own {
+            assert!(page.contains(&format!("| `{code}` |")), "{file}: {code}");
+            codes += 1;
+        }
+    }
+    assert!(codes > 30, "{codes}");
+}

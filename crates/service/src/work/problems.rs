@@ -846,7 +846,7 @@ fn volume_advice(error: &VolumeError) -> String {
             format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
         }
         VolumeError::OtherGate { .. } => {
-            "Give the gates as they were reconstructed together: as many voxels, at the same place.".into()
+            "Give the gates as they were reconstructed together: of one study, as many voxels, at the same place.".into()
         }
         VolumeError::NotGated { .. } => {
             "Give the gated series (6 to 32 volumes of one heart beat in one file, or one file for each gate).".into()
@@ -860,6 +860,9 @@ fn volume_advice(error: &VolumeError) -> String {
         }
         VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
         VolumeError::NoFiniteVoxel { .. } => EMPTY_FILE.into(),
+        VolumeError::VoxelSize { .. } => {
+            "Make sure that the header or the affine states millimetres, and give the size that the scanner had.".into()
+        }
         VolumeError::Memory { .. } => "Try again later, or use a smaller volume.".into(),
         VolumeError::Io { .. } => "Check that the file exists and can be read.".into(),
         VolumeError::Cancelled(_) => START_AGAIN.into(),
@@ -944,14 +947,18 @@ fn failure(
     }
 }
 
-/// An error's message as a sentence.
+/// An error's message as a sentence. A file's name, with which many begin, stays as it is.
 fn sentence(error: &dyn Error) -> String {
     let text = error.to_string();
+    let is_name = text.split_whitespace().next().is_some_and(|word| {
+        word.trim_end_matches([':', ',', '.'])
+            .contains(['.', '/', '_'])
+    });
     let mut letters = text.chars();
-    let mut sentence: String = letters
-        .next()
-        .map(|first| first.to_uppercase().chain(letters).collect())
-        .unwrap_or_default();
+    let mut sentence: String = match letters.next() {
+        Some(first) if !is_name => first.to_uppercase().chain(letters).collect(),
+        _ => text,
+    };
     if !sentence.ends_with('.') {
         sentence.push('.');
     }

@@ -6,9 +6,13 @@
 
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Full width at half maximum of a Gaussian over its standard deviation.
 pub const FWHM_PER_SIGMA: f64 = 2.354_820_045;
+
+/// Farthest offset of a kernel, voxels. A wider Gaussian has nearly one weight for all voxels of any axis.
+const MAX_REACH_VOXELS: usize = 1 << 16;
 
 /// Half of a symmetric kernel: the weights of the offsets 0, 1, 2, ... They add up to 1 over both
 /// sides.
@@ -23,7 +27,7 @@ impl Kernel {
 
     /// A Gaussian of `sigma` voxels, at least 0, cut off beyond `cut` times sigma.
     pub fn gaussian(sigma: f64, cut: f64) -> Self {
-        let reach = (cut * sigma).ceil() as usize;
+        let reach = ((cut * sigma).ceil() as usize).min(MAX_REACH_VOXELS);
         let weight = |n: usize| match n {
             // 0 / 0 for a sigma of 0.
             0 => 1.0,
@@ -37,6 +41,17 @@ impl Kernel {
     pub fn noise_gain(&self) -> f64 {
         let square = |w: &f32| f64::from(*w).powi(2);
         2.0 * self.0.iter().map(square).sum::<f64>() - square(&self.0[0])
+    }
+
+    /// The same blur of an axis of `count` voxels: all offsets that lead beyond the border, where the outermost value
+    /// continues, are one.
+    fn on_axis(&self, count: usize) -> Cow<'_, Self> {
+        if self.0.len() <= count {
+            return Cow::Borrowed(self);
+        }
+        let (within, beyond) = self.0.split_at(count - 1);
+        let rest = beyond.iter().sum();
+        Cow::Owned(Self(within.iter().copied().chain([rest]).collect()))
     }
 
     fn is_identity(&self) -> bool {
@@ -54,13 +69,18 @@ pub fn blur(
     [along_i, along_j, along_k]: &[Kernel; 3],
     monitor: &Monitor,
 ) -> Result<(), Cancelled> {
+    let [along_i, along_j, along_k] = [
+        along_i.on_axis(nx),
+        along_j.on_axis(ny),
+        along_k.on_axis(nz),
+    ];
     if !along_i.is_identity() {
         let rows = values.par_chunks_mut(nx);
         rows.try_for_each_init(Vec::new, |before, row| {
             monitor.check()?;
             before.clear();
             before.extend_from_slice(row);
-            blur_row(before, along_i, row);
+            blur_row(before, &along_i, row);
             Ok(())
         })?;
     }
@@ -71,7 +91,7 @@ pub fn blur(
             before.clear();
             before.extend_from_slice(slice);
             for (j, row) in slice.chunks_mut(nx).enumerate() {
-                blur_line(before, nx, ny, j, along_j, row);
+                blur_line(before, nx, ny, j, &along_j, row);
             }
             Ok(())
         })?;
@@ -81,7 +101,7 @@ pub fn blur(
         let slices = values.par_chunks_mut(nx * ny).enumerate();
         slices.try_for_each(|(k, slice)| {
             monitor.check()?;
-            blur_line(&before, nx * ny, nz, k, along_k, slice);
+            blur_line(&before, nx * ny, nz, k, &along_k, slice);
             Ok(())
         })?;
     }
@@ -126,6 +146,27 @@ fn blur_line(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A kernel longer than the axis, folded at its end, against the whole one value by value; and one that would not fit
+    /// into memory.
+    #[test]
+    fn kernels_beyond_the_axis_are_folded() {
+        let row: Vec<f32> = (0..7).map(|n| (n as f32 * 1.3).sin()).collect();
+        let wide = Kernel::gaussian(9.0, 3.0);
+        let mut found = row.clone();
+        let (one, silent) = (Kernel::identity(), Monitor::silent());
+        let kernels = [wide.clone(), one.clone(), one.clone()];
+        blur(&mut found, [7, 1, 1], &kernels, &silent).unwrap();
+        let mut expected = row.clone();
+        blur_row(&row, &wide, &mut expected);
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+        let huge = [Kernel::gaussian(1e12, 3.0), one.clone(), one];
+        let mut flat = row;
+        blur(&mut flat, [7, 1, 1], &huge, &silent).unwrap();
+        assert!(flat.iter().all(|value| value.is_finite()));
+    }
 
     #[test]
     fn mass_and_variance_are_those_of_the_gaussian() {

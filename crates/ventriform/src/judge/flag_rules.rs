@@ -4,7 +4,7 @@ use super::confidence;
 use super::dark_apex;
 use super::evidence::Evidence;
 use super::field_of_view;
-use super::flags::Flag;
+use super::flags::{ApexDirection, Flag};
 use super::septum;
 use crate::deform::dynamics::StopReason;
 use crate::deform::{FittedModel, Orbit, WallSurfaces};
@@ -160,21 +160,33 @@ fn cut(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     (area_cm2 >= CUT_FLAG_AREA_CM2).then_some(Flag::FieldOfView { area_cm2 })
 }
 
-/// Part of the long axis's direction to the patient's right from which on a heart is flagged. Axes point 5 degrees or more
-/// to the left in simulated hearts and in all real scans that were looked at; a fitted axis is off by some degrees.
+/// Part of the long axis's direction to the patient's right, or to the back, from which on a heart is flagged. Axes point 5
+/// degrees or more to the left and to the front in simulated hearts and in all real scans that were looked at; a
+/// fitted axis is off by some degrees.
 const MIRRORED_SINE: f64 = 0.1;
+/// The same upward: horizontal hearts lie nearly level.
+const UPWARD_SINE: f64 = 0.2;
 /// Greatest angle of the patient's superior direction to the frame's at which the frame's x tells left from right.
 const UPRIGHT_COSINE: f64 = 0.7;
 
-/// The flag of an apex that points to the right in a frame that claims a patient.
+/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient.
 fn mirrored(model: &FittedModel) -> Option<Flag> {
     let (cup, orientation) = (model.cup.as_ref()?, model.patient_orientation.as_ref()?);
     let claims =
         orientation.source != OrientationSource::Unknown && orientation.superior.z > UPRIGHT_COSINE;
-    let to_the_right = -cup.axis.x;
-    (claims && to_the_right > MIRRORED_SINE).then(|| Flag::Mirrored {
-        degrees: to_the_right.clamp(-1.0, 1.0).asin().to_degrees(),
-    })
+    let axis = cup.axis;
+    let directions = [
+        (ApexDirection::Right, -axis.x, MIRRORED_SINE),
+        (ApexDirection::Posterior, axis.y, MIRRORED_SINE),
+        (ApexDirection::Superior, axis.z, UPWARD_SINE),
+    ];
+    let found = directions.into_iter().find(|(_, part, most)| part > most);
+    found
+        .filter(|_| claims)
+        .map(|(towards, part, _)| Flag::Mirrored {
+            towards,
+            degrees: part.clamp(-1.0, 1.0).asin().to_degrees(),
+        })
 }
 
 /// Number of different values from which on a volume is taken for an image.

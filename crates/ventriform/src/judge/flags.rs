@@ -102,14 +102,12 @@ pub enum Flag {
         /// Share of area with an edge.
         active: f64,
     },
-    /// The apex points to the patient's right.
-    #[error(
-        "the apex points {degrees:.0} degrees to the patient's right: left and right may be exchanged in the file \
-         (compare with another view: the liver lies on the right), or the heart lies on the right (dextrocardia). \
-         The sides of the polar map are those of the file"
-    )]
+    /// The apex points where no apex does.
+    #[error("{}", mirrored_text(*towards, *degrees))]
     Mirrored {
-        /// Angle of the long axis to the plane between left and right, degrees to the right.
+        /// Where it points.
+        towards: ApexDirection,
+        /// Angle of the long axis to the plane across that direction, degrees.
         degrees: f64,
     },
     /// The image ends in the wall.
@@ -160,6 +158,36 @@ fn two_places(evidence: &Evidence) -> String {
             100.0 * views.gain
         )
     })
+}
+
+/// Directions to which the apex of a heart does not point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ApexDirection {
+    /// To the patient's right.
+    Right,
+    /// To the back.
+    Posterior,
+    /// Up.
+    Superior,
+}
+
+fn mirrored_text(towards: ApexDirection, degrees: f64) -> String {
+    match towards {
+        ApexDirection::Right => format!(
+            "the apex points {degrees:.0} degrees to the patient's right: left and right may be exchanged in the file \
+             (compare with another view: the liver lies on the right), or the heart lies on the right (dextrocardia). \
+             The sides of the polar map are those of the file"
+        ),
+        ApexDirection::Posterior => format!(
+            "the apex points {degrees:.0} degrees to the patient's back: front and back may be exchanged in the file \
+             (compare with another view: the spine lies behind). The sides of the polar map are those of the file"
+        ),
+        ApexDirection::Superior => format!(
+            "the apex points {degrees:.0} degrees up: up and down may be exchanged in the file (compare with another view: \
+             the liver lies below the heart). The sides of the polar map are those of the file: a defect named anterior may \
+             be inferior"
+        ),
+    }
 }
 
 impl Flag {

@@ -209,8 +209,18 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
             |flag: &str| flag == code || (flag == "field_of_view" && code == "touches_border");
         report.flags.iter().any(|flag| is_told(&flag.code))
     };
+    let polar = report.polar.as_ref();
+    let placed = polar.is_some_and(|polar| polar.orientation != UNKNOWN_ORIENTATION);
+    let turned = report.parameters.get("orbit").and_then(Value::as_str) != Some("none");
+    // What was not judged is neither in order nor not.
+    let judged = |code: &str| match code {
+        "mirrored" => placed,
+        "motion" => turned,
+        _ => true,
+    };
     checks
         .into_iter()
+        .filter(|(code, _)| judged(code))
         .map(|(code, text)| (!raised(code), text))
         .collect()
 }

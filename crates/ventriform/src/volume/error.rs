@@ -1,5 +1,6 @@
 //! Errors of reading a volume.
 
+use crate::geometry::frame::VOXEL_MM;
 use crate::mesh_files::MeshFileError;
 use crate::progress::Cancelled;
 
@@ -131,8 +132,8 @@ pub enum VolumeError {
         /// The file's name.
         file: String,
     },
-    /// A file that is given as a gate and does not lie on the first gate's grid.
-    #[error("gate {gate} {}: files of one gate each must have one grid", .difference)]
+    /// A file that is given as a gate and does not lie on the first gate's grid, or is of another patient or study.
+    #[error("gate {gate} {}: files of one gate each must be one study on one grid", .difference)]
     OtherGate {
         /// The gate, from 1.
         gate: usize,
@@ -170,6 +171,19 @@ pub enum VolumeError {
         voxel: [usize; 3],
         /// The value with slope and intercept applied.
         value: f64,
+    },
+    /// No scan of a heart has voxels of this size.
+    #[error(
+        "{file}: the voxels are {} mm in size, and those of a scan are {} to {} mm",
+        .spacing_mm.map(|mm| mm.to_string()).join(" x "),
+        VOXEL_MM.start(),
+        VOXEL_MM.end()
+    )]
+    VoxelSize {
+        /// The file's name.
+        file: String,
+        /// Along i, j, k, mm.
+        spacing_mm: [f64; 3],
     },
     /// Every voxel is NaN or infinite.
     #[error("{file}: no voxel has a finite value")]

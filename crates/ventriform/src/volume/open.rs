@@ -13,7 +13,7 @@ use super::preview::MiddlePlanes;
 use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
 use super::{Provenance, Segment, Volume, VolumeError};
 use crate::draw::Image;
-use crate::geometry::frame::VoxelToPatient;
+use crate::geometry::frame::{VOXEL_MM, VoxelToPatient};
 use crate::grid::gates::GATES;
 use crate::mesh::TriMesh;
 use crate::progress::Monitor;
@@ -209,6 +209,13 @@ pub(super) fn read(
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
     let header = file.header();
+    let spacing_mm = header.placement.frame.spacing();
+    if !spacing_mm.iter().all(|mm| VOXEL_MM.contains(mm)) {
+        return Err(VolumeError::VoxelSize {
+            file: header.file.to_owned(),
+            spacing_mm,
+        });
+    }
     let frame = options.choose(header.frames, header.gated);
     let frame = frame.map_err(|error| because(error, file.why_not_gated()))?;
     let decoded = match frame {

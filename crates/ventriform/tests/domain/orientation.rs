@@ -129,16 +129,16 @@ fn short_axis_slices_are_oriented_by_their_header_or_by_what_is_stated_or_not_at
     }
 }
 
-/// The image in a NIfTI file, its x exchanged if `mirrored`, with the codes of its affines set to `code`.
-fn file(volume: &Volume, mirrored: bool, code: u8) -> Vec<VolumeFile> {
+/// The image in a NIfTI file, the coordinate `mirrored` exchanged, with the codes of its affines set to `code`.
+fn file(volume: &Volume, mirrored: Option<usize>, code: u8) -> Vec<VolumeFile> {
     let mut bytes = nifti::write(volume, StoredType::Int16, false).unwrap();
-    // qform_code and sform_code; srow_x.
+    // qform_code and sform_code; srow_x, srow_y, srow_z.
     bytes[252] = code;
     bytes[254] = code;
-    if mirrored {
+    if let Some(axis) = mirrored {
         bytes[252] = 0;
         for at in (280..296).step_by(4) {
-            bytes[at + 3] ^= 0x80;
+            bytes[at + 16 * axis + 3] ^= 0x80;
         }
     }
     vec![VolumeFile::in_memory("scan.nii", bytes)]
@@ -164,6 +164,33 @@ fn is_mirrored(made: &Segmentation) -> bool {
     flags.iter().any(|flag| flag.code() == "mirrored")
 }
 
+/// An apex at the back, or well above the base.
+#[test]
+fn a_heart_with_front_and_back_or_up_and_down_exchanged_is_flagged() {
+    for seed in 0..3 {
+        let parameters = PhantomParameters {
+            shape: [52; 3],
+            spacing_mm: [5.0; 3],
+            seed,
+            ..PhantomParameters::default()
+        };
+        let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+        let coded = segmented(&file(&volume, None, 1), &[]);
+        let axis = coded.fit.model.cup.as_ref().unwrap().axis;
+        assert!(axis.y < -0.2, "{axis}");
+        assert!(
+            is_mirrored(&segmented(&file(&volume, Some(1), 1), &[])),
+            "{seed}"
+        );
+        if axis.z < -0.3 {
+            assert!(
+                is_mirrored(&segmented(&file(&volume, Some(2), 1), &[])),
+                "{seed}"
+            );
+        }
+    }
+}
+
 /// Hearts of all poses that the phantom has: told when the file exchanges left and right, and only then.
 #[test]
 fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
@@ -176,14 +203,14 @@ fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
         };
         let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
         assert!(
-            !is_mirrored(&segmented(&file(&volume, false, 1), &[])),
+            !is_mirrored(&segmented(&file(&volume, None, 1), &[])),
             "{seed}"
         );
-        let mirrored = segmented(&file(&volume, true, 1), &[]);
+        let mirrored = segmented(&file(&volume, Some(0), 1), &[]);
         assert!(is_mirrored(&mirrored), "{seed}");
         // It is told of frames that claim a patient only.
         assert!(
-            !is_mirrored(&segmented(&file(&volume, true, 0), &[])),
+            !is_mirrored(&segmented(&file(&volume, Some(0), 0), &[])),
             "{seed}"
         );
     }
@@ -193,8 +220,8 @@ fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
 #[test]
 fn a_file_without_codes_has_no_sides_unless_they_are_stated() {
     let volume = patient().volume;
-    let coded = segmented(&file(&volume, false, 1), &[]);
-    let bare = file(&volume, false, 0);
+    let coded = segmented(&file(&volume, None, 1), &[]);
+    let bare = file(&volume, None, 0);
     let untold = segmented(&bare, &[]);
     let map = untold.polar.as_ref().unwrap();
     assert_eq!(map.orientation, OrientationSource::Unknown);
