@@ -228,6 +228,36 @@ async fn keys_are_managed_over_http_within_one_tenant() {
 }
 
 #[tokio::test]
+async fn a_key_does_not_outlive_the_keys_that_made_it() {
+    let app = TestApp::start().await;
+    let admin = plain_key(&app, Scope::Admin).await;
+    closed(&app).await;
+    let make = |by: &str, scope: &str| {
+        let wanted = json!({"name": "made", "scope": scope});
+        let request = app.post("/v1/keys").bearer_auth(by).json(&wanted);
+        async move {
+            let made = request.send().await.unwrap();
+            let path = made.headers()["location"].to_str().unwrap().to_owned();
+            let made: Value = made.json().await.unwrap();
+            (path, text(&made["key"]))
+        }
+    };
+    let (first_path, first) = make(&admin, "admin").await;
+    let (_, second) = make(&first, "admin").await;
+    let (_, third) = make(&second, "read").await;
+    let seen = |key: &str| status(app.get("/v1/jobs").bearer_auth(key));
+    for key in [&first, &second, &third] {
+        assert_eq!(seen(key).await, StatusCode::OK);
+    }
+    let gone = app.delete(&first_path).bearer_auth(&admin);
+    assert_eq!(status(gone).await, StatusCode::NO_CONTENT);
+    for key in [&first, &second, &third] {
+        assert_eq!(seen(key).await, StatusCode::UNAUTHORIZED);
+    }
+    assert_eq!(seen(&admin).await, StatusCode::OK);
+}
+
+#[tokio::test]
 async fn beyond_loopback_nobody_is_served_without_credentials() {
     let data = tempfile::tempdir().unwrap();
     let settings = |allow_anonymous| Settings {

@@ -35,14 +35,14 @@ pub enum Refusal {
     /// There is no such key.
     #[error("unknown key")]
     UnknownKey,
-    /// The key was revoked, or its time is over.
+    /// The key was revoked, or its time is over; or that of a key that made it.
     #[error("the key is {}", state.as_str())]
     EndedKey {
         /// The key's id.
         key: String,
         /// Whose key it was.
         tenant: Tenant,
-        /// How it ended.
+        /// How it, or the key that made it, ended.
         state: KeyState,
     },
     /// The token is not valid here.
@@ -184,12 +184,16 @@ impl Gate {
     }
 
     /// The keys that have made a key.
-    async fn makers(&self, key: &ApiKey) -> Result<Makers, StoreError> {
+    ///
+    /// # Errors
+    /// [`Refusal::EndedKey`] if one of them has ended: a key does not outlive its makers.
+    async fn makers(&self, made: &ApiKey) -> Result<Makers, Refusal> {
         let mut makers = Makers {
-            any: key.maker != Maker::Operator,
+            any: made.maker != Maker::Operator,
             keys: Vec::new(),
         };
-        let mut maker = key.maker.clone();
+        let now = self.clock.now();
+        let mut maker = made.maker.clone();
         while let Maker::Caller(Some(id)) = maker {
             // Rows of keys are never deleted, and a key is made before those that it makes.
             let Some(key) = self
@@ -199,6 +203,16 @@ impl Gate {
             else {
                 break;
             };
+            match key.state(now) {
+                KeyState::Active => {}
+                state => {
+                    return Err(Refusal::EndedKey {
+                        key: made.id.clone(),
+                        tenant: made.tenant.clone(),
+                        state,
+                    });
+                }
+            }
             makers.keys.push((account(&key.id), key.quota));
             maker = key.maker;
         }
