@@ -502,7 +502,7 @@ settings! {
     webhook_concurrency: usize = "16";
     /// Largest number of deliveries sent at the same time to one host and port
     webhook_destination_concurrency: usize = "4";
-    /// Largest number of pending deliveries to one host and port; the oldest beyond that are given up
+    /// Largest number of pending deliveries of one tenant to one host and port; the oldest beyond that are given up
     webhook_backlog: u32 = "10000";
     /// How long delivered and given-up deliveries are kept
     webhook_history: Span = "7d";

@@ -106,7 +106,7 @@ impl DeliveryStore for SqlStore {
              WHERE sequence IN (
                  SELECT sequence FROM (
                      SELECT sequence, row_number() OVER
-                         (PARTITION BY destination ORDER BY since DESC, sequence DESC) AS place
+                         (PARTITION BY tenant, destination ORDER BY since DESC, sequence DESC) AS place
                      FROM deliveries WHERE state = 'pending') AS ranked
                  WHERE place > $3)",
         )
