@@ -3,7 +3,9 @@
 //! It is that of the connection and of the `Host` header. If the other end is a trusted proxy (setting
 //! `trusted_proxies`), its word is taken for what it has changed: `X-Forwarded-Proto`,
 //! `X-Forwarded-Host`, `X-Forwarded-Port` and `X-Forwarded-Prefix`, or `proto` and `host` of `Forwarded`
-//! (RFC 7239). Of a list, the first value counts, which the outermost proxy has written; prefixes are
+//! (RFC 7239). Of a list, as many values count from its right as there are trusted proxies
+//! ([`trusted_hops`]): the leftmost of them, which the outermost trusted proxy has written. What stands before it could
+//! have been made up by the client. If `X-Forwarded-*` and `Forwarded` disagree, neither is used. Prefixes are
 //! joined in their order. Values that cannot be part of an address are not used. Without a prefix from a proxy, the
 //! setting `base_path` is the path.
 //!
@@ -12,6 +14,7 @@
 //! Every path in an answer is made by [`public_path`]: links, `Location`, the files of the page.
 //! [`crate::connections`] runs each request within [`PublicBase::scope`].
 
+use super::client::trusted_hops;
 use axum::http::{HeaderMap, HeaderName, header};
 use std::net::IpAddr;
 use std::sync::Arc;
@@ -67,15 +70,21 @@ impl PublicBase {
     /// The address as a proxy has seen it.
     fn forwarded(self, headers: &HeaderMap, policy: &ProxyPolicy) -> Self {
         let element = outermost(headers, &policy.trusted);
-        let stated = |name: HeaderName, parameter: &str| {
-            first(headers, &name).or_else(|| pair(&element, parameter))
+        let hops = trusted_hops(headers, &policy.trusted);
+        let stated = |name: HeaderName, parameter: &str| match (
+            from_right(headers, &name, hops),
+            pair(&element, parameter),
+        ) {
+            (Some(one), Some(other)) if !one.eq_ignore_ascii_case(&other) => None,
+            (one, other) => one.or(other),
         };
         let https = match stated(X_FORWARDED_PROTO, "proto") {
             Some(scheme) if scheme.eq_ignore_ascii_case("https") => true,
             Some(scheme) if scheme.eq_ignore_ascii_case("http") => false,
             _ => self.https,
         };
-        let port = first(headers, &X_FORWARDED_PORT).and_then(|port| port.parse::<u16>().ok());
+        let port = from_right(headers, &X_FORWARDED_PORT, hops);
+        let port = port.and_then(|port| port.parse::<u16>().ok());
         let usual = if https { 443 } else { 80 };
         let host = stated(X_FORWARDED_HOST, "host").filter(|host| is_host(host));
         let host = host.map(|host| match port.filter(|port| *port != usual) {
@@ -130,6 +139,17 @@ pub fn public_path(path: &str) -> String {
 fn first(headers: &HeaderMap, name: &HeaderName) -> Option<String> {
     let value = headers.get(name)?.to_str().ok()?;
     let value = value.split(',').next().unwrap_or_default().trim();
+    (!value.is_empty()).then(|| value.to_owned())
+}
+
+/// The value at `place` from the right (1 is the last) of a header that may be a list, or the first of a
+/// shorter one: some proxies pass on a value instead of appending theirs.
+fn from_right(headers: &HeaderMap, name: &HeaderName, place: usize) -> Option<String> {
+    let lines = headers.get_all(name).iter();
+    let values: Vec<&str> = lines
+        .flat_map(|line| line.to_str().unwrap_or_default().split(','))
+        .collect();
+    let value = values.get(values.len().saturating_sub(place))?.trim();
     (!value.is_empty()).then(|| value.to_owned())
 }
 
@@ -211,6 +231,7 @@ mod tests {
     #[test]
     fn what_several_proxies_say_is_put_together() {
         let lists = [
+            ("x-forwarded-for", "203.0.113.7, 10.2.2.2"),
             ("x-forwarded-proto", "https, http"),
             ("x-forwarded-host", "[2001:db8::1], inner"),
             ("x-forwarded-port", "8443"),
@@ -220,6 +241,20 @@ mod tests {
             seen("10.1.2.3", &lists),
             "https://[2001:db8::1]:8443/outer/inner"
         );
+        // Behind one trusted proxy, only the last value is that of a proxy.
+        let made_up = [
+            ("x-forwarded-for", "10.2.2.2, 203.0.113.7"),
+            ("x-forwarded-proto", "http"),
+            ("x-forwarded-proto", "https"),
+            ("x-forwarded-host", "evil.example, heart.example"),
+        ];
+        assert_eq!(seen("10.1.2.3", &made_up), "https://heart.example/own");
+        let disagreeing = [
+            ("host", "backend"),
+            ("x-forwarded-host", "evil.example"),
+            ("forwarded", "for=203.0.113.7;host=heart.example"),
+        ];
+        assert_eq!(seen("10.1.2.3", &disagreeing), "http://backend/own");
         let usual = [
             ("x-forwarded-proto", "HTTPS"),
             ("x-forwarded-host", "heart.example"),
