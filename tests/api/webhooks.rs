@@ -368,7 +368,9 @@ async fn registered_webhooks_are_told_about_every_job_and_show_their_secret_once
         .await
         .unwrap();
     assert_eq!(made.status(), 201);
+    let path = made.headers()["location"].to_str().unwrap().to_owned();
     let made: Value = made.json().await.unwrap();
+    assert_eq!(path, format!("/v1/webhooks/{}", text(&made["id"])));
     let secret: SigningSecret = text(&made["secret"]).parse().unwrap();
     let second = app
         .post("/v1/webhooks")

@@ -12,6 +12,7 @@ use super::problem::{Answer, Problem, shorten};
 use super::query::NoQuery;
 use super::request::{PathSegments, json_object};
 use super::webhook_request::GivenWebhook;
+use crate::public_base::public_path;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
@@ -97,7 +98,8 @@ pub struct WebhookSecret {
 #[utoipa::path(post, path = "/v1/webhooks", tag = "webhooks",
     request_body(content = openapi::WebhookRequest, content_type = "application/json"),
     responses(
-        (status = 201, description = "Registered", body = WebhookBody),
+        (status = 201, description = "Registered", body = WebhookBody,
+            headers(("Location" = String, description = "The webhook's path"))),
         FileProblems,
     ))]
 pub async fn create_webhook(
@@ -135,8 +137,12 @@ pub async fn create_webhook(
         )
         .fix("Remove one first, or ask the operator to raise `webhook_endpoint_limit`."));
     }
+    let location = public_path(&format!("/v1/webhooks/{}", endpoint.id));
     let body = WebhookBody::of(endpoint, Some(secret.reveal()));
-    let headers = [(header::CACHE_CONTROL, "no-store")];
+    let headers = [
+        (header::LOCATION, location),
+        (header::CACHE_CONTROL, "no-store".to_owned()),
+    ];
     Ok((StatusCode::CREATED, headers, Json(body)).into_response())
 }
 
