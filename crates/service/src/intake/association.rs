@@ -88,7 +88,7 @@ impl From<WireError> for Break {
         match error {
             WireError::Closed | WireError::Failed(_) => Self::Broken,
             WireError::Unrecognised(_) => Self::Violation(AbortReason::UnrecognizedPdu),
-            WireError::TooLong { .. } | WireError::Malformed(_) => {
+            WireError::TooLong { .. } | WireError::TooMany { .. } | WireError::Malformed(_) => {
                 Self::Violation(AbortReason::InvalidPduParameter)
             }
         }
@@ -124,7 +124,7 @@ where
         Ok(request) => match admit(service, &request, peer).await {
             Err(rejection) => (AssociationEnd::Rejected, false, Some(rejection)),
             Ok((origin, place)) => {
-                let (end, last) = associate(service, &mut wire, &request, origin).await;
+                let (end, last) = associate(service, &mut wire, request, origin).await;
                 drop(place);
                 (end, true, last)
             }
@@ -207,17 +207,19 @@ async fn admit<'a>(
 async fn associate<S>(
     service: &Service,
     wire: &mut Wire<S>,
-    request: &AssociationRQ,
+    request: AssociationRQ,
     origin: Origin,
 ) -> (AssociationEnd, Option<Pdu>)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send,
 {
     let deadline = Instant::now() + service.settings.time_limit;
-    let (answer, contexts) = negotiate(request, &service.offer);
+    let (answer, contexts) = negotiate(&request, &service.offer);
     let accept = Pdu::AssociationAC(answer);
     service.observer.associated();
-    let theirs = longest_of(request).and_then(|length| usize::try_from(length).ok());
+    let theirs = longest_of(&request).and_then(|length| usize::try_from(length).ok());
+    // An association may last long, and this is not needed any more.
+    drop(request);
     let mut association = Association {
         service,
         wire,
@@ -231,7 +233,7 @@ where
         message: None,
     };
     let served = tokio::select! {
-        served = timeout_at(deadline, association.run(&accept)) => served,
+        served = timeout_at(deadline, association.run(accept)) => served,
         () = service.ending.cancelled() => Ok(Err(Break::Shutdown)),
     };
     let broken = match served {
@@ -285,8 +287,9 @@ enum Target {
 
 impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
     /// Accepts the association and serves it until it is to be released.
-    async fn run(&mut self, accept: &Pdu) -> Result<(), Break> {
-        self.write(accept).await?;
+    async fn run(&mut self, accept: Pdu) -> Result<(), Break> {
+        self.write(&accept).await?;
+        drop(accept);
         loop {
             match self.read().await? {
                 Pdu::PData { data } => {

@@ -13,6 +13,18 @@ use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
 /// Longest request for an association, bytes: 128 contexts with every transfer syntax there is.
 const LONGEST_REQUEST: u32 = 512 << 10;
+/// Most presentation contexts of a request (PS3.8, 9.3.2.2: their ids are odd and have one byte).
+const MOST_CONTEXTS: usize = 128;
+/// Most transfer syntaxes of one presentation context, more than the standard has.
+const MOST_SYNTAXES: usize = 64;
+/// Bytes of a request for an association before its variable items (PS3.8, table 9-11).
+const REQUEST_ITEMS_AT: usize = 74;
+/// Type of a presentation context in a request, and of a transfer syntax in one (PS3.8, 9.3.2.2).
+const CONTEXT_ITEM: u8 = 0x20;
+const SYNTAX_ITEM: u8 = 0x40;
+/// Bytes of an item before its content, and of a presentation context before its items.
+const ITEM_HEADER_BYTES: usize = 4;
+const CONTEXT_HEADER_BYTES: usize = 4;
 /// Longest PDU of any kind that has no content, bytes.
 const LONGEST_OTHER: u32 = 1024;
 /// Bytes before the content.
@@ -45,6 +57,14 @@ pub enum WireError {
         length: u32,
         /// The greatest length.
         limit: u32,
+    },
+    /// A request for an association has more parts than are read.
+    #[error("a request for an association has more than {limit} {what}")]
+    TooMany {
+        /// The parts.
+        what: &'static str,
+        /// The greatest number.
+        limit: usize,
     },
     /// The content is not what PS3.8 says.
     #[error("the content of a PDU of type {0:02X}H is malformed")]
@@ -139,14 +159,55 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Wire<S> {
 /// The PDU in `bytes`, header and content.
 ///
 /// # Errors
-/// [`WireError::Malformed`], also if the reader of the fields panics.
+/// [`WireError::Malformed`], also if the reader of the fields panics; [`WireError::TooMany`].
 pub fn decode(bytes: &[u8]) -> Result<Pdu, WireError> {
+    if bytes.first() == Some(&1) {
+        check_request(bytes)?;
+    }
     let malformed = || WireError::Malformed(bytes.first().copied().unwrap_or(0));
     let read = || read_pdu(bytes, MAXIMUM_PDU_SIZE, false);
     match catch_unwind(AssertUnwindSafe(read)) {
         Ok(Ok(Some(pdu))) => Ok(pdu),
         _ => Err(malformed()),
     }
+}
+
+/// Counts the parts of a request for an association, of which each takes more memory than bytes once it is
+/// read. Damaged items end the count; reading them is an error.
+fn check_request(bytes: &[u8]) -> Result<(), WireError> {
+    let mut contexts = 0;
+    for (kind, content) in items(bytes.get(REQUEST_ITEMS_AT..).unwrap_or_default()) {
+        if kind != CONTEXT_ITEM {
+            continue;
+        }
+        contexts += 1;
+        if contexts > MOST_CONTEXTS {
+            return Err(WireError::TooMany {
+                what: "presentation contexts",
+                limit: MOST_CONTEXTS,
+            });
+        }
+        let parts = items(content.get(CONTEXT_HEADER_BYTES..).unwrap_or_default());
+        if parts.filter(|(kind, _)| *kind == SYNTAX_ITEM).count() > MOST_SYNTAXES {
+            return Err(WireError::TooMany {
+                what: "transfer syntaxes in one presentation context",
+                limit: MOST_SYNTAXES,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The items that follow each other in `bytes`: type and content.
+fn items(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let mut rest = bytes;
+    std::iter::from_fn(move || {
+        let (header, after) = rest.split_at_checked(ITEM_HEADER_BYTES)?;
+        let length = usize::from(u16::from_be_bytes([header[2], header[3]]));
+        let (content, after) = after.split_at_checked(length)?;
+        rest = after;
+        Some((header[0], content))
+    })
 }
 
 #[cfg(test)]
@@ -180,6 +241,34 @@ mod tests {
             read(b"GET / HTTP/1.1").await,
             Err(WireError::Unrecognised(b'G'))
         ));
+    }
+
+    #[test]
+    fn a_request_with_too_many_parts_is_refused() {
+        use dicom_ul::pdu::{AssociationRQ, PresentationContextProposed};
+        let request = |contexts: usize, syntaxes: usize| {
+            let context = PresentationContextProposed {
+                id: 1,
+                abstract_syntax: "1.2.3".into(),
+                transfer_syntaxes: vec!["1.2".into(); syntaxes],
+            };
+            let request = Pdu::AssociationRQ(AssociationRQ {
+                protocol_version: 1,
+                calling_ae_title: "A".into(),
+                called_ae_title: "B".into(),
+                application_context_name: "1.2.840.10008.3.1.1.1".into(),
+                presentation_contexts: vec![context; contexts],
+                user_variables: Vec::new(),
+            });
+            let mut bytes = Vec::new();
+            write_pdu(&mut bytes, &request).unwrap();
+            decode(&bytes)
+        };
+        assert!(request(MOST_CONTEXTS, MOST_SYNTAXES).is_ok());
+        for (contexts, syntaxes) in [(MOST_CONTEXTS + 1, 1), (1, MOST_SYNTAXES + 1)] {
+            let refused = request(contexts, syntaxes);
+            assert!(matches!(refused, Err(WireError::TooMany { .. })));
+        }
     }
 
     #[tokio::test]
