@@ -311,7 +311,7 @@ const SERVICE: &[(&str, &[&str])] = &[
             "hooks",
         ],
     ),
-    ("intake", &["records", "error", "jobs", "access"]),
+    ("intake", &["records", "error", "client", "jobs", "access"]),
     ("worklist", &["records", "dicom_tags"]),
     (
         "stores",

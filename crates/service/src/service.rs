@@ -51,7 +51,7 @@ pub struct Service {
     /// Cancelled when the service shuts down, so that long answers end.
     pub closing: CancellationToken,
     /// Reads files outside of jobs.
-    pub decoding: Decoding,
+    pub decoding: Arc<Decoding>,
     /// The memory that requests may hold.
     pub memory: MemoryBudget,
     /// Webhooks.

@@ -11,6 +11,7 @@ use super::receive::Receiver;
 use super::service::{Places, ScpSettings, Service};
 use super::session::Sessions;
 use crate::access::Recorder;
+use crate::client::ClientAddress;
 use crate::records::Clock;
 use rustls::ServerConfig;
 use std::collections::BTreeMap;
@@ -141,6 +142,7 @@ impl Listener {
             };
             let _ = stream.set_nodelay(true);
             let peer = address.ip();
+            let client = ClientAddress::of_peer(peer);
             let enter = |table: &Mutex<Unassociated>| {
                 let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
                 table.enter(peer)
@@ -161,7 +163,7 @@ impl Listener {
                             peer,
                             displaced,
                         };
-                        serve(&service, connection, leave).await;
+                        client.scope(serve(&service, connection, leave)).await;
                     }
                     Some(tls) => match handshake(&service, stream, tls, &displaced).await {
                         Some(stream) => {
@@ -170,7 +172,7 @@ impl Listener {
                                 peer,
                                 displaced,
                             };
-                            serve(&service, connection, leave).await;
+                            client.scope(serve(&service, connection, leave)).await;
                         }
                         None => service.observer.ended(AssociationEnd::Broken, false),
                     },

@@ -6,7 +6,7 @@
 //! 1. [`Listener`] accepts connections; each becomes an association, if the caller is one of the
 //!    operator's [`Sender`]s. [`Wire`](wire) reads PDUs within limits; the contexts are negotiated to the
 //!    SOP classes and transfer syntaxes that [`ventriform::volume`] reads.
-//! 2. [`Receiver`] takes one object: its bytes go to the disk as they come, its header is checked, and
+//! 2. [`Receiver`] takes one object: its bytes go to the disk as they come, its header is checked ([`HeaderTurns`]), and
 //!    its row is committed ([`IntakeStore`]). Only then the sender is told that it is stored.
 //! 3. [`Gatherer`] waits until a group of objects is complete: at once for an object that is a volume of
 //!    its own; for a series of slices, when the association is released and nothing more has come
@@ -53,7 +53,9 @@ pub use desk::Intake;
 pub use gather::{GatherSettings, Gatherer, MakeError, VolumeMaker};
 pub use listener::{Listener, TlsConfiguration};
 pub use observer::{AssociationEnd, IntakeObserver};
-pub use receive::{Incoming, ReceiveError, Receiver, ReceiverSettings, Refused, Stated};
+pub use receive::{
+    HeaderTurns, HeaderWork, Incoming, ReceiveError, Receiver, ReceiverSettings, Refused, Stated,
+};
 pub use record::{
     Added, GROUP_PREFIX, GroupState, IncomingFile, IntakeGroup, IntakeRoom, IntakeStore, NewObject,
     Origin, Protocol, ReceivedFiles, ReceivedObject,

@@ -1,7 +1,7 @@
 //! One object: from bytes to a row.
 //!
 //! 1. The bytes are written to a file as they come ([`Incoming::write`]).
-//! 2. The header is read and the content hashed, a few objects at a time.
+//! 2. The header is read and the content hashed, within the bounds of a [`HeaderTurns`].
 //! 3. The file is forced to the disk; then its row is committed.
 
 use super::observer::IntakeObserver;
@@ -9,19 +9,22 @@ use super::record::{
     Added, IncomingFile, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, ReceivedFiles,
 };
 use super::session::Session;
-use crate::records::{BlobError, Clock, StoreError, StoreFault, hex, random_id};
+use crate::error::ServiceError;
+use crate::records::{BlobError, Clock, Fault, StoreError, StoreFault, hex, random_id};
+use async_trait::async_trait;
 use sha2::{Digest, Sha256};
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
-use tokio::sync::Semaphore;
-use ventriform::progress::Monitor;
+use tokio::sync::oneshot;
+use ventriform::progress::{Monitor, Stage};
 use ventriform::volume::dicom::{DicomHeader, read_header};
 use ventriform::volume::{ReadLimits, VolumeError, VolumeFile};
 
-/// Objects whose headers are read at the same time. A hostile header takes 16 MiB at most.
-const EXAMINED_AT_ONCE: usize = 2;
+/// Memory of reading a header, bytes: a hostile one takes as much.
+const HEADER_MEMORY: u64 = 16 << 20;
 
 /// Bytes that are gathered for one write.
 const WRITE_BYTES: usize = 64 << 10;
@@ -104,6 +107,18 @@ impl From<BlobError> for ReceiveError {
     }
 }
 
+impl From<ServiceError> for ReceiveError {
+    fn from(error: ServiceError) -> Self {
+        if error.may_pass() {
+            Self::NoRoom("too many objects are being read; send it again later")
+        } else if matches!(error.failure.fault, Fault::Content) {
+            Self::NotUnderstood(error.to_string())
+        } else {
+            Self::Storage(error.to_string())
+        }
+    }
+}
+
 impl From<StoreError> for ReceiveError {
     fn from(error: StoreError) -> Self {
         match error.cause() {
@@ -150,6 +165,20 @@ pub struct ReceiverSettings {
     pub limits: ReadLimits,
 }
 
+/// The reading of a header, which ends early once its monitor is cancelled.
+pub type HeaderWork = Box<dyn FnOnce(&Monitor<'_>) + Send>;
+
+/// Where headers of received objects are read: within bounds on time and memory, in turn with other work.
+#[async_trait]
+pub trait HeaderTurns: Send + Sync {
+    /// Does `work`, which reads a file of `bytes` bytes and needs at most `memory` bytes. Dropping the future
+    /// cancels it.
+    ///
+    /// # Errors
+    /// If too much waits, or the work takes too long or panics.
+    async fn run(&self, bytes: u64, memory: u64, work: HeaderWork) -> Result<(), ReceiveError>;
+}
+
 /// Takes objects.
 pub struct Receiver {
     store: Arc<dyn IntakeStore>,
@@ -157,7 +186,7 @@ pub struct Receiver {
     clock: Arc<dyn Clock>,
     observer: Arc<dyn IntakeObserver>,
     settings: ReceiverSettings,
-    examined: Semaphore,
+    turns: Arc<dyn HeaderTurns>,
 }
 
 /// An object on its way to the disk. Dropping it deletes it.
@@ -208,6 +237,7 @@ impl Receiver {
         files: Arc<dyn ReceivedFiles>,
         clock: Arc<dyn Clock>,
         observer: Arc<dyn IntakeObserver>,
+        turns: Arc<dyn HeaderTurns>,
         settings: ReceiverSettings,
     ) -> Self {
         Self {
@@ -216,7 +246,7 @@ impl Receiver {
             clock,
             observer,
             settings,
-            examined: Semaphore::new(EXAMINED_AT_ONCE),
+            turns,
         }
     }
 
@@ -283,10 +313,12 @@ impl Receiver {
         closed.map_err(BlobError::from)?;
         let local = incoming.file.local();
         let limits = self.settings.limits;
-        let examined = {
-            let _turn = self.examined.acquire().await;
-            tokio::task::spawn_blocking(move || examine(&local, &limits)).await
-        };
+        let (tell, told) = oneshot::channel();
+        let work: HeaderWork = Box::new(move |monitor| {
+            let _ = tell.send(examine(&local, &limits, monitor));
+        });
+        self.turns.run(incoming.bytes, HEADER_MEMORY, work).await?;
+        let examined = told.await;
         let examined = examined.map_err(|error| ReceiveError::Storage(error.to_string()))??;
         let header = examined.header.clone();
         let kept = match stated.contradiction(&header) {
@@ -345,15 +377,22 @@ impl Receiver {
 }
 
 /// Reads the header of an object and hashes its data set and its whole file.
-fn examine(path: &Path, limits: &ReadLimits) -> Result<Examined, ReceiveError> {
+fn examine(
+    path: &Path,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<Examined, ReceiveError> {
     let not_understood = |error: VolumeError| ReceiveError::NotUnderstood(error.to_string());
-    let file = VolumeFile::named("the object", path);
-    let header = read_header(&file, limits, &Monitor::silent()).map_err(not_understood)?;
-    let hashed = hashes(path, header.data_set).map_err(BlobError::from)?;
-    let Some((data_sha256, file_sha256)) = hashed else {
+    let mut opened = File::open(path).map_err(BlobError::from)?;
+    // Before anything is unpacked: a packed file is none.
+    if !is_file_of_ps310(&mut opened).map_err(BlobError::from)? {
         let reason = "it is no file of PS3.10".to_owned();
         return Err(ReceiveError::NotUnderstood(reason));
-    };
+    }
+    let file = VolumeFile::named("the object", path);
+    let header = read_header(&file, limits, monitor).map_err(not_understood)?;
+    let hashed = hashes(opened, header.data_set, monitor).map_err(BlobError::from)?;
+    let (data_sha256, file_sha256) = hashed;
     Ok(Examined {
         header,
         data_sha256,
@@ -361,14 +400,18 @@ fn examine(path: &Path, limits: &ReadLimits) -> Result<Examined, ReceiveError> {
     })
 }
 
-/// The hashes of the file from byte `data_set` on, and of all of it; `None` if it does not begin as
-/// PS3.10 says.
-fn hashes(path: &Path, data_set: u64) -> io::Result<Option<(String, String)>> {
-    let mut file = std::fs::File::open(path)?;
+/// Whether the file begins as PS3.10 says.
+fn is_file_of_ps310(file: &mut File) -> io::Result<bool> {
     let mut start = [0; 132];
-    if file.read_exact(&mut start).is_err() || start[128..] != *b"DICM" {
-        return Ok(None);
+    match file.read_exact(&mut start) {
+        Ok(()) => Ok(start[128..] == *b"DICM"),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(error) => Err(error),
     }
+}
+
+/// The hashes of the file from byte `data_set` on, and of all of it.
+fn hashes(mut file: File, data_set: u64, monitor: &Monitor<'_>) -> io::Result<(String, String)> {
     file.seek(SeekFrom::Start(0))?;
     let (mut data, mut whole) = (Sha256::new(), Sha256::new());
     let mut head = vec![0; usize::try_from(data_set).unwrap_or(0)];
@@ -376,10 +419,13 @@ fn hashes(path: &Path, data_set: u64) -> io::Result<Option<(String, String)>> {
     whole.update(&head);
     let mut portion = vec![0; HASHED_BYTES];
     loop {
+        monitor
+            .report(Stage::Read, 0.0)
+            .map_err(|_| io::Error::other("the reading was cancelled"))?;
         let read = file.read(&mut portion)?;
         if read == 0 {
             let [data, whole] = [data, whole].map(|hash| hex(&hash.finalize()));
-            return Ok(Some((data, whole)));
+            return Ok((data, whole));
         }
         data.update(&portion[..read]);
         whole.update(&portion[..read]);

@@ -1,8 +1,20 @@
 //! The settings of the intake.
 
 use crate::config::Settings;
-use crate::intake::{IntakeRoom, ReceiverSettings, ScpSettings, Senders, Waits};
+use crate::decoding::Decoding;
+use crate::intake::{
+    HeaderTurns, HeaderWork, IntakeRoom, ReceiveError, ReceiverSettings, ScpSettings, Senders,
+    Waits,
+};
+use async_trait::async_trait;
 use ventriform::volume::ReadLimits;
+
+#[async_trait]
+impl HeaderTurns for Decoding {
+    async fn run(&self, bytes: u64, memory: u64, work: HeaderWork) -> Result<(), ReceiveError> {
+        Ok(self.run_on(bytes, memory, work).await?)
+    }
+}
 
 /// Bounds of the longest P-DATA-TF PDU, bytes.
 const PDU_BYTES: (u64, u64) = (4 << 10, 16 << 20);

@@ -73,6 +73,10 @@ pub async fn open(
     let metrics = Metrics::new();
     let spans = Spans::new(settings.otlp_endpoint.0.as_deref())?;
     queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
+    let decoding = Arc::new(Decoding::new(
+        &settings,
+        metrics.requests.decoding_waits.clone(),
+    ));
     let service = Service {
         engine,
         access: stores.access.clone(),
@@ -84,14 +88,14 @@ pub async fn open(
         scheduled: Notify::new(),
         quotas: Quotas::new(stores.access.clone(), general_quota(&settings)),
         closing: CancellationToken::new(),
-        decoding: Decoding::new(&settings, metrics.requests.decoding_waits.clone()),
+        decoding: decoding.clone(),
         memory: MemoryBudget::new(settings.request_memory.0),
         hooks: hooks(&settings, &stores, &queue),
         archives: ArchiveDesk::new(
             stores.archives.clone(),
             UrlGuard::of_listed(settings.dicomweb_allow.clone()),
         ),
-        intake: receiving(&settings, &stores, &queue, &metrics),
+        intake: receiving(&settings, &stores, &queue, &metrics, decoding),
         metrics,
         readiness: Readiness::default(),
         figures: stores.figures.clone(),
@@ -207,12 +211,19 @@ fn general_quota(settings: &Settings) -> Quota {
 }
 
 /// The reception of objects.
-fn receiving(settings: &Settings, stores: &Stores, queue: &Queue, metrics: &Metrics) -> Intake {
+fn receiving(
+    settings: &Settings,
+    stores: &Stores,
+    queue: &Queue,
+    metrics: &Metrics,
+    decoding: Arc<Decoding>,
+) -> Intake {
     let receiver = Receiver::new(
         stores.intake.clone(),
         stores.received.clone(),
         queue.clock().clone(),
         Arc::new(metrics.intake.clone()),
+        decoding,
         intake::receiver_settings(settings),
     );
     Intake {

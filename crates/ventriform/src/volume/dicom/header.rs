@@ -15,6 +15,10 @@ use std::fmt;
 /// Longest UID (PS3.5, 9.1).
 const LONGEST_UID: usize = 64;
 
+/// Longest deflated data set before its pixels, or without pixels, bytes once inflated. Deflate packs up to a
+/// thousand to one, and objects with many frames have a few megabytes there.
+const LONGEST_INFLATED_BYTES: u64 = 64 << 20;
+
 /// Identity and kind of one object. This is personal data: `Debug` shows none of it.
 #[derive(Clone, PartialEq, Eq)]
 pub struct DicomHeader {
@@ -48,14 +52,20 @@ impl fmt::Debug for DicomHeader {
 ///
 /// # Errors
 /// [`VolumeError`] if the file is no DICOM object, is damaged or cut off, has a transfer syntax that is
-/// not read, or lacks one of its four UIDs.
+/// not read, lacks one of its four UIDs, or has more than 64 MiB of deflated data before its pixels.
 pub fn read_header(
     file: &VolumeFile,
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<DicomHeader, VolumeError> {
     let syntax = syntax::find(file, limits)?;
-    let mut source = syntax.open(file, limits.unpacked_bytes)?;
+    let longest = if syntax.deflated {
+        let longest = syntax.data_set.saturating_add(LONGEST_INFLATED_BYTES);
+        longest.min(limits.unpacked_bytes)
+    } else {
+        limits.unpacked_bytes
+    };
+    let mut source = syntax.open(file, longest)?;
     let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
     let sop_class = uid(&a, SOP_CLASS)?;
     Ok(DicomHeader {

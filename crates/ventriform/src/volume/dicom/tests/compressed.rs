@@ -248,6 +248,21 @@ fn deflated_data_sets_are_read_and_bounded() {
         ),
         "{error}"
     );
+    // The header of a received object has a bound of its own, whatever else may be unpacked.
+    let mut bomb = vec![0x08, 0, 0x01, 0, b'U', b'N', 0, 0];
+    bomb.extend((65_u32 << 20).to_le_bytes());
+    bomb.resize(bomb.len() + (65 << 20), 0);
+    bomb.extend(&plain);
+    let bomb = VolumeFile::in_memory("bomb", with_meta(uid, deflate(&bomb)));
+    let read = super::super::read_header(&bomb, &ReadLimits::default(), &Monitor::silent());
+    let error = read.unwrap_err();
+    assert!(
+        matches!(
+            error,
+            VolumeError::Corrupt { .. } | VolumeError::TooLarge { .. }
+        ),
+        "{error}"
+    );
 }
 
 #[test]
