@@ -58,7 +58,14 @@ const SEARCH_MEMORY: u64 = 20 << 20;
 const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 
 /// How often a change is tried again that another one came before.
-const CHANGE_TRIES: usize = 20;
+const CHANGE_TRIES: u32 = 20;
+
+/// Pause before the second try of a change; it grows by as much with each further one, so that the tries
+/// of many requests spread.
+const CHANGE_PAUSE: Duration = Duration::from_millis(2);
+
+/// Pause before a change is asked for again that all tries have failed, seconds.
+const CHANGE_RETRY_S: &str = "1";
 
 /// The query of a new work item.
 #[derive(Deserialize, IntoParams)]
@@ -419,7 +426,8 @@ async fn change(
     uid: &str,
     how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
 ) -> Answer<Change> {
-    for _ in 0..CHANGE_TRIES {
+    for tried in 0..CHANGE_TRIES {
+        tokio::time::sleep(CHANGE_PAUSE * tried).await;
         let mut item = find(app, caller, uid).await?;
         let moment = now(app);
         let before = text_of(&item.attributes)?.len();
@@ -433,7 +441,13 @@ async fn change(
             return Ok(done);
         }
     }
-    Err(Problem::internal("a work item changes all the time"))
+    Err(Problem::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "busy",
+        "Other requests change this work item at the same time, so it was not changed.",
+    )
+    .fix("Send the request again after the number of seconds in Retry-After.")
+    .header(header::RETRY_AFTER, CHANGE_RETRY_S))
 }
 
 /// An item's attributes as they are stored.
