@@ -151,6 +151,11 @@ async fn what_cannot_be_compared_is_refused_with_its_field() {
             "invalid-field",
         ),
         (
+            json!({"stress": "vol_00", "rest": rest}),
+            "stress",
+            "invalid-field",
+        ),
+        (
             json!({"stress": "seg_00", "rest": rest}),
             "stress",
             "invalid-field",
@@ -356,6 +361,7 @@ async fn a_table_that_is_none_is_refused_with_its_row() {
         (with("tracer", json!("x".repeat(300))), "cases[1].tracer"),
         (with("rest_case", json!("n3")), "cases[1].rest_case"),
         (with("rest_case", json!("n2")), "cases[1].rest_case"),
+        (json!({"cases": [case("n1", "vol_00")]}), "cases[0].volume"),
         (json!({"name": "", "cases": [case("n1", &volume)]}), "name"),
         (
             json!({"parameters": {"model": "mdl_00"}, "cases": [case("n1", &volume)]}),

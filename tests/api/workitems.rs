@@ -218,6 +218,23 @@ async fn a_cancellation_is_carried_out_or_passed_on() {
 }
 
 #[tokio::test]
+async fn a_uid_that_is_none_is_refused_by_the_name_under_which_it_came() {
+    let app = TestApp::start().await;
+    let mut named = scheduled();
+    named[0]["00080018"] = json!({"vr": "UI", "Value": ["1.2.x"]});
+    let in_query = format!("{ITEMS}?workitem=1.2.x");
+    for (path, body, field) in [
+        (ITEMS, &named, "00080018"),
+        (in_query.as_str(), &scheduled(), "workitem"),
+    ] {
+        let refused = send(&app, Method::POST, path, body).await;
+        assert_eq!(refused.status(), StatusCode::BAD_REQUEST);
+        let refused: Value = refused.json().await.unwrap();
+        assert_eq!(refused["field"], field, "{refused}");
+    }
+}
+
+#[tokio::test]
 async fn work_items_are_searched_and_belong_to_a_tenant() {
     let app = TestApp::start().await;
     for number in 0..5 {

@@ -190,7 +190,8 @@ pub async fn create_comparison(
     let filed = app
         .service
         .file_job(work, Some(stress.volume), parameters, order, &counting)
-        .await?;
+        .await
+        .map_err(|error| error.naming("volume", WhichScan::Stress.as_str()))?;
     filing::answer(&app, filed, patience, &headers, &offers()).await
 }
 

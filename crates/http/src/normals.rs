@@ -185,5 +185,7 @@ pub async fn create_normals(
     let volume = first_volume(&parameters);
     order.webhook = webhook_of(&app, &object).await?;
     let filed = service.file_job(work, volume, parameters, order, &counting);
-    filing::accepted(&app, filed.await?).await
+    let filed = filed.await;
+    let filed = filed.map_err(|error| error.naming("volume", "cases[0].volume"))?;
+    filing::accepted(&app, filed).await
 }

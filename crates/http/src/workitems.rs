@@ -107,9 +107,12 @@ pub async fn create_workitem(
     };
     let counting = reserve_item(&app, &caller, request.headers()).await?;
     let attributes = data_set(request).await?;
-    let named = named.or_else(|| attributes.text(SOP_INSTANCE_UID).map(str::to_owned));
-    let uid = named.unwrap_or_else(new_uid);
-    require_uid("workitem", &uid)?;
+    let (field, named) = match named {
+        None => (SOP_INSTANCE_UID, attributes.text(SOP_INSTANCE_UID)),
+        Some(ref uid) => ("workitem", Some(uid.as_str())),
+    };
+    let uid = named.map_or_else(new_uid, str::to_owned);
+    require_uid(field, &uid)?;
     let size = text_of(&attributes)?.len() as u64;
     counting.arrived(size).await?;
     let moment = now(&app);

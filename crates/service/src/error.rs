@@ -84,6 +84,18 @@ impl ServiceError {
     }
 }
 
+impl ServiceError {
+    /// Says that the field concerned is `named` if it is `field`, which the request has under that name.
+    #[must_use]
+    pub fn naming(self, field: &str, named: impl Into<String>) -> Self {
+        if self.failure.field.as_deref() == Some(field) {
+            self.at(named)
+        } else {
+            self
+        }
+    }
+}
+
 impl From<Failure> for ServiceError {
     fn from(failure: Failure) -> Self {
         Self::new(Refusal::Failed, failure)
