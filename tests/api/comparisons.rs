@@ -339,6 +339,24 @@ async fn normal_limits_are_listed_used_and_outlive_their_cohort() {
 }
 
 #[tokio::test]
+async fn a_repeated_cohort_gets_its_job_although_the_library_is_full_since() {
+    let app = TestApp::with(|s| s.normals_limit = 1).await;
+    let order = json!({"cases": [case("n1", &app.volume("sphere").await)]});
+    let send = || {
+        let request = app.post("/v1/normals").header("idempotency-key", "one");
+        request.json(&order).send()
+    };
+    let first: Value = send().await.unwrap().json().await.unwrap();
+    app.until(&first, &["succeeded"]).await;
+    let again = send().await.unwrap();
+    assert_eq!(again.status(), StatusCode::ACCEPTED);
+    let again: Value = again.json().await.unwrap();
+    assert_eq!(again["id"], first["id"]);
+    let other = app.post_json("/v1/normals", order.clone()).await;
+    problem(other, 409, "library-full").await;
+}
+
+#[tokio::test]
 async fn a_table_that_is_none_is_refused_with_its_row() {
     let app = TestApp::start().await;
     let volume = app.volume("sphere").await;

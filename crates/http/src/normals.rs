@@ -2,6 +2,7 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::idempotency;
 use super::jobs::filing;
 use super::jobs::order_of;
 use super::links::{added, path_of, rfc3339};
@@ -150,9 +151,13 @@ pub async fn create_normals(
     let counting = reserve_item(&app, &caller, &headers).await?;
     let name = query.name.as_deref().unwrap_or("normals");
     check_name(name).map_err(ServiceError::from)?;
-    service
-        .require_product_room(tenant, Resource::Normals)
-        .await?;
+    // A repeated request gets its job, whatever has become of the library.
+    let key = idempotency::key(&headers)?;
+    if !service.is_filed(tenant, key.as_deref()).await? {
+        service
+            .require_product_room(tenant, Resource::Normals)
+            .await?;
+    }
     let bytes = json_bytes(request).await?;
     // A table is short; whatever is longer is read as limits, under the budget of decoding.
     let table_limit = app.service.settings.json_limit.as_usize();
