@@ -164,6 +164,20 @@ async fn no_way_in_goes_round_the_quota_of_bytes() {
     assert!(import(10 * quota).0);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn the_texts_of_a_job_count_before_it_is_filed() {
+    let app = TestApp::with(|settings| settings.quota_bytes = "6000B".parse().unwrap()).await;
+    let id = app.volume("sphere").await;
+    let labels: serde_json::Map<String, Value> = (0..16)
+        .map(|n| (format!("label-{n}"), json!("x".repeat(256))))
+        .collect();
+    let file = |order: Value| app.post("/v1/jobs").json(&order).send();
+    let wordy = file(json!({"volume": id, "labels": labels})).await.unwrap();
+    problem(wordy, 507, "storage-quota").await;
+    let short = file(json!({"volume": id})).await.unwrap();
+    assert_eq!(short.status(), StatusCode::ACCEPTED);
+}
+
 /// A computation that takes longer than any test.
 fn compute_endlessly(_: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
     loop {

@@ -135,10 +135,11 @@ impl Service {
         kinds.join(", ")
     }
 
-    /// Files a job on a stored volume, or on the series of its source. `counting` has counted it.
+    /// Files a job on a stored volume, or on the series of its source. `counting` has counted its record; its texts
+    /// are counted here.
     ///
     /// # Errors
-    /// `queue-full`; `idempotency-key-reused` if the key stands for another order; `invalid-field` if something
+    /// `queue-full`; `storage-quota` if its texts have no room; `idempotency-key-reused` if the key stands for another order; `invalid-field` if something
     /// that it needs does not exist.
     pub async fn file_job(
         &self,
@@ -146,12 +147,24 @@ impl Service {
         volume: Option<String>,
         parameters: Map<String, Value>,
         order: JobOrder,
-        _counting: &Counting,
+        counting: &Counting,
     ) -> Result<Job, ServiceError> {
         work.check_order(volume.as_deref(), &parameters)?;
         let job = order.into_job(work, volume, parameters);
+        self.count(&job, counting).await?;
         let filed = self.queue.file(&job).await?;
         self.accepted(&job.tenant, filed).await
+    }
+
+    /// Counts the texts of a job that is about to be filed. Those of one that is filed already, told by its
+    /// idempotency key, add nothing.
+    async fn count(&self, job: &NewJob, counting: &Counting) -> Result<(), ServiceError> {
+        let counted = counting.arrived(job.text_bytes()).await;
+        let key = job.idempotency.as_ref().map(|promise| &*promise.key);
+        match counted {
+            Err(_) if self.is_filed(&job.tenant, key).await? => Ok(()),
+            counted => counted,
+        }
     }
 
     /// The job of an earlier order under the same key; `None` if there was none. Ids are hashes, so the order can be
@@ -331,10 +344,9 @@ impl Service {
             ..JobOrder::new(job.tenant.clone(), quota)
         };
         let volume = job.volume.map(str::to_owned);
-        let filed = self
-            .queue
-            .file(&order.into_job(work, volume, parameters))
-            .await?;
+        let new = order.into_job(work, volume, parameters);
+        self.count(&new, &counting).await?;
+        let filed = self.queue.file(&new).await?;
         drop(counting);
         match filed {
             Filed::New(job) | Filed::Same(job) => Ok(job.id),

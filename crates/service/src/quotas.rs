@@ -205,7 +205,11 @@ impl Counting {
     /// The bytes that have come are stored: the database counts it from now on.
     pub fn stored(&self) {
         if let Some(counted) = &self.0 {
-            counted.state().reservation.stored();
+            let mut state = counted.state();
+            state.reservation.stored();
+            // What comes after it is not part of what was announced.
+            state.announced = state.arrived;
+            state.used = state.used.saturating_add(state.arrived);
         }
     }
 }
