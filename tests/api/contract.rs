@@ -1241,7 +1241,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     };
     let job = on
         .file(&NewJob {
-            webhook: Some(own),
+            webhook: Some(own.clone()),
             ..new_job(&volume)
         })
         .await;
@@ -1348,6 +1348,20 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     assert_eq!(on.a.expire(limits(0, 1), now()).await.unwrap(), 0);
     assert_eq!(on.a.expire(limits(0, 0), now()).await.unwrap(), 1);
     assert_eq!(on.a.expire(limits(i64::MAX, 0), now()).await.unwrap(), 0);
+    // Each tenant has a backlog of its own, also at a receiver that several tell.
+    for tenant in [tenant(), other()] {
+        let volume = on.volume(&tenant).await;
+        on.file(&NewJob {
+            tenant,
+            webhook: Some(own.clone()),
+            ..new_job(&volume)
+        })
+        .await;
+        let (_, lease) = on.claim().await.unwrap();
+        on.b.finish(&lease, &outcome, now()).await.unwrap().unwrap();
+    }
+    assert_eq!(on.b.backlog().await.unwrap().pending, 2);
+    assert_eq!(on.a.expire(limits(0, 1), now()).await.unwrap(), 0);
     // What was told about an erased job goes with it.
     on.a.delete_job(&job.id, now()).await.unwrap();
     assert!(

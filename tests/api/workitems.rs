@@ -217,6 +217,26 @@ async fn a_cancellation_is_carried_out_or_passed_on() {
     assert_eq!(given_up.status(), StatusCode::OK);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn changes_at_the_same_time_are_made_or_put_off() {
+    let app = TestApp::start().await;
+    let path = created(&app, "1.2.840.7").await;
+    let changes = (0..30).map(|number| {
+        let label = format!("Fit {number}");
+        let body = json!([{"00741204": {"vr": "LO", "Value": [label]}}]);
+        let (app, path) = (&app, &path);
+        async move { send(app, Method::POST, path, &body).await }
+    });
+    let answers = futures::future::join_all(changes).await;
+    assert!(answers.iter().any(|answer| answer.status().is_success()));
+    for answer in answers {
+        if !answer.status().is_success() {
+            assert_eq!(answer.headers()["retry-after"], "1");
+            problem(answer, 503, "busy").await;
+        }
+    }
+}
+
 #[tokio::test]
 async fn a_uid_that_is_none_is_refused_by_the_name_under_which_it_came() {
     let app = TestApp::start().await;
