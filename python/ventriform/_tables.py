@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
+import numbers
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from . import _native
+from ._errors import InputError
 
 Row = dict[str, Any]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -44,7 +47,7 @@ def annotation(row: Row) -> str:
     elif kind == "switch":
         made = "bool"
     elif kind == "choice":
-        made = f"Literal[{', '.join(map(repr, row['words']))}]"
+        made = f"Literal[{', '.join(map(repr, [*row['words'], *_numbers(row)]))}]"
     elif kind == "direction":
         words = f"Literal[{', '.join(map(repr, row['words']))}] | " if row["words"] else ""
         made = f"{words}Sequence[float]"
@@ -69,7 +72,7 @@ def values(row: Row) -> str:
     if kind == "switch":
         return "bool"
     if kind == "choice":
-        return "{" + ", ".join(map(repr, row["words"])) + "}"
+        return "{" + ", ".join(map(repr, [*row["words"], *_numbers(row)])) + "}"
     if kind == "direction":
         words = ", ".join(map(repr, row["words"]))
         return f"{{{words}}} or 3 floats" if words else "3 floats"
@@ -79,6 +82,29 @@ def values(row: Row) -> str:
     return f"str, such as {row['example']}"
 
 
+def _numbers(row: Row) -> list[int]:
+    """Those of the words of a choice that are numbers."""
+    return [int(word) for word in row["words"] if word.isdigit()]
+
+
+def checked(command: str, parameters: dict[str, Any]) -> dict[str, Any]:
+    """Parameters with choices as words. None is refused where it would be taken as a default that is something else."""
+    made = dict(parameters)
+    for row in rows(command):
+        name = row["name"]
+        if name not in made:
+            continue
+        value = made[name]
+        if value is None and default(row) is not None:
+            fix = f"Leave it out for {default(row)!r}"
+            if row["kind"] == "choice":
+                fix += f", or give one of {', '.join(map(repr, row['words']))}"
+            raise InputError(name, f"`{name}` is None.", f"{fix}.")
+        if row["kind"] == "choice" and isinstance(value, numbers.Real) and not isinstance(value, bool):
+            made[name] = next((word for word in row["words"] if word.isdigit() and int(word) == value), value)
+    return made
+
+
 def _described(row: Row) -> str:
     known = default(row)
     told = f", default {known!r}" if known is not None else ", optional"
@@ -86,7 +112,7 @@ def _described(row: Row) -> str:
 
 
 def with_table(command: str) -> Callable[[Function], Function]:
-    """Gives a function with `**parameters` the signature and the docstring of its table."""
+    """Gives a function with `**parameters` the signature and the docstring of its table, and checks what it is given."""
 
     def decorate(function: Function) -> Function:
         own = inspect.signature(function)
@@ -97,10 +123,16 @@ def with_table(command: str) -> Callable[[Function], Function]:
             inspect.Parameter(row["name"], inspect.Parameter.KEYWORD_ONLY, default=default(row), annotation=annotation(row))
             for row in listed
         ]
-        function.__signature__ = own.replace(parameters=[*before, *added])  # type: ignore[attr-defined]
+
+        @functools.wraps(function)
+        def with_checks(*given: Any, **parameters: Any) -> Any:
+            ours = {name: value for name, value in parameters.items() if name not in taken}
+            return function(*given, **{**parameters, **checked(command, ours)})
+
+        with_checks.__signature__ = own.replace(parameters=[*before, *added])  # type: ignore[attr-defined]
         head = inspect.cleandoc(function.__doc__ or "")
         table = "\n".join(inspect.cleandoc("\n" + _described(row)) for row in listed)
-        function.__doc__ = head.replace("[parameters]", table)
-        return function
+        with_checks.__doc__ = head.replace("[parameters]", table)
+        return cast(Function, with_checks)
 
     return decorate
