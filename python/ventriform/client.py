@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._errors import InputError, VentriformError
 from ._inputs import is_bytes, is_path
-from ._results import extra
+from ._results import extra, teller
 from .reports import Job, StoredVolume
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ class Client:
         id: str,
         *,
         timeout: float = 600.0,
-        progress: Callable[[str, float], object] | None = None,
+        progress: Any = None,
     ) -> Job:
         """The job once it has ended well, following its events.
 
@@ -159,8 +159,8 @@ class Client:
         while True:
             try:
                 for told in self.events(id):
-                    if progress is not None:
-                        progress(told.stage or "", told.progress)
+                    if tell is not None:
+                        tell(told.stage or "", told.progress)
                     if time.monotonic() > end:
                         break
             except ServiceError as error:
@@ -207,11 +207,21 @@ class Client:
             page = _object(self.request("GET", f"/v1/{kind}", params=query or None))
             yield from page.get(kind, [])
             if not page.get("next_cursor"):
+        Parameters
+        ----------
+        id : str
+            The job's id.
+        timeout : float
+            Seconds to wait at most.
+        progress : callable or tqdm, optional
+            Told stage and completed fraction, as with `segment`; True makes a bar.
+
                 return
             query = {**query, "cursor": str(page["next_cursor"])}
 
     def erase(self, path: str) -> None:
         """Erases a stored item: `/v1/volumes/ID`."""
+        tell = teller(progress)
         self.request("DELETE", path)
 
 
