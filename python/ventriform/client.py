@@ -6,9 +6,11 @@ import io
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from . import _tables
 from ._errors import InputError, VentriformError
 from ._inputs import is_bytes, is_path
 from ._results import extra, teller
@@ -22,6 +24,13 @@ if TYPE_CHECKING:
 
 #: Time between two questions for a job whose stream of events has ended.
 POLL_SECONDS = 0.2
+
+#: The function of each kind of job, whose table has its parameters.
+FUNCTIONS = {"model": "generate", "segmentation": "segment", "beat": "beat", "comparison": "compare"}
+
+MOST_PORT = 65535
+
+_ADDRESS = "Give an address such as http://127.0.0.1:8080."
 
 
 class ServiceError(VentriformError):
@@ -59,7 +68,7 @@ class Client:
     url : str
         Where the service is, such as ``http://127.0.0.1:8080``.
     key : str, optional
-        The API key, sent as ``Authorization: Bearer``.
+        The API key, sent as ``Authorization: Bearer``, and to no other scheme, host or port than those of `url`.
     timeout : float
         Seconds to wait for an answer.
 
@@ -74,8 +83,15 @@ class Client:
 
     def __init__(self, url: str, key: str | None = None, *, timeout: float = 60.0) -> None:
         package = extra("httpx", "client")
+        base = _url(url, _ADDRESS)
+        if base.scheme not in ("http", "https") or not base.host or (base.port or 0) > MOST_PORT:
+            raise InputError("url", f"`{url}` is no address of a service.", _ADDRESS)
+        if key is not None and not (isinstance(key, str) and key.isascii() and key.isprintable()):
+            raise InputError("key", "It is no text of printable ASCII characters.", "Give the key as `keys create` printed it.")
+        if timeout is not None and (not isinstance(timeout, (int, float)) or not timeout > 0):
+            raise InputError("timeout", f"It is {timeout!r}.", "Give seconds above 0.")
         headers = {"Authorization": f"Bearer {key}"} if key else {}
-        self._http: httpx.Client = package.Client(base_url=url, headers=headers, timeout=timeout)
+        self._http: httpx.Client = package.Client(base_url=base, headers=headers, timeout=timeout)
 
     def __enter__(self) -> Client:
         return self
@@ -90,29 +106,56 @@ class Client:
         self._http.close()
 
     def request(self, method: str, path: str, **options: Any) -> httpx.Response:
-        """Any request. An answer of 400 and above is raised."""
-        import httpx
+        """Any request to the service, with options of httpx. An answer of 400 and above is raised.
 
-        try:
-            answer = self._http.request(method, path, **options)
-        except httpx.HTTPError as error:
-            fix = "Check the address, and that the service runs."
-            raise ServiceError(0, "unreachable", f"{self._http.base_url}: {error}.", fix) from error
-        except (ValueError, TypeError, httpx.InvalidURL) as error:
-            raise InputError("url", f"{error}.", "Give an address such as http://127.0.0.1:8080.") from error
+        `path` is a path, or an address of the client's scheme, host and port: another would be sent the API key.
+        """
+        target = self._target(path)
+        with self._sending(target):
+            try:
+                answer = self._http.request(method, target, **options)
+            except (ValueError, TypeError, AttributeError) as error:
+                raise InputError("options", f"{error}.", "Give a method and options as httpx.Client.request takes them.") from error
         if answer.status_code >= 400:
             raise _refusal(answer)
         return answer
 
+    def _target(self, path: str) -> httpx.URL:
+        """The address of a path, if the key may be sent there."""
+        if self._http.is_closed:
+            raise InputError("client", "The client is closed.", "Make a new one.")
+        fix = "Give a path such as /v1/volumes; fetch another address without this client, whose key it must not get."
+        given, base = _url(path, fix), self._http.base_url
+        if given.scheme or given.host:
+            if (given.scheme, given.host, given.port) != (base.scheme, base.host, base.port):
+                raise InputError("url", f"`{path}` is not at {base}, the client's address.", fix)
+            return given
+        return base.copy_with(raw_path=base.raw_path.rstrip(b"/") + b"/" + given.raw_path.lstrip(b"/"))
+
+    @contextmanager
+    def _sending(self, target: httpx.URL) -> Iterator[None]:
+        """Turns what httpx raises into errors of this package."""
+        import httpx
+
+        try:
+            yield
+        except httpx.HTTPError as error:
+            fix = "Check the address, and that the service runs."
+            raise ServiceError(0, "unreachable", f"{target}: {error}.", fix) from error
+        except httpx.InvalidURL as error:
+            raise InputError("url", f"{target}: {error}.", _ADDRESS) from error
+
     def upload(self, scan: Any, name: str | None = None) -> StoredVolume:
         """Stores a volume. Takes a path or bytes: a file, or a zip archive of a series."""
+        if name is not None and not isinstance(name, str):
+            raise InputError("name", f"It is a {type(name).__name__}.", "Give the name of a file.")
         if is_path(scan):
-            name = name or os.path.basename(os.fspath(scan))
             try:
-                with open(scan, "rb") as file:
-                    return self._store(file, name)
-            except OSError as error:
+                file = open(scan, "rb")
+            except (OSError, ValueError) as error:
                 raise InputError("scan", f"{error}.", "Give the path of a file that can be read.") from error
+            with file:
+                return self._store(file, name or os.fsdecode(os.path.basename(scan)))
         if not is_bytes(scan):
             raise InputError("scan", f"A {type(scan).__name__} cannot be sent.", "Give a path or bytes.")
         return self._store(io.BytesIO(bytes(scan)), name or "scan")
@@ -121,20 +164,34 @@ class Client:
         files = {"file": (name, file, "application/octet-stream")}
         return StoredVolume.from_dict(_object(self.request("POST", "/v1/volumes", files=files)))
 
-    def submit(self, kind: str, volume: str, **parameters: Any) -> Job:
+    def submit(self, kind: str, volume: str | StoredVolume, **parameters: Any) -> Job:
         """Files a job on a stored volume.
 
         Parameters
         ----------
-        kind : {'model', 'segmentation', 'beat', 'comparison'}
+        kind : {'model', 'segmentation', 'beat', 'comparison', 'normals'}
             What is made.
-        volume : str
-            The id of an upload.
+        volume : str or StoredVolume
+            An upload, or its id.
         **parameters
-            Those of the function of this kind; `model` and `expert` are ids of what is stored, or 'auto'.
+            Those of the function of this kind: numbers and arrays of NumPy are sent as numbers. `model`, `expert` and
+            `normals` are ids of what is stored; `model` may be 'auto'.
+
+        Raises
+        ------
+        InputError
+            If a parameter cannot be sent.
+        ServiceError
+            If the service refuses one.
         """
-        given = {name: value for name, value in parameters.items() if value is not None}
-        body = {"kind": kind, "volume": volume, "parameters": given}
+        own = {"kind": kind, "volume": getattr(volume, "id", volume)}
+        for name, value in own.items():
+            if not isinstance(value, str):
+                raise InputError(name, f"It is a {type(value).__name__}.", f"Give {_OWN[name]}.")
+        if kind in FUNCTIONS:
+            parameters = _tables.checked(FUNCTIONS[kind], parameters)
+        given = {name: _plain(name, value) for name, value in parameters.items() if value is not None}
+        body = {**{name: _plain(name, value) for name, value in own.items()}, "parameters": given}
         return Job.from_dict(_object(self.request("POST", "/v1/jobs", json=body)))
 
     def job(self, id: str) -> Job:
@@ -150,11 +207,21 @@ class Client:
     ) -> Job:
         """The job once it has ended well, following its events.
 
+        Parameters
+        ----------
+        id : str
+            The job's id.
+        timeout : float
+            Seconds to wait at most.
+        progress : callable or tqdm, optional
+            Told stage and completed fraction, as with `segment`; True makes a bar.
+
         Raises
         ------
         ServiceError
             If the job failed or was cancelled, or has not ended within `timeout` seconds (code ``timeout``).
         """
+        tell = teller(progress)
         end = time.monotonic() + timeout
         while True:
             try:
@@ -178,54 +245,84 @@ class Client:
 
     def events(self, id: str) -> Iterator[Job]:
         """The job each time that something changes, until it has ended."""
-        import httpx
-
-        try:
-            headers = {"Accept": "text/event-stream"}
-            with self._http.stream("GET", f"/v1/jobs/{id}/events", headers=headers) as answer:
-                if answer.status_code >= 400:
-                    answer.read()
-                    raise _refusal(answer)
-                for line in answer.iter_lines():
-                    if line.startswith("data:"):
-                        told = json.loads(line.removeprefix("data:"))
-                        if isinstance(told, dict) and "state" in told:
-                            yield Job.from_dict(told)
-        except httpx.HTTPError as error:
-            fix = "Check the address, and that the service runs."
-            raise ServiceError(0, "unreachable", f"{self._http.base_url}: {error}.", fix) from error
+        target = self._target(f"/v1/jobs/{id}/events")
+        headers = {"Accept": "text/event-stream"}
+        with self._sending(target), self._http.stream("GET", target, headers=headers) as answer:
+            if answer.status_code >= 400:
+                answer.read()
+                raise _refusal(answer)
+            for line in answer.iter_lines():
+                if line.startswith("data:"):
+                    told = json.loads(line.removeprefix("data:"))
+                    if isinstance(told, dict) and "state" in told:
+                        yield Job.from_dict(told)
 
     def download(self, path: str, *, accept: str | None = None) -> bytes:
-        """The bytes of a file: a link of a job or of a result."""
+        """The bytes of a file: a link of a job or of a result, which is a path of the service."""
         headers = {"Accept": accept} if accept else {}
         return self.request("GET", path, headers=headers).content
 
     def search(self, kind: str, **filters: Any) -> Iterator[dict[str, Any]]:
-        """What is stored, newest first: `volumes`, `models`, `segmentations`, `beats`, `templates`, `readers` or `jobs`."""
+        """What is stored, newest first: `volumes`, `models`, `segmentations`, `beats`, `comparisons`, `normals`,
+        `templates`, `readers` or `jobs`."""
         query = {name: _text(value) for name, value in filters.items() if value is not None}
         while True:
             page = _object(self.request("GET", f"/v1/{kind}", params=query or None))
             yield from page.get(kind, [])
             if not page.get("next_cursor"):
-        Parameters
-        ----------
-        id : str
-            The job's id.
-        timeout : float
-            Seconds to wait at most.
-        progress : callable or tqdm, optional
-            Told stage and completed fraction, as with `segment`; True makes a bar.
-
                 return
             query = {**query, "cursor": str(page["next_cursor"])}
 
     def erase(self, path: str) -> None:
         """Erases a stored item: `/v1/volumes/ID`."""
-        tell = teller(progress)
         self.request("DELETE", path)
 
 
+_OWN = {
+    "kind": "one of 'model', 'segmentation', 'beat', 'comparison', 'normals'",
+    "volume": "what `upload` returned, or its id",
+}
+"""What the values of a job beside its parameters are."""
+
+
+def _url(address: Any, fix: str) -> httpx.URL:
+    import httpx
+
+    if not isinstance(address, (str, httpx.URL)):
+        raise InputError("url", f"A {type(address).__name__} is no address.", fix)
+    try:
+        made = httpx.URL(address)
+        str(made).encode("ascii")
+    except (httpx.InvalidURL, ValueError) as error:
+        raise InputError("url", f"{str(address)!r} is no address: {str(error).rstrip('.')}.", fix) from error
+    return made
+
+
+def _plain(name: str, value: Any) -> Any:
+    """A parameter's value of what JSON has."""
+    try:
+        plain: Any = json.loads(json.dumps(value, allow_nan=False, default=_numbers))
+        json.dumps(plain, ensure_ascii=False).encode()
+    except (TypeError, ValueError, RecursionError) as error:
+        fix = "Give a number, a word, true or false, or a sequence of numbers."
+        raise InputError(name, f"It cannot be sent: {error}.", fix) from error
+    return plain
+
+
+def _numbers(value: Any) -> Any:
+    """Numbers and arrays of NumPy as those of Python, and an upload as its id."""
+    if isinstance(value, StoredVolume):
+        return value.id
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} is no value of JSON")
+
+
 def _text(value: Any) -> str:
+    if isinstance(value, StoredVolume):
+        return value.id
+    if hasattr(value, "tolist"):
+        value = value.tolist()
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (list, tuple)):
