@@ -24,12 +24,23 @@ UNIT_MM = {"meter": 1000.0, "micron": 0.001}
 
 
 def voxels(array: Any) -> NDArray[np.float32]:
-    """An array (i, j, k) or (i, j, k, gate) as 32-bit floats in Fortran order; no copy where it is that already."""
+    """An array (i, j, k) or (i, j, k, gate) as 32-bit floats in Fortran order; no copy where it is that already.
+
+    Masked values become NaN.
+    """
     import numpy as np
 
     refuse_fix = "Give an array of numbers (i, j, k), or (i, j, k, gate)."
+    masked = None
     try:
-        found = np.asarray(array)
+        if isinstance(array, (list, tuple)) and any(isinstance(one, np.ma.MaskedArray) for one in array):
+            array = np.ma.array(array)
+        if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
+            masked = np.ma.getmaskarray(array)
+            # What is beneath the mask is not judged below.
+            found = np.where(masked, np.zeros((), array.dtype), array.data)
+        else:
+            found = np.asarray(array)
     except Exception as error:
         raise InputError("array", f"It is no array: {error}.", refuse_fix) from error
     if found.dtype.kind not in "buif":
@@ -45,6 +56,8 @@ def voxels(array: Any) -> NDArray[np.float32]:
         single = np.asfortranarray(found, dtype=np.float32)
     if found.dtype.itemsize > 4 and np.isinf(single).any() and not np.isinf(found).any():
         raise InputError("array", "A value is beyond 32-bit floats.", "Scale the values.")
+    if masked is not None:
+        single[masked] = np.nan
     return single
 
 

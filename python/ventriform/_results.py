@@ -43,8 +43,9 @@ class Volume:
     Parameters
     ----------
     array : array_like, (i, j, k) or (i, j, k, gate)
-        Voxel values; NaN where one is missing. They are kept as 32-bit floats in Fortran order: such an array is copied
-        once, any other is converted first. The last axis of a 4-D array of 6 to 32 volumes are the gates of a heart beat.
+        Voxel values; NaN, or the mask of a `numpy.ma.MaskedArray`, where one is missing. They are kept as 32-bit floats in
+        Fortran order: such an array is copied once, any other is converted first. The last axis of a 4-D array of 6 to 32
+        volumes are the gates of a heart beat.
     affine : array_like, (4, 4)
         From voxel indices to millimetres in the patient. Its numbers are rounded to 32 bits, as NIfTI files hold them.
     frame : {'RAS', 'LPS'}
