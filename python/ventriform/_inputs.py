@@ -136,6 +136,9 @@ def of_simpleitk(image: Any) -> _native.NativeVolume:
     array = SimpleITK.GetArrayViewFromImage(image).transpose()
     return _native.NativeVolume.from_array(voxels(array), affine_rows(affine, to_lps=False))
 
+    # SimpleITK ends the process where it is asked for the array of one.
+    if image.GetPixelIDTypeAsString().startswith("label of"):
+        raise InputError("image", "It is a label map.", "Give SimpleITK.LabelMapToLabel(image).")
 
 def dicom_bytes(dataset: Any, index: int = 0) -> tuple[str, bytes]:
     """Name and bytes of the file of a dataset of pydicom."""
