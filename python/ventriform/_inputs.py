@@ -6,6 +6,7 @@ Images are recognised by what they can do, so that none of those packages is nee
 from __future__ import annotations
 
 import os
+import struct
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 
 #: Whole numbers beyond this are not told apart by the 32-bit floats that voxels are kept in.
 MOST_EXACT_WHOLE = 1 << 24
+
+#: Most voxels along an axis of a NIfTI-1 file.
+MOST_NIFTI_VOXELS = 32767
 
 #: Millimetres of NIfTI's units of length.
 UNIT_MM = {"meter": 1000.0, "micron": 0.001}
@@ -110,12 +114,17 @@ def of_nibabel(image: Any) -> _native.NativeVolume:
     if image.affine is None:
         raise InputError("affine", "The image has no affine.", "Give an image with its place in the patient.")
     affine = np.array(image.affine, dtype=np.float64)
-    units = getattr(getattr(image, "header", None), "get_xyzt_units", None)
+    header = getattr(image, "header", None)
+    units = getattr(header, "get_xyzt_units", None)
     scale = UNIT_MM.get(units()[0], 1.0) if units else 1.0
     affine[:3] *= scale
     array = np.asanyarray(image.dataobj)
     while array.ndim > 3 and array.shape[-1] == 1:
         array = array[..., 0]
+    coded = [getattr(header, name, None) for name in ("get_sform", "get_qform")]
+    if all(coded) and not any(get(coded=True)[1] for get in coded if get):
+        sizes = [float(mm) * scale for mm in image.header.get_zooms()[:3]]
+        return unplaced(voxels(array), sizes)
     return _native.NativeVolume.from_array(voxels(array), affine_rows(affine, to_lps=True))
 
 
@@ -127,6 +136,9 @@ def of_simpleitk(image: Any) -> _native.NativeVolume:
     dimension = image.GetDimension()
     if dimension not in (3, 4):
         raise InputError("image", f"The image has {dimension} dimensions.", "Give an image of 3, or of 4 with gates.")
+    # SimpleITK ends the process where it is asked for the array of one.
+    if image.GetPixelIDTypeAsString().startswith("label of"):
+        raise InputError("image", "It is a label map.", "Give SimpleITK.LabelMapToLabel(image).")
     if image.GetNumberOfComponentsPerPixel() != 1:
         raise InputError("image", "A voxel has several components.", "Give an image of one number a voxel.")
     direction = np.array(image.GetDirection(), dtype=np.float64).reshape(dimension, dimension)[:3, :3]
@@ -134,11 +146,29 @@ def of_simpleitk(image: Any) -> _native.NativeVolume:
     affine[:3, :3] = direction * np.array(image.GetSpacing()[:3])
     affine[:3, 3] = image.GetOrigin()[:3]
     array = SimpleITK.GetArrayViewFromImage(image).transpose()
+    codes = [image.GetMetaData(key) if image.HasMetaDataKey(key) else "" for key in ("sform_code", "qform_code")]
+    # SimpleITK reads such a file as the identity. An image that has another place now was given it since.
+    if codes == ["0", "0"] and not np.any(affine[:3, 3]) and np.array_equal(direction, np.eye(3)):
+        return unplaced(voxels(array), [float(mm) for mm in image.GetSpacing()[:3]])
     return _native.NativeVolume.from_array(voxels(array), affine_rows(affine, to_lps=False))
 
-    # SimpleITK ends the process where it is asked for the array of one.
-    if image.GetPixelIDTypeAsString().startswith("label of"):
-        raise InputError("image", "It is a label map.", "Give SimpleITK.LabelMapToLabel(image).")
+
+def unplaced(array: NDArray[np.float32], sizes_mm: Sequence[float]) -> _native.NativeVolume:
+    """Voxels whose place in the patient no header states, as a NIfTI file that states none: they are read with its warning."""
+    if max(array.shape) > MOST_NIFTI_VOXELS:
+        reason = f"The array has the shape {array.shape}, and the image does not state its place."
+        raise InputError("affine", reason, "Give ventriform.Volume(array, affine).")
+    header = bytearray(352)
+    struct.pack_into("<i", header, 0, 348)
+    struct.pack_into("<8h", header, 40, array.ndim, *array.shape, *[1] * (7 - array.ndim))
+    struct.pack_into("<2h", header, 70, 16, 32)
+    struct.pack_into("<8f", header, 76, 1.0, *sizes_mm, *[1.0] * 4)
+    struct.pack_into("<3f", header, 108, 352.0, 1.0, 0.0)
+    header[123] = 2
+    header[344:348] = b"n+1\0"
+    content = bytes(header) + array.astype("<f4", copy=False).tobytes(order="F")
+    return _native.NativeVolume.from_bytes([("the image", content)])
+
 
 def dicom_bytes(dataset: Any, index: int = 0) -> tuple[str, bytes]:
     """Name and bytes of the file of a dataset of pydicom."""

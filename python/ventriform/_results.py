@@ -143,6 +143,8 @@ class Volume:
         else:
             gates = [self.data(gate) for gate in range(self.frames)]
             array = np.stack(gates, axis=-1)
+        if self.facts["affine_source"] == "pixdim":
+            return _unplaced_again, (array, self.spacing_mm, self._frame)
         return _array_again, (array, affine_from_lps(self._native.affine(), "LPS"), self._frame)
 
 
@@ -154,6 +156,10 @@ def _volume_again(source: tuple[str, Any], frame: Frame) -> Volume:
 
 def _array_again(array: Any, affine: Any, frame: Frame) -> Volume:
     return Volume(array, affine, frame="LPS").in_frame(frame)
+
+
+def _unplaced_again(array: Any, sizes_mm: Sequence[float], frame: Frame) -> Volume:
+    return Volume._of(_inputs.unplaced(array, sizes_mm), frame)
 
 
 class Surface:
