@@ -230,6 +230,8 @@ def measure(
         Frame of meshes that do not state theirs.
 
     Returns
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
     -------
     Measured
 
@@ -427,6 +429,8 @@ def phantom(
         If a value is out of its range.
     """
     kept = checked(frame)
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
     try:
         order = {
             "shape": [int(size)] * 3 if isinstance(size, int) else [int(n) for n in size],

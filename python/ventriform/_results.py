@@ -124,7 +124,7 @@ class Volume:
         return self._native.warnings()
 
     def to_nibabel(self) -> Any:
-        """The volume as a `nibabel.Nifti1Image`."""
+        """The volume as a `nibabel.Nifti1Image`; of a gated one the sum of its gates (`data(gate)` has each)."""
         return extra("nibabel", "nibabel").Nifti1Image(self.array, affine_from_lps(self._native.affine(), "RAS"))
 
     def __repr__(self) -> str:
