@@ -10,7 +10,8 @@ from . import _inputs, _native
 from ._errors import InputError
 from ._frames import checked
 from ._results import (
-    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Volume, teller, unwrap,
+    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume,
+    teller, unwrap,
 )
 from ._tables import with_table
 
@@ -99,7 +100,7 @@ def segment(
     reader : Profile or path, optional
         How a reader draws the wall (`calibrate`): the wall is drawn as that reader would.
     expert : Volume, path, bytes or image, optional
-        An expert's mask to measure the result against: a volume, or the file of a closed mesh.
+        An expert's mask to measure the result against: what `measure` takes.
     normals : NormalLimits, path or bytes, optional
         Normal limits to compare the wall's uptake with (`build_normals`).
     formats : sequence of str
@@ -122,7 +123,7 @@ def segment(
         If the volume or a model cannot be read, the organ is not found, or a parameter cannot be used.
     """
     order = _order(model, formats, parts, (normals, parameters), deidentify)
-    order["expert"] = None if expert is None else _inputs.native(expert, unwrap)
+    order["expert"] = None if expert is None else _inputs.native(_mask(expert), unwrap)
     order["reader"] = _profile(reader)
     native = _inputs.native(scan, unwrap)
     return Fit(_native.segment(native, order, parameters, teller(progress)))
@@ -215,7 +216,7 @@ def measure(
 
     Parameters
     ----------
-    a, b : Fit, Volume, path, bytes or image
+    a, b : Fit, Wall, Model, Volume, path, bytes or image
         The mask to judge, and the reference: a volume of 0 and another value, a label map, a DICOM Segmentation,
         probabilities of which those above .5 count, or the file of a closed mesh.
     label : str or int, optional
@@ -462,7 +463,7 @@ def _mask(source: Any) -> Any:
         import numpy as np
 
         return Volume(source.mask.astype(np.float32, order="F"), source.in_frame("LPS").affine, frame="LPS")
-    return source
+    return source._mesh() if isinstance(source, Surface) else source
 
 
 _OF_LIMITS = ("sex", "protocol", "stress_protocol", "rest_protocol", "tracer", "attenuation_corrected")

@@ -200,6 +200,11 @@ class Surface:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self.vertices)} vertices, {len(self.faces)} faces, {self.frame})"
+    def _mesh(self) -> bytes:
+        """The bytes of the library's own file of a mesh, which states frame and unit, with every digit."""
+        document = {"frame": "LPS", "unit": "mm", "vertices": self._lps.tolist(), "triangles": self.faces.tolist()}
+        return json.dumps(document).encode()
+
 
 
 class Wall(Surface):
