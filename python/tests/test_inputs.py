@@ -189,7 +189,7 @@ def test_other_arguments_are_checked(scan: pathlib.Path, tmp_path: pathlib.Path)
         ("mesh_unit", lambda: vf.measure(scan, scan, mesh_unit="inch")),
         ("cohort", lambda: vf.calibrate(tmp_path / "none")),
         ("cohort", lambda: vf.build_normals(tmp_path / "none")),
-        ("phantom", lambda: vf.phantom(size=4)),
+        ("size", lambda: vf.phantom(size=4)),
     ]
     for field, call in work:
         with pytest.raises(vf.InputError) as raised:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from . import _inputs, _native
+from . import _checks, _inputs, _native
 from ._errors import InputError
 from ._frames import checked
 from ._results import (
@@ -218,7 +218,8 @@ def measure(
     ----------
     a, b : Fit, Wall, Model, Volume, path, bytes or image
         The mask to judge, and the reference: a volume of 0 and another value, a label map, a DICOM Segmentation,
-        probabilities of which those above .5 count, or the file of a closed mesh.
+        probabilities of which those above .5 count, or a closed surface: a `Wall`, a `Model` or the file of a mesh. A `Fit`
+        is its mask.
     label : str or int, optional
         Structure to compare, of each that holds several: number of a label or segment, or name of a segment.
     label_a, label_b : str or int, optional
@@ -229,10 +230,10 @@ def measure(
         Unit of meshes that do not state theirs.
     mesh_frame : {'lps', 'ras'}, optional
         Frame of meshes that do not state theirs.
-
-    Returns
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+
+    Returns
     -------
     Measured
 
@@ -241,8 +242,7 @@ def measure(
     InputError
         If a mask cannot be read or is empty, or which structure is meant cannot be told.
     """
-    _one_of("mesh_unit", mesh_unit, ("mm", "cm", "m"))
-    _one_of("mesh_frame", mesh_frame, ("lps", "ras"))
+    _check_mesh(mesh_unit, mesh_frame)
     masks = [_inputs.native(_mask(mask), unwrap) for mask in (a, b)]
     labels = [None if one is None else str(one) for one in (label, label_a, label_b)]
     text, structures, resampled = _native.measure(
@@ -282,7 +282,9 @@ def calibrate(
     """
     import json
 
-    text, figures = _native.calibrate(cohort, mask, parameters, teller(progress))
+    folder, of_masks = _checks.path("cohort", cohort), _checks.text("mask", mask)
+    _checks.text("name", name)
+    text, figures = _native.calibrate(folder, of_masks, parameters, teller(progress))
     table = json.loads(figures)
     return Calibration(Profile(text.encode(), name), table["cases"], table["problems"])
 
@@ -308,7 +310,8 @@ def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> N
     InputError
         If the table cannot be read, a group has too few usable cases, or a parameter cannot be used.
     """
-    return NormalLimits(_native.build_normals(cohort, parameters, teller(progress)).encode())
+    folder = _checks.path("cohort", cohort)
+    return NormalLimits(_native.build_normals(folder, parameters, teller(progress)).encode())
 
 
 def evaluate(
@@ -325,7 +328,7 @@ def evaluate(
     mesh_unit: str | None = None,
     mesh_frame: str | None = None,
     leave_one_out: bool = False,
-    in_sample: Sequence[str] = (),
+    in_sample: str | Sequence[str] = (),
     progress: Any = None,
 ) -> Evaluation:
     """Makes models of a cohort's templates, fits them to every patient and writes tables, as `ventriform evaluate`.
@@ -354,8 +357,8 @@ def evaluate(
         As `measure` takes them.
     leave_one_out : bool
         Choose model, number of points and reader's profile for each case without that case.
-    in_sample : sequence of str
-        Cases that the program's constants were chosen on, or 'all': their figures are labelled in-sample.
+    in_sample : sequence of str, or 'all'
+        Cases that the program's constants were chosen on, or all: their figures are labelled in-sample.
     progress : callable or tqdm, optional
         Told step and its completed fraction.
 
@@ -368,14 +371,21 @@ def evaluate(
     InputError
         If the folder is no cohort, or no fit succeeded.
     """
+    _checks.one_of("method", method, ("refined", "paper"))
+    _check_mesh(mesh_unit, mesh_frame)
+    folder = _checks.path("out", out)
     order = {
-        "cohort": os.fspath(cohort), "out": os.fspath(out), "points": list(points),
-        "reference_points": list(reference_points), "models": list(models), "method": method, "manual": manual,
-        "label": None if label is None else str(label), "resample": resample, "mesh_unit": mesh_unit,
-        "mesh_frame": mesh_frame, "leave_one_out": leave_one_out, "in_sample": list(in_sample),
+        "cohort": _checks.path("cohort", cohort), "out": folder,
+        "points": _checks.wholes("points", points, 0, _checks.MOST_POINTS),
+        "reference_points": _checks.wholes("reference_points", reference_points, 0, _checks.MOST_POINTS),
+        "models": _checks.words("models", models), "method": method,
+        "manual": None if manual is None else _checks.text("manual", manual),
+        "label": None if label is None else str(label), "resample": bool(resample), "mesh_unit": mesh_unit,
+        "mesh_frame": mesh_frame, "leave_one_out": bool(leave_one_out),
+        "in_sample": ["all"] if in_sample == "all" else _checks.words("in_sample", in_sample),
         "program": _program(),
     }
-    return Evaluation(os.fspath(out), _native.evaluate(order, teller(progress)))
+    return Evaluation(folder, _native.evaluate(order, teller(progress)))
 
 
 def phantom(
@@ -419,6 +429,8 @@ def phantom(
         Perfusion defects: AHA segment (1 to 17) and severity (0 to 1).
     frame : {'RAS', 'LPS'}
         The patient frame of the volumes' affine.
+    progress : callable or tqdm, optional
+        Told stage and completed fraction of the whole. An exception in it ends the work.
 
     Returns
     -------
@@ -430,19 +442,24 @@ def phantom(
         If a value is out of its range.
     """
     kept = checked(frame)
-    progress : callable or tqdm, optional
-        Told stage and completed fraction of the whole. An exception in it ends the work.
-    try:
-        order = {
-            "shape": [int(size)] * 3 if isinstance(size, int) else [int(n) for n in size],
-            "spacing_mm": [float(spacing_mm)] * 3 if isinstance(spacing_mm, (int, float)) else list(spacing_mm),
-            "length_mm": length_mm, "width_mm": width_mm, "wall_mm": wall_mm, "noise": noise, "liver": liver,
-            "right_ventricle": right_ventricle, "motion_mm": motion_mm, "heads": heads,
-            "defects": list((defects or {}).items()), "seed": seed,
-        }
-        voxels, truth, lps = _native.phantom(order, teller(progress))
-    except (TypeError, OverflowError) as error:
-        raise InputError("phantom", f"{error}.", "Give the types that help(ventriform.phantom) lists.") from error
+    figures = {
+        "length_mm": length_mm, "width_mm": width_mm, "wall_mm": wall_mm, "noise": noise, "liver": liver,
+        "right_ventricle": right_ventricle, "motion_mm": motion_mm,
+    }
+    if defects is not None and not isinstance(defects, Mapping):
+        raise InputError("defects", f"A {type(defects).__name__} is no dictionary.", "Give {segment: severity}.")
+    order = {
+        "shape": [_checks.whole("size", one, 16, 1024) for one in _checks.each_axis("size", size)],
+        "spacing_mm": [_checks.number("spacing_mm", one) for one in _checks.each_axis("spacing_mm", spacing_mm)],
+        **{name: _checks.number(name, value) for name, value in figures.items()},
+        "heads": _checks.whole("heads", heads, 1, 2),
+        "defects": [
+            (_checks.whole("defects", part, 1, 17), _checks.number("defects", severity))
+            for part, severity in (defects or {}).items()
+        ],
+        "seed": _checks.whole("seed", seed, 0, 2**64 - 1),
+    }
+    voxels, truth, lps = _native.phantom(order, teller(progress))
     made = [Volume(array, lps, frame="LPS").in_frame(kept) for array in (voxels, truth)]
     return Phantom(made[0], made[1])
 
@@ -453,9 +470,11 @@ def _stem(source: Any, otherwise: str) -> str:
     return os.path.basename(os.fspath(source)).split(".")[0] or otherwise
 
 
-def _one_of(field: str, value: str | None, words: Sequence[str]) -> None:
-    if value is not None and value not in words:
-        raise InputError(field, f"`{value}` is not one of the choices.", f"Give one of {', '.join(words)}.")
+def _check_mesh(unit: str | None, frame: str | None) -> None:
+    if unit is not None:
+        _checks.one_of("mesh_unit", unit, ("mm", "cm", "m"))
+    if frame is not None:
+        _checks.one_of("mesh_frame", frame, ("lps", "ras"))
 
 
 def _mask(source: Any) -> Any:
@@ -484,14 +503,11 @@ def _order(
             models.append(os.fspath(one))
         else:
             raise InputError("model", f"A {type(one).__name__} is no model.", "Give 'auto', a Model or a path.")
-    for field, words in (("formats", formats), ("parts", parts)):
-        if isinstance(words, str) or not all(isinstance(word, str) for word in words):
-            raise InputError(field, f"{words!r} is no sequence of words.", "Give a list of words.")
     normals, parameters = limits
     if normals is None and any(parameters.get(name) is not None for name in _OF_LIMITS):
         raise InputError("normals", "A scan's kind was stated without limits.", "Give `normals` too.")
     return {
-        "model": models, "formats": list(formats), "parts": list(parts),
+        "model": models, "formats": _checks.words("formats", formats), "parts": _checks.words("parts", parts),
         "normals": _limits(normals),
         "expert": None, "reader": None, "deidentify": deidentify,
     }

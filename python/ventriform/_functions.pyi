@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Volume
+from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume
 
 Path = str | os.PathLike[str]
 def read(
@@ -312,7 +312,7 @@ def evaluate(
     mesh_unit: str | None = None,
     mesh_frame: str | None = None,
     leave_one_out: bool = False,
-    in_sample: Sequence[str] = (),
+    in_sample: str | Sequence[str] = (),
     progress: Any = None,
 ) -> Evaluation: ...
 def phantom(

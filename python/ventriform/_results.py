@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from . import _inputs, _native
+from . import _checks, _inputs, _native
 from ._errors import InputError, MissingExtraError
 from ._frames import Frame, affine_from_lps, checked, points_from_lps
 
@@ -108,7 +108,9 @@ class Volume:
         return self.data()
 
     def data(self, frame: int | None = None) -> NDArray[np.float32]:
-        """The voxels of one volume of several, counted from 0."""
+        """The voxels of one volume of several, counted from 0; without `frame` those of the only one, or of the sum of the gates."""
+        if frame is not None:
+            frame = _checks.whole("frame", frame, 0, self.frames - 1)
         voxels, _ = self._native.voxels(frame)
         return voxels
 
@@ -198,13 +200,13 @@ class Surface:
         """The surface as a `trimesh.Trimesh`, its vertices as they are."""
         return extra("trimesh", "trimesh").Trimesh(vertices=self.vertices, faces=self.faces, process=False)
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self.vertices)} vertices, {len(self.faces)} faces, {self.frame})"
     def _mesh(self) -> bytes:
         """The bytes of the library's own file of a mesh, which states frame and unit, with every digit."""
         document = {"frame": "LPS", "unit": "mm", "vertices": self._lps.tolist(), "triangles": self.faces.tolist()}
         return json.dumps(document).encode()
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.vertices)} vertices, {len(self.faces)} faces, {self.frame})"
 
 
 class Wall(Surface):
@@ -637,13 +639,20 @@ class Profile:
     ----------
     name : str
         The reader's name in reports.
+
+    Parameters
+    ----------
+    text : bytes
+        The content of its file.
+    name : str
+        The reader's name.
     """
 
     __slots__ = ("_text", "name")
 
     def __init__(self, text: bytes, name: str = "reader") -> None:
-        self._text = text
-        self.name = name
+        self._text = _checks.document("text", text, "ventriform-reader-profile", "calibrate")
+        self.name = _checks.text("name", name)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Profile, (self._text, self.name)
@@ -666,7 +675,7 @@ class NormalLimits:
     """Normal limits of healthy people, as `build_normals` makes them: `normals` of `segment`, `beat` and `compare`."""
 
     def __init__(self, text: bytes) -> None:
-        self._text = text
+        self._text = _checks.document("text", text, "ventriform-normal-limits", "normals build")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return NormalLimits, (self._text,)

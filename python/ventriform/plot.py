@@ -37,6 +37,8 @@ def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str =
     """
     import numpy as np
 
+    if not isinstance(fit, Fit):
+        raise InputError("fit", f"A {type(fit).__name__} is no fit.", "Give what `segment` returned.")
     found = fit.polar_map
     if found is None or found.level_ends is None or found.rings is None:
         raise InputError("fit", "It has no polar map.", "Give a fit of a left ventricle.")
@@ -45,7 +47,7 @@ def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str =
         figure = pyplot.figure(figsize=(5, 5))
         ax = figure.add_subplot(projection="polar")
     assert ax is not None
-    if ax.name != "polar":
+    if getattr(ax, "name", None) != "polar":
         raise InputError("ax", "The axes are not polar.", "Make them with projection='polar'.")
     values = np.array(found.values_percent, dtype=np.float64)
     rows, columns = values.shape
