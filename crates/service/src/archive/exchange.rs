@@ -50,7 +50,7 @@ impl Exchange {
             store,
             host,
             queue,
-            web: WebClients::new(guard, settings.timeout),
+            web: WebClients::new(guard, settings.timeout, settings.parts),
             settings,
         }
     }

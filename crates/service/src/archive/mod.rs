@@ -28,9 +28,11 @@
 //! | `record` | fetches and deliveries, the trait that a database implements |
 //! | `host` | the trait that the service around implements: storing volumes, making objects |
 //! | `web`, `related`, `pieces`, `parts`, `dimse` | DICOMweb, its messages of several objects, C-STORE |
+//! | `answer` | what is read of an answer in JSON |
 //! | `trouble`, `end` | why an attempt failed, and whether that may pass; how attempts end |
 //! | `exchange`, `pull`, `deliver` | what both have in common; fetching; delivering |
 
+mod answer;
 mod deliver;
 mod description;
 mod desk;

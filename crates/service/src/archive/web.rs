@@ -3,6 +3,7 @@
 //! Redirects are followed within the archive's own scheme, host and port only. For a URL without a
 //! configured archive, connections go to the addresses that the guard has checked.
 
+use super::answer::{Read, Step, listed, read};
 use super::parts::{PartLimits, SeriesParts};
 use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
@@ -13,14 +14,19 @@ use futures::StreamExt;
 use reqwest::header::{ACCEPT, CONTENT_TYPE, HeaderMap};
 use reqwest::redirect::{Attempt, Policy};
 use reqwest::{Certificate, Client, ClientBuilder, Response, StatusCode};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::time::Duration;
 
-/// The largest JSON answer that is read, bytes.
-const JSON_BYTES: usize = 16 << 20;
+/// Most bytes of a search's answer for each object that a series may have. PS3.18 (10.6.3.3) has some 40 attributes in an
+/// answer about an instance, those of its study and its series included, of 60 to 100 bytes each as JSON.
+const FOUND_BYTES: usize = 4 << 10;
+/// Most bytes of a search's answer beside those.
+const SEARCH_BYTES: usize = 64 << 10;
+/// Most bytes of the answer about one stored object: a few hundred for what PS3.18 (annex I) has, and room for the attributes that
+/// the archive has changed, or for a page of text.
+const STORED_BYTES: usize = 256 << 10;
 
 /// Longest time to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -37,6 +43,8 @@ pub struct WebClients {
     guard: UrlGuard,
     names: PinnedNames,
     timeout: Duration,
+    /// Most objects of a series.
+    objects: usize,
     /// Made for the first use: reading the system's certificates takes time and memory. By the
     /// name of the archive; the empty name is for URLs without one.
     clients: Mutex<BTreeMap<String, Client>>,
@@ -48,6 +56,8 @@ pub struct DicomWeb {
     base: String,
     credentials: Credentials,
     now: Timestamp,
+    /// Most objects that a search may find.
+    objects: usize,
     /// Keeps the checked addresses.
     _pin: Option<Pin>,
 }
@@ -62,12 +72,13 @@ pub enum Stored {
 }
 
 impl WebClients {
-    /// Clients that allow pauses of that length in answers.
-    pub fn new(guard: UrlGuard, timeout: Duration) -> Self {
+    /// Clients that allow pauses of that length in answers, and so many objects in a series.
+    pub fn new(guard: UrlGuard, timeout: Duration, objects: usize) -> Self {
         Self {
             guard,
             names: PinnedNames::default(),
             timeout,
+            objects,
             clients: Mutex::default(),
         }
     }
@@ -103,6 +114,7 @@ impl WebClients {
             base,
             credentials: archive.credentials.clone(),
             now,
+            objects: self.objects,
             _pin: None,
         })
     }
@@ -134,6 +146,7 @@ impl WebClients {
             base: url.trim_end_matches('/').to_owned(),
             credentials: Credentials::None,
             now,
+            objects: self.objects,
             _pin: Some(pin),
         })
     }
@@ -183,10 +196,11 @@ impl DicomWeb {
         &self.base
     }
 
-    /// The SOP Instance UIDs of a series, as the archive lists them; `None` if it does not say.
+    /// The SOP Instance UIDs of a series, as the archive lists them; `None` if it does not say, or lists more than a series
+    /// may have.
     ///
     /// # Errors
-    /// If the archive does not answer.
+    /// If the archive does not answer, or its answer is longer than any that can be used.
     pub async fn instances(
         &self,
         study: &str,
@@ -220,15 +234,9 @@ impl DicomWeb {
             }
             status => return Err(busy(status, answer.headers(), self.now)),
         }
-        let bytes = limited(answer).await?;
-        let Ok(Value::Array(found)) = serde_json::from_slice(&bytes) else {
-            return Ok(None);
-        };
-        let uid = |object: &Value| {
-            let uid = object.get(SOP_INSTANCE_UID)?.get("Value")?.get(0)?;
-            Some(uid.as_str()?.to_owned())
-        };
-        Ok(found.iter().map(uid).collect())
+        let most = SEARCH_BYTES.saturating_add(FOUND_BYTES.saturating_mul(self.objects));
+        let bytes = limited(answer, most).await?;
+        Ok(uids(&bytes, self.objects))
     }
 
     /// The files of a series, as they are stored.
@@ -297,7 +305,7 @@ impl DicomWeb {
         if !matches!(status.as_u16(), 200 | 202 | 409) {
             return Err(refused(status, answer.headers(), self.now));
         }
-        let bytes = limited(answer).await?;
+        let bytes = limited(answer, STORED_BYTES).await?;
         judge(status, &bytes)
     }
 
@@ -319,14 +327,26 @@ impl DicomWeb {
     }
 }
 
+/// The SOP Instance UIDs in an answer to QIDO-RS; `None` if it is no list of objects that have one, or of more than `most`.
+fn uids(answer: &[u8], most: usize) -> Option<Vec<String>> {
+    let uid = [
+        Step::Member(SOP_INSTANCE_UID),
+        Step::Member("Value"),
+        Step::First,
+    ];
+    listed(answer, &uid, most).ok()
+}
+
 /// The outcome for the only object in an answer to STOW-RS (PS3.18, 10.5.3; Store Instances Response
 /// Module, PS3.18 annex I).
 fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
-    let json: Option<Value> = serde_json::from_slice(answer).ok();
-    let failed = json
-        .as_ref()
-        .and_then(|answer| answer.get(FAILED_SOP_SEQUENCE)?.get("Value")?.get(0));
-    let Some(failed) = failed else {
+    let failed = [
+        Step::Member(FAILED_SOP_SEQUENCE),
+        Step::Member("Value"),
+        Step::First,
+    ];
+    let json = read(answer, &failed).ok();
+    if matches!(json, None | Some(Read::Nothing)) {
         let said = match status {
             StatusCode::OK => json.is_some() || answer.is_empty() || is_xml_without_failure(answer),
             StatusCode::ACCEPTED => json.is_some(),
@@ -339,11 +359,21 @@ fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
                 "The archive did not say whether it has stored the object.",
             ))
         };
+    }
+    let [sequence, value, first] = failed;
+    let reason = [
+        sequence,
+        value,
+        first,
+        Step::Member(FAILURE_REASON),
+        Step::Member("Value"),
+        Step::First,
+    ];
+    let reason = match read(answer, &reason) {
+        Ok(Read::Number(reason)) => u16::try_from(reason).ok(),
+        _ => None,
     };
-    let reason = failed
-        .get(FAILURE_REASON)
-        .and_then(|reason| reason.get("Value")?.get(0)?.as_u64());
-    store_failure(reason.and_then(|reason| u16::try_from(reason).ok()))
+    store_failure(reason)
 }
 
 /// Whether it is the Native DICOM Model (PS3.19 A.1) of a response that lists no failure.
@@ -424,15 +454,18 @@ fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
     }
 }
 
-/// The body of an answer, if it is not too long.
-async fn limited(mut answer: Response) -> Result<Vec<u8>, Trouble> {
+/// The body of an answer, if it has no more than `most` bytes.
+async fn limited(mut answer: Response, most: usize) -> Result<Vec<u8>, Trouble> {
     let mut bytes = Vec::new();
     loop {
         match answer.chunk().await {
-            Ok(Some(piece)) if bytes.len() + piece.len() <= JSON_BYTES => {
+            Ok(Some(piece)) if bytes.len() + piece.len() <= most => {
                 bytes.extend_from_slice(&piece);
             }
-            Ok(Some(_)) => return Err(odd_answer("The archive's answer has no end.")),
+            Ok(Some(_)) => {
+                let what = format!("The archive's answer has more than {most} bytes.");
+                return Err(odd_answer(what));
+            }
             Ok(None) => return Ok(bytes),
             Err(_) => {
                 return Err(Trouble::passing(
@@ -450,6 +483,7 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
 
 #[cfg(test)]
 mod tests {
+    use super::super::answer::TEXT_BYTES;
     use super::*;
 
     #[test]
@@ -479,5 +513,36 @@ mod tests {
         }
         assert!(matches!(judge(202, "<xml/>"), Err(Trouble::Passing { .. })));
         assert!(matches!(judge(409, ""), Err(Trouble::Passing { .. })));
+        // A failure is one, however odd its description is.
+        for odd in ["null", "{}", "7", r#"{"00081197": {"Value": ["x"]}}"#] {
+            let body = format!(r#"{{"00081198": {{"Value": [{odd}]}}}}"#);
+            let unsaid = judge(200, &body).unwrap_err();
+            assert!(matches!(unsaid, Trouble::Passing { .. }), "{odd}");
+        }
+    }
+
+    #[test]
+    fn a_search_keeps_the_uids_of_its_answer_and_no_more_than_a_series_has() {
+        let object =
+            r#"{"00080018": {"vr": "UI", "Value": ["1.2.3"]}, "00080060": {"Value": [[0]]}}"#;
+        let three = format!("[{object}, {object}, {object}]");
+        let uid = "1.2.3".to_owned();
+        assert_eq!(uids(three.as_bytes(), 3), Some(vec![uid; 3]));
+        assert_eq!(uids(three.as_bytes(), 2), None);
+        assert_eq!(uids(b"[]", 2), Some(Vec::new()));
+        let long = object.replace("1.2.3", &"1".repeat(TEXT_BYTES + 1));
+        for odd in [
+            long.as_str(),
+            "{\"\":0}",
+            "0",
+            "null",
+            "[0]",
+            "{\"00080018\": 0}",
+        ] {
+            assert_eq!(uids(format!("[{odd}]").as_bytes(), 9), None, "{odd}");
+        }
+        assert_eq!(uids(object.as_bytes(), 9), None);
+        assert_eq!(uids(b"[", 9), None);
+        assert_eq!(uids(format!("{three}]").as_bytes(), 9), None);
     }
 }
