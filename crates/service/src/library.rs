@@ -16,8 +16,9 @@ use ventriform::progress::Monitor;
 
 /// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;
-/// Memory for a byte of normal limits: numbers as text, parsed twice, and as the file and the text that is hashed.
-const LIMITS_MEMORY_PER_BYTE: u64 = 8;
+/// Memory for a byte of normal limits: what is parsed, its copy, and the text of it that is hashed. The costliest text is a list of people
+/// without names: 14 bytes of it take 370.
+const LIMITS_MEMORY_PER_BYTE: u64 = 26;
 
 /// A product with its owner's record, and whether it is new.
 pub type Added = (Owned<Product>, bool);
@@ -70,6 +71,7 @@ impl Service {
     ) -> Result<Added, ServiceError> {
         let reader = self.engine.reader.clone();
         let check = move |_: &Monitor<'_>| reader.profile(&profile);
+        // At most 1 MiB of text, parsed to at most 5001 entries, and written again.
         let output = self.decoding.run(LITTLE_MEMORY, check).await??;
         let room = self.product_room(Resource::Reader, quota);
         let made = (tenant, Resource::Reader);

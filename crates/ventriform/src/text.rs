@@ -3,10 +3,41 @@
 //! A terminal obeys control characters, a log ends its line at others, and controls of writing
 //! direction show a text in an order in which it is not stored (Unicode Technical Report 36, 3.1).
 //! Names that are taken have none of them ([`is_printable`]); whatever is printed has them escaped
-//! ([`escaped`], [`escaped_lines`]). Digests are printed by [`hex`].
+//! ([`escaped`], [`escaped_lines`]). Digests are printed by [`hex`]. Lists of documents are read by [`at_most`].
 
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use std::borrow::Cow;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
+use std::marker::PhantomData;
+
+/// A list of a document, which is refused at the entry after `MOST`. What entries are parsed to may have many times the
+/// bytes of their text.
+pub(crate) fn at_most<'de, T, D, const MOST: usize>(deserializer: D) -> Result<Vec<T>, D::Error>
+where
+    T: Deserialize<'de>,
+    D: Deserializer<'de>,
+{
+    struct AtMost<T, const MOST: usize>(PhantomData<T>);
+    impl<'de, T: Deserialize<'de>, const MOST: usize> Visitor<'de> for AtMost<T, MOST> {
+        type Value = Vec<T>;
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "a list of at most {MOST} entries")
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<T>, A::Error> {
+            let mut entries = Vec::new();
+            while let Some(entry) = list.next_element()? {
+                if entries.len() == MOST {
+                    let reason = format!("a list has more than {MOST} entries");
+                    return Err(A::Error::custom(reason));
+                }
+                entries.push(entry);
+            }
+            Ok(entries)
+        }
+    }
+    deserializer.deserialize_seq(AtMost::<T, MOST>(PhantomData))
+}
 
 /// The bytes as lower-case hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {

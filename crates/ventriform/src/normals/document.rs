@@ -5,8 +5,9 @@ use super::kind::{GroupSex, ScanKind, yes_or_no};
 use super::pattern::TERMS;
 use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
-use crate::text::hex;
-use serde::{Deserialize, Serialize};
+use crate::text::{at_most, hex};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -18,6 +19,13 @@ const NORMALS_FORMAT: &str = "ventriform-normal-limits";
 pub const MOST_NORMALS_BYTES: usize = 16 << 20;
 /// Most groups of a file.
 const MOST_GROUPS: usize = 64;
+/// Most people of a group, and most cases that are in none: as many as a cohort's table may have.
+const MOST_PEOPLE: usize = 5000;
+/// Most figures of a group: each of the heart's and of its segments' once, and room for later ones.
+const MOST_FIGURES: usize = 256;
+/// Most parameters of the fits.
+const MOST_PARAMETERS: usize = 1024;
+
 /// Normal limits, as `ventriform normals build` writes them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
@@ -36,10 +44,14 @@ pub struct NormalLimits {
     /// What the people are, in words.
     pub people: String,
     /// One group for each kind of scan.
+    // What is beyond a limit by one is read, to be refused by its name.
+    #[serde(deserialize_with = "at_most::<_, _, { MOST_GROUPS + 1 }>")]
     pub groups: Vec<NormalGroup>,
     /// Cases that are in no group.
+    #[serde(deserialize_with = "at_most::<_, _, MOST_PEOPLE>")]
     pub excluded: Vec<ExcludedCase>,
     /// Every parameter of the fits, defaults written out.
+    #[serde(deserialize_with = "flat")]
     pub parameters: Map<String, Value>,
 }
 
@@ -56,10 +68,12 @@ pub struct NormalGroup {
     /// Whether attenuation was corrected.
     pub attenuation_corrected: bool,
     /// The people, in the order of the table.
+    #[serde(deserialize_with = "at_most::<_, _, MOST_PEOPLE>")]
     pub cases: Vec<NormalCase>,
     /// Mean and standard deviation of the uptake.
     pub map: LimitMap,
     /// Limits of figures of the whole heart.
+    #[serde(deserialize_with = "at_most::<_, _, MOST_FIGURES>")]
     pub figures: Vec<GlobalLimit>,
     /// The people, each judged by the limits of the others.
     pub leave_one_out: Specificity,
@@ -93,8 +107,10 @@ pub struct ExcludedCase {
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
 pub struct LimitMap {
     /// Mean; null where too few of the people have muscle.
+    #[serde(deserialize_with = "rows")]
     pub mean: Vec<Vec<Option<f64>>>,
     /// Standard deviation, the uncertainty of so small a sample's mean and deviation included.
+    #[serde(deserialize_with = "rows")]
     pub sd: Vec<Vec<Option<f64>>>,
     /// Covariance of the coefficients by which healthy people differ from the mean as a whole: of 2 r - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a,
     /// r sin 2a, with the way r from apex (0) to base (1) and the angle a from lateral over anterior. `sd` is what is left beside these.
@@ -132,6 +148,7 @@ pub struct Specificity {
     /// The deficit score that 95 of 100 people stay below, per cent: quantile of 95 per cent.
     pub deficit_percent_of_95: f64,
     /// Each person's figures.
+    #[serde(deserialize_with = "at_most::<_, _, MOST_PEOPLE>")]
     pub cases: Vec<LeftOut>,
 }
 
@@ -147,6 +164,80 @@ pub struct LeftOut {
     pub deficit_percent: f64,
     /// Sum of the segments' scores.
     pub summed_score: u32,
+}
+
+/// What is read of a file before all of it.
+#[derive(Deserialize)]
+struct Head {
+    #[serde(default)]
+    format: String,
+    #[serde(default)]
+    schema_version: u64,
+}
+
+/// The rows of a polar map, of which there are not many more than it has.
+fn rows<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Vec<Option<f64>>>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(transparent)]
+    struct Row(
+        #[serde(deserialize_with = "at_most::<_, _, { RAY_COLUMNS + 1 }>")] Vec<Option<f64>>,
+    );
+    let rows = at_most::<Row, D, { RAY_ROWS + 1 }>(deserializer)?;
+    Ok(rows.into_iter().map(|row| row.0).collect())
+}
+
+/// Parameters: texts, numbers, `true`, `false` and `null`, and nothing that has values in it.
+fn flat<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Map<String, Value>, D::Error> {
+    struct Plain(Value);
+    impl<'de> Deserialize<'de> for Plain {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_any(PlainVisitor).map(Plain)
+        }
+    }
+    struct PlainVisitor;
+    impl Visitor<'_> for PlainVisitor {
+        type Value = Value;
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a text, a number, true, false or null")
+        }
+        fn visit_unit<E>(self) -> Result<Value, E> {
+            Ok(Value::Null)
+        }
+        fn visit_bool<E>(self, flag: bool) -> Result<Value, E> {
+            Ok(flag.into())
+        }
+        fn visit_i64<E>(self, number: i64) -> Result<Value, E> {
+            Ok(number.into())
+        }
+        fn visit_u64<E>(self, number: u64) -> Result<Value, E> {
+            Ok(number.into())
+        }
+        fn visit_f64<E>(self, number: f64) -> Result<Value, E> {
+            Ok(number.into())
+        }
+        fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+            Ok(text.into())
+        }
+    }
+    struct Flat;
+    impl<'de> Visitor<'de> for Flat {
+        type Value = Map<String, Value>;
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("an object of parameters")
+        }
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut parameters = Map::new();
+            while let Some((name, value)) = map.next_entry::<String, Plain>()? {
+                if parameters.len() == MOST_PARAMETERS {
+                    let reason = format!("there are more than {MOST_PARAMETERS} parameters");
+                    return Err(A::Error::custom(reason));
+                }
+                parameters.insert(name, value.0);
+            }
+            Ok(parameters)
+        }
+    }
+    deserializer.deserialize_map(Flat)
 }
 
 impl NormalLimits {
@@ -195,16 +286,17 @@ impl NormalLimits {
             return Err(NormalsError::Syntax(reason));
         }
         let syntax = |error: serde_json::Error| NormalsError::Syntax(error.to_string());
-        let any: Value = serde_json::from_slice(text).map_err(syntax)?;
-        if any["format"] != NORMALS_FORMAT {
+        // Neither is a tree of JSON values, which has up to 50 times as many bytes as its text.
+        let head: Head = serde_json::from_slice(text).map_err(syntax)?;
+        if head.format != NORMALS_FORMAT {
             let reason = format!("`format` is not {NORMALS_FORMAT}");
             return Err(NormalsError::Syntax(reason));
         }
-        let version = any["schema_version"].as_u64().unwrap_or(0);
+        let version = head.schema_version;
         if version != u64::from(NORMALS_SCHEMA_VERSION) {
             return Err(NormalsError::SchemaVersion(version));
         }
-        let limits: Self = serde_json::from_value(any).map_err(syntax)?;
+        let limits: Self = serde_json::from_slice(text).map_err(syntax)?;
         let found = limits.content_sha256();
         if found != limits.sha256 {
             return Err(NormalsError::Edited {

@@ -414,6 +414,39 @@ fn a_file_is_read_as_it_was_written_and_not_if_it_was_edited() {
     }
 }
 
+/// Lists are read up to the length that they may have, and parameters have nothing in them: what they are parsed to could
+/// have 50 times the bytes of the text.
+#[test]
+fn what_is_longer_than_any_limits_is_refused_before_it_is_all_read() {
+    let text = file().to_json();
+    let zeros = vec!["0"; 5001].join(",");
+    let pairs: Vec<String> = (0..1025).map(|n| format!("\"p{n}\":0")).collect();
+    for (from, to) in [
+        (
+            "\"excluded\":[]",
+            format!("\"excluded\":[{}]", vec![r#"["",""]"#; 5001].join(",")),
+        ),
+        ("\"mean\":[[", format!("\"mean\":[[{zeros},")),
+        (
+            "\"parameters\":{}",
+            format!("\"parameters\":{{{}}}", pairs.join(",")),
+        ),
+        ("\"parameters\":{}", "\"parameters\":{\"a\":[0]}".to_owned()),
+        ("\"parameters\":{}", "\"parameters\":{\"a\":{}}".to_owned()),
+    ] {
+        let changed = text.replacen(from, &to, 1);
+        assert_ne!(changed, text, "{from}");
+        let error = NormalLimits::from_json(changed.as_bytes()).unwrap_err();
+        assert!(matches!(error, NormalsError::Syntax(_)), "{from}: {error}");
+    }
+    // Parameters of every kind are read as they are written.
+    let parameters = serde_json::json!({"a": null, "b": true, "c": -1, "d": 2, "e": 0.5, "f": "x"});
+    let parameters = parameters.as_object().unwrap().clone();
+    let written = NormalLimits::new("0.0.0", true, vec![group()], Vec::new(), parameters);
+    let read = NormalLimits::from_json(written.to_json().as_bytes());
+    assert_eq!(read.unwrap(), written);
+}
+
 /// The SHA-256 is right, and the content is not usable all the same.
 #[test]
 fn limits_that_no_cohort_can_have_are_refused() {

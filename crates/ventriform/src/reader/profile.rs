@@ -1,7 +1,7 @@
 //! A reader's profile and its JSON.
 
 use crate::deform::WallEdge;
-use crate::text::hex;
+use crate::text::{at_most, hex};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::ops::RangeInclusive;
@@ -224,7 +224,17 @@ pub struct ProfileDocument {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     level: Option<ReaderLevel>,
     /// The masks it was learnt on.
+    #[serde(deserialize_with = "at_most::<_, _, { MOST_MASKS + 1 }>")]
     learnt_on: Vec<LearntOn>,
+}
+
+/// What is read of a profile before all of it.
+#[derive(Deserialize)]
+struct Head {
+    #[serde(default)]
+    format: String,
+    #[serde(default)]
+    version: u64,
 }
 
 /// The distances of a reader's profile.
@@ -295,17 +305,18 @@ impl ReaderProfile {
             return Err(ProfileError::Syntax(reason));
         }
         let syntax = |error: serde_json::Error| ProfileError::Syntax(error.to_string());
-        let any: serde_json::Value = serde_json::from_slice(text).map_err(syntax)?;
-        if any["format"] != PROFILE_FORMAT {
+        // Neither is a tree of JSON values, which has up to 50 times as many bytes as its text.
+        let head: Head = serde_json::from_slice(text).map_err(syntax)?;
+        if head.format != PROFILE_FORMAT {
             let reason = format!("`format` is not {PROFILE_FORMAT}");
             return Err(ProfileError::Syntax(reason));
         }
-        let version = any["version"].as_u64().unwrap_or(0);
+        let version = head.version;
         if !(1..=u64::from(PROFILE_VERSION)).contains(&version) {
             let version = u32::try_from(version).unwrap_or(u32::MAX);
             return Err(ProfileError::Version(version));
         }
-        let document: ProfileDocument = serde_json::from_value(any).map_err(syntax)?;
+        let document: ProfileDocument = serde_json::from_slice(text).map_err(syntax)?;
         let edge = WallEdge::parse(&document.edge)
             .ok_or_else(|| refused("edge", "it must be apparent or anatomical"))?;
         let learnt = document.learnt()?;
@@ -484,5 +495,17 @@ pub(super) mod tests {
             assert!(error.to_string().contains(field), "{error} for {to}");
         }
         assert!(ReaderProfile::from_json(b"").is_err());
+    }
+
+    /// What a list of JSON values would be parsed to has many times the bytes of its text.
+    #[test]
+    fn a_list_longer_than_that_of_any_profile_is_refused_before_it_is_all_read() {
+        let text = profile([0.5, -1.25, 3.0]).to_json();
+        let start = text.find("\"learnt_on\"").unwrap();
+        let many = vec![r#"["",""]"#; MOST_MASKS + 2].join(",");
+        let many = format!("{}\"learnt_on\":[{many}]}}", &text[..start]);
+        let error = ReaderProfile::from_json(many.as_bytes()).unwrap_err();
+        assert!(matches!(error, ProfileError::Syntax(_)), "{error}");
+        assert!(error.to_string().contains("5001"), "{error}");
     }
 }
