@@ -965,15 +965,20 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
     assert_eq!(found.items[0].tags, tags("b"));
     // New tags replace the old ones.
     let job = &found.items[0].id;
-    for id in [&ids[0], job] {
-        assert!(on.a.set_tags(&tenant(), id, &tags("new")).await.unwrap());
+    let none = Tags::default();
+    for (id, name) in [(&ids[0], "é"), (job, "b")] {
+        let change = async |tenant, before: &Tags, after: &Tags| {
+            let changed = on.a.change_tags(tenant, id, before, after).await;
+            changed.unwrap()
+        };
+        assert!(!change(&other(), &tags(name), &tags("new")).await);
+        // Not if they have changed in between.
+        assert!(!change(&tenant(), &tags("c"), &tags("new")).await);
+        assert!(!change(&tenant(), &none, &tags("new")).await);
+        assert!(change(&tenant(), &tags(name), &none).await);
+        assert!(!change(&tenant(), &tags(name), &tags("new")).await);
+        assert!(change(&tenant(), &none, &tags("new")).await);
     }
-    assert!(
-        !on.a
-            .set_tags(&other(), &ids[0], &tags("new"))
-            .await
-            .unwrap()
-    );
     assert!(
         on.b.volumes(&tenant(), &both, ALL)
             .await

@@ -280,3 +280,25 @@ async fn the_original_upload_comes_back_byte_for_byte() {
     let missing = format!("/v1/volumes/{}/files/other.nii", text(&shown["id"]));
     problem(app.get(&missing).send().await.unwrap(), 404, "not-found").await;
 }
+
+/// The patches are read, merged and written at the same time; each is of a label of its own.
+#[tokio::test]
+async fn patches_of_different_labels_are_all_kept() {
+    let app = TestApp::start().await;
+    let volume = app.volume("sphere").await;
+    let order = json!({"kind": "model", "volume": volume, "parameters": {"points": 67}});
+    let job = app.post("/v1/jobs").json(&order).send().await.unwrap();
+    let job: Value = job.json().await.unwrap();
+    for path in [format!("/v1/volumes/{volume}"), text(&job["links"]["self"])] {
+        let patches = (0..16).map(|number| {
+            let patch = app.client.patch(format!("{}{path}", app.url));
+            let name = format!("label-{number}");
+            patch.json(&json!({"labels": {name: "x"}})).send()
+        });
+        for answer in futures::future::join_all(patches).await {
+            assert_eq!(answer.unwrap().status(), StatusCode::OK);
+        }
+        let labels = app.json(&path).await["labels"].clone();
+        assert_eq!(labels.as_object().unwrap().len(), 16, "{labels}");
+    }
+}

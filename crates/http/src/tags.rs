@@ -8,6 +8,7 @@ use super::app::App;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
 use axum::extract::Request;
+use axum::http::{StatusCode, header};
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -99,24 +100,38 @@ pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
     Ok(tags)
 }
 
-/// Applies the JSON merge patch of a request to the tags of a tenant's item or job.
+/// How often a change of tags is tried that others come before. Each time, one of the others has been made.
+const CHANGE_TRIES: usize = 100;
+
+/// Applies the JSON merge patch of a request to the tags of a tenant's item or job, as `tags_of` reads them. The body is
+/// read first, so that nothing of the item is held while it comes; a change that comes between is read and merged anew.
 ///
 /// # Errors
-/// Those of [`merge_patch`] and [`merged`], 503 or 507 if the storage fails.
+/// Those of [`merge_patch`], `tags_of` and [`merged`], 503 if others change the tags all the time, 503 or 507 if the storage
+/// fails.
 pub async fn change(
     app: &App,
     tenant: &Tenant,
     id: &str,
-    tags: Tags,
     request: Request,
+    tags_of: impl AsyncFn() -> Answer<Tags>,
 ) -> Answer<()> {
-    let tags = merged(app, tags, &merge_patch(request).await?)?;
-    app.service
-        .items()
-        .catalogue()
-        .set_tags(tenant, id, &tags)
-        .await?;
-    Ok(())
+    let patch = merge_patch(request).await?;
+    let catalogue = app.service.items().catalogue();
+    for _ in 0..CHANGE_TRIES {
+        let before = tags_of().await?;
+        let after = merged(app, before.clone(), &patch)?;
+        if catalogue.change_tags(tenant, id, &before, &after).await? {
+            return Ok(());
+        }
+    }
+    Err(Problem::new(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "busy",
+        "Other requests change the tags all the time.",
+    )
+    .fix("Send the patch again.")
+    .header(header::RETRY_AFTER, "1"))
 }
 
 /// The tags after a JSON merge patch: what is `null` goes, what is absent stays.

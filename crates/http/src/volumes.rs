@@ -342,8 +342,11 @@ pub async fn update_volume(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<VolumeBody>> {
-    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    tags::change(&app, &caller.tenant, &id, volume.ownership.tags, request).await?;
+    let tags_of = async || {
+        let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
+        Ok(volume.ownership.tags)
+    };
+    tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(VolumeBody::of(&app, caller.scope, volume)?))
 }

@@ -248,8 +248,8 @@ pub async fn update_job(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<JobBody>> {
-    let job = find(&app, &caller.tenant, &id).await?;
-    tags::change(&app, &caller.tenant, &id, job.tags, request).await?;
+    let tags_of = async || Ok(find(&app, &caller.tenant, &id).await?.tags);
+    tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
     let job = find(&app, &caller.tenant, &id).await?;
     Ok(Json(describe(&app, job).await?))
 }

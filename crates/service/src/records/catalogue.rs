@@ -105,8 +105,14 @@ pub trait Catalogue: Custody + Scans {
         page: ListRequest,
     ) -> StoreResult<ListPage<Owned<Product>>>;
 
-    /// Replaces the tags of an item or a job. `false` if there is none with that id.
-    async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool>;
+    /// Replaces the tags of an item or a job. `false` if there is none with that id, or its tags are not `before` any more.
+    async fn change_tags(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        before: &Tags,
+        after: &Tags,
+    ) -> StoreResult<bool>;
 
     /// Sets whether every `model=auto` of the tenant fits a template. `false` if it has no such
     /// template.

@@ -174,21 +174,29 @@ impl Catalogue for SqlStore {
         rows::page(rows, page, record, |held| held.sequence)
     }
 
-    async fn set_tags(&self, tenant: &Tenant, id: &str, tags: &Tags) -> StoreResult<bool> {
-        let statement = match Resource::of(id) {
-            Some(Resource::Job) => {
-                "UPDATE jobs SET external_id = $1, labels = $2, revision = revision + 1
-                 WHERE tenant = $3 AND id = $4"
-            }
-            _ => "UPDATE holdings SET external_id = $1, labels = $2 WHERE tenant = $3 AND id = $4",
+    async fn change_tags(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        before: &Tags,
+        after: &Tags,
+    ) -> StoreResult<bool> {
+        let (table, revised) = match Resource::of(id) {
+            Some(Resource::Job) => ("jobs", ", revision = revision + 1"),
+            _ => ("holdings", ""),
         };
-        let changed = query(statement)
-            .bind(&tags.external_id)
-            .bind(to_json(&tags.labels)?)
-            .bind(tenant.as_str())
-            .bind(id)
-            .write(&self.writer)
-            .await?;
+        let changed = query(format!(
+            "UPDATE {table} SET external_id = $1, labels = $2{revised}
+             WHERE tenant = $3 AND id = $4 AND external_id IS NOT DISTINCT FROM $5 AND labels = $6"
+        ))
+        .bind(&after.external_id)
+        .bind(to_json(&after.labels)?)
+        .bind(tenant.as_str())
+        .bind(id)
+        .bind(&before.external_id)
+        .bind(to_json(&before.labels)?)
+        .write(&self.writer)
+        .await?;
         Ok(changed == 1)
     }
 
