@@ -25,9 +25,9 @@ use ventriform_service::records::{
     AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
     ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
     Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
-    JobWebhook, Lease, LegalHold, ListRequest, NewJob, Priority, Product, ProductFile, ProductRoom,
-    Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault, StoredVolume,
-    SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
+    JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product, ProductFile,
+    ProductRoom, Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault,
+    StoredVolume, SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
@@ -255,6 +255,7 @@ contracts!(
     erasures_leave_receipts,
     old_things_expire,
     lists_find_by_tags_and_scans,
+    a_page_is_planned_by_the_bytes_of_its_rows,
     identities_are_kept_and_erased,
     items_are_shared_by_tenants,
     the_audit_trail_is_one_chain,
@@ -890,6 +891,54 @@ async fn old_things_expire(on: &Stores) {
     );
     let load = on.a.load().await.unwrap();
     assert!(load.mean_duration_ms.is_some_and(|mean| mean >= 0.0));
+}
+
+async fn a_page_is_planned_by_the_bytes_of_its_rows(on: &Stores) {
+    let owner: Tenant = "pages".parse().unwrap();
+    let large = PAGE_BYTES as usize / 2 + 1;
+    let mut ids = Vec::new();
+    for size in [large, 10, large, large] {
+        let volume = StoredVolume {
+            facts: json!({"text": "x".repeat(size)}),
+            ..stored_volume(&random_id(Resource::Volume.prefix()), 1)
+        };
+        let added =
+            on.a.add_volume(&volume, &owner, &Tags::default(), None)
+                .await;
+        assert!(added.unwrap());
+        ids.push(volume.id);
+    }
+    let filter = ItemFilter::default();
+    let (mut asked, mut found, mut counts) = (ALL, Vec::new(), Vec::new());
+    loop {
+        let plan = on.b.plan_items(&owner, Resource::Volume, &filter, asked);
+        let plan = plan.await.unwrap();
+        let page = on.b.volumes(&owner, &filter, plan.page).await.unwrap();
+        assert!(plan.bytes as usize > large);
+        counts.push(page.items.len());
+        found.extend(page.items.iter().map(|volume| volume.id.clone()));
+        match page.next {
+            Some(next) => asked.before = Some(next),
+            None => break,
+        }
+    }
+    // The newest first, and as many on a page as fit.
+    assert_eq!(counts, [1, 2, 1]);
+    ids.reverse();
+    assert_eq!(found, ids);
+    let none = on.b.plan_receipts(&owner, None, ALL).await.unwrap();
+    assert_eq!(none.bytes, 0);
+    let jobs = JobFilter {
+        tenant: owner.clone(),
+        ..JobFilter::default()
+    };
+    assert_eq!(on.b.plan_jobs(&jobs, ALL).await.unwrap().bytes, 0);
+    on.file(&NewJob {
+        tenant: owner,
+        ..new_job(&ids[0])
+    })
+    .await;
+    assert!(on.b.plan_jobs(&jobs, ALL).await.unwrap().bytes > 2048);
 }
 
 async fn lists_find_by_tags_and_scans(on: &Stores) {

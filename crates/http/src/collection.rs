@@ -12,7 +12,7 @@ use super::openapi::{
     CachedHeaders, Documented, EraseProblems, ErasureHeader, ListProblems, LookupProblems,
     UnchangedAnswer,
 };
-use super::pagination::{PageQuery, next_cursor};
+use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
 use super::problem::Answer;
 use super::problem::not_found::missing;
 use super::query::{NoQuery, QueryReader};
@@ -169,13 +169,10 @@ async fn list<C: Collection>(
         filter.scan = query.take::<ScanQuery>()?.into();
     }
     let page = query.all::<PageQuery>()?.charged().await?;
-    let page = C::rows(
-        app.service.items().catalogue(),
-        &caller.tenant,
-        &filter,
-        page,
-    )
-    .await?;
+    let (catalogue, tenant) = (app.service.items().catalogue(), &caller.tenant);
+    let plan = catalogue.plan_items(tenant, C::RESOURCE, &filter, page);
+    let page = charged_by_bytes(page, plan.await?).await?;
+    let page = C::rows(catalogue, tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
     let items = page
         .items

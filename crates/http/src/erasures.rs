@@ -5,7 +5,7 @@ use super::caller::Caller;
 use super::guard::{Agent, AlreadyRecorded};
 use super::links::{path_of, rfc3339};
 use super::openapi::{ListProblems, LookupProblems};
-use super::pagination::{PageQuery, next_cursor};
+use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
 use super::problem::not_found::{missing, no_receipt};
 use super::problem::{Answer, Problem};
 use super::query::{NoQuery, Query};
@@ -244,9 +244,10 @@ pub async fn list_erasures(
 ) -> Answer<Json<ReceiptList>> {
     let page = page.charged().await?;
     let catalogue = app.service.items().catalogue();
-    let page = catalogue
-        .receipts(&caller.tenant, search.item.as_deref(), page)
-        .await?;
+    let item = search.item.as_deref();
+    let plan = catalogue.plan_receipts(&caller.tenant, item, page).await?;
+    let page = charged_by_bytes(page, plan).await?;
+    let page = catalogue.receipts(&caller.tenant, item, page).await?;
     let next_cursor = next_cursor(&page);
     Ok(Json(ReceiptList {
         erasures: page.items.into_iter().map(ReceiptBody::from).collect(),

@@ -15,7 +15,7 @@ use super::caller::Caller;
 use super::idempotency;
 use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
-use super::pagination::{PageQuery, next_cursor};
+use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
 use super::problem::not_found::missing;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::query::{NoQuery, Query, moment};
@@ -185,7 +185,10 @@ pub async fn list_jobs(
         created_after: search.created_after,
     };
     let page = page.charged().await?;
-    let page = app.service.queue().table().jobs(&filter, page).await?;
+    let table = app.service.queue().table();
+    let plan = table.plan_jobs(&filter, page).await?;
+    let page = charged_by_bytes(page, plan).await?;
+    let page = table.jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
     let jobs = describe_all(&app, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))

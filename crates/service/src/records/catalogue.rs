@@ -4,7 +4,7 @@
 
 use super::{
     Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest, Owned,
-    Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
+    PagePlan, Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
 use super::{Resource, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -74,6 +74,23 @@ pub trait Catalogue: Custody + Scans {
 
     /// The volume with that id.
     async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>>;
+
+    /// What such a page of items of one kind takes, so that it can be charged before it is read.
+    async fn plan_items(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> StoreResult<PagePlan>;
+
+    /// What such a page of receipts takes, likewise.
+    async fn plan_receipts(
+        &self,
+        tenant: &Tenant,
+        item: Option<&str>,
+        page: ListRequest,
+    ) -> StoreResult<PagePlan>;
 
     /// Volumes, newest first.
     async fn volumes(

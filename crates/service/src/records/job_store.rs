@@ -1,6 +1,8 @@
 //! The interface to the jobs table.
 
-use super::{Deleted, ListPage, ListRequest, Product, ScanFilter, StoreResult, TagFilter};
+use super::{
+    Deleted, ListPage, ListRequest, PagePlan, Product, ScanFilter, StoreResult, TagFilter,
+};
 use super::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
@@ -105,6 +107,9 @@ pub trait JobStore: Send + Sync + 'static {
 
     /// The job with that id.
     async fn job(&self, id: &str) -> StoreResult<Option<Job>>;
+
+    /// What such a page of jobs takes, so that it can be charged before it is read.
+    async fn plan_jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<PagePlan>;
 
     /// A tenant's jobs, newest first.
     async fn jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<ListPage<Job>>;

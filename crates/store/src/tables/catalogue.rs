@@ -10,13 +10,14 @@ use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::records::{
     AddedProduct, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage,
-    ListRequest, Owned, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult,
+    ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult,
     StoredVolume, Tags, Tenant, Timestamp,
 };
 
 /// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
 const HELD_VOLUME: Select = Select {
     columns: "v.bytes, v.files, v.facts",
+    size: "octet_length(v.files) + octet_length(v.facts)",
     table: "volumes AS v ON v.id = h.id",
     volume: "h.id",
 };
@@ -24,6 +25,7 @@ const HELD_VOLUME: Select = Select {
 /// A product with the columns of its ownership, likewise.
 const HELD_PRODUCT: Select = Select {
     columns: "p.volume, p.parameters, p.summary, p.software, p.files",
+    size: "octet_length(p.parameters) + octet_length(p.summary) + octet_length(p.files)",
     table: "products AS p ON p.id = h.id",
     volume: "p.volume",
 };
@@ -32,25 +34,51 @@ const HELD_PRODUCT: Select = Select {
 struct Select {
     /// The columns of its content.
     columns: &'static str,
+    /// The bytes of those that are of any size.
+    size: &'static str,
     /// The table of its content.
     table: &'static str,
     /// The column with the volume whose scan it is of.
     volume: &'static str,
 }
 
+/// What is read of the rows of a page.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Columns {
+    /// Everything.
+    All,
+    /// The sequence number and the bytes.
+    Size,
+}
+
+/// The bytes of what a tenant's row has of any size, beside those of the item.
+const HELD_SIZE: &str = "octet_length(h.labels) + coalesce(octet_length(c.found), 0)
+    + coalesce(octet_length(c.stated), 0)";
+
 impl Select {
-    fn query(&self) -> QueryBuilder {
-        let Self {
-            columns,
-            table,
-            volume,
-        } = self;
+    fn of(kind: Resource) -> &'static Self {
+        match kind {
+            Resource::Volume => &HELD_VOLUME,
+            _ => &HELD_PRODUCT,
+        }
+    }
+
+    fn query(&self, columns: Columns) -> QueryBuilder {
+        let Self { table, volume, .. } = self;
+        let columns = match columns {
+            Columns::All => format!(
+                "h.*, {}, {SCAN_COLUMNS}, (SELECT count(*) FROM sources
+                 JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
+                 WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
+                     AS source_holds",
+                self.columns
+            ),
+            Columns::Size => {
+                format!("h.sequence, CAST({} + {HELD_SIZE} AS BIGINT)", self.size)
+            }
+        };
         QueryBuilder::new(format!(
-            "SELECT h.*, {columns}, {SCAN_COLUMNS}, (SELECT count(*) FROM sources
-             JOIN holdings AS s ON s.tenant = sources.tenant AND s.id = sources.volume
-             WHERE sources.tenant = h.tenant AND sources.id = h.id AND s.held_at IS NOT NULL)
-                 AS source_holds
-             FROM holdings AS h JOIN {table}
+            "SELECT {columns} FROM holdings AS h JOIN {table}
              LEFT JOIN scans AS c ON c.tenant = h.tenant AND c.volume = {volume}"
         ))
     }
@@ -113,13 +141,34 @@ impl Catalogue for SqlStore {
         row.map(|row| rows::held(row, rows::volume)).transpose()
     }
 
+    async fn plan_items(
+        &self,
+        tenant: &Tenant,
+        kind: Resource,
+        filter: &ItemFilter,
+        page: ListRequest,
+    ) -> StoreResult<PagePlan> {
+        let query = listed(Columns::Size, tenant, kind, filter, page).build();
+        rows::plan(query.fetch_all(&self.readers).await?, page)
+    }
+
+    async fn plan_receipts(
+        &self,
+        tenant: &Tenant,
+        item: Option<&str>,
+        page: ListRequest,
+    ) -> StoreResult<PagePlan> {
+        let query = listed_receipts(Columns::Size, tenant, item, page).build();
+        rows::plan(query.fetch_all(&self.readers).await?, page)
+    }
+
     async fn volumes(
         &self,
         tenant: &Tenant,
         filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Owned<StoredVolume>>> {
-        let rows = listed_volumes(tenant, filter, page)
+        let rows = listed(Columns::All, tenant, Resource::Volume, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -166,7 +215,7 @@ impl Catalogue for SqlStore {
         filter: &ItemFilter,
         page: ListRequest,
     ) -> StoreResult<ListPage<Owned<Product>>> {
-        let rows = listed_products(tenant, kind, filter, page)
+        let rows = listed(Columns::All, tenant, kind, filter, page)
             .build()
             .fetch_all(&self.readers)
             .await?;
@@ -277,7 +326,7 @@ impl Catalogue for SqlStore {
         item: Option<&str>,
         page: ListRequest,
     ) -> StoreResult<ListPage<Receipt>> {
-        let query = listed_receipts(tenant, item, page).build();
+        let query = listed_receipts(Columns::All, tenant, item, page).build();
         let rows = query.fetch_all(&self.readers).await?;
         let page = rows::page(rows, page, rows::receipt, |(_, sequence)| *sequence)?;
         Ok(ListPage {
@@ -318,7 +367,7 @@ impl Catalogue for SqlStore {
 
 /// The row of one item that a tenant has.
 fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder {
-    let mut query = select.query();
+    let mut query = select.query(Columns::All);
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
@@ -326,34 +375,15 @@ fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder {
     query
 }
 
-/// A page of the volumes that a tenant has.
-pub(super) fn listed_volumes(
-    tenant: &Tenant,
-    filter: &ItemFilter,
-    page: ListRequest,
-) -> QueryBuilder {
-    listed(&HELD_VOLUME, tenant, Resource::Volume, filter, page)
-}
-
-/// A page of the products of one kind that a tenant has.
-pub(super) fn listed_products(
-    tenant: &Tenant,
-    kind: Resource,
-    filter: &ItemFilter,
-    page: ListRequest,
-) -> QueryBuilder {
-    listed(&HELD_PRODUCT, tenant, kind, filter, page)
-}
-
 /// A page of the items of one kind that a tenant has.
-fn listed(
-    select: &Select,
+pub(super) fn listed(
+    columns: Columns,
     tenant: &Tenant,
     kind: Resource,
     filter: &ItemFilter,
     page: ListRequest,
 ) -> QueryBuilder {
-    let mut query = select.query();
+    let mut query = Select::of(kind).query(columns);
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
@@ -373,11 +403,16 @@ fn listed(
 
 /// A page of a tenant's receipts.
 pub(super) fn listed_receipts(
+    columns: Columns,
     tenant: &Tenant,
     item: Option<&str>,
     page: ListRequest,
 ) -> QueryBuilder {
-    let mut query = QueryBuilder::new("SELECT sequence, receipt FROM erasures WHERE tenant = ");
+    let columns = match columns {
+        Columns::All => "sequence, receipt",
+        Columns::Size => "sequence, CAST(octet_length(receipt) AS BIGINT)",
+    };
+    let mut query = QueryBuilder::new(format!("SELECT {columns} FROM erasures WHERE tenant = "));
     query.push_bind(tenant.to_string());
     if let Some(item) = item {
         query.push(" AND item = ").push_bind(item.to_owned());

@@ -30,8 +30,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 use ventriform_service::records::{
     Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
-    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, Priority, Product, QueueLoad,
-    Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
+    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan, Priority, Product,
+    QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
 };
 
 /// Number of last succeeded jobs whose durations are averaged.
@@ -211,8 +211,13 @@ impl JobStore for SqlStore {
         row.map(rows::job).transpose()
     }
 
+    async fn plan_jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<PagePlan> {
+        let query = listed("sequence, bytes", filter, page).build();
+        rows::plan(query.fetch_all(&self.readers).await?, page)
+    }
+
     async fn jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<ListPage<Job>> {
-        let query = listed(filter, page).build();
+        let query = listed("*", filter, page).build();
         let rows = query.fetch_all(&self.readers).await?;
         rows::page(rows, page, rows::job, |job| job.sequence)
     }
@@ -570,9 +575,9 @@ impl SqlStore {
     }
 }
 
-/// A page of a tenant's jobs.
-pub(super) fn listed(filter: &JobFilter, page: ListRequest) -> QueryBuilder {
-    let mut query = QueryBuilder::new("SELECT * FROM jobs WHERE tenant = ");
+/// These columns of a page of a tenant's jobs.
+pub(super) fn listed(columns: &str, filter: &JobFilter, page: ListRequest) -> QueryBuilder {
+    let mut query = QueryBuilder::new(format!("SELECT {columns} FROM jobs WHERE tenant = "));
     query.push_bind(filter.tenant.to_string());
     if let Some(volume) = &filter.volume {
         query.push(" AND volume = ").push_bind(volume.clone());

@@ -84,6 +84,7 @@ mod tests {
     use crate::database::SqlStore;
     use crate::query::query;
     use crate::space::DiskGauge;
+    use crate::tables::catalogue::Columns;
     use crate::tables::{access, catalogue, intake, jobs, rows};
     use std::time::Duration;
     use ventriform_service::access::AuditFilter;
@@ -155,7 +156,8 @@ mod tests {
                     (true, Some(wide)) => vec![wide],
                     (true, None) => vec!["jobs_by_tenant (tenant=?"],
                 };
-                add(jobs::listed(&filter, page), by);
+                add(jobs::listed("sequence, bytes", &filter, page), by.clone());
+                add(jobs::listed("*", &filter, page), by);
             }
             for on in combinations(5) {
                 let filter = ItemFilter {
@@ -169,13 +171,11 @@ mod tests {
                 ];
                 let by: Vec<_> = narrow.iter().filter(|one| one.0).map(|one| one.1).collect();
                 let by = if by.is_empty() { vec!["kind=?"] } else { by };
-                add(
-                    catalogue::listed_volumes(&tenant, &filter, page),
-                    by.clone(),
-                );
-                for kind in [Resource::Model, Resource::Template] {
-                    let query = catalogue::listed_products(&tenant, kind, &filter, page);
-                    add(query, by.clone());
+                for kind in [Resource::Volume, Resource::Model, Resource::Template] {
+                    for column in [Columns::All, Columns::Size] {
+                        let query = catalogue::listed(column, &tenant, kind, &filter, page);
+                        add(query, by.clone());
+                    }
                 }
             }
             for on in combinations(4) {
@@ -197,12 +197,12 @@ mod tests {
                 add(access::listed_events(&filter, page), by);
             }
             add(access::listed_keys(Some(&tenant), page), vec!["tenant=?"]);
-            add(
-                catalogue::listed_receipts(&tenant, None, page),
-                vec!["tenant=?"],
-            );
-            let of_item = catalogue::listed_receipts(&tenant, Some("x"), page);
-            add(of_item, vec!["item=?"]);
+            for columns in [Columns::All, Columns::Size] {
+                let all = catalogue::listed_receipts(columns, &tenant, None, page);
+                add(all, vec!["tenant=?"]);
+                let of_item = catalogue::listed_receipts(columns, &tenant, Some("x"), page);
+                add(of_item, vec!["item=?"]);
+            }
             add(intake::listed(&tenant, None, page), vec!["tenant=?"]);
             let failed = intake::listed(&tenant, Some(GroupState::Failed), page);
             add(failed, vec!["state=?"]);

@@ -4,8 +4,9 @@ use crate::query::DbRow;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ventriform_service::records::{
-    Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, Priority, Product, Receipt,
-    ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
+    Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority, Product,
+    Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant,
+    Timestamp,
 };
 
 pub(super) fn job(row: DbRow) -> StoreResult<Job> {
@@ -153,14 +154,25 @@ pub(super) fn all<T>(
     rows.into_iter().map(record).collect()
 }
 
+/// The plan of a page, from rows of a sequence number and a size, queried with a limit of one more than requested.
+pub(super) fn plan(rows: Vec<DbRow>, request: ListRequest) -> StoreResult<PagePlan> {
+    let size = |row: DbRow| Ok((row.try_get(0)?, unsigned(row.try_get(1)?)));
+    Ok(request.planned(all(rows, size)?))
+}
+
 /// A page of a list, from rows queried with a limit of one more than requested.
 pub(super) fn page<T>(
-    rows: Vec<DbRow>,
+    mut rows: Vec<DbRow>,
     request: ListRequest,
     record: impl Fn(DbRow) -> StoreResult<T>,
     sequence: fn(&T) -> i64,
 ) -> StoreResult<ListPage<T>> {
-    Ok(ListPage::cut(all(rows, record)?, request.limit, sequence))
+    // The extra row, which may be large, only tells that there is a next page.
+    let more = rows.len() > request.limit as usize;
+    rows.truncate(request.limit as usize);
+    let items = all(rows, record)?;
+    let next = items.last().filter(|_| more).map(sequence);
+    Ok(ListPage { items, next })
 }
 
 pub(crate) fn to_json(value: &impl Serialize) -> StoreResult<String> {
