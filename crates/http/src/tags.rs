@@ -9,6 +9,7 @@ use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
 use axum::extract::Request;
 use axum::http::{StatusCode, header};
+use futures::future::BoxFuture;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -109,12 +110,12 @@ const CHANGE_TRIES: usize = 100;
 /// # Errors
 /// Those of [`merge_patch`], `tags_of` and [`merged`], 503 if others change the tags all the time, 503 or 507 if the storage
 /// fails.
-pub async fn change(
+pub async fn change<'a>(
     app: &App,
     tenant: &Tenant,
     id: &str,
     request: Request,
-    tags_of: impl AsyncFn() -> Answer<Tags>,
+    tags_of: impl Fn() -> BoxFuture<'a, Answer<Tags>>,
 ) -> Answer<()> {
     let patch = merge_patch(request).await?;
     let catalogue = app.service.items().catalogue();

@@ -16,6 +16,7 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, header};
 use axum::response::IntoResponse;
+use futures::{FutureExt, TryFutureExt};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -342,9 +343,9 @@ pub async fn update_volume(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<VolumeBody>> {
-    let tags_of = async || {
-        let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-        Ok(volume.ownership.tags)
+    let tags_of = || {
+        let found = find::<Volumes>(&app, &caller.tenant, &id);
+        found.map_ok(|volume| volume.ownership.tags).boxed()
     };
     tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;

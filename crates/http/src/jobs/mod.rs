@@ -30,6 +30,7 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::IntoResponse;
+use futures::{FutureExt, TryFutureExt};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::ops::ControlFlow;
@@ -251,7 +252,11 @@ pub async fn update_job(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<JobBody>> {
-    let tags_of = async || Ok(find(&app, &caller.tenant, &id).await?.tags);
+    let tags_of = || {
+        find(&app, &caller.tenant, &id)
+            .map_ok(|job| job.tags)
+            .boxed()
+    };
     tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
     let job = find(&app, &caller.tenant, &id).await?;
     Ok(Json(describe(&app, job).await?))
