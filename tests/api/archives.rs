@@ -402,6 +402,36 @@ async fn a_waiting_fetch_survives_a_restart_and_ends_with_its_job() {
     assert_eq!(cancelled["volume"], Value::Null);
 }
 
+/// Otherwise a fetch with which the process ends would be repeated after every start.
+#[tokio::test]
+async fn a_fetch_during_which_the_service_ended_counts() {
+    let fake = FakeArchive::start(&[b"VOLUME sphere"]).await;
+    fake.fail(&[Fault::Silence]);
+    let app = app_with(&fake, |settings| {
+        settings.archive_attempts = 1;
+        settings.shutdown_grace = "50ms".parse().unwrap();
+    })
+    .await;
+    let job: Value = file(&app, &order()).await.json().await.unwrap();
+    while fake.transfers().is_empty() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    let data = app.stop().await;
+    fake.recover();
+    let app = TestApp::on(data, fake_engine(), |settings| {
+        set(settings, &fake);
+        settings.archive_attempts = 1;
+    })
+    .await;
+    let job = app.until(&job, &["failed"]).await;
+    assert_eq!(
+        job["error"]["type"],
+        "urn:ventriform:problem:archive-unavailable"
+    );
+    assert_eq!(job["source"]["attempts"], 1);
+    assert_eq!(fake.transfers().len(), 1);
+}
+
 #[tokio::test]
 async fn a_listed_service_is_used_without_credentials() {
     let fake = FakeArchive::start(&[b"VOLUME sphere"]).await;

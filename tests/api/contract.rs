@@ -1447,7 +1447,12 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     assert_eq!(on.b.pull_destinations().await.unwrap()[0].0, "pacs");
     let due = on.b.due_pulls("pacs", now(), 10).await.unwrap();
     assert_eq!(due.len(), 2);
-    assert_eq!(due[0].source, source);
+    assert_eq!((&due[0].source, due[0].attempts), (&source, 0));
+    // An attempt counts from its beginning.
+    on.a.pull_begun(&job.id, now()).await.unwrap();
+    let due = on.b.due_pulls("pacs", now(), 10).await.unwrap();
+    let begun = due.iter().find(|due| due.job == job.id).unwrap();
+    assert_eq!(begun.attempts, 1);
     on.a.pull_failed(&job.id, "away", now() + 60_000, now())
         .await
         .unwrap();
@@ -1465,6 +1470,8 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
             .unwrap()
             .is_none()
     );
+    on.a.pull_begun(&job.id, now()).await.unwrap();
+    on.a.pull_begun(&lost.id, now()).await.unwrap();
     let supplied = on.a.pulled(&job.id, &volume, now()).await.unwrap().unwrap();
     assert_eq!(supplied.volume.as_ref(), Some(&volume));
     let pulls = on.b.pulls(&[&job.id, &lost.id]).await.unwrap();
@@ -1472,7 +1479,10 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
         (pulls[&job.id].state, pulls[&job.id].attempts),
         (DeliveryState::Delivered, 2)
     );
-    assert_eq!(pulls[&lost.id].state, DeliveryState::Dead);
+    assert_eq!(
+        (pulls[&lost.id].state, pulls[&lost.id].attempts),
+        (DeliveryState::Dead, 0)
+    );
     let tenant = tenant();
     let key = SeriesKey {
         tenant: &tenant,

@@ -84,10 +84,11 @@ impl Puller {
         Ok((stored, ExchangeEnd::Done))
     }
 
-    /// Writes down how an attempt ended.
+    /// Writes down how the last of so many attempts ended.
     async fn settle(
         &self,
         due: &DuePull,
+        attempts: u32,
         fetched: Result<(StoredSeries, ExchangeEnd), Trouble>,
     ) -> StoreResult<(ExchangeEnd, AttemptEnd)> {
         let (exchange, store) = (&self.exchange, &self.exchange.store);
@@ -108,7 +109,6 @@ impl Puller {
         tracing::info!(job = %due.job, error = trouble.what(), "a series was not fetched");
         let failure = match trouble {
             Trouble::Passing { what, asked } => {
-                let attempts = due.attempts.saturating_add(1);
                 match exchange.again_at(attempts, due.since, asked) {
                     Some(again_at) => {
                         store.pull_failed(&due.job, &what, again_at, now).await?;
@@ -181,12 +181,27 @@ impl Errands for Puller {
     }
 
     async fn attempt(&self, due: DuePull) -> AttemptEnd {
-        let changes = self.exchange.queue.changes();
-        let fetched = tokio::select! {
-            fetched = self.exchange.in_time(self.fetch(&due)) => fetched,
-            () = self.until_ended(changes, &due.job) => return AttemptEnd::Fine,
+        let exchange = &self.exchange;
+        let changes = exchange.queue.changes();
+        let mut attempts = due.attempts;
+        let fetched = if attempts >= exchange.settings.retries.attempts {
+            // The process ended during the last one.
+            Err(Trouble::passing(
+                "How the last one ended was not written down.",
+            ))
+        } else {
+            let now = exchange.clock().now();
+            if let Err(error) = exchange.store.pull_begun(&due.job, now).await {
+                tracing::error!(job = %due.job, %error, "a fetch was not written down");
+                return AttemptEnd::NotWritten;
+            }
+            attempts += 1;
+            tokio::select! {
+                fetched = exchange.in_time(self.fetch(&due)) => fetched,
+                () = self.until_ended(changes, &due.job) => return AttemptEnd::Fine,
+            }
         };
-        match self.settle(&due, fetched).await {
+        match self.settle(&due, attempts, fetched).await {
             Ok((end, meaning)) => {
                 self.counts.add(end);
                 self.exchange.host.fetched(&due, end).await;

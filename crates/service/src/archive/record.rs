@@ -126,10 +126,13 @@ pub trait ArchiveStore: Send + Sync + 'static {
         limit: usize,
     ) -> StoreResult<Vec<DuePull>>;
 
+    /// Counts an attempt to fetch before it is made, so that one with which the process ends counts too.
+    async fn pull_begun(&self, job: &str, now: Timestamp) -> StoreResult<()>;
+
     /// Gives a waiting job its volume. `None` if the job waits no more.
     async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>>;
 
-    /// Writes down that an attempt to fetch failed.
+    /// Writes down that an attempt to fetch failed, which has been counted.
     async fn pull_failed(
         &self,
         job: &str,

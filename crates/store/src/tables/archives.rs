@@ -47,6 +47,18 @@ impl ArchiveStore for SqlStore {
         })
     }
 
+    async fn pull_begun(&self, job: &str, now: Timestamp) -> StoreResult<()> {
+        query(
+            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = $1
+             WHERE job = $2 AND state = 'pending' RETURNING job",
+        )
+        .bind(now)
+        .bind(job)
+        .write_optional(&self.writer)
+        .await?;
+        Ok(())
+    }
+
     async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>> {
         let mut transaction = self.writer.begin().await?;
         let row = query(
@@ -60,8 +72,8 @@ impl ArchiveStore for SqlStore {
         let job = row.map(rows::job).transpose()?;
         if let Some(job) = &job {
             query(
-                "UPDATE pulls SET state = 'done', attempts = attempts + 1, last_attempt_at = $1,
-                        last_error = NULL WHERE job = $2",
+                "UPDATE pulls SET state = 'done', last_attempt_at = $1, last_error = NULL
+                 WHERE job = $2",
             )
             .bind(now)
             .bind(&job.id)
@@ -81,8 +93,7 @@ impl ArchiveStore for SqlStore {
         now: Timestamp,
     ) -> StoreResult<()> {
         query(
-            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = $1, last_error = $2,
-                    next_attempt_at = $3
+            "UPDATE pulls SET last_attempt_at = $1, last_error = $2, next_attempt_at = $3
              WHERE job = $4 AND state = 'pending' RETURNING job",
         )
         .bind(now)
@@ -111,15 +122,12 @@ impl ArchiveStore for SqlStore {
         .bind(job)
         .fetch_optional(&mut transaction)
         .await?;
-        query(
-            "UPDATE pulls SET attempts = attempts + 1, last_attempt_at = $1, last_error = $2
-             WHERE job = $3",
-        )
-        .bind(now)
-        .bind(&failure.detail)
-        .bind(job)
-        .execute(&mut transaction)
-        .await?;
+        query("UPDATE pulls SET last_attempt_at = $1, last_error = $2 WHERE job = $3")
+            .bind(now)
+            .bind(&failure.detail)
+            .bind(job)
+            .execute(&mut transaction)
+            .await?;
         transaction.commit().await?;
         row.map(rows::job).transpose()
     }
