@@ -1016,7 +1016,7 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
     let job = &found.items[0].id;
     let none = Tags::default();
     for (id, name) in [(&ids[0], "é"), (job, "b")] {
-        let change = async |tenant, before: &Tags, after: &Tags| {
+        let change = async |tenant: &Tenant, before: &Tags, after: &Tags| {
             let changed = on.a.change_tags(tenant, id, before, after).await;
             changed.unwrap()
         };
