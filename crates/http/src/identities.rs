@@ -57,8 +57,8 @@ pub async fn state_identity(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<Map<String, Value>>> {
-    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let stated = json_object(request).await?;
+    let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let catalogue = app.service.items().catalogue();
     if catalogue.scan(&caller.tenant, &id).await?.is_none() {
         let noted = app.service.note_scan(&caller.tenant, &id, &volume.files);
