@@ -97,8 +97,8 @@ class BeatReport(Document):
     """Confidence of the fit to the gates' sum, 0..=1."""
     curve: list[CurvePoint]
     """The volume curve, gates' width taken off, at equal steps from the beginning of the first gate."""
-    edv_interval_ml: list[float]
-    """Interval about EDV that holds the true volume of nine of ten hearts."""
+    edv_interval_ml: list[float] | None = None
+    """Interval about EDV that holds the true volume of nine of ten hearts; `null` if the gates are no beat."""
     edv_ml: float
     """End-diastolic volume: the largest of the curve."""
     ef_interval_percent: list[float] | None = None
@@ -115,12 +115,12 @@ class BeatReport(Document):
     """When the curve is smallest, degrees."""
     end_systole_gate: int
     """The gate with the smallest cavity."""
-    esv_interval_ml: list[float]
+    esv_interval_ml: list[float] | None = None
     """The same about ESV."""
     esv_ml: float
     """End-systolic volume: the smallest of the curve."""
     flags: list[Flag]
-    """Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat."""
+    """Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat."""
     gates: list[GateReport]
     """Each gate, in the mean over its width."""
     input: FileFacts
@@ -149,8 +149,8 @@ class BeatReport(Document):
     """The wall's segments (AHA)."""
     steps: int
     """Steps of the joint fit."""
-    sv_ml: float
-    """Stroke volume."""
+    sv_ml: float | None = None
+    """Stroke volume; `null` if the gates are no beat."""
     template: str
     """The model that was fitted to the gates' sum."""
     timing: TimingReport
@@ -196,7 +196,7 @@ class ComparedScan(Document):
     confidence: float
     """Confidence of the fit, 0..=1."""
     injected_dose: str | None = None
-    """Total dose as the header has it."""
+    """Total dose by the header, MBq."""
     input: FileFacts
     """The file."""
     long_axis: LongAxis | None = None
@@ -1534,7 +1534,8 @@ class Scan(Document):
     image_type: str | None = None
     """Image Type (0008,0008), values separated by backslashes."""
     injected_dose: str | None = None
-    """Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images."""
+    """Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images
+    ([`Provenance::injected_dose_mbq`])."""
     injection_time: str | None = None
     """Radiopharmaceutical Start Time (0018,1072)."""
     instance_uids: list[str] | None = None

@@ -396,8 +396,8 @@ export interface components {
             confidence: number;
             /** @description The volume curve, gates' width taken off, at equal steps from the beginning of the first gate. */
             curve: components["schemas"]["CurvePoint"][];
-            /** @description Interval about EDV that holds the true volume of nine of ten hearts. */
-            edv_interval_ml: number[];
+            /** @description Interval about EDV that holds the true volume of nine of ten hearts; `null` if the gates are no beat. */
+            edv_interval_ml?: number[] | null;
             /**
              * Format: double
              * @description End-diastolic volume: the largest of the curve.
@@ -436,13 +436,13 @@ export interface components {
              */
             end_systole_gate: number;
             /** @description The same about ESV. */
-            esv_interval_ml: number[];
+            esv_interval_ml?: number[] | null;
             /**
              * Format: double
              * @description End-systolic volume: the smallest of the curve.
              */
             esv_ml: number;
-            /** @description Reasons to look closer: of the fit to the gates' sum, of what the file says of the beats, then of the beat. */
+            /** @description Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat. */
             flags: components["schemas"]["Flag"][];
             /** @description Each gate, in the mean over its width. */
             gates: components["schemas"]["GateReport"][];
@@ -480,9 +480,9 @@ export interface components {
             steps: number;
             /**
              * Format: double
-             * @description Stroke volume.
+             * @description Stroke volume; `null` if the gates are no beat.
              */
-            sv_ml: number;
+            sv_ml?: number | null;
             /** @description The model that was fitted to the gates' sum. */
             template: string;
             /** @description What the file says of the beats. */
@@ -555,7 +555,7 @@ export interface components {
              * Format: double
              * @description Stroke volume.
              */
-            sv_ml: number;
+            sv_ml?: number | null;
             /** @description Name of the model that was fitted to the gates' sum. */
             template: string;
         };
@@ -675,7 +675,7 @@ export interface components {
              * @description Confidence of the fit, 0..=1.
              */
             confidence: number;
-            /** @description Total dose as the header has it. */
+            /** @description Total dose by the header, MBq. */
             injected_dose?: string | null;
             /** @description The file. */
             input: components["schemas"]["FileFacts"];
@@ -4033,7 +4033,10 @@ export interface components {
             frame_of_reference_uid?: string | null;
             /** @description Image Type (0008,0008), values separated by backslashes. */
             image_type?: string | null;
-            /** @description Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images. */
+            /**
+             * @description Radionuclide Total Dose (0018,1074) as stored: MBq in NM images, Bq in PET images
+             *     ([`Provenance::injected_dose_mbq`]).
+             */
             injected_dose?: string | null;
             /** @description Radiopharmaceutical Start Time (0018,1072). */
             injection_time?: string | null;
