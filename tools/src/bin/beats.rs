@@ -125,7 +125,7 @@ impl Table {
     fn add(&mut self, folder: &Path, row: &Row) {
         let (beat, truth) = (&row.beat, &row.truth);
         let number = |name: &str| truth[name].as_f64().unwrap_or(f64::NAN);
-        let ef = 100.0 * beat.stroke_ml() / beat.end_diastole.cavity_ml;
+        let ef = 100.0 * (1.0 - beat.end_systole.cavity_ml / beat.end_diastole.cavity_ml);
         let flags: Vec<&str> = beat.flags.iter().map(|flag| flag.code()).collect();
         println!(
             "{},{ef:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{},{:.4},{:.2},{}",

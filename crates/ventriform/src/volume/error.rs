@@ -174,14 +174,12 @@ pub enum VolumeError {
     },
     /// No scan of a heart has voxels of this size.
     #[error(
-        "{file}: the voxels are {} mm in size, and those of a scan are {} to {} mm",
+        "the voxels are {} mm in size, and those of a scan are {} to {} mm",
         .spacing_mm.map(|mm| mm.to_string()).join(" x "),
         VOXEL_MM.start(),
         VOXEL_MM.end()
     )]
     VoxelSize {
-        /// The file's name.
-        file: String,
         /// Along i, j, k, mm.
         spacing_mm: [f64; 3],
     },

@@ -41,12 +41,16 @@ impl Reading {
     /// nobody stated and whose size is not that of an organ.
     ///
     /// # Errors
-    /// [`VolumeError::SingleSlice`] or [`VolumeError::Mesh`].
+    /// [`VolumeError::SingleSlice`], [`VolumeError::VoxelSize`] or [`VolumeError::Mesh`].
     pub fn usable(self) -> Result<Self, VolumeError> {
         let shape = self.volume.shape;
+        let spacing_mm = self.volume.frame.spacing();
         match &self.problem {
             Some(problem) => Err(problem.clone()),
             None if shape.contains(&1) => Err(VolumeError::SingleSlice { shape }),
+            None if !spacing_mm.iter().all(|mm| VOXEL_MM.contains(mm)) => {
+                Err(VolumeError::VoxelSize { spacing_mm })
+            }
             None => Ok(self),
         }
     }
@@ -209,13 +213,6 @@ pub(super) fn read(
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
     let header = file.header();
-    let spacing_mm = header.placement.frame.spacing();
-    if !spacing_mm.iter().all(|mm| VOXEL_MM.contains(mm)) {
-        return Err(VolumeError::VoxelSize {
-            file: header.file.to_owned(),
-            spacing_mm,
-        });
-    }
     let frame = options.choose(header.frames, header.gated);
     let frame = frame.map_err(|error| because(error, file.why_not_gated()))?;
     let decoded = match frame {
