@@ -385,7 +385,7 @@ async fn the_records_of_jobs_count_for_their_tenant() {
         assert!(filed < 100, "the records of {filed} jobs are stored");
     };
     problem(refused, 507, "storage-quota").await;
-    assert!(filed > 10, "{filed}");
+    assert!(filed >= 5, "{filed}");
 }
 
 #[tokio::test]
