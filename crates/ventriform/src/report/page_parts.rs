@@ -104,7 +104,7 @@ pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
         "without"
     };
     let whose = format!(
-        "Limits of {} ({} cases): sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}.",
+        "Limits: {}, {} cases, sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}.",
         used.people,
         used.cases,
         used.sex.as_str(),
@@ -137,7 +137,7 @@ pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
     html! {
         section {
             h2 { "Beside normal limits" }
-            p.hint { (whose) " The " (perfusion.note) "." }
+            p.hint { (whose) " Figures: " (perfusion.note) "." }
             (document::figures(&figures))
             ul.warnings { @for flag in &perfusion.flags { li { (flag.reason) } } }
             div.scroll tabindex="0" role="group" aria-label="Table of scores, scrollable" {

@@ -191,7 +191,7 @@ fn checks(report: &SegmentationReport) -> Vec<(bool, String)> {
             ("dark_apex", "The apical wall is seen".to_owned()),
             (
                 "mirrored",
-                "The apex does not point to the patient's right".to_owned(),
+                "The apex points neither to the right nor to the back nor up".to_owned(),
             ),
             (
                 "implausible_shape",
