@@ -53,18 +53,6 @@ pub struct ListPage<T> {
     pub next: Option<i64>,
 }
 
-impl<T> ListPage<T> {
-    /// Makes a page of rows that were queried with a limit of `limit + 1`: the extra row only
-    /// tells that there is a next page.
-    pub fn cut(mut items: Vec<T>, limit: u32, sequence: impl Fn(&T) -> i64) -> Self {
-        let limit = limit as usize;
-        let more = items.len() > limit;
-        items.truncate(limit);
-        let next = items.last().filter(|_| more).map(sequence);
-        Self { items, next }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
