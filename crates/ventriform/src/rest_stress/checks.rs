@@ -133,18 +133,12 @@ pub(super) fn flags(
         });
     }
     for (scan, heart) in both {
-        let own = heart.segmentation().fit.judgement.flags.iter();
-        flags.extend(own.map(|flag| ComparisonFlag::OfScan {
-            scan,
-            code: flag.code(),
-            reason: flag.to_string(),
-        }));
+        let of_fit = heart.segmentation().fit.judgement.flags.iter();
         let of_beat = heart.beat().map(GatedHeart::flags).unwrap_or_default();
-        flags.extend(of_beat.iter().map(|flag| ComparisonFlag::OfScan {
-            scan,
-            code: flag.code(),
-            reason: flag.to_string(),
-        }));
+        let told = of_fit
+            .map(|flag| (flag.code(), flag.to_string()))
+            .chain(of_beat.iter().map(|flag| (flag.code(), flag.to_string())));
+        flags.extend(told.map(|(code, reason)| ComparisonFlag::OfScan { scan, code, reason }));
     }
     flags.extend(of_limits(stress.perfusion(), rest.perfusion()));
     flags
@@ -158,22 +152,29 @@ fn of_limits(stress: Option<&Perfusion>, rest: Option<&Perfusion>) -> Vec<Compar
         flags.map(|flag| (flag.code(), flag.to_string())).collect()
     };
     let [of_stress, of_rest] = [stress, rest].map(told);
-    let shared = |flag: &(&'static str, String)| of_stress.contains(flag) && of_rest.contains(flag);
-    let flag = |scan: Option<WhichScan>, (code, reason): &(&'static str, String)| {
-        ComparisonFlag::OfLimits {
-            scan,
-            code,
-            reason: reason.clone(),
-        }
+    let at_stress = (of_stress.iter()).map(|own| {
+        let alone = !of_rest.contains(own);
+        (alone.then_some(WhichScan::Stress), own)
+    });
+    let at_rest = (of_rest.iter())
+        .filter(|own| !of_stress.contains(own))
+        .map(|own| (Some(WhichScan::Rest), own));
+    let flag = |(scan, (code, reason)): (_, &(&'static str, String))| ComparisonFlag::OfLimits {
+        scan,
+        code,
+        reason: reason.clone(),
     };
-    let mut flags = Vec::new();
-    for own in &of_stress {
-        flags.push(flag((!shared(own)).then_some(WhichScan::Stress), own));
-    }
-    for own in of_rest.iter().filter(|own| !shared(own)) {
-        flags.push(flag(Some(WhichScan::Rest), own));
-    }
-    flags
+    at_stress.chain(at_rest).map(flag).collect()
+}
+
+/// The flag of a field that one header states and the other one leaves out, as they have it at stress and at rest.
+fn of_one(field: &'static str, stated: [Option<String>; 2]) -> Option<ComparisonFlag> {
+    let (scan, other) = match stated {
+        [None, Some(other)] => (WhichScan::Stress, other),
+        [Some(other), None] => (WhichScan::Rest, other),
+        _ => return None,
+    };
+    Some(ComparisonFlag::NotStated { scan, field, other })
 }
 
 /// What the headers say of how both scans were made.
@@ -183,29 +184,23 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
     if !patient.is_empty() {
         flags.push(ComparisonFlag::NotComparable(Reason::Patient(patient)));
     }
-    match (stress.attenuation_corrected(), rest.attenuation_corrected()) {
-        (Some(at_stress), Some(at_rest)) if at_stress != at_rest => {
-            let corrected = if at_stress {
-                WhichScan::Stress
-            } else {
-                WhichScan::Rest
-            };
-            flags.push(ComparisonFlag::NotComparable(
-                Reason::AttenuationCorrection { corrected },
-            ));
-        }
-        // What is stated of neither is no difference: most cameras correct none.
-        (None, Some(true)) => flags.push(ComparisonFlag::NotStated {
-            scan: WhichScan::Stress,
-            field: "attenuation correction",
-            other: "corrected".to_owned(),
-        }),
-        (Some(true), None) => flags.push(ComparisonFlag::NotStated {
-            scan: WhichScan::Rest,
-            field: "attenuation correction",
-            other: "corrected".to_owned(),
-        }),
-        _ => {}
+    let corrections = [stress, rest].map(Provenance::attenuation_corrected);
+    if let [Some(at_stress), Some(at_rest)] = corrections
+        && at_stress != at_rest
+    {
+        let corrected = if at_stress {
+            WhichScan::Stress
+        } else {
+            WhichScan::Rest
+        };
+        flags.push(ComparisonFlag::NotComparable(
+            Reason::AttenuationCorrection { corrected },
+        ));
+    }
+    // Most cameras correct none: where a header says so, silence of the other one is no difference.
+    if !corrections.contains(&Some(false)) {
+        let corrected = corrections.map(|is| is.map(|_| "corrected".to_owned()));
+        flags.extend(of_one("attenuation correction", corrected));
     }
     let differing = |a: &Option<String>, b: &Option<String>| {
         let (a, b) = (a.as_deref()?.trim(), b.as_deref()?.trim());
@@ -230,16 +225,7 @@ fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
             .find(|text| !text.trim().is_empty());
         stated.map(|text| text.trim().to_owned())
     };
-    let one_sided = match (tracer(stress), tracer(rest)) {
-        (None, Some(other)) => Some((WhichScan::Stress, other)),
-        (Some(other), None) => Some((WhichScan::Rest, other)),
-        _ => None,
-    };
-    flags.extend(one_sided.map(|(scan, other)| ComparisonFlag::NotStated {
-        scan,
-        field: "tracer",
-        other,
-    }));
+    flags.extend(of_one("tracer", [stress, rest].map(tracer)));
     for (field, a, b) in [
         ("the camera", &stress.model_name, &rest.model_name),
         ("the unit of uptake", &stress.units, &rest.units),
