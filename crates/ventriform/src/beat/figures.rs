@@ -151,6 +151,12 @@ impl Beat {
         self.ef_percent.map(|_| ejected)
     }
 
+    /// Muscle of the wall in the mean of the curve, ml.
+    pub fn mean_wall_ml(&self) -> f64 {
+        let walls = self.curve.iter().map(|volumes| volumes.wall_ml);
+        walls.sum::<f64>() / self.curve.len() as f64
+    }
+
     /// Whether the gates are a beat, and enough of the wall moves, more than noise does, to have phases.
     pub fn has_phases(&self) -> bool {
         let unreliable = |flag: &BeatFlag| matches!(flag, BeatFlag::PhaseUnreliable { .. });

@@ -196,14 +196,13 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
         ..
     } = *facts;
     let no_beat = orders_as_smooth > ORDERS_AS_SMOOTH || ef_percent < LEAST_EF_PERCENT;
-    let losses: Vec<(usize, f64)> = (facts.losses.iter().enumerate())
-        .filter(|(_, loss)| **loss > COUNT_LOSS_FLAG_SHARE)
-        .map(|(gate, loss)| (gate + 1, *loss))
-        .collect();
-    let gains: Vec<(usize, f64)> = (facts.losses.iter().enumerate())
-        .filter(|(_, loss)| **loss < -COUNT_LOSS_FLAG_SHARE)
-        .map(|(gate, loss)| (gate + 1, -loss))
-        .collect();
+    let beyond = |sign: f64| -> Vec<(usize, f64)> {
+        (facts.losses.iter().enumerate())
+            .map(|(gate, loss)| (gate + 1, sign * loss))
+            .filter(|(_, share)| *share > COUNT_LOSS_FLAG_SHARE)
+            .collect()
+    };
+    let (losses, gains) = (beyond(1.0), beyond(-1.0));
     let dark = facts.dark_share;
     let outside = facts.share_outside;
     let outward: Vec<(usize, f64)> = (facts.motions.iter().copied())

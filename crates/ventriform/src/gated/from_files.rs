@@ -151,9 +151,7 @@ pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure
 impl GatedHeart {
     /// Reasons to look closer by what the file says of the beats, and by what the caller says of the wall.
     fn stated_flags(&self) -> Vec<BeatFlag> {
-        let walls = self.beat.curve.iter().map(|volumes| volumes.wall_ml);
-        let mean_ml = walls.sum::<f64>() / self.beat.curve.len() as f64;
-        let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean_ml;
+        let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * self.beat.mean_wall_ml();
         let given = self.choice.mass_g;
         let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let mass = given.and_then(|given_g| BeatFlag::of_mass(given_g, found_g));

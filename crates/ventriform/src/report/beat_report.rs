@@ -225,7 +225,7 @@ impl BeatReport {
     /// Joins the figures of `beat` to the other parts.
     pub fn new(beat: &Beat, parts: BeatParts) -> Self {
         let walls: Vec<f64> = beat.curve.iter().map(|v| v.wall_ml).collect();
-        let mean = walls.iter().sum::<f64>() / walls.len() as f64;
+        let mean = beat.mean_wall_ml();
         let [least, most] = [f64::min, f64::max].map(|end| walls.iter().copied().reduce(end));
         let swing = most
             .zip(least)

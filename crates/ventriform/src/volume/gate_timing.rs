@@ -56,8 +56,11 @@ impl GateTiming {
 
     /// The R-R interval of `gates` gates, ms: as stated, or of the length of a gate; `None` if no heart beats so.
     pub fn rr_of(&self, gates: usize) -> Option<f64> {
-        let stated = self.rr_ms.or_else(|| self.rr_of_frames(gates));
-        stated.filter(|ms| RR_MS.contains(ms))
+        self.stated_rr(gates).filter(|ms| RR_MS.contains(ms))
+    }
+
+    fn stated_rr(&self, gates: usize) -> Option<f64> {
+        self.rr_ms.or_else(|| self.rr_of_frames(gates))
     }
 
     fn rr_of_frames(&self, gates: usize) -> Option<f64> {
@@ -67,8 +70,8 @@ impl GateTiming {
     /// Warnings about the R-R interval of `gates` gates: no heart beats so, or the gates last longer or shorter.
     pub(super) fn warnings(&self, gates: usize) -> Vec<String> {
         let [least, most] = [RR_MS.start(), RR_MS.end()];
-        let impossible = self.rr_ms.or_else(|| self.rr_of_frames(gates));
-        let impossible = impossible.filter(|ms| !RR_MS.contains(ms)).map(|ms| {
+        let stated = self.stated_rr(gates);
+        let impossible = stated.filter(|ms| !RR_MS.contains(ms)).map(|ms| {
             format!(
                 "The header's R-R interval of {ms:.0} ms is none of a heart ({least:.0} to {most:.0} ms) and was left out."
             )

@@ -164,17 +164,22 @@ fn is_mirrored(made: &Segmentation) -> bool {
     flags.iter().any(|flag| flag.code() == "mirrored")
 }
 
+/// A heart in one of the poses that the phantom has.
+fn posed(seed: u64) -> Volume {
+    let parameters = PhantomParameters {
+        shape: [52; 3],
+        spacing_mm: [5.0; 3],
+        seed,
+        ..PhantomParameters::default()
+    };
+    phantom(&parameters, &Monitor::silent()).unwrap().volume
+}
+
 /// An apex at the back, or well above the base.
 #[test]
 fn a_heart_with_front_and_back_or_up_and_down_exchanged_is_flagged() {
     for seed in 0..3 {
-        let parameters = PhantomParameters {
-            shape: [52; 3],
-            spacing_mm: [5.0; 3],
-            seed,
-            ..PhantomParameters::default()
-        };
-        let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+        let volume = posed(seed);
         let coded = segmented(&file(&volume, None, 1), &[]);
         let axis = coded.fit.model.cup.as_ref().unwrap().axis;
         assert!(axis.y < -0.2, "{axis}");
@@ -195,13 +200,7 @@ fn a_heart_with_front_and_back_or_up_and_down_exchanged_is_flagged() {
 #[test]
 fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
     for seed in 0..8 {
-        let parameters = PhantomParameters {
-            shape: [52; 3],
-            spacing_mm: [5.0; 3],
-            seed,
-            ..PhantomParameters::default()
-        };
-        let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+        let volume = posed(seed);
         assert!(
             !is_mirrored(&segmented(&file(&volume, None, 1), &[])),
             "{seed}"

@@ -280,8 +280,7 @@ fn fitted(
     monitor: &Monitor,
 ) -> Result<(Segmentation, Vec<HeartFigure>), String> {
     let (parameters, limits) = (&options.parameters.fit, &options.limits);
-    let refused = |error: &dyn std::fmt::Display| error.to_string();
-    if hold_gates(files, false, limits, monitor).map_err(|error| refused(&error))? {
+    if hold_gates(files, false, limits, monitor).map_err(|error| error.to_string())? {
         let order = GatedOrder {
             gates: files,
             auto: true,
@@ -290,7 +289,7 @@ fn fitted(
             parameters,
             choice: BeatChoice::default(),
         };
-        let made = gated::from_files(&order, limits, monitor).map_err(|error| refused(&error))?;
+        let made = gated::from_files(&order, limits, monitor).map_err(|error| error.to_string())?;
         let figures = beat_figures(&made.segmentation, &made.beat);
         return Ok((made.segmentation, figures));
     }
@@ -304,7 +303,7 @@ fn fitted(
         parameters,
     };
     let made =
-        segmentation::from_files(&order, limits, monitor).map_err(|error| refused(&error))?;
+        segmentation::from_files(&order, limits, monitor).map_err(|error| error.to_string())?;
     let figures = heart_figures(&made.segmentation);
     Ok((made.segmentation, figures))
 }
