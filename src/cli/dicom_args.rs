@@ -74,7 +74,7 @@ pub(super) struct DicomOrder {
 }
 
 impl DicomArgs {
-    /// What is to be written of `files`; `None` without `--dicom`.
+    /// The objects that are to be written of `files`; `None` without `--dicom`.
     ///
     /// # Errors
     /// If patient or study are unknown, or a flag has a value that DICOM does not allow.

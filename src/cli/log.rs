@@ -30,7 +30,7 @@ const LAST_LINES: Duration = Duration::from_secs(2);
 /// Most bytes of lines that wait to be written.
 const GATHERED_BYTES: usize = 4 << 20;
 
-/// How a line is written.
+/// The format of a line.
 #[derive(Debug, Clone, Copy)]
 enum Line {
     Json,

@@ -15,7 +15,7 @@ use ventriform_service::config::{DatabaseUrl, Flags, Settings};
 use ventriform_service::jobs::{Isolation, serve_isolated};
 use ventriform_service::work::Engine;
 
-/// How long the health check waits for an answer.
+/// Time for which the health check waits for an answer.
 const HEALTH_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Threads for work that blocks, if the settings name no number. tokio's 512 have stacks of 1 GiB together: where a disk

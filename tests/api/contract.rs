@@ -1,4 +1,4 @@
-//! What the queue and the service rely on of a database, checked on SQLite and on PostgreSQL.
+//! The properties of a database that the queue and the service rely on, checked on SQLite and on PostgreSQL.
 //!
 //! On PostgreSQL, `a` and `b` are two processes on one database; on SQLite, which one process uses, they
 //! are the same.

@@ -236,7 +236,7 @@ fn migrations() -> Vec<std::path::PathBuf> {
     files
 }
 
-/// What the database in `folder` consists of: kind, name and definition of each part.
+/// The parts of the database in `folder`: kind, name and definition of each.
 async fn parts(folder: &std::path::Path) -> Vec<(String, String, Option<String>)> {
     let options = sqlx::sqlite::SqliteConnectOptions::new().filename(folder.join("ventriform.db"));
     let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();

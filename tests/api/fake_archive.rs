@@ -19,7 +19,7 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How the next retrieval or storing goes wrong.
+/// The fault of the next retrieval or storing.
 #[derive(Debug, Clone)]
 pub enum Fault {
     /// It is answered with this status.
@@ -89,12 +89,12 @@ impl FakeArchive {
         self.content.lock().unwrap().series = series;
     }
 
-    /// What goes wrong next in retrieving, in this order.
+    /// Adds the next faults of retrieving, in this order.
     pub fn fail(&self, faults: &[Fault]) {
         self.content.lock().unwrap().faults.extend(faults.to_vec());
     }
 
-    /// What goes wrong next in storing, in this order.
+    /// Adds the next faults of storing, in this order.
     pub fn fail_storing(&self, faults: &[Fault]) {
         let mut content = self.content.lock().unwrap();
         content.storing_faults.extend(faults.to_vec());

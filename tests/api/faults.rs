@@ -91,7 +91,7 @@ impl Disk {
         u32::from_ne_bytes(number)
     }
 
-    /// What a power cut leaves of the data folder: only what was forced to disk.
+    /// The data folder after a power cut: only files that were forced to disk.
     fn after_power_cut(&self) -> TempDir {
         use std::os::unix::fs::MetadataExt;
         let rest = tempfile::tempdir().unwrap();
@@ -119,7 +119,7 @@ impl Disk {
     }
 }
 
-/// What the service acknowledged.
+/// The ids that the service acknowledged.
 #[derive(Debug, Default)]
 struct Acknowledged {
     volumes: Vec<String>,

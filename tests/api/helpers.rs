@@ -109,7 +109,7 @@ impl Deref for TestApp {
 }
 
 impl TestApp {
-    /// What `/metrics` answers.
+    /// The answer of `/metrics`.
     pub async fn metrics(&self) -> String {
         let answer = self.get("/metrics").send().await.unwrap();
         answer.text().await.unwrap()

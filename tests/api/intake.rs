@@ -530,7 +530,7 @@ fn connect(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// What the service sends before it closes the connection.
+/// The bytes that the service sends before it closes the connection.
 fn answer(mut stream: TcpStream) -> Vec<u8> {
     let mut answer = Vec::new();
     // The connection may be reset.

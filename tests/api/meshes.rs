@@ -210,7 +210,7 @@ async fn an_expert_may_draw_a_mesh() {
     problem(stray, 422, "invalid-parameter").await;
 }
 
-/// What a template may be sent as, an expert's mesh may be, too: the same bytes are told by their content.
+/// A template and an expert's mesh may be sent under the same media types: the bytes are told by their content.
 #[tokio::test]
 async fn a_mesh_is_taken_under_each_of_its_media_types_by_both_collections() {
     let data = tempfile::tempdir().unwrap();
@@ -307,7 +307,7 @@ fn object(class: &str, modality: &str, number: usize) -> Vec<u8> {
     ])
 }
 
-/// What lies beside a scan on a medium and in an export.
+/// The files that lie beside a scan on a medium and in an export.
 fn company() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("LOCKFILE", Vec::new()),

@@ -34,7 +34,7 @@ struct Folder {
     seen: BTreeMap<String, Vec<u8>>,
 }
 
-/// What a caller sees: lists, and the files behind their links.
+/// The answers that a caller gets: lists, and the files behind their links.
 async fn seen(app: &TestApp) -> BTreeMap<String, Vec<u8>> {
     let mut seen = BTreeMap::new();
     for list in LISTS {

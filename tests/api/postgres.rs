@@ -195,7 +195,7 @@ pub async fn database_of(folder: &Path) -> DatabaseUrl {
     server().url(&name).parse().unwrap()
 }
 
-/// How to reach a database.
+/// The address of a database.
 pub fn reached(url: &str) -> PostgresSettings {
     reached_at(url.parse().unwrap())
 }

@@ -58,7 +58,7 @@ impl Receiver {
         Self::start(|_| StatusCode::NO_CONTENT.into_response()).await
     }
 
-    /// What has arrived.
+    /// The requests that have arrived.
     pub fn received(&self) -> Vec<Received> {
         self.received.lock().unwrap().clone()
     }

@@ -1,4 +1,4 @@
-//! What a caller stores about its things: names and their search, legal holds, receipts of
+//! The records that a caller has of its items: names and their search, legal holds, receipts of
 //! erasures, validators, originals.
 
 use crate::helpers::{TestApp, problem, text, volume};

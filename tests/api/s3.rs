@@ -150,7 +150,7 @@ fn bytes(length: usize, seed: u32) -> Vec<u8> {
     (0..length).map(|_| next()).collect()
 }
 
-/// What every store of files promises.
+/// The promises of every store of files.
 async fn contract(subject: &Subject) {
     let blobs = &subject.blobs;
     blobs.check().await.unwrap();

@@ -148,7 +148,7 @@ fn client(location: &S3Location) -> AmazonS3 {
     builder.with_client_options(http).build().unwrap()
 }
 
-/// How a proxy treats requests.
+/// The proxy's treatment of requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(usize)]
 pub enum Network {
@@ -175,7 +175,7 @@ struct ProxyState {
     client: reqwest::Client,
 }
 
-/// What happens to one request.
+/// The fault of one request.
 #[derive(Clone, Copy)]
 enum Fault {
     Error(StatusCode),

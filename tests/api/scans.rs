@@ -256,7 +256,7 @@ async fn patients_are_named_to_those_who_may_submit_only() {
     assert!(!events.contains("Doe"));
 }
 
-/// What our own reader and others find in an object.
+/// The source, the voxels and the frame that readers find in an object.
 fn read_back(bytes: &[u8]) -> (Provenance, Vec<f32>, nalgebra::Matrix4<f64>) {
     let files = [VolumeFile::in_memory("mask.dcm", bytes.to_vec())];
     let reading = volume::read(

@@ -1,4 +1,4 @@
-//! What the service answers when its disk is nearly full or its database is locked.
+//! The service's answers when its disk is nearly full or its database is locked.
 
 use crate::helpers::{TestApp, problem, text, volume};
 use futures::future::join_all;

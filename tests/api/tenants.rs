@@ -87,7 +87,7 @@ async fn two_tenants(app: &TestApp) -> [TestApp; 2] {
     tenants
 }
 
-/// What a tenant has: for each kind of path, the values that go into it.
+/// A tenant's ids: for each kind of path, the values that go into it.
 struct Belongings {
     volume: Value,
     job: Value,

@@ -1,4 +1,4 @@
-//! What the program's commands write and say: files, keys and errors that other programs rely on.
+//! The output of the program's commands: files, keys and errors that other programs rely on.
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]

@@ -1,4 +1,4 @@
-//! What the instruments share.
+//! The parts that all instruments share.
 
 pub mod statistics;
 pub mod walls;

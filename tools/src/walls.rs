@@ -21,7 +21,7 @@ const BORDER_MM: f64 = 25.0;
 /// Most bytes of a mesh.
 const MAX_MESH_BYTES: u64 = 1 << 28;
 
-/// What the instruments end with.
+/// The result of an instrument.
 pub type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 /// The true wall of the case in a folder, `lv_surface.ply`, LPS mm; `None` if it has no heart.

@@ -23,7 +23,7 @@ pub struct Caller {
     pub own: (Quota, Option<Timestamp>),
     /// The id of its key.
     pub key: Option<String>,
-    /// How many keys have made that key, one the other.
+    /// The number of keys that have made that key, one the other.
     pub makers: usize,
 }
 

@@ -1,4 +1,4 @@
-//! How ids and times are written in answers, and what answers that something was added.
+//! Ids and times as answers write them, and the answer that something was added.
 
 use super::public_base::public_path;
 use axum::Json;

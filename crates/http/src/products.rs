@@ -83,7 +83,7 @@ pub trait ProductCollection: 'static {
     /// The description of a download in the document.
     const FILE_HELP: &'static str;
 
-    /// How the document describes a downloaded file.
+    /// The document's description of a downloaded file.
     type FileAnswer: IntoResponses;
 }
 

@@ -101,7 +101,7 @@ pub fn of_object(app: &App, object: &Map<String, Value>) -> Answer<Tags> {
     Ok(tags)
 }
 
-/// How often a change of tags is tried that others come before. Each time, one of the others has been made.
+/// Attempts at a change of tags that others come before. Each time, one of the others has been made.
 const CHANGE_TRIES: usize = 100;
 
 /// Applies the JSON merge patch of a request to the tags of a tenant's item or job, as `tags_of` reads them. The body is

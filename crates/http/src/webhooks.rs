@@ -23,7 +23,7 @@ use utoipa::ToSchema;
 use ventriform_service::hooks::{Delivery, HookEndpoint, SigningSecret};
 use ventriform_service::records::{Timestamp, random_id};
 
-/// How long the former signing secret signs too.
+/// The time for which the former signing secret signs too.
 const SECRET_OVERLAP: Duration = Duration::from_secs(24 * 3600);
 
 /// Most deliveries in one answer.

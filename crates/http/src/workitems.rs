@@ -57,7 +57,7 @@ const SEARCH_MEMORY: u64 = 20 << 20;
 /// Longest search.
 const LONGEST_SEARCH: Duration = Duration::from_secs(10);
 
-/// How often a change is tried again that another one came before.
+/// Attempts at a change that another one came before.
 const CHANGE_TRIES: u32 = 20;
 
 /// Pause before the second try of a change; it grows by as much with each further one, so that the tries

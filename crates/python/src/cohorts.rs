@@ -107,7 +107,7 @@ fn no_limits(error: BuildError) -> Stopped {
     }
 }
 
-/// What an evaluation is asked for.
+/// The choices of an evaluation.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct EvaluationOrder {

@@ -19,7 +19,7 @@ use ventriform::rest_stress::{self, ComparisonOrder};
 use ventriform::segmentation::{self, SegmentationOrder};
 use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions, VolumeFile};
 
-/// What a fit is given beside its parameters.
+/// The inputs of a fit beside its parameters.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct FitOrder {

@@ -1,4 +1,4 @@
-//! What a fit is given beside its parameters: models, a reader's profile, normal limits, other volumes.
+//! The inputs of a fit beside its parameters: models, a reader's profile, normal limits, other volumes.
 
 use crate::errors::{Stopped, refused, stopped};
 use crate::models::NativeModel;

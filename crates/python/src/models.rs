@@ -21,12 +21,12 @@ use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions};
 pub struct NativeModel {
     /// The model.
     pub model: Model,
-    /// What files say of it, with the distance of every vertex to the surface.
+    /// The description that its files hold, with the distance of every vertex to the surface.
     metadata: Metadata,
     scan: Option<Provenance>,
 }
 
-/// What a pickle of a model holds: vertices and triangles of the model and of its surface, the part of each triangle,
+/// The content of a model's pickle: vertices and triangles of the model and of its surface, the part of each triangle,
 /// the report, the Frame of Reference UID, and whose scan it is.
 type ModelState = (
     [(Vec<[f64; 3]>, Vec<[u32; 3]>); 2],
@@ -127,7 +127,7 @@ impl NativeModel {
         })
     }
 
-    /// What a pickle holds.
+    /// The content of a pickle.
     fn state(&self) -> PyResult<ModelState> {
         let flat = |mesh: &ventriform::TriMesh| {
             let vertices = mesh.vertices.iter().map(|p| [p.x, p.y, p.z]);

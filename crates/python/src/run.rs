@@ -68,7 +68,7 @@ fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
 
 type Outcome<T> = Result<Result<T, Stopped>, Box<dyn Any + Send>>;
 
-/// What the working thread tells the calling one.
+/// The state that the working thread shares with the calling one: outcome, stage, progress.
 struct Watch<T> {
     outcome: Mutex<Option<Outcome<T>>>,
     ended: Condvar,

@@ -26,7 +26,7 @@ pub struct JobOrder {
     pub tenant: Tenant,
     /// The tenant's names for the job.
     pub tags: Tags,
-    /// How urgent it is.
+    /// Its urgency.
     pub priority: Priority,
     /// Its idempotency key.
     pub key: Option<String>,
@@ -303,7 +303,7 @@ pub struct UnattendedJob<'a> {
     pub tenant: &'a Tenant,
     /// Its kind.
     pub kind: &'a str,
-    /// How urgent it is.
+    /// Its urgency.
     pub priority: Priority,
     /// Its parameters.
     pub parameters: &'a Map<String, Value>,

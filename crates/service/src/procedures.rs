@@ -23,7 +23,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
-/// How often claimed items are looked at.
+/// Interval between two looks at claimed items.
 const ROUND_EVERY: Duration = Duration::from_secs(1);
 /// How often all scheduled items are looked at, also if none was announced.
 const CLAIM_EVERY: Duration = Duration::from_secs(60);

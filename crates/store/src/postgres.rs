@@ -76,7 +76,7 @@ pub enum PostgresError {
     Unreachable {
         /// The database.
         url: PostgresUrl,
-        /// How long it was tried.
+        /// The time for which it was tried.
         waited: Duration,
         /// The last message.
         reason: String,

@@ -21,7 +21,7 @@
 //! A request that is refused while its body is still arriving is answered at once, and the connection
 //! ends as [`stall`] says, so that the client gets the answer.
 //!
-//! What is refused before it is a request has a line in the log, at `info` ([`refused`]).
+//! A connection that is refused before it carries a request has a line in the log, at `info` ([`refused`]).
 //!
 //! On shutdown no connection is accepted any more. Open ones may finish the answer they are
 //! working on; those that are still open after the grace period are closed.
@@ -91,7 +91,7 @@ pub struct ConnectionLimits {
     pub idle: Duration,
     /// Longest pause in reading an answer.
     pub write: Duration,
-    /// How long a client may go on sending after an early answer.
+    /// Time for which a client may go on sending after an early answer.
     pub linger: Linger,
     /// Longest time for open connections to end on shutdown.
     pub grace: Duration,

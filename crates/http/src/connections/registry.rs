@@ -17,7 +17,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
-/// How long a connection may stall before another may take its place.
+/// Time for which a connection may stall before another may take its place.
 const EVICTION_PATIENCE: Duration = Duration::from_millis(500);
 
 /// Connections beyond the limits.

@@ -41,7 +41,7 @@ pub struct Late {
     pub idle: bool,
 }
 
-/// How long a stream whose client may still send is read at its end.
+/// Time for which a stream whose client may still send is read at its end.
 #[derive(Debug, Clone, Copy)]
 pub struct Linger {
     /// Longest time for the client to read the last answer and to close.
@@ -53,7 +53,7 @@ pub struct Linger {
     pub bytes: u64,
 }
 
-/// How long a stream waits for its client.
+/// Time for which a stream waits for its client.
 #[derive(Debug, Clone, Copy)]
 pub struct StreamLimits {
     /// For it to read.

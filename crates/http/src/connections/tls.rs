@@ -30,7 +30,7 @@ use ventriform_service::config::{OptionalPath, Settings};
 use ventriform_service::pem;
 use ventriform_service::records::hex;
 
-/// How often the files are looked at.
+/// Interval between two looks at the files.
 const LOOK_EVERY: Duration = Duration::from_secs(5);
 
 /// The first byte of a TLS handshake (RFC 8446, section 5.1).

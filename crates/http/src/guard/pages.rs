@@ -68,7 +68,7 @@ pub const EXPOSED_HEADERS: [&str; 19] = [
     "x-request-id",
 ];
 
-/// How long browsers may remember the answer to a preflight.
+/// Time for which browsers may remember the answer to a preflight.
 const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
 /// The layer that adds the headers; `tls` says whether the service speaks TLS.

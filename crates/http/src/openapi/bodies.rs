@@ -335,7 +335,7 @@ impl PartialSchema for NormalsJobParameters {
     }
 }
 
-/// What is said of a job beside its work: names, priority, webhook.
+/// The fields of a job beside those of its work: names, priority, webhook.
 fn job_fields(object: ObjectBuilder) -> ObjectBuilder {
     let (external_id, labels) = tag_fields(false);
     object

@@ -1,4 +1,4 @@
-//! How much each caller may ask for.
+//! The rate at which each caller may ask.
 //!
 //! Requests are counted per caller in windows of one minute that begin with the caller's first
 //! request (a quota policy of draft-ietf-httpapi-ratelimit-headers). The counts are kept in memory:

@@ -1,4 +1,4 @@
-//! What is read of an archive's JSON answer.
+//! The values that are read of an archive's JSON answer.
 //!
 //! In: the bytes, and the path of the value that is looked for. Out: that value. Everything else is parsed and dropped, so that
 //! memory is bounded by what is kept: a tree of JSON values has up to 50 times as many bytes as its text.
@@ -16,7 +16,7 @@ pub(super) enum Step {
     First,
 }
 
-/// What is at the end of a path.
+/// The value at the end of a path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Read {
     /// No value.
@@ -32,7 +32,7 @@ pub(super) enum Read {
 /// Longest text that is kept, bytes: a UID has no more (PS3.5, 9.1).
 pub(super) const TEXT_BYTES: usize = 64;
 
-/// What is at the end of that path in a JSON value.
+/// The value at the end of that path in a JSON value.
 ///
 /// # Errors
 /// If it is no JSON.
@@ -62,7 +62,7 @@ fn whole<'de, S: DeserializeSeed<'de>>(json: &'de [u8], seed: S) -> serde_json::
 struct At<'p>(&'p [Step]);
 
 impl At<'_> {
-    /// What a value is that has nothing in it.
+    /// The value of a text, number or the like: `value` where the path ends at it, else nothing.
     fn scalar(self, value: Read) -> Read {
         if self.0.is_empty() {
             value

@@ -1,8 +1,8 @@
-//! How attempts to fetch and to deliver end.
+//! The outcomes of attempts to fetch and to deliver.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How an attempt ended.
+/// The outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ExchangeEnd {
     /// The series or object was transferred.

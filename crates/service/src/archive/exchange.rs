@@ -9,7 +9,7 @@ use crate::records::{Clock, Tenant, Timestamp};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// How archives are used.
+/// The settings of the exchange with archives.
 #[derive(Debug, Clone)]
 pub struct ExchangeSettings {
     /// The configured archives.

@@ -85,7 +85,7 @@ pub struct ObjectDelivery {
     pub name: String,
     /// The archive.
     pub to: String,
-    /// How far it has come.
+    /// Its state.
     pub state: DeliveryState,
     /// Number of attempts.
     pub attempts: u32,
@@ -93,7 +93,7 @@ pub struct ObjectDelivery {
     pub next_attempt_at: Option<Timestamp>,
     /// When it was tried last.
     pub last_attempt_at: Option<Timestamp>,
-    /// How the last attempt ended.
+    /// The outcome of the last attempt.
     pub last_outcome: Option<String>,
     /// Why the last attempt failed.
     pub last_error: Option<String>,
@@ -102,9 +102,9 @@ pub struct ObjectDelivery {
 /// The record of an attempt to deliver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SendSettlement {
-    /// How far it has come.
+    /// Its state.
     pub state: DeliveryState,
-    /// How the attempt ended.
+    /// The outcome of the attempt.
     pub outcome: &'static str,
     /// Why it failed.
     pub error: Option<String>,
@@ -190,7 +190,7 @@ pub trait ArchiveStore: Send + Sync + 'static {
         now: Timestamp,
     ) -> StoreResult<Option<ObjectDelivery>>;
 
-    /// How many fetches and deliveries wait.
+    /// The number of fetches and deliveries that wait.
     async fn archive_backlog(&self) -> StoreResult<ArchiveBacklog>;
 }
 

@@ -17,10 +17,10 @@ use std::time::Duration;
 use tokio::task::JoinSet;
 use tokio_util::sync::CancellationToken;
 
-/// How often the upkeep looks for expired things and for jobs beyond their attempt limit.
+/// Interval at which the upkeep looks for expired items and for jobs beyond their attempt limit.
 pub(crate) const UPKEEP_EVERY: Duration = Duration::from_secs(30);
 
-/// How often old rows of the audit trail are removed.
+/// Interval at which old rows of the audit trail are removed.
 const PRUNE_EVERY: Duration = Duration::from_secs(3600);
 
 /// Runs all of them until `end`, whenever this process is the leader.

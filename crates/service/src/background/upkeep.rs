@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 
 const HOUR_MS: Timestamp = 3_600_000;
 
-/// How long nothing is erased by age after a start at a doubtful time.
+/// Time for which nothing is erased by age after a start at a doubtful time.
 const CLOCK_GRACE: Duration = Duration::from_secs(3600);
 
 /// The periodic upkeep of a running service.

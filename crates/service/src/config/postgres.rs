@@ -5,14 +5,14 @@ use std::fmt::{self, Debug, Display, Formatter};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// How to reach a server.
+/// The address of a server, and the means of reaching it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PostgresSettings {
     /// Where it is, and who connects.
     pub url: PostgresUrl,
     /// Largest number of connections.
     pub connections: u32,
-    /// How long the start waits for the server.
+    /// Time for which the start waits for the server.
     pub patience: Duration,
 }
 

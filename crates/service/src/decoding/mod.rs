@@ -42,7 +42,7 @@ use tokio_util::sync::CancellationToken;
 use turns::{Turn, Turns};
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
 
-/// How long work computes before others that wait get their turn.
+/// Time for which work computes before others that wait get their turn.
 const TURN_SLICE: Duration = Duration::from_millis(10);
 
 /// How long work keeps its turn without a report, and how often that is looked at.
@@ -52,7 +52,7 @@ const STALL_TIME: Duration = Duration::from_millis(50);
 /// that has the turn.
 const OVERRUNS_PER_CORE: usize = 2;
 
-/// How long work waits for memory before costly work is ended for it.
+/// Time for which work waits for memory before costly work is ended for it.
 const ADMISSION_PATIENCE: Duration = Duration::from_secs(1);
 
 /// The part of its time after which work is costly: one in so many.
@@ -192,16 +192,16 @@ struct TaskState {
     clock: Option<ThreadClock>,
     /// Since when it computes; `None` while it waits.
     since: Option<(Instant, Moment)>,
-    /// How long it computed before.
+    /// The time that it computed before.
     before: Duration,
-    /// How much of that its client was charged with.
+    /// The part of that with which its client was charged.
     counted: Duration,
     /// Whether it was ended for others that wait.
     displaced: bool,
 }
 
 impl TaskState {
-    /// How long it has computed.
+    /// The time that it has computed.
     fn computed(&self) -> Duration {
         let now = match (&self.clock, self.since) {
             (Some(clock), Some((_, then))) => clock.since(then),

@@ -42,7 +42,7 @@ impl ThreadClock {
         }
     }
 
-    /// How long the thread has computed since then.
+    /// The time that the thread has computed since then.
     pub fn since(&self, then: Moment) -> Duration {
         let waited = self.waited().unwrap_or(then.waited);
         then.at
@@ -50,7 +50,7 @@ impl ThreadClock {
             .saturating_sub(waited.saturating_sub(then.waited))
     }
 
-    /// How long the thread has waited for a processor in all.
+    /// The time that the thread has waited for a processor in all.
     fn waited(&self) -> Option<Duration> {
         let text = std::fs::read_to_string(self.statistics.as_ref()?).ok()?;
         // Nanoseconds of computing, nanoseconds of waiting, and how often.

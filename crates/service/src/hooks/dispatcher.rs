@@ -14,7 +14,7 @@ use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
 use tokio_util::sync::CancellationToken;
 
-/// How webhooks are sent.
+/// The settings of webhooks.
 #[derive(Debug, Clone)]
 pub struct HookSettings {
     /// When failed deliveries are tried again.
@@ -27,7 +27,7 @@ pub struct HookSettings {
     pub per_destination: usize,
     /// Most pending deliveries of one destination.
     pub backlog: u32,
-    /// How long ended deliveries are kept.
+    /// Time for which ended deliveries are kept.
     pub history: Duration,
     /// The beginning of the paths in messages.
     pub base_path: String,

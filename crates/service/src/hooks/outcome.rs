@@ -1,8 +1,8 @@
-//! How attempts to deliver end.
+//! The outcomes of attempts to deliver.
 
 use reqwest::StatusCode;
 
-/// How an attempt ended.
+/// The outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttemptOutcome {
     /// The receiver answered 2xx.

@@ -4,7 +4,7 @@ use super::{AttemptOutcome, HookEvent, SigningSecret};
 use crate::records::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
-/// How far a delivery has come.
+/// The state of a delivery.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DeliveryState {
     /// It will be tried.
@@ -51,7 +51,7 @@ pub struct Delivery {
     pub url: String,
     /// The event that it tells.
     pub event: HookEvent,
-    /// How far it has come.
+    /// Its state.
     pub state: DeliveryState,
     /// Number of attempts.
     pub attempts: u32,
@@ -63,7 +63,7 @@ pub struct Delivery {
     pub last_attempt_at: Option<Timestamp>,
     /// The status of the receiver's last answer.
     pub last_status: Option<u16>,
-    /// How the last attempt ended.
+    /// The outcome of the last attempt.
     pub last_outcome: Option<String>,
 }
 
@@ -88,7 +88,7 @@ pub struct DueDelivery {
     pub result: Option<String>,
     /// Why it failed: the code of the failure.
     pub cause: Option<String>,
-    /// How often a worker had started the job.
+    /// The number of times that a worker had started the job.
     pub run: u32,
     /// See [`Delivery::occurred_at`].
     pub occurred_at: Timestamp,
@@ -101,7 +101,7 @@ pub struct DueDelivery {
 /// The record of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settlement {
-    /// How the attempt ended.
+    /// The outcome of the attempt.
     pub outcome: AttemptOutcome,
     /// When to try again; `None` if this was the last attempt.
     pub again_at: Option<Timestamp>,
@@ -137,7 +137,7 @@ pub struct DeliveryLimits {
     pub backlog: u32,
 }
 
-/// How much waits to be told.
+/// The number of deliveries that wait.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Backlog {
     /// Number of pending deliveries.
@@ -169,7 +169,7 @@ pub trait DeliveryStore: Send + Sync + 'static {
     /// Gives up and deletes deliveries beyond the limits; returns how many were given up.
     async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64>;
 
-    /// How much waits to be told.
+    /// The number of deliveries that wait.
     async fn backlog(&self) -> StoreResult<Backlog>;
 
     /// The deliveries of a tenant's job, the newest first, at most `limit`.

@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 /// The table is read at least this often.
 pub(super) const IDLE_WAIT: Duration = Duration::from_secs(5);
 
-/// How often what is too old is given up or deleted.
+/// Interval at which deliveries that are too old are given up or deleted.
 const EXPIRE_EVERY: Duration = Duration::from_secs(30);
 
 /// Tasks at other machines, as rows of a table.

@@ -11,7 +11,7 @@ use std::time::Duration;
 /// The prefix of a group's id.
 pub const GROUP_PREFIX: &str = "rcv_";
 
-/// How an object came.
+/// The way an object came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Protocol {
     /// DIMSE C-STORE over an association.

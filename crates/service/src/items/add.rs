@@ -15,7 +15,7 @@ use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::text::is_printable;
 
-/// How often an item is added anew that other processes erase at the same time.
+/// Attempts at adding an item that other processes erase at the same time.
 const PUBLISH_ROUNDS: u32 = 3;
 
 impl Items {

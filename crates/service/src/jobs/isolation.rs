@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// How to start a process that calls [`serve_isolated`](super::serve_isolated).
+/// The command of a process that calls [`serve_isolated`](super::serve_isolated).
 #[derive(Debug, Clone)]
 pub struct Isolation {
     /// The program.

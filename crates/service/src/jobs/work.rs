@@ -48,7 +48,7 @@ pub trait Work: Send + Sync + 'static {
     /// job; `None` if it is yet to be fetched.
     ///
     /// # Errors
-    /// What is missing.
+    /// If an input is missing.
     fn check_order(
         &self,
         _volume: Option<&str>,
@@ -171,7 +171,7 @@ impl Works {
         self
     }
 
-    /// How to do a job in a process of its own; `None` if this program cannot.
+    /// The command that does a job in a process of its own; `None` if this program cannot.
     pub fn isolation(&self) -> Option<&Isolation> {
         self.isolation.as_ref()
     }

@@ -75,7 +75,7 @@ pub trait Catalogue: Custody + Scans {
     /// The volume with that id.
     async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>>;
 
-    /// What such a page of items of one kind takes, so that it can be charged before it is read.
+    /// The memory that such a page of items of one kind takes, so that it can be charged before it is read.
     async fn plan_items(
         &self,
         tenant: &Tenant,
@@ -84,7 +84,7 @@ pub trait Catalogue: Custody + Scans {
         page: ListRequest,
     ) -> StoreResult<PagePlan>;
 
-    /// What such a page of receipts takes, likewise.
+    /// The memory that such a page of receipts takes, likewise.
     async fn plan_receipts(
         &self,
         tenant: &Tenant,

@@ -67,7 +67,7 @@ pub struct Job {
     pub tags: Tags,
     /// The kind of work: `model`, `segmentation`, `beat`, `comparison`, `normals`.
     pub kind: String,
-    /// How urgent it is.
+    /// Its urgency.
     pub priority: Priority,
     /// Id of the volume to work on; `None` until it has come from [`Job::source`].
     pub volume: Option<String>,
@@ -83,12 +83,12 @@ pub struct Job {
     pub stage: Option<String>,
     /// The completed fraction, 0..=1.
     pub progress: f64,
-    /// How often a worker has claimed the job.
+    /// The number of times that a worker has claimed the job.
     pub attempts: u32,
     /// How often the service died while the job was running on its threads. From the first time
     /// on, the job is computed in a process of its own, where that is possible.
     pub interruptions: u32,
-    /// How often the job's own process died while the service lived.
+    /// The number of times that the job's own process died while the service lived.
     pub crashes: u32,
     /// Increases with every change; the id of the job's events.
     pub revision: i64,

@@ -25,7 +25,7 @@ pub struct Claimant {
     /// The run of the service that the worker belongs to. A lease of a run that lives does not
     /// expire for workers of the same run, which know that its holder is alive.
     pub run: String,
-    /// How long the lease lasts for workers of other runs unless it is renewed.
+    /// Duration of the lease for workers of other runs unless it is renewed.
     pub lease: Duration,
 }
 
@@ -38,7 +38,7 @@ pub struct DeathLimit {
     pub reason: Failure,
 }
 
-/// How a claimed job ended.
+/// The end of a claimed job.
 #[derive(Debug, Clone)]
 pub enum JobOutcome {
     /// With this product.
@@ -62,7 +62,7 @@ pub enum Interrupted {
     Unknown,
 }
 
-/// How busy the queue is.
+/// The load of the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct QueueLoad {
     /// Number of waiting jobs.
@@ -108,7 +108,7 @@ pub trait JobStore: Send + Sync + 'static {
     /// The job with that id.
     async fn job(&self, id: &str) -> StoreResult<Option<Job>>;
 
-    /// What such a page of jobs takes, so that it can be charged before it is read.
+    /// The memory that such a page of jobs takes, so that it can be charged before it is read.
     async fn plan_jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<PagePlan>;
 
     /// A tenant's jobs, newest first.
@@ -125,7 +125,7 @@ pub trait JobStore: Send + Sync + 'static {
     /// When a job was last filed or ended, or a volume last used; `None` if there are none.
     async fn last_change(&self) -> StoreResult<Option<Timestamp>>;
 
-    /// How busy the queue is.
+    /// The load of the queue.
     async fn load(&self) -> StoreResult<QueueLoad>;
 
     /// Claims the next waiting job: counts the attempt and sets a lease. Tenants take turns; jobs of one

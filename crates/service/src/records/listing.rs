@@ -9,7 +9,7 @@ pub struct ListRequest {
     pub limit: u32,
 }
 
-/// What the rows of a page take that are of any size, see [`ListRequest::planned`].
+/// A page of a list, and the bytes that it takes; see [`ListRequest::planned`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PagePlan {
     /// The page, with as many rows as [`PAGE_BYTES`] allow.

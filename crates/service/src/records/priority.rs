@@ -1,4 +1,4 @@
-//! How urgent a job is.
+//! The urgency of a job.
 
 /// Every waiting job of a higher priority starts before any of a lower one. Within one priority,
 /// tenants take turns.

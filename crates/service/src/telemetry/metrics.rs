@@ -244,7 +244,7 @@ impl Metrics {
 
 /// Readings from elsewhere.
 pub struct MetricReadings<'a> {
-    /// How busy the queue is.
+    /// The load of the queue.
     pub load: QueueLoad,
     /// Numbers of waiting jobs and stored items.
     pub figures: QueueFigures,

@@ -9,7 +9,7 @@ use tokio::sync::Mutex;
 #[derive(Default)]
 pub struct Readiness(Mutex<Option<(Instant, Vec<Check>)>>);
 
-/// How long the outcome of a check is given to other probes.
+/// Time for which the outcome of a check is given to other probes.
 const CHECK_EVERY: Duration = Duration::from_secs(1);
 
 /// A check that takes longer counts as failed.

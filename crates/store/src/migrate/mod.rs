@@ -45,7 +45,7 @@ pub struct Destination {
     pub folder: Option<PathBuf>,
 }
 
-/// How far the copying has come.
+/// The progress of the copying.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// Files are copied.

@@ -42,7 +42,7 @@ struct Select {
     volume: &'static str,
 }
 
-/// What is read of the rows of a page.
+/// The columns that are read of the rows of a page.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Columns {
     /// Everything.

@@ -96,7 +96,7 @@ pub struct BeatFit {
     pub orders_as_smooth: f64,
     /// Share of the voxels about the wall that lie outside of the volume.
     pub share_outside: f64,
-    /// How far noise alone scatters the phases of the wall, degrees ([`noise`]).
+    /// The scatter of the wall's phases by noise alone, degrees ([`noise`]).
     pub phase_noise_degrees: f64,
     /// Steps made.
     pub steps: usize,
@@ -368,7 +368,7 @@ fn start_of(
     unknowns
 }
 
-/// How far each node lies in wall too dark to show its motion, 0..=1. The rim looks dark because it ends there.
+/// The share of each node in wall too dark to show its motion, 0..=1. The rim looks dark because it ends there.
 fn dark_nodes(layout: &Layout, still: &StillWall, relative: &[f64]) -> Vec<f64> {
     const DARK_UPTAKE: f64 = 0.45;
     const DARK_BLEND: f64 = 0.1;

@@ -162,7 +162,7 @@ impl BeatFlag {
     }
 }
 
-/// What the flags of a beat are raised by.
+/// The facts that raise the flags of a beat.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FlagFacts<'a> {
     /// Share of the orders of the gates that are as smooth as theirs.

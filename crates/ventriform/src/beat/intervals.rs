@@ -1,4 +1,4 @@
-//! How far the figures of a beat may be off.
+//! The intervals of the figures of a beat.
 //!
 //! In: EDV, ESV, EF and the share of the wall that is too dark to show its motion. Out: intervals that hold the true
 //! figures in nine of ten hearts. The error's variance is that of a bright heart of usual size, more where the wall is

@@ -1,4 +1,4 @@
-//! How far the noise of the gates alone scatters the phases of a wall.
+//! The scatter of a wall's phases by the noise of the gates alone.
 //!
 //! In: the function that the fit minimised, its unknowns at the minimum and its curvature there. Out: degrees. The steps:
 //!

@@ -1,4 +1,4 @@
-//! How far a beating wall is from the gates, and from what is known of walls: the function that the fit minimises.
+//! The distance of a beating wall from the gates and from prior knowledge of walls: the function that the fit minimises.
 //!
 //! Image: the mean over voxels and gates of the squared difference of the blurred activity and the gate, within
 //! reach of the wall, in units of the wall's own uptake. Priors: neighbouring nodes differ little (second
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// Value of the function where voxels are off by the wall's own uptake in the mean.
 pub(super) const VALUE_SCALE: f64 = 1e4;
 
-/// What is known of walls before the image is looked at, and its weights: each adds a square to the function, whose
+/// Prior knowledge of walls, independent of the image, as weights: each adds a square to the function, whose
 /// unit is 1e-4 of the squared uptake in the mean over voxels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
@@ -99,14 +99,14 @@ pub(super) struct Observed {
     pub bases: Vec<Vec<f64>>,
     /// Rim of the summed image's wall, mm of arc.
     pub rim: Vec<f64>,
-    /// How dark the wall is at every node, 0..=1.
+    /// The darkness of the wall at every node, 0..=1.
     pub dark: Vec<f64>,
 }
 
 /// A gate as the unknowns describe it.
 struct GateView {
     state: WallState,
-    /// What the voxels hold of the wall.
+    /// The wall's share of each voxel.
     samples: Vec<Sample>,
     /// The blurred image, without the gate's factor.
     seen: Vec<f32>,

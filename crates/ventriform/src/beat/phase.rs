@@ -106,7 +106,7 @@ pub fn circular_mean(weighted: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// How far an angle lies behind another, degrees, -180..180.
+/// The lag of an angle behind another, degrees, -180..180.
 pub fn behind(degrees: f64, other: f64) -> f64 {
     (degrees - other + 180.0).rem_euclid(360.0) - 180.0
 }

@@ -53,7 +53,7 @@ pub enum ComparisonFlag {
         scan: WhichScan,
         /// The thing that is not stated.
         field: &'static str,
-        /// What the other header says.
+        /// The other header's statement.
         other: String,
     },
     /// The scans were made in different ways that change uptake a little.

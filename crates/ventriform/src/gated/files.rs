@@ -177,7 +177,7 @@ impl GatedHeart {
         }
     }
 
-    /// What is known of the meshes: parts and uptake are those of the gates' sum, whose nodes they have.
+    /// The description in the meshes' files: parts and uptake are those of the gates' sum, whose nodes they have.
     fn metadata(&self, report: &BeatReport, monitor: &Monitor<'_>) -> Result<Metadata, Cancelled> {
         let scan = self.reading.provenance();
         let figures = json!({

@@ -23,7 +23,7 @@ pub enum Purpose {
     PhantomShape = 5,
     /// Starting poses of the deformable model.
     Pose = 6,
-    /// How healthy phantoms differ.
+    /// The differences between healthy phantoms.
     PhantomPerson = 7,
 }
 

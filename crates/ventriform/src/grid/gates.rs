@@ -1,4 +1,4 @@
-//! What makes volumes the gates of one study.
+//! The conditions under which volumes are the gates of one study.
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! How far the volumes of the anatomical wall and of its cavity may be off.
+//! The intervals of the volumes of the anatomical wall and of its cavity.
 //!
 //! In: both volumes and the share of the wall that is dark. Out: intervals that hold the true volumes in nine of ten hearts,
 //! as those of a beat do ([`crate::numeric::error_terms`]): wider where the wall is dark and, of the cavity, where it is small.

@@ -166,7 +166,7 @@ pub struct LeftOut {
     pub summed_score: u32,
 }
 
-/// What is read of a file before all of it.
+/// The first fields of a file, which are read before all of it.
 #[derive(Deserialize)]
 struct Head {
     #[serde(default)]

@@ -50,7 +50,7 @@ pub enum NormalsError {
         /// The groups.
         groups: Vec<String>,
     },
-    /// What is known of the scan does not tell which group it belongs to.
+    /// The known facts of the scan do not tell which group it belongs to.
     #[error("several groups of the normal limits suit this scan ({scan}): {}", .groups.join("; "))]
     Ambiguous {
         /// The scan.

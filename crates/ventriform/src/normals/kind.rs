@@ -1,4 +1,4 @@
-//! What kind of scan limits were built from, or are compared with.
+//! The kind of scan that limits were built from, or are compared with.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;

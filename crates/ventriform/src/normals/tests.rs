@@ -257,7 +257,7 @@ fn scores_run_from_the_limit_to_seventy_per_cent() {
     );
 }
 
-/// What all hearts vary in is taken off; a defect as wide as a segment hardly is.
+/// Patterns in which all hearts vary are taken off; a defect as wide as a segment hardly is.
 #[test]
 fn the_pattern_of_a_healthy_heart_is_no_defect() {
     let limits = PlaceLimits::from(&group().map);

@@ -21,13 +21,13 @@ pub struct ComparisonChoice {
     pub gated: bool,
     /// Whether the scans are of one patient although the headers say otherwise. Default `false`.
     pub same_patient: bool,
-    /// What the user corrects of the fit to the scan at stress.
+    /// The user's correction of the fit to the scan at stress.
     pub stress_correction: Correction,
-    /// What the user corrects of the fit to the scan at rest.
+    /// The user's correction of the fit to the scan at rest.
     pub rest_correction: Correction,
 }
 
-/// What a user corrects of the fit to one scan. All places are in its frame, LPS mm.
+/// A user's correction of the fit to one scan. All places are in its frame, LPS mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Correction {
     /// A point in the cavity.

@@ -33,7 +33,7 @@ pub struct FitParameters {
     pub reader: Option<String>,
     /// Id of the normal limits to compare the wall's uptake with, if there are some.
     pub normals: Option<String>,
-    /// What the caller says of the scan, by which the group of the normal limits is chosen.
+    /// The scan's kind as the caller states it, by which the group of the normal limits is chosen.
     pub scan: ScanKind,
     /// The organ that the model shows.
     pub organ: Organ,

@@ -231,7 +231,7 @@ impl FigureDocument {
     }
 }
 
-/// What lies at each pixel.
+/// The state of each pixel.
 fn states(map: &PolarMap) -> Vec<Vec<PlaceState>> {
     let row = |row| {
         (0..RAY_COLUMNS)

@@ -121,7 +121,7 @@ pub struct Pixel {
     pub max: f64,
     /// Area of wall that the ray stands for, mm².
     pub area: f64,
-    /// What the ray meets.
+    /// The state of the place that the ray meets.
     pub state: PlaceState,
 }
 
@@ -336,7 +336,7 @@ impl PolarMap {
         }
     }
 
-    /// What lies at a pixel. Places beyond a column's last one with wall are of the valve plane.
+    /// The state of a pixel. Places beyond a column's last one with wall are of the valve plane.
     pub fn state(&self, row: usize, column: usize) -> PlaceState {
         let at = |row: usize| self.pixels[row * RAY_COLUMNS + column];
         match at(row) {

@@ -116,7 +116,7 @@ pub struct ReaderLevel {
     pub spread: f64,
 }
 
-/// What was learnt of a reader.
+/// The part of a reader's drawing that was learnt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Learnt {
     /// The distances, in the order of [`ReaderOffsets`].
@@ -134,7 +134,7 @@ impl Learnt {
         }
     }
 
-    /// What is applied.
+    /// The drawing that is applied.
     pub fn drawing(&self) -> ReaderDrawing {
         match self {
             Self::Edge(offsets) => {
@@ -228,7 +228,7 @@ pub struct ProfileDocument {
     learnt_on: Vec<LearntOn>,
 }
 
-/// What is read of a profile before all of it.
+/// The first fields of a profile, which are read before all of it.
 #[derive(Deserialize)]
 struct Head {
     #[serde(default)]
@@ -251,7 +251,7 @@ struct LearntOffsets {
 }
 
 impl ReaderProfile {
-    /// What is applied.
+    /// The drawing that is applied.
     pub fn drawing(&self) -> ReaderDrawing {
         self.learnt.drawing()
     }
@@ -497,7 +497,7 @@ pub(super) mod tests {
         assert!(ReaderProfile::from_json(b"").is_err());
     }
 
-    /// What a list of JSON values would be parsed to has many times the bytes of its text.
+    /// A parsed list of JSON values has many times the bytes of its text.
     #[test]
     fn a_list_longer_than_that_of_any_profile_is_refused_before_it_is_all_read() {
         let text = profile([0.5, -1.25, 3.0]).to_json();

@@ -298,7 +298,7 @@ fn segments(report: &ComparisonReport) -> Markup {
     }
 }
 
-/// What is known of both scans, side by side.
+/// The known facts of both scans, side by side.
 fn scans(report: &ComparisonReport) -> Markup {
     let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "not stated".to_owned());
     let both = [&report.stress, &report.rest];

@@ -6,7 +6,7 @@ use crate::normals::{FigureBeside, NormalsFlag, NormalsUsed, Perfusion, Z_LIMIT}
 use crate::polar::PolarMap;
 use serde::{Deserialize, Serialize};
 
-/// What the deficit score is, for whoever reads it.
+/// The meaning of the deficit score, for its reader.
 const DEFICIT_NOTE: &str =
     "deficit score against the normal limits named here; TPD-like, not comparable with QPS's";
 

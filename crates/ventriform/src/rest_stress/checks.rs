@@ -144,7 +144,7 @@ pub(super) fn flags(
     flags
 }
 
-/// What makes the comparison of each scan with normal limits doubtful; what both share is told once.
+/// Flags of each scan's comparison with normal limits; one that both share stands once.
 fn of_limits(stress: Option<&Perfusion>, rest: Option<&Perfusion>) -> Vec<ComparisonFlag> {
     let told = |perfusion: Option<&Perfusion>| -> Vec<(&'static str, String)> {
         let flags = perfusion.map(|perfusion| perfusion.flags.as_slice());
@@ -177,7 +177,7 @@ fn of_one(field: &'static str, stated: [Option<String>; 2]) -> Option<Comparison
     Some(ComparisonFlag::NotStated { scan, field, other })
 }
 
-/// What the headers say of how both scans were made.
+/// Differences between the headers in patient, times and acquisition.
 fn of_headers(stress: &Provenance, rest: &Provenance) -> Vec<ComparisonFlag> {
     let mut flags = Vec::new();
     let patient = other_patient(stress, rest);

@@ -84,7 +84,7 @@ impl ComparedHeart {
         Some(self.segmentation().resolution?.value)
     }
 
-    /// What the header says of when the scan was made.
+    /// The role that the header states; `None` if it states neither rest nor stress.
     pub fn stated_role(&self) -> Option<WhichScan> {
         match self.provenance()?.rest_or_stress.as_deref()? {
             "stress" => Some(WhichScan::Stress),
@@ -113,7 +113,7 @@ impl ComparedHeart {
         SourceScan::new(identity, image.frame.clone(), image.shape, placed, made)
     }
 
-    /// What files of the mesh hold beside it.
+    /// The description that files of the mesh hold.
     pub(super) fn metadata(
         &self,
         which: WhichScan,

@@ -17,7 +17,7 @@ fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
     perfusion?.segments[segment - 1].score
 }
 
-/// What is said of one of both scans.
+/// The report's part about one of both scans.
 fn scan_report(heart: &ComparedHeart) -> ComparedScan {
     let segmentation = heart.segmentation();
     let model = &segmentation.fit.model;

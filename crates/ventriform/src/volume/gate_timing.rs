@@ -1,4 +1,4 @@
-//! What a file says of the beats that were gated.
+//! The timing that a file states of the beats that were gated.
 
 use super::facts::GateFacts;
 use std::ops::RangeInclusive;
@@ -8,7 +8,7 @@ pub const RR_MS: RangeInclusive<f64> = 300.0..=2500.0;
 /// Share of the R-R interval by which the gates together may last longer or shorter.
 const GATES_APART_SHARE: f64 = 0.2;
 
-/// What a file says of the beats of one R-R interval that were gated. Parts that it leaves out are `None`.
+/// The stated timing of the gated beats of one R-R interval. Parts that the file leaves out are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct GateTiming {
     /// Length of a gate, ms: Frame Time (0018,1063).

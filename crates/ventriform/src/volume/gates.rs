@@ -19,7 +19,7 @@ pub struct GatedReading {
     pub gates: Vec<Volume>,
     /// The volume of the file that is the first gate, or the file, counted from 0: the others follow it.
     pub first_frame: usize,
-    /// What the file says of the beats that were taken.
+    /// The timing that the file states of the beats that were taken.
     pub timing: GateTiming,
     /// Facts about the file, or that of the first gate, with warnings of all.
     pub facts: VolumeFacts,
@@ -29,7 +29,7 @@ pub struct GatedReading {
     pub stated_grid: Option<StatedGrid>,
 }
 
-/// How a gate's header names another patient or study than that of gate 1; `None` if it does not.
+/// The difference in patient or study between a gate's header and that of gate 1; `None` if there is none.
 fn other_scan(first: Option<&Provenance>, scan: Option<&Provenance>) -> Option<String> {
     let (first, scan) = (first?, scan?);
     let fields = [

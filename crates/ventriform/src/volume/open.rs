@@ -101,7 +101,7 @@ pub(super) trait OpenVolume {
         None
     }
 
-    /// What the file says of the beats of gated volumes, for each R-R interval; empty if it says nothing.
+    /// The stated timing of gated volumes, for each R-R interval; empty if the file states none.
     fn gate_timings(&self) -> Vec<GateTiming> {
         Vec::new()
     }
@@ -344,7 +344,7 @@ pub fn describe(volume: &Volume) -> Result<VolumeFacts, VolumeError> {
     facts(header, Some(0), intensity, Vec::new())
 }
 
-/// What a file of `frames` volumes in memory would say.
+/// The header of a file that holds `frames` volumes in memory.
 pub(super) fn array_header<'a>(
     file: &'a str,
     placement: &'a Placement,

@@ -571,7 +571,7 @@ fn every_gate_has_a_mesh_that_does_not_meet_itself() {
     }
 }
 
-/// What a person reads says the figures of the report, and names nobody without a scan.
+/// The page shows the figures of the report, and names nobody without a scan.
 #[test]
 fn the_page_has_figures_pictures_and_flags() {
     let heart = whole();

@@ -307,7 +307,7 @@ fn a_profile_learnt_on_one_mask_helps_another_of_that_reader() {
     }
 }
 
-/// How far the mask drawn by a profile lies from the one without it: endocardium, epicardium, rim, mm.
+/// The distance of the mask drawn by a profile from the one without it: endocardium, epicardium, rim, mm.
 fn moved_by(without: &SegmentedVolume, made: &SegmentedVolume) -> [f64; 3] {
     let masks = [without, made].map(|made| &made.segmentation.mask);
     let fit = &without.segmentation.fit.model;

@@ -35,7 +35,7 @@ pub enum Activity {
     AuditGap,
 }
 
-/// How it ended.
+/// Its outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
@@ -52,7 +52,7 @@ pub struct AuditEvent {
     pub recorded: Timestamp,
     /// The act.
     pub activity: Activity,
-    /// How it ended.
+    /// Its outcome.
     pub outcome: Outcome,
     /// Whose items it concerns.
     pub tenant: Tenant,
@@ -70,7 +70,7 @@ pub struct AuditEvent {
     /// The request's `x-request-id`, if it was one request.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub request: Option<String>,
-    /// How often it was done within a second.
+    /// The number of times that it was done within a second.
     pub count: u64,
 }
 

@@ -22,7 +22,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
 use tokio::time::Instant;
 
-/// How long noted events may wait.
+/// Time for which noted events may wait.
 const FLUSH_AFTER: Duration = Duration::from_secs(1);
 /// Events on their way to the task.
 const BUFFERED_EVENTS: usize = 1024;

@@ -23,7 +23,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 use ventriform::progress::{CancelToken, Monitor};
 
-/// How long a computation that was told to stop may go on before its job is ended anyway.
+/// Time for which a computation that was told to stop may go on before its job is ended anyway.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 
 /// First and longest pause before the storage is tried again.
@@ -44,7 +44,7 @@ pub(super) struct JobRunner {
 /// The result of the computation; the outer error is a panic.
 type Computed = std::thread::Result<Result<WorkOutput, Ended>>;
 
-/// How a computation ended without an output.
+/// The end of a computation without an output.
 #[derive(Debug)]
 pub(super) enum Ended {
     /// The work says why.

@@ -2,14 +2,14 @@
 
 use std::time::Duration;
 
-/// How jobs are computed.
+/// The settings of the workers.
 #[derive(Debug, Clone, Copy)]
 pub struct WorkerSettings {
     /// Number of jobs computed at the same time.
     pub workers: usize,
     /// Threads per job.
     pub threads: usize,
-    /// How long other runs of the service respect a claim that is not renewed.
+    /// Time for which other runs of the service respect a claim that is not renewed.
     pub lease: Duration,
     /// Number of times a job may end its own process before it is failed.
     pub attempt_limit: u32,

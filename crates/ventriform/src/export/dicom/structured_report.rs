@@ -1,4 +1,4 @@
-//! What structured reports of measurements have in common: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID
+//! The common parts of structured reports of measurements: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID
 //! 1500 of PS3.16.
 //!
 //! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
@@ -26,7 +26,7 @@ pub(super) struct Figure<T> {
 /// The ends of an interval about a figure.
 type Interval<T> = fn(&T) -> Option<[f64; 2]>;
 
-/// How far the true value may lie below a figure, and above it (CID 225).
+/// The distance that the true value may lie below a figure, and above it (CID 225).
 /// The comment of a group with intervals: no code says how sure a range is.
 pub(super) const RANGES: &str =
     "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
@@ -95,7 +95,7 @@ pub(super) const WALL_SEGMENTS: [Code; 17] = [
     sct("128564006", "Apex of left ventricle"),
 ];
 
-/// What a report refers to beside the images of its scan.
+/// A series that a report refers to beside the images of its scan.
 pub(super) struct SeriesReference {
     /// Series Instance UID.
     pub series: String,

@@ -518,7 +518,7 @@ fn each_volume_has_a_group_that_says_which_it_is() {
     assert_eq!(found, [10.75, 19.0, 7.25, 6.25]);
 }
 
-/// How far the truth may lie below and above, ml, for each figure that says so.
+/// The distance that the truth may lie below and above, ml, for each figure that states it.
 fn ranges(set: &InMemDicomObject, into: &mut Vec<f64>) {
     for child in set
         .get(tags::CONTENT_SEQUENCE)

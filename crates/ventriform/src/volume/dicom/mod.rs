@@ -85,7 +85,7 @@ pub(super) struct DicomFile {
     volumes: usize,
     /// Whether the volumes are gates of one heart beat.
     gated: bool,
-    /// What the file says of the beats of each R-R interval, if it is gated.
+    /// The stated timing of each R-R interval, if the file is gated.
     timings: Vec<GateTiming>,
     shape: [usize; 3],
     placement: Placement,
@@ -524,7 +524,7 @@ struct Series {
     located: Vec<Located>,
     /// SOP Instance UID of each part.
     instances: Vec<String>,
-    /// What each part says of the beats; an error counts only where the series is gated.
+    /// The timing that each part states; an error counts only where the series is gated.
     timings: Vec<Result<GateTiming, VolumeError>>,
     /// The part of each SOP Instance UID.
     known: BTreeMap<String, usize>,

@@ -365,7 +365,7 @@ fn gates_are_volumes_of_their_own() {
     );
 }
 
-/// What a file says of the beats of an R-R interval of about `nominal` ms.
+/// The attributes of the beats of an R-R interval of about `nominal` ms.
 fn said_of_interval(nominal: &'static str) -> Elements {
     BTreeMap::from([
         ((0x18, 0x1062), ("IS", Text(nominal))),

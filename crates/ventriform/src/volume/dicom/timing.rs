@@ -1,4 +1,4 @@
-//! What gated images say of the beats, and whether volumes are gates.
+//! The timing of the beats that gated images state, and whether volumes are gates.
 //!
 //! In: the attributes of a file. Out: [`GateTiming`] of each R-R interval, of which the file may leave out any part.
 //! Nuclear Medicine images have it in the Gated Information Sequence (PS3.3 C.8.4.9), with an item of the Data Information

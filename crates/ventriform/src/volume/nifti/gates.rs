@@ -56,7 +56,7 @@ pub(super) fn contradiction(header: &Header) -> Option<String> {
     })
 }
 
-/// What the header says of the gates' length; nothing if it states no time.
+/// The length of a gate as the header states it; `None` if it states no time.
 pub(super) fn timing(header: &Header) -> Option<GateTiming> {
     let seconds = step_seconds(header).ok()??;
     Some(GateTiming {
