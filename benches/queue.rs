@@ -26,14 +26,14 @@ use ventriform_service::records::{
 use ventriform_service::work::Engine;
 use ventriform_store::{SqlStore, open_database};
 
-/// How long a job sleeps.
-const NAP: Duration = Duration::from_millis(500);
+/// The time that a job sleeps.
+const SLEEP_TIME: Duration = Duration::from_millis(500);
 /// Jobs for each worker.
-const JOBS: usize = 24;
+const JOBS_PER_WORKER: usize = 24;
 const CLAIMS_PER_SECOND: u32 = 100;
-const CLAIMS: u32 = 3_000;
-const CLAIMANTS: u32 = 4;
-const TURNS: usize = 3;
+const CLAIM_COUNT: u32 = 3_000;
+const CLAIMANT_COUNT: u32 = 4;
+const MEASURED_TURNS: usize = 3;
 
 type Outcome<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
@@ -64,12 +64,12 @@ async fn main() -> Outcome<()> {
     let volume = volume["id"].as_str().ok_or("the scan was refused")?;
 
     bench.claims(volume).await?;
-    for _ in 0..TURNS {
+    for _ in 0..MEASURED_TURNS {
         for workers in [1, 2, 4] {
             let rate = bench.sleepers(workers, volume).await?;
             let each = rate / workers as f64;
             println!(
-                "{workers} processes of one worker, jobs that sleep {NAP:?}: {rate:.2} jobs/s, {each:.3} each"
+                "{workers} processes of one worker, jobs that sleep {SLEEP_TIME:?}: {rate:.2} jobs/s, {each:.3} each"
             );
         }
     }
@@ -120,15 +120,15 @@ impl Bench {
 
     /// Claims at a fixed rate, each at its time whether or not the one before has ended.
     async fn claims(&self, volume: &str) -> Outcome<()> {
-        self.file(volume, CLAIMS as usize).await?;
+        self.file(volume, CLAIM_COUNT as usize).await?;
         let mut claimants = tokio::task::JoinSet::new();
-        for _ in 0..CLAIMANTS {
+        for _ in 0..CLAIMANT_COUNT {
             let store = self.store.clone();
             claimants.spawn(async move {
-                let mut due = interval(Duration::from_secs(1) * CLAIMANTS / CLAIMS_PER_SECOND);
+                let mut due = interval(Duration::from_secs(1) * CLAIMANT_COUNT / CLAIMS_PER_SECOND);
                 due.set_missed_tick_behavior(MissedTickBehavior::Burst);
                 let mut times = Vec::new();
-                for _ in 0..CLAIMS / CLAIMANTS {
+                for _ in 0..CLAIM_COUNT / CLAIMANT_COUNT {
                     let due_at = due.tick().await;
                     let claimant = Claimant {
                         token: random_id("lse_"),
@@ -158,7 +158,7 @@ impl Bench {
                 finished.push(c);
             }
         }
-        println!("{CLAIMS_PER_SECOND} claims/s by {CLAIMANTS}:");
+        println!("{CLAIMS_PER_SECOND} claims/s by {CLAIMANT_COUNT}:");
         for (what, times) in [
             ("from the time it was due", &mut late),
             ("a claim", &mut claimed),
@@ -175,7 +175,7 @@ impl Bench {
     /// Jobs per second of so many processes. The first and the last tenth are left out: processes start and end
     /// one after the other.
     async fn sleepers(&self, workers: usize, volume: &str) -> Outcome<f64> {
-        let count = workers * JOBS;
+        let count = workers * JOBS_PER_WORKER;
         let begin = SystemClock.now();
         sleep(Duration::from_millis(2)).await;
         self.file(volume, count).await?;
@@ -268,7 +268,7 @@ impl Work for Sleepy {
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
         if let Some(made) = self.made.get() {
             let begun = Instant::now();
-            while begun.elapsed() < NAP {
+            while begun.elapsed() < SLEEP_TIME {
                 monitor.check()?;
                 std::thread::sleep(Duration::from_millis(20));
             }

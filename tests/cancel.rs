@@ -25,10 +25,10 @@ use ventriform_service::work::Engine;
 
 /// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not
 /// the fastest one.
-const MOST: Duration = Duration::from_millis(100);
+const MOST_AFTER_CANCEL: Duration = Duration::from_millis(100);
 
 /// Number of moments of cancellation, spread evenly over the length of the work.
-const MOMENTS: u32 = 14;
+const MOMENT_COUNT: u32 = 14;
 
 /// Processor time of a thread so far; `None` if the system does not report it.
 fn processor_time(thread: &str) -> Option<Duration> {
@@ -135,14 +135,14 @@ fn stops_wherever_it_is(
     let (outcome, _) = run(&**work, &input, never);
     outcome.unwrap();
     let (_, [whole, _]) = run(&**work, &input, never);
-    for moment in 0..MOMENTS {
-        let (outcome, [_, after]) = run(&**work, &input, whole * moment / MOMENTS);
+    for moment in 0..MOMENT_COUNT {
+        let (outcome, [_, after]) = run(&**work, &input, whole * moment / MOMENT_COUNT);
         assert!(
-            after < MOST,
-            "{kind}: {after:?} after moment {moment} of {MOMENTS}"
+            after < MOST_AFTER_CANCEL,
+            "{kind}: {after:?} after moment {moment} of {MOMENT_COUNT}"
         );
         assert!(
-            moment > MOMENTS / 2 || matches!(outcome, Err(WorkError::Cancelled)),
+            moment > MOMENT_COUNT / 2 || matches!(outcome, Err(WorkError::Cancelled)),
             "{outcome:?}"
         );
     }

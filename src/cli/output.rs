@@ -25,7 +25,7 @@ macro_rules! note {
 pub(super) use {note, say};
 
 /// Why standard output could not be written; the first reason counts.
-static FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
+static WRITE_FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// Prints `text` and a line feed to standard output.
 pub fn out(text: &dyn Display) {
@@ -54,7 +54,7 @@ fn keep(outcome: io::Result<()>) {
     if let Err(error) = outcome
         && error.kind() != ErrorKind::BrokenPipe
     {
-        let mut failure = FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut failure = WRITE_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
         failure.get_or_insert(error);
     }
 }
@@ -65,7 +65,7 @@ fn keep(outcome: io::Result<()>) {
 /// If standard output could not be written, other than because its reader is gone.
 pub fn finish() -> Result<()> {
     keep(io::stdout().lock().flush());
-    let failure = FAILURE
+    let failure = WRITE_FAILURE
         .lock()
         .unwrap_or_else(PoisonError::into_inner)
         .take();

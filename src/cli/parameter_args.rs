@@ -100,7 +100,7 @@ pub fn with_fit<C: BesideFit>(
 
 /// The parameters that are flags: all but those that are ids of what a service stores.
 fn rows<P: Parameters>() -> impl Iterator<Item = &'static ParameterSpec<P>> {
-    P::SPECS
+    P::PARAMETER_SPECS
         .iter()
         .filter(|spec| !matches!(spec.kind, Kind::Stored { .. }))
 }
@@ -145,7 +145,7 @@ fn flag<P: Parameters>(spec: &'static ParameterSpec<P>) -> Arg {
     if spec.name.contains('_') {
         arg = arg.alias(spec.name);
     }
-    for (other, own) in P::ALIASES {
+    for (other, own) in P::NAME_ALIASES {
         if *own == spec.name {
             arg = arg.visible_alias(*other);
         }

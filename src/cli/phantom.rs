@@ -115,8 +115,8 @@ pub fn run(args: &PhantomArgs) -> Result<()> {
     Ok(())
 }
 
-/// What the simulated healthy people are called in their files.
-const PEOPLE: &str = "simulated, not patients";
+/// The description of the simulated healthy people in their files.
+const PEOPLE_NOTE: &str = "simulated, not patients";
 
 /// Healthy hearts of as many seeds as asked for, and the table of who they are.
 fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
@@ -134,7 +134,7 @@ fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
             StoredType::Int16,
         )?;
         let mut facts = serde_json::to_value(&made.parameters)?;
-        facts["people"] = PEOPLE.into();
+        facts["people"] = PEOPLE_NOTE.into();
         write_file(
             &folder.join("params.json"),
             serde_json::to_string_pretty(&facts)?.as_bytes(),
@@ -144,7 +144,7 @@ fn healthy(args: &PhantomArgs, base: &PhantomParameters) -> Result<()> {
     }
     write_file(&args.output.join("cohort.csv"), table.as_bytes())?;
     note!(
-        "Written: {} healthy hearts ({PEOPLE}) and cohort.csv in {}",
+        "Written: {} healthy hearts ({PEOPLE_NOTE}) and cohort.csv in {}",
         args.cases.unwrap_or(30),
         args.output.display()
     );

@@ -15,8 +15,8 @@ use ventriform_service::archive::{Archive, Archives, Credentials};
 use ventriform_service::config::Settings;
 use ventriform_service::work::Engine;
 
-pub const STUDY: &str = "1.2.826.0.1.3680043.8.498.1";
-const SERIES: &str = "1.2.826.0.1.3680043.8.498.1.2";
+pub const STUDY_UID: &str = "1.2.826.0.1.3680043.8.498.1";
+const SERIES_UID: &str = "1.2.826.0.1.3680043.8.498.1.2";
 
 /// An archive of the settings.
 pub fn archive(entry: &[(&str, &str)], tenants: &[&str]) -> Archive {
@@ -76,8 +76,8 @@ async fn a_job_with_a_source_is_accepted_and_waits_for_its_volume() {
     ] {
         let mut job =
             json!({"kind": "segmentation", "source": source, "parameters": {"model": "auto"}});
-        job["source"]["study"] = json!(STUDY);
-        job["source"]["series"] = json!(SERIES);
+        job["source"]["study"] = json!(STUDY_UID);
+        job["source"]["series"] = json!(SERIES_UID);
         let answer = file(&app, &job).await;
         assert_eq!(answer.status(), 202);
         let job: Value = answer.json().await.unwrap();
@@ -85,8 +85,8 @@ async fn a_job_with_a_source_is_accepted_and_waits_for_its_volume() {
         assert_eq!(job["state"], "queued");
         assert_eq!(job["source"]["archive"], archive, "{job}");
         assert_eq!(job["source"]["dicomweb"], dicomweb, "{job}");
-        assert_eq!(job["source"]["study"], STUDY);
-        assert_eq!(job["source"]["series"], SERIES);
+        assert_eq!(job["source"]["study"], STUDY_UID);
+        assert_eq!(job["source"]["series"], SERIES_UID);
         let cancelled = app.delete(&text(&job["links"]["self"])).send().await;
         let cancelled: Value = cancelled.unwrap().json().await.unwrap();
         assert_eq!(cancelled["state"], "cancelled");
@@ -98,7 +98,7 @@ async fn what_a_job_says_of_archives_is_checked() {
     let app = app_with_archives().await;
     let volume = app.volume("sphere").await;
     let series = |more: Value| {
-        let mut source = json!({"study": STUDY, "series": SERIES});
+        let mut source = json!({"study": STUDY_UID, "series": SERIES_UID});
         source
             .as_object_mut()
             .unwrap()
@@ -106,8 +106,7 @@ async fn what_a_job_says_of_archives_is_checked() {
         json!({ "source": source })
     };
     let sends = |send: Value, to: Value| json!({"kind": "segmentation", "volume": volume, "parameters": {"model": "auto"}, "send": send, "to": to});
-    let both =
-        json!({"volume": volume, "source": {"archive": "pacs", "study": STUDY, "series": SERIES}});
+    let both = json!({"volume": volume, "source": {"archive": "pacs", "study": STUDY_UID, "series": SERIES_UID}});
     for (job, field) in [
         (json!({}), "volume"),
         (json!({"source": "pacs"}), "source"),
@@ -174,21 +173,21 @@ async fn what_a_job_says_of_archives_is_checked() {
 #[tokio::test]
 async fn a_key_stands_for_the_source_and_the_order_too() {
     let app = app_with_archives().await;
-    let job = |series: &str, send: Value| json!({"source": {"archive": "pacs", "study": STUDY, "series": series}, "send": send});
+    let job = |series: &str, send: Value| json!({"source": {"archive": "pacs", "study": STUDY_UID, "series": series}, "send": send});
     let keyed = |job: Value| {
         app.post("/v1/jobs")
             .header("Idempotency-Key", "k1")
             .json(&job)
             .send()
     };
-    let first = keyed(job(SERIES, json!(["mesh.dcm"]))).await.unwrap();
+    let first = keyed(job(SERIES_UID, json!(["mesh.dcm"]))).await.unwrap();
     let first: Value = first.json().await.unwrap();
-    let again = keyed(job(SERIES, json!(["mesh.dcm"]))).await.unwrap();
+    let again = keyed(job(SERIES_UID, json!(["mesh.dcm"]))).await.unwrap();
     let again: Value = again.json().await.unwrap();
     assert_eq!(again["id"], first["id"]);
     for other in [
         job("1.2.3", json!(["mesh.dcm"])),
-        job(SERIES, json!(["surface.dcm"])),
+        job(SERIES_UID, json!(["surface.dcm"])),
     ] {
         problem(keyed(other).await.unwrap(), 422, "idempotency-key-reused").await;
     }
@@ -215,7 +214,7 @@ fn set(settings: &mut Settings, fake: &FakeArchive) {
 }
 
 fn order() -> Value {
-    json!({"source": {"archive": "pacs", "study": STUDY, "series": SERIES}})
+    json!({"source": {"archive": "pacs", "study": STUDY_UID, "series": SERIES_UID}})
 }
 
 /// Files a job on the series and waits for its end.
@@ -247,7 +246,7 @@ async fn a_series_is_fetched_stored_and_computed() {
     assert_eq!(asked.method, "GET");
     assert_eq!(
         asked.path,
-        format!("/dicom-web/studies/{STUDY}/series/{SERIES}")
+        format!("/dicom-web/studies/{STUDY_UID}/series/{SERIES_UID}")
     );
     assert_eq!(
         asked.headers["accept"],
@@ -335,7 +334,7 @@ async fn what_lasts_fails_the_job_with_its_reason() {
         let kind = format!("urn:ventriform:problem:{code}");
         assert_eq!(job["error"]["type"], kind, "{fault:?}: {job}");
         assert!(!text(&job["error"]["fix"]).is_empty());
-        assert!(!job["error"].to_string().contains(STUDY));
+        assert!(!job["error"].to_string().contains(STUDY_UID));
         assert_eq!(job["source"]["state"], "failed");
         assert_eq!(job["volume"], Value::Null);
     }
@@ -439,7 +438,7 @@ async fn a_listed_service_is_used_without_credentials() {
         settings.dicomweb_allow = "127.0.0.1".parse().unwrap();
     })
     .await;
-    let order = json!({"source": {"dicomweb": fake.url, "study": STUDY, "series": SERIES}});
+    let order = json!({"source": {"dicomweb": fake.url, "study": STUDY_UID, "series": SERIES_UID}});
     let job = pulled(&app, &order).await;
     assert_eq!(job["state"], "succeeded", "{job}");
     let asked = fake.asked();
@@ -450,8 +449,8 @@ async fn a_listed_service_is_used_without_credentials() {
     );
 }
 
-/// What a model can send.
-const OBJECTS: [&str; 4] = ["mask.dcm", "contours.dcm", "mesh.dcm", "surface.dcm"];
+/// The objects that a model can send.
+const SENT_OBJECTS: [&str; 4] = ["mask.dcm", "contours.dcm", "mesh.dcm", "surface.dcm"];
 
 /// Reads real volumes and makes a sphere of each.
 fn engine() -> Engine {
@@ -557,7 +556,7 @@ async fn results_are_delivered_once_whatever_happens() {
         Fault::Failure(0xA700),
         Fault::Page,
     ]);
-    let job = sending(&app, &OBJECTS, "pacs").await;
+    let job = sending(&app, &SENT_OBJECTS, "pacs").await;
     assert_eq!(job["deliveries"][0]["name"], "mask.dcm");
     assert_eq!(job["deliveries"][0]["state"], "pending");
     let job = sent(&app, &job, "delivered").await;
@@ -571,20 +570,20 @@ async fn results_are_delivered_once_whatever_happens() {
             text(&delivery["name"])
         })
         .collect();
-    assert_eq!(names, OBJECTS);
+    assert_eq!(names, SENT_OBJECTS);
     let mut found = outcomes(&job);
     found.sort();
     assert_eq!(found, ["present", "stored", "stored", "stored"]);
     let (stored, storings) = fake.stored();
     assert_eq!((stored.len(), storings), (4, 4));
-    for name in OBJECTS {
+    for name in SENT_OBJECTS {
         let path = format!("{}/{name}", text(&job["links"]["model"]));
         let offered = app.get(&path).send().await.unwrap().bytes().await.unwrap();
         assert!(stored.values().any(|object| *object == offered), "{name}");
     }
 
     // The same result is not stored twice.
-    let again = sending(&app, &OBJECTS, "pacs").await;
+    let again = sending(&app, &SENT_OBJECTS, "pacs").await;
     let again = sent(&app, &again, "delivered").await;
     assert_eq!(again["model"], job["model"]);
     assert_eq!(outcomes(&again), ["present"; 4]);
@@ -777,7 +776,7 @@ async fn who_erases_whose_scan_it_is_erases_its_uids_in_jobs() {
     }
 }
 
-const WORKITEMS: &str = "/dicom-web/workitems";
+const ITEMS_PATH: &str = "/dicom-web/workitems";
 
 /// Schedules work on a series of the patient; returns the item's path.
 async fn scheduled(app: &TestApp, code: &str, series: &str) -> String {
@@ -798,7 +797,7 @@ async fn scheduled(app: &TestApp, code: &str, series: &str) -> String {
         }]},
     }]);
     let request = app
-        .post(WORKITEMS)
+        .post(ITEMS_PATH)
         .header("content-type", "application/dicom+json");
     let answer = request.body(body.to_string()).send().await.unwrap();
     assert_eq!(answer.status(), 201);

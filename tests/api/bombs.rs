@@ -12,11 +12,11 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Columns and rows of a frame: the largest that are read.
-const SIDE: u16 = 1024;
+const FRAME_SIDE: u16 = 1024;
 
 /// Processor time that an honest upload may cost or wait for, seconds: two cores for two seconds, and the
 /// upload itself in a build without optimisation.
-const BOUND: f64 = 6.0;
+const COST_BOUND_S: f64 = 6.0;
 
 /// A Nuclear Medicine Image of `frames` frames, all `frame`, in that transfer syntax.
 fn image(syntax: &str, bits: u16, frames: u16, frame: &[u8]) -> Vec<u8> {
@@ -59,8 +59,8 @@ fn image(syntax: &str, bits: u16, frames: u16, frame: &[u8]) -> Vec<u8> {
             element(0x28, 0x02, "US", &short(1)),
             text((0x28, 0x08), "IS", &frames.to_string()),
             element(0x28, 0x09, "AT", &[0x54, 0, 0x80, 0]),
-            element(0x28, 0x10, "US", &short(SIDE)),
-            element(0x28, 0x11, "US", &short(SIDE)),
+            element(0x28, 0x10, "US", &short(FRAME_SIDE)),
+            element(0x28, 0x11, "US", &short(FRAME_SIDE)),
             text((0x28, 0x30), "DS", "4\\4"),
             element(0x28, 0x100, "US", &short(bits)),
             element(0x28, 0x101, "US", &short(bits)),
@@ -136,7 +136,7 @@ fn stuffed(bits: &str) -> Vec<u8> {
 /// A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data.
 fn jpeg_2000() -> Vec<u8> {
     let mut frame = vec![0xff, 0x4f, 0xff, 0x51, 0, 41, 0, 0];
-    let side = u32::from(SIDE);
+    let side = u32::from(FRAME_SIDE);
     for n in [side, side, 0, 0, side, side, 0, 0] {
         frame.extend(n.to_be_bytes());
     }
@@ -146,7 +146,7 @@ fn jpeg_2000() -> Vec<u8> {
     frame.extend([0xff, 0x5c, 0, 4, 0x20, 31 << 3]);
     // One packet: every block is included, has no empty bit-plane, and 91 passes of no bytes.
     let mut bits = String::from("1");
-    let blocks = u32::from(SIDE) / 64;
+    let blocks = u32::from(FRAME_SIDE) / 64;
     for y in 0..blocks {
         for x in 0..blocks {
             // A node of a tag tree is met for the first time at its first leaf.
@@ -272,7 +272,7 @@ async fn bombs_whose_clients_hang_up_keep_no_upload_waiting() {
         assert_eq!(answer.status(), 201, "{kind}");
         let cost = service.processor_seconds() - before;
         assert!(
-            cost < BOUND,
+            cost < COST_BOUND_S,
             "{kind}: {cost} s of processor time until the answer"
         );
         // What is left of the bombs ends by itself.
@@ -287,7 +287,7 @@ async fn bombs_whose_clients_hang_up_keep_no_upload_waiting() {
         }
         let cost = service.processor_seconds() - before;
         assert!(
-            cost < 2.0 * BOUND,
+            cost < 2.0 * COST_BOUND_S,
             "{kind}: {cost} s of processor time in all"
         );
     }
@@ -315,7 +315,7 @@ async fn bombs_whose_clients_wait_are_ended_and_keep_no_upload_waiting() {
         assert_eq!(answer.status(), 201, "{kind}");
         let cost = service.processor_seconds() - before;
         assert!(
-            cost < BOUND,
+            cost < COST_BOUND_S,
             "{kind}: {cost} s of processor time until the answer"
         );
         for answer in held {
@@ -326,7 +326,7 @@ async fn bombs_whose_clients_wait_are_ended_and_keep_no_upload_waiting() {
             );
         }
         // Each has its time, and a second for every mebibyte.
-        let most = 3.0 * (3.0 + bomb.len() as f64 / f64::from(1 << 20)) + 2.0 * BOUND;
+        let most = 3.0 * (3.0 + bomb.len() as f64 / f64::from(1 << 20)) + 2.0 * COST_BOUND_S;
         let cost = service.processor_seconds() - started;
         assert!(
             cost < most,

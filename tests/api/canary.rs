@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use ventriform_http::install_cryptography;
 
 /// The patient.
-const CANARY: &str = "Zzyzx^Kanarienvogel";
+const CANARY_NAME: &str = "Zzyzx^Kanarienvogel";
 /// Part of it that remains recognisable in any encoding of the rest.
 const TRACE_OF_IT: &str = "kanarienvogel";
 
@@ -32,17 +32,17 @@ fn unusable() -> Vec<u8> {
     file(&[
         element(8, 0x16, "UI", b"1.2.840.10008.5.1.4.1.1.20"),
         element(8, 0x60, "CS", b"NM"),
-        element(0x10, 0x10, "PN", CANARY.as_bytes()),
-        element(0x10, 0x20, "LO", CANARY.as_bytes()),
-        element(0x10, 0x4000, "LT", CANARY.as_bytes()),
+        element(0x10, 0x10, "PN", CANARY_NAME.as_bytes()),
+        element(0x10, 0x20, "LO", CANARY_NAME.as_bytes()),
+        element(0x10, 0x4000, "LT", CANARY_NAME.as_bytes()),
     ])
 }
 
 /// A DICOM scan of the patient.
 fn scan() -> Vec<u8> {
     let patient = Patient {
-        name: CANARY,
-        id: CANARY,
+        name: CANARY_NAME,
+        id: CANARY_NAME,
         study: "1.2.840.99999.5",
         accession: "Kanarienvogel",
     };
@@ -57,7 +57,7 @@ fn nifti() -> Vec<u8> {
     flate2::read::GzDecoder::new(&packed[..])
         .read_to_end(&mut bytes)
         .unwrap();
-    bytes[148..148 + CANARY.len()].copy_from_slice(CANARY.as_bytes());
+    bytes[148..148 + CANARY_NAME.len()].copy_from_slice(CANARY_NAME.as_bytes());
     let mut file = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     file.write_all(&bytes).unwrap();
     file.finish().unwrap()
@@ -119,7 +119,7 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
     let client = reqwest::Client::new();
 
     let mut heads = String::new();
-    let file_name = format!("{CANARY}.nii.gz");
+    let file_name = format!("{CANARY_NAME}.nii.gz");
     let form =
         |bytes: Vec<u8>| Form::new().part("file", Part::bytes(bytes).file_name(file_name.clone()));
     let mut volumes = Vec::new();
@@ -127,7 +127,7 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
         (nifti(), 201),
         (scan(), 201),
         (unusable(), 422),
-        (CANARY.as_bytes().to_vec(), 422),
+        (CANARY_NAME.as_bytes().to_vec(), 422),
     ] {
         let answer = client
             .post(format!("{url}/v1/volumes"))
@@ -156,16 +156,17 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
     }
     // Whose scan it is: shown, stated, searched, written into DICOM objects, erased.
     let of_nifti = format!("{url}/v1/volumes/{}/identity", volumes[0].as_str().unwrap());
-    let stated = json!({"patient_id": CANARY, "patient_name": CANARY, "study_uid": "1.2.3"});
+    let stated =
+        json!({"patient_id": CANARY_NAME, "patient_name": CANARY_NAME, "study_uid": "1.2.3"});
     for body in [
         stated,
-        json!({"patient_id": CANARY, "study_uid": CANARY}),
-        json!({CANARY: 1}),
+        json!({"patient_id": CANARY_NAME, "study_uid": CANARY_NAME}),
+        json!({CANARY_NAME: 1}),
     ] {
         let answer = client.put(&of_nifti).json(&body).send().await.unwrap();
         heads += &format!("{:?}", answer.headers());
     }
-    let models = client.get(format!("{url}/v1/models?accession={CANARY}"));
+    let models = client.get(format!("{url}/v1/models?accession={CANARY_NAME}"));
     assert_eq!(models.send().await.unwrap().status(), 200);
     let models = client
         .get(format!("{url}/v1/models?study=1.2.3"))
@@ -177,11 +178,11 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
     let object = client.get(format!("{url}/v1/models/{model}/mesh.dcm"));
     let object = object.send().await.unwrap();
     heads += &format!("{:?}", object.headers());
-    assert!(contains(&object.bytes().await.unwrap(), CANARY));
+    assert!(contains(&object.bytes().await.unwrap(), CANARY_NAME));
     let of_dicom = format!("{url}/v1/volumes/{}", volumes[1].as_str().unwrap());
     let shown = client.get(&of_dicom).send().await.unwrap();
     heads += &format!("{:?}", shown.headers());
-    assert!(shown.text().await.unwrap().contains(CANARY));
+    assert!(shown.text().await.unwrap().contains(CANARY_NAME));
     let erased = client
         .delete(format!("{of_dicom}/identity"))
         .send()
@@ -189,15 +190,14 @@ async fn no_patient_is_named_in_logs_metrics_traces_or_webhooks() {
         .unwrap();
     assert_eq!(erased.status(), 204);
     for path in [
-        format!("/v1/volumes/{CANARY}"),
-        format!("/v1/jobs?state={CANARY}"),
-        format!("/v1/models?{CANARY}=1"),
-        format!("/{CANARY}"),
+        format!("/v1/volumes/{CANARY_NAME}"),
+        format!("/v1/jobs?state={CANARY_NAME}"),
+        format!("/v1/models?{CANARY_NAME}=1"),
+        format!("/{CANARY_NAME}"),
     ] {
         client.get(format!("{url}{path}")).send().await.unwrap();
     }
-    let labelled =
-        json!({"volume": volumes[0], "external_id": CANARY, "labels": {"patient": CANARY}});
+    let labelled = json!({"volume": volumes[0], "external_id": CANARY_NAME, "labels": {"patient": CANARY_NAME}});
     let answer = client
         .post(format!("{url}/v1/jobs"))
         .json(&labelled)

@@ -415,9 +415,9 @@ fn packed(volume: &Volume) -> Vec<u8> {
 }
 
 /// Healthy people of the limits.
-const PEOPLE: u64 = 13;
+const HEALTHY_PEOPLE: u64 = 13;
 /// Mid and apical segments of the LAD.
-const LAD: [u8; 4] = [7, 8, 13, 14];
+const LAD_SEGMENTS: [u8; 4] = [7, 8, 13, 14];
 
 #[tokio::test]
 async fn a_cohort_becomes_limits_and_two_scans_a_scored_comparison() {
@@ -444,7 +444,7 @@ async fn a_cohort_becomes_limits_and_two_scans_a_scored_comparison() {
         text(&stored.unwrap().json::<Value>().await.unwrap()["id"])
     };
     let mut cases = Vec::new();
-    for seed in 0..PEOPLE {
+    for seed in 0..HEALTHY_PEOPLE {
         let volume = upload(packed(&person(seed, &[]))).await;
         let mut row = case(&format!("n{seed}"), &volume);
         row["sex"] = json!(if seed % 2 == 0 { "F" } else { "M" });
@@ -496,7 +496,7 @@ async fn a_cohort_becomes_limits_and_two_scans_a_scored_comparison() {
         );
     }
 
-    let defects = LAD.map(|segment| PerfusionDefect {
+    let defects = LAD_SEGMENTS.map(|segment| PerfusionDefect {
         segment,
         severity: 0.6,
     });

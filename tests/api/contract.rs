@@ -35,16 +35,16 @@ use ventriform_service::worklist::{
 use ventriform_store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};
 
 /// Longer than a busy machine keeps anybody waiting.
-const WAIT: Duration = Duration::from_secs(30);
-/// How long an operation waits for a server that is away.
-const SHORT: Duration = Duration::from_millis(500);
-const LEASE: Duration = Duration::from_millis(150);
+const CONNECT_WAIT: Duration = Duration::from_secs(30);
+/// Time for which an operation waits for a server that is away.
+const SHORT_WAIT: Duration = Duration::from_millis(500);
+const SHORT_LEASE: Duration = Duration::from_millis(150);
 const ALL: ListRequest = ListRequest {
     before: None,
     limit: 1000,
 };
 
-const ROOM: ProductRoom = ProductRoom {
+const AMPLE_ROOM: ProductRoom = ProductRoom {
     count: u32::MAX,
     bytes: None,
 };
@@ -62,7 +62,7 @@ impl Stores {
     async fn sqlite() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let gauge = DiskGauge::new(folder.path(), Some(0));
-        let a = SqlStore::open(&folder.path().join("contract.db"), WAIT, gauge).await;
+        let a = SqlStore::open(&folder.path().join("contract.db"), CONNECT_WAIT, gauge).await;
         let a = Arc::new(a.unwrap());
         let (b, url) = (a.clone(), None);
         Self { a, b, url, folder }
@@ -75,7 +75,11 @@ impl Stores {
         let settings = reached(&url);
         let open = || async {
             let gauge = DiskGauge::new(folder.path(), Some(0));
-            Arc::new(SqlStore::connect(&settings, WAIT, gauge).await.unwrap())
+            Arc::new(
+                SqlStore::connect(&settings, CONNECT_WAIT, gauge)
+                    .await
+                    .unwrap(),
+            )
         };
         let (a, b) = tokio::join!(open(), open());
         let url = Some(url);
@@ -129,7 +133,7 @@ async fn claim(store: &SqlStore, run: &str) -> Option<(Job, Lease)> {
     let by = Claimant {
         token: random_id(""),
         run: run.into(),
-        lease: LEASE,
+        lease: SHORT_LEASE,
     };
     let job = store.claim(&by, now()).await.unwrap()?;
     let lease = Lease {
@@ -277,7 +281,7 @@ async fn a_lost_lease_writes_nothing(on: &Stores) {
     assert!(claim(&on.b, "run_b").await.is_none(), "it is claimed");
     // A run that lives keeps its leases.
     let (alive, limit) = (Some("run_a"), None);
-    tokio::time::sleep(2 * LEASE).await;
+    tokio::time::sleep(2 * SHORT_LEASE).await;
     assert!(
         on.b.release_dead(alive, limit, now())
             .await
@@ -297,7 +301,7 @@ async fn a_lost_lease_writes_nothing(on: &Stores) {
     assert_eq!((&again.id, again.attempts), (&job.id, 2));
     let first = model(&volume);
     assert!(
-        on.a.renew_lease(&lost, LEASE, now())
+        on.a.renew_lease(&lost, SHORT_LEASE, now())
             .await
             .unwrap()
             .is_none()
@@ -320,12 +324,12 @@ async fn a_lost_lease_writes_nothing(on: &Stores) {
         "no part of a result"
     );
     // A lease that is renewed does not expire for others.
-    tokio::time::sleep(LEASE).await;
+    tokio::time::sleep(SHORT_LEASE).await;
     assert_eq!(
-        on.b.renew_lease(&lease, WAIT, now()).await.unwrap(),
+        on.b.renew_lease(&lease, CONNECT_WAIT, now()).await.unwrap(),
         Some(false)
     );
-    tokio::time::sleep(LEASE).await;
+    tokio::time::sleep(SHORT_LEASE).await;
     assert!(
         on.a.release_dead(Some("run_a"), limit, now())
             .await
@@ -660,7 +664,7 @@ async fn jobs_end_in_every_way(on: &Stores) {
     let asked = on.a.interrupt(&job.id, now()).await.unwrap();
     assert!(matches!(asked, Interrupted::Asked(job) if job.cancel_requested));
     assert_eq!(
-        on.b.renew_lease(&lease, LEASE, now()).await.unwrap(),
+        on.b.renew_lease(&lease, SHORT_LEASE, now()).await.unwrap(),
         Some(true)
     );
     let ended = on.b.hand_back(&lease, now()).await.unwrap().unwrap();
@@ -726,7 +730,7 @@ async fn holds_keep_what_they_name(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let result = model(&volume);
     let owner = tenant();
-    let added = on.a.add_product(&result, &owner, Some(&volume), ROOM);
+    let added = on.a.add_product(&result, &owner, Some(&volume), AMPLE_ROOM);
     assert_eq!(added.await.unwrap(), AddedProduct::New);
     let hold = LegalHold {
         reason: "a trial".into(),
@@ -1048,7 +1052,7 @@ async fn lists_find_by_tags_and_scans(on: &Stores) {
         1
     );
     let template = product(random_id(Resource::Template.prefix()), None);
-    on.a.add_product(&template, &tenant(), Some(&ids[0]), ROOM)
+    on.a.add_product(&template, &tenant(), Some(&ids[0]), AMPLE_ROOM)
         .await
         .unwrap();
     assert!(
@@ -1148,7 +1152,7 @@ async fn items_are_shared_by_tenants(on: &Stores) {
     let page = on.b.records(Resource::Volume, 0, 10).await.unwrap();
     assert_eq!(page, [ItemRecord::Volume(amended)]);
     let template = product(random_id(Resource::Template.prefix()), None);
-    on.a.add_product(&template, &tenant(), None, ROOM)
+    on.a.add_product(&template, &tenant(), None, AMPLE_ROOM)
         .await
         .unwrap();
     on.a.amend(&ItemRecord::Product(template.clone()))
@@ -1691,7 +1695,7 @@ async fn work_items_change_once(on: &Stores) {
 async fn figures_are_counted(on: &Stores) {
     let volume = on.volume(&tenant()).await;
     let job = on.file(&new_job(&volume)).await;
-    on.a.add_product(&model(&volume), &tenant(), Some(&volume), ROOM)
+    on.a.add_product(&model(&volume), &tenant(), Some(&volume), AMPLE_ROOM)
         .await
         .unwrap();
     let figures = on.b.queue_figures().await.unwrap();
@@ -1788,7 +1792,7 @@ async fn both_engines_have_the_same_indexes_of_tenants() {
 
 async fn connect(url: &str) -> Result<SqlStore, PostgresError> {
     let gauge = DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
-    SqlStore::connect(&reached(url), WAIT, gauge).await
+    SqlStore::connect(&reached(url), CONNECT_WAIT, gauge).await
 }
 
 /// The first half of a rolling upgrade: the next version adds to the tables while this one runs, and this one is
@@ -1926,7 +1930,7 @@ async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
     let mut impatient = reached(&url);
     impatient.patience = Duration::from_millis(300);
     let gauge = || DiskGauge::new(std::path::Path::new("/tmp"), Some(0));
-    let error = SqlStore::connect(&impatient, WAIT, gauge())
+    let error = SqlStore::connect(&impatient, CONNECT_WAIT, gauge())
         .await
         .err()
         .unwrap();
@@ -1935,7 +1939,7 @@ async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
         "{error}"
     );
     let patient = reached(&url);
-    let started = tokio::join!(SqlStore::connect(&patient, SHORT, gauge()), async {
+    let started = tokio::join!(SqlStore::connect(&patient, SHORT_WAIT, gauge()), async {
         tokio::time::sleep(Duration::from_millis(500)).await;
         again(None).await.unwrap();
     });
@@ -1948,7 +1952,7 @@ async fn a_server_that_is_away_is_waited_for_and_never_answered_for() {
         .unwrap();
     for word in ["crash", "stop"] {
         again(Some(word)).await.unwrap();
-        let short = tokio::time::timeout(WAIT, async {
+        let short = tokio::time::timeout(CONNECT_WAIT, async {
             let read = store.volume(&tenant(), "vol_1").await.unwrap_err();
             let written = store
                 .add_volume(&volume, &tenant(), &tags, None)

@@ -69,8 +69,8 @@ pub const NM_GREATEST: f32 = 30_000.0;
 
 /// The simulated heart that [`nm`] shows, and its true mask.
 pub fn simulated() -> &'static Phantom {
-    static MADE: OnceLock<Phantom> = OnceLock::new();
-    MADE.get_or_init(|| {
+    static SIMULATED_HEART: OnceLock<Phantom> = OnceLock::new();
+    SIMULATED_HEART.get_or_init(|| {
         let parameters = PhantomParameters {
             shape: [64; 3],
             ..PhantomParameters::default()

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-const OBJECTS: [&str; 7] = [
+const DICOM_OBJECTS: [&str; 7] = [
     "mask.dcm",
     "contours.dcm",
     "mesh.dcm",
@@ -59,7 +59,7 @@ fn deidentified_objects_name_nobody_and_stay_together() {
     let flags = "scan.dcm --model auto -o out --dicom --deidentify --deidentify-secret s";
     made(folder.path(), &format!("{flags} --patient-id ANON-1"));
     let mut studies = BTreeSet::new();
-    for name in OBJECTS {
+    for name in DICOM_OBJECTS {
         let bytes = fs::read(folder.path().join("out").join(name)).unwrap();
         assert!(!hers(&bytes), "{name}");
         let object = from_reader(&bytes[..]).unwrap();
@@ -110,7 +110,7 @@ fn a_scan_that_is_not_dicom_gives_objects_only_for_a_stated_patient_and_study() 
         folder.path(),
         &format!("scan.nii.gz --model auto -o out --dicom {stated}"),
     );
-    for name in OBJECTS {
+    for name in DICOM_OBJECTS {
         let object = from_reader(&fs::read(folder.path().join("out").join(name)).unwrap()[..]);
         let object = object.unwrap();
         let text = |tag| object.element(tag).unwrap().to_str().unwrap();

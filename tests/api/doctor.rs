@@ -147,10 +147,10 @@ async fn send_slice(service: &Service, number: u16) {
 
 #[tokio::test]
 async fn received_objects_are_backed_up_checked_and_set_aside() {
-    const WAITING: [&str; 4] = ["--series-quiet", "1h", "--series-patience", "2h"];
+    const SERIES_WAIT_FLAGS: [&str; 4] = ["--series-quiet", "1h", "--series-patience", "2h"];
     const AT_ONCE: [&str; 4] = ["--series-quiet", "50ms", "--series-patience", "100ms"];
     let data = tempfile::tempdir().unwrap();
-    let service = Service::start(data.path(), &WAITING).await;
+    let service = Service::start(data.path(), &SERIES_WAIT_FLAGS).await;
     for number in 1..=3 {
         send_slice(&service, number).await;
     }

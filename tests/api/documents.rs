@@ -5,10 +5,11 @@ use std::path::Path;
 use ventriform_service::config::Settings;
 
 /// If set, the test writes the page instead of comparing it.
-const UPDATE: &str = "UPDATE_DOCS";
+const UPDATE_VARIABLE: &str = "UPDATE_DOCS";
 
-const BEGIN: &str = "<!-- settings: written by UPDATE_DOCS=1 cargo test --test api operators -->\n";
-const END: &str = "<!-- end of settings -->\n";
+const SETTINGS_BEGIN: &str =
+    "<!-- settings: written by UPDATE_DOCS=1 cargo test --test api operators -->\n";
+const SETTINGS_END: &str = "<!-- end of settings -->\n";
 
 /// Every setting as tables, one for each group.
 fn tables() -> String {
@@ -38,16 +39,16 @@ fn tables() -> String {
 fn the_page_for_operators_lists_every_setting() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/operations.md");
     let page = std::fs::read_to_string(&path).unwrap();
-    let (before, rest) = page.split_once(BEGIN).unwrap();
-    let (_, after) = rest.split_once(END).unwrap();
-    let expected = format!("{before}{BEGIN}{}{END}{after}", tables());
-    if std::env::var_os(UPDATE).is_some() {
+    let (before, rest) = page.split_once(SETTINGS_BEGIN).unwrap();
+    let (_, after) = rest.split_once(SETTINGS_END).unwrap();
+    let expected = format!("{before}{SETTINGS_BEGIN}{}{SETTINGS_END}{after}", tables());
+    if std::env::var_os(UPDATE_VARIABLE).is_some() {
         std::fs::write(&path, expected).unwrap();
         return;
     }
     assert!(
         page == expected,
-        "docs/operations.md is out of date; write it anew with {UPDATE}=1 cargo test --test api operators"
+        "docs/operations.md is out of date; write it anew with {UPDATE_VARIABLE}=1 cargo test --test api operators"
     );
 }
 

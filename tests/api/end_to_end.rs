@@ -105,12 +105,13 @@ async fn errors_name_the_problem_with_a_file_or_a_parameter() {
 #[cfg(target_os = "linux")]
 #[tokio::test]
 async fn uploads_are_not_held_in_memory() {
-    const MIB: usize = 1 << 20;
+    const BYTES_PER_MIB: usize = 1 << 20;
     let data = tempfile::tempdir().unwrap();
     let service = Service::start(data.path(), &[]).await;
     service.get("/healthz").send().await.unwrap();
     let before = service.peak_memory_kib();
-    let pieces = futures::stream::iter((0..256).map(|_| Ok::<_, std::io::Error>(vec![1u8; MIB])));
+    let pieces =
+        futures::stream::iter((0..256).map(|_| Ok::<_, std::io::Error>(vec![1u8; BYTES_PER_MIB])));
     let body = reqwest::Body::wrap_stream(pieces);
     let answer = service.post("/v1/volumes").body(body).send().await.unwrap();
     assert_eq!(answer.status(), 422);

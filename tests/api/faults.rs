@@ -19,16 +19,16 @@ use tempfile::TempDir;
 use ventriform_store::examine;
 
 /// `errno` of a failing and of a full disk.
-const FAULTS: [(&str, i32); 2] = [("EIO", 5), ("ENOSPC", 28)];
+const DISK_FAULTS: [(&str, i32); 2] = [("EIO", 5), ("ENOSPC", 28)];
 /// Writes that fail by default.
-const SAMPLE: u32 = 6;
-/// How long a job, or the recovery of the service, may take.
-const PATIENCE: Duration = Duration::from_secs(60);
+const SAMPLED_WRITES: u32 = 6;
+/// Longest time of a job, or of the recovery of the service.
+const EVENT_PATIENCE: Duration = Duration::from_secs(60);
 
 /// The compiled shim.
 fn shim() -> &'static Path {
-    static SHIM: OnceLock<PathBuf> = OnceLock::new();
-    SHIM.get_or_init(|| {
+    static COMPILED_SHIM: OnceLock<PathBuf> = OnceLock::new();
+    COMPILED_SHIM.get_or_init(|| {
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/shim.c");
         let library = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fault_shim.so");
         let compiled = Command::new("cc")
@@ -237,9 +237,13 @@ async fn whichever_write_fails_nothing_acknowledged_is_lost() {
     service.kill();
     assert!(writes > 50, "{writes}");
 
-    let step = if all_points() { 1 } else { writes / SAMPLE };
+    let step = if all_points() {
+        1
+    } else {
+        writes / SAMPLED_WRITES
+    };
     for (number, point) in (1..=writes).step_by(step as usize).enumerate() {
-        let (name, error) = FAULTS[number % FAULTS.len()];
+        let (name, error) = DISK_FAULTS[number % DISK_FAULTS.len()];
         // Every other pair of rounds, the disk does not recover by itself.
         let last = if number % 4 < 2 { point } else { point + 20 };
         let when = format!("{name} at writes {point} to {last} of {writes}");
@@ -249,7 +253,7 @@ async fn whichever_write_fails_nothing_acknowledged_is_lost() {
         let mut noted = Acknowledged::default();
         load(&service, &mut noted).await;
         disk.fail(u32::MAX, u32::MAX, 0);
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + EVENT_PATIENCE;
         loop {
             let ready = service.get("/readyz").send().await.unwrap();
             if ready.status() == 200 {

@@ -8,8 +8,8 @@ use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// A small simulated heart in eight gates: it shrinks and thickens, and is smallest in the fourth.
 pub fn beating() -> &'static [Volume] {
-    static GATES: std::sync::OnceLock<Vec<Volume>> = std::sync::OnceLock::new();
-    GATES.get_or_init(|| {
+    static GATE_VOLUMES: std::sync::OnceLock<Vec<Volume>> = std::sync::OnceLock::new();
+    GATE_VOLUMES.get_or_init(|| {
         let contractions = [0.0, 0.4, 0.85, 1.0, 0.75, 0.45, 0.2, 0.05];
         let gate = |contraction: f64| {
             let parameters = PhantomParameters {

@@ -35,8 +35,8 @@ use ventriform_service::records::{
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 use ventriform_store::{open_database, open_rows};
 
-/// How long a test waits for a job or another event before it fails.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Time for which a test waits for a job or another event before it fails.
+const EVENT_PATIENCE: Duration = Duration::from_secs(60);
 
 /// A client of one service.
 pub struct Api {
@@ -82,11 +82,11 @@ fn on_postgres() -> bool {
 /// above 32767 to whoever asks for any, and to connections.
 pub fn quiet_port() -> u16 {
     use std::sync::atomic::{AtomicU16, Ordering};
-    static NEXT: AtomicU16 = AtomicU16::new(0);
+    static NEXT_PORT: AtomicU16 = AtomicU16::new(0);
     // Other processes of the tests begin elsewhere.
     let first = 16_000 + (std::process::id() % 160) as u16 * 100;
     loop {
-        let port = first + NEXT.fetch_add(1, Ordering::Relaxed) % 100;
+        let port = first + NEXT_PORT.fetch_add(1, Ordering::Relaxed) % 100;
         if std::net::TcpListener::bind(("127.0.0.1", port)).is_ok() {
             return port;
         }
@@ -215,7 +215,7 @@ impl TestApp {
     /// Waits until a job is in one of the states; returns the job.
     pub async fn until(&self, job: &Value, states: &[&str]) -> Value {
         let path = text(&job["links"]["self"]);
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + EVENT_PATIENCE;
         loop {
             let job = self.json(&path).await;
             if states.contains(&job["state"].as_str().unwrap()) {
@@ -635,8 +635,8 @@ pub fn mesh_json(mesh: &TriMesh) -> Vec<u8> {
 
 /// A simulated scan of a heart and its true mask, as `.nii.gz` files; computed once.
 pub fn heart() -> (Vec<u8>, Vec<u8>) {
-    static HEART: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
-    HEART
+    static HEART_FILES: std::sync::OnceLock<(Vec<u8>, Vec<u8>)> = std::sync::OnceLock::new();
+    HEART_FILES
         .get_or_init(|| {
             let parameters = PhantomParameters {
                 shape: [64; 3],
@@ -654,17 +654,18 @@ pub fn heart() -> (Vec<u8>, Vec<u8>) {
 
 /// A small simulated scan as `.nii.gz`; computed once.
 pub fn scan() -> Vec<u8> {
-    static SCAN: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
-    SCAN.get_or_init(|| {
-        let parameters = PhantomParameters {
-            shape: [64; 3],
-            spacing_mm: [6.4; 3],
-            ..PhantomParameters::default()
-        };
-        let made = phantom(&parameters, &Monitor::silent()).unwrap();
-        nifti::write(&made.volume, StoredType::Int16, true).unwrap()
-    })
-    .clone()
+    static SCAN_FILE: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
+    SCAN_FILE
+        .get_or_init(|| {
+            let parameters = PhantomParameters {
+                shape: [64; 3],
+                spacing_mm: [6.4; 3],
+                ..PhantomParameters::default()
+            };
+            let made = phantom(&parameters, &Monitor::silent()).unwrap();
+            nifti::write(&made.volume, StoredType::Int16, true).unwrap()
+        })
+        .clone()
 }
 
 /// Sends a signal to a process, by name.
@@ -785,7 +786,7 @@ impl Service {
 
     /// Waits until the job has ended; returns the job.
     pub async fn ended(&self, id: &str) -> Value {
-        let deadline = Instant::now() + 3 * PATIENCE;
+        let deadline = Instant::now() + 3 * EVENT_PATIENCE;
         loop {
             let job = self.get(&format!("/v1/jobs/{id}")).send().await.unwrap();
             assert_eq!(job.status(), StatusCode::OK, "{id} was lost");

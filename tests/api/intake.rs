@@ -2,7 +2,7 @@
 
 use crate::dicom::{JANE, Patient, nm_of};
 use crate::helpers::{Service, TestApp, fake_engine, key, problem, text};
-use crate::scu::{CT, NM, Object, Scu, command, nuclear, slice};
+use crate::scu::{CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, slice};
 use dicom_ul::pdu::{PDataValueType, Pdu};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ use ventriform_service::config::Settings;
 use ventriform_service::start::OpenError;
 use ventriform_service::work::Engine;
 
-const PATIENCE: Duration = Duration::from_secs(20);
+const EVENT_PATIENCE: Duration = Duration::from_secs(20);
 
 /// Reads volumes as the product does; computes as the fake does.
 fn engine() -> Engine {
@@ -63,7 +63,7 @@ async fn intake(app: &TestApp) -> Vec<Value> {
 
 /// Waits until `number` groups were received and none of them is unfinished; returns them.
 async fn settled(app: &TestApp, number: usize) -> Vec<Value> {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     loop {
         let groups = intake(app).await;
         let ended =
@@ -78,7 +78,7 @@ async fn settled(app: &TestApp, number: usize) -> Vec<Value> {
 
 /// Waits until that many received files are kept: those of a volume are deleted after it is shown.
 async fn kept(data: &Path, number: usize) {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     loop {
         let files = std::fs::read_dir(data.join("received")).unwrap();
         let names: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
@@ -161,12 +161,17 @@ async fn each_context_is_accepted_or_rejected_by_itself() {
     let mut scu = Scu::open(address);
     assert_eq!(scu.contexts(), [1, 3, 5]);
     // C-FIND, and C-STORE of another class than the context's.
-    scu.send(PDataValueType::Command, 3, command(0x0020, NM, None), true);
+    scu.send(
+        PDataValueType::Command,
+        3,
+        command(0x0020, NM_CLASS, None),
+        true,
+    );
     assert_eq!(scu.status(), 0x0211);
     scu.send(
         PDataValueType::Command,
         3,
-        command(0x0001, CT, Some("1.2")),
+        command(0x0001, CT_CLASS, Some("1.2")),
         true,
     );
     scu.send(PDataValueType::Data, 3, vec![1, 2], true);
@@ -174,7 +179,7 @@ async fn each_context_is_accepted_or_rejected_by_itself() {
     scu.send(
         PDataValueType::Command,
         3,
-        command(0x0001, NM, Some("1.2")),
+        command(0x0001, NM_CLASS, Some("1.2")),
         true,
     );
     scu.send(PDataValueType::Data, 3, vec![7; 99], true);
@@ -526,7 +531,7 @@ fn noise(seed: u64, length: usize) -> Vec<u8> {
 
 fn connect(address: SocketAddr) -> TcpStream {
     let stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream.set_read_timeout(Some(EVENT_PATIENCE)).unwrap();
     stream
 }
 
@@ -576,7 +581,7 @@ async fn garbage_harms_nobody() {
     stopped.send(
         PDataValueType::Command,
         3,
-        command(1, NM, Some("1.2.3.1")),
+        command(1, NM_CLASS, Some("1.2.3.1")),
         true,
     );
     stopped.send(PDataValueType::Data, 3, vec![8; 1000], false);
@@ -634,14 +639,14 @@ async fn what_was_acknowledged_survives_kills() {
         scu.send(
             PDataValueType::Command,
             5,
-            command(1, CT, Some(&next.instance)),
+            command(1, CT_CLASS, Some(&next.instance)),
             true,
         );
         scu.send(PDataValueType::Data, 5, vec![8; 100], false);
         service.kill();
     }
     let service = Service::start(data.path(), &flags).await;
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     let group = loop {
         let list = service.get("/v1/intake").send().await.unwrap();
         let list: Value = list.json().await.unwrap();
@@ -675,7 +680,7 @@ fn related(parts: &[Vec<u8>]) -> Vec<u8> {
     body
 }
 
-const RELATED: &str = "multipart/related; type=\"application/dicom\"; boundary=b";
+const RELATED_TYPE: &str = "multipart/related; type=\"application/dicom\"; boundary=b";
 
 async fn stow(app: &TestApp, path: &str, kind: &str, body: Vec<u8>) -> reqwest::Response {
     let request = app.post(path).header("content-type", kind).body(body);
@@ -687,12 +692,15 @@ async fn objects_are_stored_over_http() {
     // A machine that stands still for a moment is no sender that does.
     let (app, _) = service(|settings| settings.series_patience = "5s".parse().unwrap()).await;
     let files: Vec<_> = (1..4).map(|number| slice("1.2.4", number).file()).collect();
-    let answer = stow(&app, "/dicom-web/studies", RELATED, related(&files)).await;
+    let answer = stow(&app, "/dicom-web/studies", RELATED_TYPE, related(&files)).await;
     assert_eq!(answer.status(), StatusCode::OK);
     assert_eq!(answer.headers()["content-type"], "application/dicom+json");
     let module: Value = answer.json().await.unwrap();
     assert_eq!(module["00081199"]["Value"].as_array().unwrap().len(), 3);
-    assert_eq!(module["00081199"]["Value"][0]["00081150"]["Value"][0], CT);
+    assert_eq!(
+        module["00081199"]["Value"][0]["00081150"]["Value"][0],
+        CT_CLASS
+    );
     let groups = settled(&app, 1).await;
     let volume = app.json(&text(&groups[0]["links"]["volume"])).await;
     assert_eq!(volume["shape"], json!([4, 4, 3]));
@@ -725,7 +733,7 @@ async fn objects_are_stored_over_http() {
         b"no object".to_vec(),
         nuclear("1.2.3", 2, "RECON TOMO").file(),
     ]);
-    let answer = stow(&app, "/dicom-web/studies", RELATED, mixed).await;
+    let answer = stow(&app, "/dicom-web/studies", RELATED_TYPE, mixed).await;
     assert_eq!(answer.status(), StatusCode::ACCEPTED);
     let module: Value = answer.json().await.unwrap();
     assert_eq!(
@@ -743,7 +751,9 @@ async fn bodies_that_are_not_stow_are_refused() {
     let path = "/dicom-web/studies";
     let file = || slice("1.2.4", 1).file();
     let xml = app.post(path).header("accept", "application/dicom+xml");
-    let xml = xml.header("content-type", RELATED).body(related(&[file()]));
+    let xml = xml
+        .header("content-type", RELATED_TYPE)
+        .body(related(&[file()]));
     problem(xml.send().await.unwrap(), 406, "not-acceptable").await;
     let code = "unsupported-media-type";
     problem(
@@ -753,21 +763,32 @@ async fn bodies_that_are_not_stow_are_refused() {
     )
     .await;
     let code = "malformed-parts";
-    problem(stow(&app, path, RELATED, related(&[])).await, 400, code).await;
     problem(
-        stow(&app, path, RELATED, b"--b\r\nA: ".to_vec()).await,
+        stow(&app, path, RELATED_TYPE, related(&[])).await,
+        400,
+        code,
+    )
+    .await;
+    problem(
+        stow(&app, path, RELATED_TYPE, b"--b\r\nA: ".to_vec()).await,
         400,
         code,
     )
     .await;
     let endless = [b"--b\r\nA: ".to_vec(), vec![b'a'; 2 << 20]].concat();
-    problem(stow(&app, path, RELATED, endless).await, 400, code).await;
+    problem(stow(&app, path, RELATED_TYPE, endless).await, 400, code).await;
     // The body breaks off after the first object, which is stored.
     let mut cut = related(&[file(), slice("1.2.4", 2).file()]);
     cut.truncate(cut.len() - 200);
-    problem(stow(&app, path, RELATED, cut).await, 400, code).await;
+    problem(stow(&app, path, RELATED_TYPE, cut).await, 400, code).await;
     assert_eq!(settled(&app, 1).await[0]["objects"], 1);
     let (_, reader) = key(app.data.path(), Scope::Read, "default", Quota::default()).await;
-    let answer = stow(&app.seen_with(&reader), path, RELATED, related(&[file()])).await;
+    let answer = stow(
+        &app.seen_with(&reader),
+        path,
+        RELATED_TYPE,
+        related(&[file()]),
+    )
+    .await;
     assert_eq!(answer.status(), StatusCode::FORBIDDEN);
 }

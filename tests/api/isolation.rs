@@ -11,10 +11,10 @@ use ventriform_service::records::{Claimant, Filed, JobStore, NewJob, Tenant};
 use ventriform_service::work::Engine;
 use ventriform_store::Store;
 
-const PATIENCE: Duration = Duration::from_secs(30);
+const EVENT_PATIENCE: Duration = Duration::from_secs(30);
 
 /// A job of several seconds.
-const LONG: &str = "/v1/models?points=3000&starts=4&method=paper";
+const LONG_JOB: &str = "/v1/models?points=3000&starts=4&method=paper";
 
 async fn job_of(service: &Service, path: &str) -> String {
     let filed = service.post(path).body(heart().0).send().await.unwrap();
@@ -28,7 +28,7 @@ async fn state_of(service: &Service, id: &str) -> Value {
 }
 
 async fn until_running(service: &Service, id: &str) {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     while state_of(service, id).await["state"] != "running" {
         assert!(Instant::now() < deadline);
         tokio::time::sleep(Duration::from_millis(10)).await;
@@ -37,7 +37,7 @@ async fn until_running(service: &Service, id: &str) {
 
 /// The process that computes a job.
 async fn child_of(service: &Service, other_than: &[u32]) -> u32 {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     loop {
         let children = service.children();
         if let Some(child) = children.iter().find(|child| !other_than.contains(child)) {
@@ -59,7 +59,7 @@ async fn kills_of_the_service_fail_no_job_and_leave_no_process() {
     let data = tempfile::tempdir().unwrap();
     let arguments = ["--workers", "1", "--attempt-limit", "2"];
     let mut service = Service::start(data.path(), &arguments).await;
-    let id = job_of(&service, LONG).await;
+    let id = job_of(&service, LONG_JOB).await;
     for kill in 0..4 {
         until_running(&service, &id).await;
         let child = match kill {
@@ -67,7 +67,7 @@ async fn kills_of_the_service_fail_no_job_and_leave_no_process() {
             _ => Some(child_of(&service, &[]).await),
         };
         service.kill();
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + EVENT_PATIENCE;
         while child.is_some_and(lives) {
             assert!(
                 Instant::now() < deadline,
@@ -89,7 +89,7 @@ async fn a_job_whose_own_process_dies_is_failed_and_the_service_goes_on() {
     let data = tempfile::tempdir().unwrap();
     let arguments = ["--workers", "1", "--attempt-limit", "2"];
     let service = Service::start(data.path(), &arguments).await;
-    let id = job_of(&service, LONG).await;
+    let id = job_of(&service, LONG_JOB).await;
     until_running(&service, &id).await;
     service.kill();
     let service = Service::start(data.path(), &arguments).await;
@@ -126,7 +126,7 @@ async fn a_process_of_its_own_makes_the_same_model() {
 async fn a_service_that_stood_still_for_longer_than_the_lease_keeps_its_job() {
     let data = tempfile::tempdir().unwrap();
     let service = Service::start(data.path(), &["--workers", "2", "--lease", "1s"]).await;
-    let id = job_of(&service, LONG).await;
+    let id = job_of(&service, LONG_JOB).await;
     until_running(&service, &id).await;
     service.signal("STOP");
     tokio::time::sleep(Duration::from_millis(2500)).await;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use ventriform::mesh::shapes::icosphere;
 use ventriform_service::access::{Quota, Scope};
 
-const FORWARDED: &str = "x-forwarded-for";
+const FORWARDED_HEADER: &str = "x-forwarded-for";
 
 /// A sphere as a JSON mesh.
 fn mesh_json(radius: f64) -> Vec<u8> {
@@ -509,7 +509,7 @@ async fn one_client_that_holds_memory_keeps_no_other_waiting() {
         let body = begin.chain(futures::stream::pending());
         let sent = app
             .post("/v1/templates?name=t&organ=generic")
-            .header(FORWARDED, client)
+            .header(FORWARDED_HEADER, client)
             .header("content-type", "application/json")
             .body(reqwest::Body::wrap_stream(body))
             .send();
@@ -518,7 +518,9 @@ async fn one_client_that_holds_memory_keeps_no_other_waiting() {
     let greedy: Vec<_> = (0..12).map(|_| half("192.0.2.1")).collect();
     tokio::time::sleep(Duration::from_millis(500)).await;
     let list = |client: &'static str| {
-        let list = app.get("/v1/volumes?limit=3").header(FORWARDED, client);
+        let list = app
+            .get("/v1/volumes?limit=3")
+            .header(FORWARDED_HEADER, client);
         list.send()
     };
     let began = Instant::now();
@@ -550,8 +552,8 @@ async fn work_items_are_bounded_one_by_one_and_in_pages() {
             .json(&set)
             .send()
     };
-    const ITEMS: usize = 15;
-    for n in 0..ITEMS {
+    const ITEM_COUNT: usize = 15;
+    for n in 0..ITEM_COUNT {
         assert_eq!(create(n, 200_000).await.unwrap().status(), 201);
     }
     // An item does not grow beyond the largest body.
@@ -561,7 +563,7 @@ async fn work_items_are_bounded_one_by_one_and_in_pages() {
     // A search answers with as many as fit, says that there are more, and gives each once.
     let mut seen = BTreeSet::new();
     let mut pages = 0;
-    while seen.len() < ITEMS {
+    while seen.len() < ITEM_COUNT {
         let path = format!("/dicom-web/workitems?limit=1000&offset={}", seen.len());
         let page = app.get(&path).send().await.unwrap();
         assert_eq!(page.status(), 200);
@@ -572,7 +574,7 @@ async fn work_items_are_bounded_one_by_one_and_in_pages() {
         for item in &page {
             assert!(seen.insert(text(&item["00080018"]["Value"][0])));
         }
-        assert_eq!(warned, seen.len() < ITEMS);
+        assert_eq!(warned, seen.len() < ITEM_COUNT);
         pages += 1;
     }
     assert!(pages > 1);

@@ -19,7 +19,7 @@ use ventriform_store::{
 };
 
 /// Lists whose answers must not change.
-const LISTS: [&str; 5] = [
+const LIST_PATHS: [&str; 5] = [
     "/v1/volumes",
     "/v1/models",
     "/v1/jobs?state=succeeded",
@@ -37,7 +37,7 @@ struct Folder {
 /// The answers that a caller gets: lists, and the files behind their links.
 async fn seen(app: &TestApp) -> BTreeMap<String, Vec<u8>> {
     let mut seen = BTreeMap::new();
-    for list in LISTS {
+    for list in LIST_PATHS {
         let page = app.json(list).await;
         seen.insert(list.to_owned(), serde_json::to_vec(&page).unwrap());
     }

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 use ventriform_service::access::{Quota, Scope};
 
 /// The patient, short enough for every field of text.
-const NAME: &str = "Kanarienvogel";
+const PATIENT_NAME: &str = "Kanarienvogel";
 
 /// Bytes of a NIfTI-1 header, and where its voxels begin without extensions.
-const HEADER: usize = 348;
-const VOXELS: usize = 352;
+const HEADER_BYTES: usize = 348;
+const VOXEL_OFFSET_BYTES: usize = 352;
 
 fn unpacked(bytes: &[u8]) -> Vec<u8> {
     let mut all = Vec::new();
@@ -28,21 +28,21 @@ fn extended(plain: &[u8], code: i32) -> Vec<u8> {
     let mut extension = Vec::new();
     extension.extend_from_slice(&64_i32.to_le_bytes());
     extension.extend_from_slice(&code.to_le_bytes());
-    extension.extend_from_slice(NAME.as_bytes());
+    extension.extend_from_slice(PATIENT_NAME.as_bytes());
     extension.resize(64, 0);
-    let mut file = plain[..HEADER].to_vec();
-    let offset = (VOXELS + extension.len()) as f32;
+    let mut file = plain[..HEADER_BYTES].to_vec();
+    let offset = (VOXEL_OFFSET_BYTES + extension.len()) as f32;
     file[108..112].copy_from_slice(&offset.to_le_bytes());
     file.extend_from_slice(&[1, 0, 0, 0]);
     file.extend_from_slice(&extension);
-    file.extend_from_slice(&plain[VOXELS..]);
+    file.extend_from_slice(&plain[VOXEL_OFFSET_BYTES..]);
     file
 }
 
 /// The scan with the name at a place of its header.
 fn written(plain: &[u8], at: usize) -> Vec<u8> {
     let mut file = plain.to_vec();
-    file[at..at + NAME.len()].copy_from_slice(NAME.as_bytes());
+    file[at..at + PATIENT_NAME.len()].copy_from_slice(PATIENT_NAME.as_bytes());
     file
 }
 
@@ -69,9 +69,9 @@ fn zipped(name: &str, bytes: &[u8]) -> Vec<u8> {
 fn naming() -> Vec<(&'static str, Vec<u8>)> {
     let plain = unpacked(&heart().0);
     let mut longer = plain.clone();
-    longer.extend_from_slice(NAME.as_bytes());
+    longer.extend_from_slice(PATIENT_NAME.as_bytes());
     let mut after = packed(&plain, None);
-    after.extend_from_slice(NAME.as_bytes());
+    after.extend_from_slice(PATIENT_NAME.as_bytes());
     let dicom = extended(&plain, 2);
     vec![
         ("a packed DICOM extension", packed(&dicom, None)),
@@ -82,11 +82,14 @@ fn naming() -> Vec<(&'static str, Vec<u8>)> {
         ("aux_file", written(&plain, 228)),
         ("intent_name", written(&plain, 328)),
         ("bytes after the voxels", longer),
-        ("the name of the packed file", packed(&plain, Some(NAME))),
+        (
+            "the name of the packed file",
+            packed(&plain, Some(PATIENT_NAME)),
+        ),
         ("bytes after the packed data", after),
         (
             "a name in an archive",
-            zipped(&format!("{NAME}.nii"), &plain),
+            zipped(&format!("{PATIENT_NAME}.nii"), &plain),
         ),
         ("an archive", zipped("a.nii", &dicom)),
     ]
@@ -95,8 +98,8 @@ fn naming() -> Vec<(&'static str, Vec<u8>)> {
 fn names(bytes: &[u8]) -> bool {
     let holds = |bytes: &[u8]| {
         bytes
-            .windows(NAME.len())
-            .any(|part| part == NAME.as_bytes())
+            .windows(PATIENT_NAME.len())
+            .any(|part| part == PATIENT_NAME.as_bytes())
     };
     holds(bytes) || holds(&unpacked(bytes))
 }
@@ -130,7 +133,10 @@ async fn no_answer_to_a_key_that_reads_holds_what_a_nifti_file_says_of_a_patient
     let mut volumes = Vec::new();
     for (how, bytes) in naming() {
         assert!(how == "an archive" || names(&bytes), "{how}");
-        let form = Form::new().part("file", Part::bytes(bytes).file_name(format!("{NAME}.nii")));
+        let form = Form::new().part(
+            "file",
+            Part::bytes(bytes).file_name(format!("{PATIENT_NAME}.nii")),
+        );
         let sent = service.post("/v1/volumes").bearer_auth(&submit);
         let sent = sent.multipart(form).send().await.unwrap();
         let status = sent.status();

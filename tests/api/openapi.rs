@@ -4,25 +4,25 @@ use crate::helpers::{TestApp, text};
 use serde_json::{Value, json};
 use std::path::Path;
 use ventriform::parameters::{
-    BEAT_SPECS, COMPARISON_SPECS, ComparisonParameters, FIT_SPECS, GatedParameters, SPECS,
+    BEAT_SPECS, COMPARISON_SPECS, ComparisonParameters, FIT_SPECS, GatedParameters, MODEL_SPECS,
 };
 use ventriform_http::document_json;
 
 /// If set, the test writes the document instead of comparing it.
-const UPDATE: &str = "UPDATE_OPENAPI";
+const UPDATE_VARIABLE: &str = "UPDATE_OPENAPI";
 
 #[test]
 fn the_committed_document_matches_the_code() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi/ventriform.json");
     let generated = document_json();
-    if std::env::var_os(UPDATE).is_some() {
+    if std::env::var_os(UPDATE_VARIABLE).is_some() {
         std::fs::write(&path, generated).unwrap();
         return;
     }
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == generated,
-        "openapi/ventriform.json is out of date; write it anew with {UPDATE}=1 cargo test --test api"
+        "openapi/ventriform.json is out of date; write it anew with {UPDATE_VARIABLE}=1 cargo test --test api"
     );
 }
 
@@ -39,7 +39,7 @@ async fn the_service_publishes_the_same_document() {
 fn every_parameter_of_a_job_is_documented_twice() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
     let fit: Vec<_> = FIT_SPECS.iter().map(|spec| spec.name).collect();
-    let model: Vec<_> = SPECS.iter().map(|spec| spec.name).collect();
+    let model: Vec<_> = MODEL_SPECS.iter().map(|spec| spec.name).collect();
     let beat: Vec<_> = GatedParameters::fit_specs()
         .map(|spec| spec.name)
         .chain(BEAT_SPECS.iter().map(|spec| spec.name))

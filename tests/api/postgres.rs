@@ -13,11 +13,11 @@ use ventriform_service::config::DatabaseUrl;
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
 
 /// Where Debian puts the programs of each version.
-const DEBIAN: &str = "/usr/lib/postgresql";
+const DEBIAN_FOLDER: &str = "/usr/lib/postgresql";
 
 /// Runs the server $1/postgres on the folder $2 and port $3 until standard input ends; `crash` stops it as
 /// a power cut would.
-const WATCH: &str = r#"
+const WATCH_SCRIPT: &str = r#"
 trap : TERM INT HUP
 "$1/postgres" -D "$2" -p "$3" -k "$2" >>"$2/log" 2>&1 </dev/null &
 server=$!
@@ -36,13 +36,16 @@ pub struct Server {
 
 /// The server that the tests of this process share.
 pub fn server() -> &'static Server {
-    static SERVER: OnceLock<Server> = OnceLock::new();
-    SERVER.get_or_init(Server::new)
+    static SHARED_SERVER: OnceLock<Server> = OnceLock::new();
+    SHARED_SERVER.get_or_init(Server::new)
 }
 
 /// The folder with initdb and postgres.
 fn programs() -> PathBuf {
-    let versions = std::fs::read_dir(DEBIAN).into_iter().flatten().flatten();
+    let versions = std::fs::read_dir(DEBIAN_FOLDER)
+        .into_iter()
+        .flatten()
+        .flatten();
     let mut found: Vec<PathBuf> = versions
         .map(|version| version.path().join("bin"))
         .filter(|folder| folder.join("initdb").exists())
@@ -112,7 +115,7 @@ impl Server {
             return;
         }
         // The folder is deleted when the tests end; Drop does not run for the shared server.
-        let script = format!("{WATCH}[ \"$word\" ] || rm -rf \"$2\"");
+        let script = format!("{WATCH_SCRIPT}[ \"$word\" ] || rm -rf \"$2\"");
         let child = shell()
             .args(["-c", &script, "sh"])
             .arg(&self.programs)

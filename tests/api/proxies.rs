@@ -15,7 +15,7 @@ use ventriform_service::access::{Quota, Scope};
 use ventriform_service::config::Settings;
 
 /// More than the buffers of both sockets hold.
-const LARGE: usize = 24 << 20;
+const LARGE_BYTES: usize = 24 << 20;
 
 /// The status of the answer to a client that sends a whole request before it reads.
 async fn sends_all_then_reads(
@@ -24,7 +24,7 @@ async fn sends_all_then_reads(
 ) -> String {
     stream.write_all(head.as_bytes()).await.unwrap();
     let piece = vec![0; 1 << 16];
-    for _ in 0..LARGE / piece.len() {
+    for _ in 0..LARGE_BYTES / piece.len() {
         stream.write_all(&piece).await.unwrap();
     }
     let mut said = Vec::new();
@@ -44,7 +44,7 @@ async fn a_refusal_during_an_upload_reaches_the_client() {
     closed(&app).await;
     let bearer = |key: &str| format!("Authorization: Bearer {key}\r\n");
     let (submit, read) = (bearer(&submit), bearer(&read));
-    let length = format!("Content-Length: {LARGE}\r\n");
+    let length = format!("Content-Length: {LARGE_BYTES}\r\n");
     for (path, credentials, rest, status) in [
         ("/v1/volumes", "", length.as_str(), 401),
         ("/v1/volumes", read.as_str(), length.as_str(), 403),
@@ -63,7 +63,7 @@ async fn a_refusal_during_an_upload_reaches_the_client() {
         );
     }
     // A body whose length is not announced is refused in the middle.
-    let pieces = (0..LARGE >> 16).map(|_| Ok::<_, std::io::Error>(vec![0_u8; 1 << 16]));
+    let pieces = (0..LARGE_BYTES >> 16).map(|_| Ok::<_, std::io::Error>(vec![0_u8; 1 << 16]));
     let body = reqwest::Body::wrap_stream(futures::stream::iter(pieces));
     let chunked = app
         .post("/v1/volumes")
@@ -91,7 +91,7 @@ async fn a_refusal_during_an_upload_reaches_the_client_under_tls() {
         let stream = TcpStream::connect(address(&app)).await.unwrap();
         let stream = authority.secured(stream).await;
         let head = format!(
-            "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: {LARGE}\r\n\r\n"
+            "POST /v1/volumes HTTP/1.1\r\nHost: localhost\r\nContent-Length: {LARGE_BYTES}\r\n\r\n"
         );
         let said = sends_all_then_reads(stream, &head).await;
         assert!(said.starts_with("HTTP/1.1 413"), "{said}");

@@ -1,7 +1,7 @@
 //! The quotas of a tenant hold whichever way something comes: requests, STOW-RS, C-STORE, archives, rules, work
 //! items, the command line; one by one and many at a time.
 
-use crate::archives::{STUDY, archive};
+use crate::archives::{STUDY_UID, archive};
 use crate::fake_archive::FakeArchive;
 use crate::helpers::{TestApp, engine_with, fake_engine, mesh_json, problem, text, volume};
 use crate::readers::profile;
@@ -21,7 +21,7 @@ use ventriform_service::items::WorkOutput;
 use ventriform_service::jobs::{WorkError, WorkInput};
 use ventriform_service::work::Engine;
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const EVENT_PATIENCE: Duration = Duration::from_secs(60);
 
 /// The status of C-STORE for an object that finds no room.
 const OUT_OF_RESOURCES: u16 = 0xA700;
@@ -58,7 +58,7 @@ fn workitem(app: &TestApp) -> RequestBuilder {
         "00404018": {"vr": "SQ", "Value": [{
             "00080100": text("SH", "LV"), "00080102": text("SH", "99TEST"), "00080104": text("LO", "LV")}]},
         "00404021": {"vr": "SQ", "Value": [{
-            "0020000D": text("UI", STUDY), "0020000E": text("UI", "1.2.3")}]},
+            "0020000D": text("UI", STUDY_UID), "0020000E": text("UI", "1.2.3")}]},
     }]);
     let request = app.post("/dicom-web/workitems");
     let request = request.header("content-type", "application/dicom+json");
@@ -86,7 +86,7 @@ async fn no_way_in_goes_round_the_quota_of_bytes() {
     assert_eq!(stored.status(), StatusCode::CREATED);
     let id = text(&stored.json::<Value>().await.unwrap()["id"]);
     // There is room for the record of a job that fetches a series, and none for the series.
-    let order = json!({"source": {"archive": "pacs", "study": STUDY, "series": "1.2.3"}});
+    let order = json!({"source": {"archive": "pacs", "study": STUDY_UID, "series": "1.2.3"}});
     let filed = app.post("/v1/jobs").json(&order).send().await.unwrap();
     let ended = app
         .until(&filed.json().await.unwrap(), &["failed", "succeeded"])
@@ -193,7 +193,7 @@ async fn jobs(app: &TestApp) -> Vec<Value> {
 
 /// Waits until `holds` of what the service answers on that path.
 async fn becomes(app: &TestApp, path: &str, holds: impl Fn(&Value) -> bool) {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     loop {
         let answer = app.json(path).await;
         if holds(&answer) {

@@ -38,7 +38,7 @@ async fn has_line(log: &Path, words: &[&str]) {
     }
 }
 
-const REFUSED: &str = "a connection was refused";
+const REFUSED_LINE: &str = "a connection was refused";
 
 #[tokio::test]
 async fn what_never_becomes_a_request_has_a_line_in_the_log() {
@@ -71,7 +71,7 @@ async fn what_never_becomes_a_request_has_a_line_in_the_log() {
         let answer = send(&address, bytes).await;
         let answer = String::from_utf8_lossy(&answer);
         let stated = format!("status={status}");
-        let mut words = [&[REFUSED, "127.0.0.1"], words].concat();
+        let mut words = [&[REFUSED_LINE, "127.0.0.1"], words].concat();
         match status {
             0 => assert_eq!(answer, ""),
             _ => {
@@ -106,7 +106,7 @@ async fn what_never_becomes_a_request_has_a_line_in_the_log() {
     has_line(&log, &["/v1/volumes", "POST"]).await;
     let refused: Vec<String> = log_of(&log)
         .into_iter()
-        .filter(|line| line.contains(REFUSED))
+        .filter(|line| line.contains(REFUSED_LINE))
         .collect();
     assert!(refused.is_empty(), "{refused:#?}");
 }
@@ -138,6 +138,6 @@ async fn handshakes_that_fail_have_a_line_in_the_log() {
     ] {
         std::fs::write(&log, "").unwrap();
         send(&address, bytes).await;
-        has_line(&log, &[&[REFUSED, "127.0.0.1"], words].concat()).await;
+        has_line(&log, &[&[REFUSED_LINE, "127.0.0.1"], words].concat()).await;
     }
 }

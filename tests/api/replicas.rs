@@ -18,7 +18,7 @@ use ventriform_service::records::{
 use ventriform_store::{OpenError, Store, StoreSettings};
 
 /// Longest time until another process knows of a change. Their own looks come later.
-const SOON: Duration = Duration::from_secs(8);
+const NOTICE_PATIENCE: Duration = Duration::from_secs(8);
 
 /// A database and a part of a bucket.
 struct Shared {
@@ -71,7 +71,7 @@ impl Shared {
 }
 
 async fn within<T>(what: &str, look: impl AsyncFn() -> Option<T>) -> T {
-    let deadline = Instant::now() + SOON;
+    let deadline = Instant::now() + NOTICE_PATIENCE;
     loop {
         if let Some(found) = look().await {
             return found;
@@ -132,7 +132,7 @@ async fn jobs_are_filed_followed_and_cancelled_at_any_process() {
     assert!(b.delete(&path).send().await.unwrap().status().is_success());
     let cancelled = Instant::now();
     b.until(&slow, &["cancelled"]).await;
-    assert!(cancelled.elapsed() < SOON);
+    assert!(cancelled.elapsed() < NOTICE_PATIENCE);
 
     // The same key at both at once files one job.
     let id = a.volume("brief").await;

@@ -1,7 +1,7 @@
 //! The contract of the file store, over the folder and over S3 stores, and the service over S3.
 
 use crate::helpers::{TestApp, fake_engine, problem, text, volume};
-use crate::s3_server::{BUCKET, FaultProxy, Network, S3Server, variables};
+use crate::s3_server::{BUCKET_NAME, FaultProxy, Network, S3Server, variables};
 use futures::TryStreamExt;
 use futures::future::join_all;
 use serde_json::json;
@@ -20,7 +20,7 @@ use ventriform_service::records::{
 };
 use ventriform_store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
 
-const CACHE: u64 = 64 << 20;
+const CACHE_BYTES: u64 = 64 << 20;
 
 /// A store of files, and how to damage a file in it.
 struct Subject {
@@ -50,7 +50,7 @@ impl Subject {
         let location = S3Server::location_at(url, prefix);
         let folder = tempfile::tempdir().unwrap();
         let gauge = DiskGauge::new(folder.path(), Some(0));
-        let blobs = S3Blobs::open(&location, folder.path(), gauge, CACHE).await;
+        let blobs = S3Blobs::open(&location, folder.path(), gauge, CACHE_BYTES).await;
         let blobs = Arc::new(blobs.unwrap().with_grace(Duration::ZERO));
         Self {
             blobs: blobs.clone(),
@@ -332,7 +332,7 @@ async fn files_go_and_come_over_a_failing_network() {
 
 /// The settings for a service whose files are in a bucket.
 pub fn in_bucket(url: &str, prefix: &str) -> impl FnOnce(&mut Settings) + use<> {
-    let place = format!("s3://{BUCKET}/{prefix}").parse().unwrap();
+    let place = format!("s3://{BUCKET_NAME}/{prefix}").parse().unwrap();
     let aws = AwsVariables(S3Server::location_at(url, prefix).variables);
     move |settings| {
         settings.blobs = place;

@@ -26,16 +26,16 @@ use ventriform_service::config::{AwsVariables, Settings};
 use ventriform_store::S3Location;
 
 /// The bucket that exists.
-pub const BUCKET: &str = "hearts";
+pub const BUCKET_NAME: &str = "hearts";
 
-const KEY: &str = "test-key";
-const SECRET: &str = "test-secret";
+const ACCESS_KEY: &str = "test-key";
+const SECRET_KEY: &str = "test-secret";
 
 /// The variables for a store.
 pub fn variables(url: &str, secret: &str) -> Vec<(String, String)> {
     let all = [
         ("AWS_ENDPOINT_URL", url),
-        ("AWS_ACCESS_KEY_ID", KEY),
+        ("AWS_ACCESS_KEY_ID", ACCESS_KEY),
         ("AWS_SECRET_ACCESS_KEY", secret),
         ("AWS_REGION", "us-east-1"),
     ];
@@ -48,8 +48,8 @@ pub fn keep_files_in_bucket(settings: &mut Settings) {
     let url = std::env::var("VENTRIFORM_TEST_S3").unwrap();
     let folder = settings.data_dir.file_name().unwrap().to_str().unwrap();
     let prefix = folder.trim_start_matches('.');
-    settings.blobs = format!("s3://{BUCKET}/{prefix}").parse().unwrap();
-    settings.aws = AwsVariables(variables(&url, SECRET));
+    settings.blobs = format!("s3://{BUCKET_NAME}/{prefix}").parse().unwrap();
+    settings.aws = AwsVariables(variables(&url, SECRET_KEY));
 }
 
 /// A running store.
@@ -70,9 +70,9 @@ impl S3Server {
                 _root: root,
             };
         }
-        std::fs::create_dir(root.path().join(BUCKET)).unwrap();
+        std::fs::create_dir(root.path().join(BUCKET_NAME)).unwrap();
         let mut builder = S3ServiceBuilder::new(FileSystem::new(root.path()).unwrap());
-        builder.set_auth(SimpleAuth::from_single(KEY, SECRET));
+        builder.set_auth(SimpleAuth::from_single(ACCESS_KEY, SECRET_KEY));
         let service = builder.build();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let url = format!("http://{}", listener.local_addr().unwrap());
@@ -95,9 +95,9 @@ impl S3Server {
     /// The bucket's part with that prefix, reached at `url`.
     pub fn location_at(url: &str, prefix: &str) -> S3Location {
         S3Location {
-            bucket: BUCKET.into(),
+            bucket: BUCKET_NAME.into(),
             prefix: prefix.into(),
-            variables: variables(url, SECRET),
+            variables: variables(url, SECRET_KEY),
         }
     }
 

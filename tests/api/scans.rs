@@ -66,7 +66,7 @@ async fn with_scope(app: &TestApp, scope: Scope, tenant: &str) -> TestApp {
     app.seen_with(&text)
 }
 
-const NOBODY: Patient = Patient {
+const UNKNOWN_PATIENT: Patient = Patient {
     name: "Roe^Richard",
     id: "PAT-1",
     study: "1.2.840.99999.8",
@@ -105,7 +105,7 @@ async fn a_scans_identity_is_shown_searched_and_erased() {
     let identity = text(&volume["links"]["identity"]);
     assert_eq!(app.json(&path).await, volume);
     assert_eq!(app.json(&identity).await["patient_id"], JANE.id);
-    let other = upload(&app, nm(&NOBODY, 1)).await;
+    let other = upload(&app, nm(&UNKNOWN_PATIENT, 1)).await;
     let plain = upload(&app, scan()).await;
     assert_eq!(plain["dicom"], Value::Null);
     assert_eq!(

@@ -10,11 +10,11 @@ use dicom_ul::association::client::ClientAssociation;
 use dicom_ul::pdu::{PDataValue, PDataValueType, Pdu};
 use std::net::{SocketAddr, TcpStream};
 
-pub const VERIFICATION: &str = "1.2.840.10008.1.1";
-pub const NM: &str = "1.2.840.10008.5.1.4.1.1.20";
-pub const CT: &str = "1.2.840.10008.5.1.4.1.1.2";
-pub const EXPLICIT: &str = "1.2.840.10008.1.2.1";
-pub const IMPLICIT: &str = "1.2.840.10008.1.2";
+pub const VERIFICATION_CLASS: &str = "1.2.840.10008.1.1";
+pub const NM_CLASS: &str = "1.2.840.10008.5.1.4.1.1.20";
+pub const CT_CLASS: &str = "1.2.840.10008.5.1.4.1.1.2";
+pub const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
+pub const IMPLICIT_LITTLE: &str = "1.2.840.10008.1.2";
 
 /// Values of an object.
 #[derive(Clone)]
@@ -51,7 +51,7 @@ fn image(class: &'static str, instance: &str, series: &str) -> InMemDicomObject 
 /// One slice of a CT series.
 pub fn slice(series: &str, number: u16) -> Object {
     let instance = format!("{series}.{}", number + 100);
-    let mut set = image(CT, &instance, series);
+    let mut set = image(CT_CLASS, &instance, series);
     put(
         &mut set,
         (0x0008, 0x0008),
@@ -74,7 +74,7 @@ pub fn slice(series: &str, number: u16) -> Object {
         PrimitiveValue::U16(vec![number; 16].into()),
     );
     Object {
-        class: CT,
+        class: CT_CLASS,
         instance,
         set,
     }
@@ -83,7 +83,7 @@ pub fn slice(series: &str, number: u16) -> Object {
 /// A Nuclear Medicine Image of three frames.
 pub fn nuclear(series: &str, instance: u16, image_type: &str) -> Object {
     let uid = format!("{series}.{instance}");
-    let mut set = image(NM, &uid, series);
+    let mut set = image(NM_CLASS, &uid, series);
     put(
         &mut set,
         (0x0008, 0x0008),
@@ -116,7 +116,7 @@ pub fn nuclear(series: &str, instance: u16, image_type: &str) -> Object {
         PrimitiveValue::U16(pixels.into()),
     );
     Object {
-        class: NM,
+        class: NM_CLASS,
         instance: uid,
         set,
     }
@@ -136,7 +136,7 @@ impl Object {
         let set = dicom_object::from_reader(file).unwrap().into_inner();
         let instance = set.element_by_name("SOPInstanceUID").unwrap();
         Self {
-            class: NM,
+            class: NM_CLASS,
             instance: instance.to_str().unwrap().into_owned(),
             set,
         }
@@ -157,8 +157,9 @@ impl Object {
 
     /// The object as a file.
     pub fn file(&self) -> Vec<u8> {
-        let start = ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT);
-        [start.unwrap(), self.data_set(EXPLICIT)].concat()
+        let start =
+            ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT_LITTLE);
+        [start.unwrap(), self.data_set(EXPLICIT_LITTLE)].concat()
     }
 }
 
@@ -173,12 +174,12 @@ impl Scu {
         let options = ClientAssociationOptions::new()
             .calling_ae_title(calling.to_owned())
             .called_ae_title(called.to_owned())
-            .with_presentation_context(VERIFICATION, vec![IMPLICIT])
-            .with_presentation_context(NM, vec![EXPLICIT])
-            .with_presentation_context(CT, vec![IMPLICIT])
+            .with_presentation_context(VERIFICATION_CLASS, vec![IMPLICIT_LITTLE])
+            .with_presentation_context(NM_CLASS, vec![EXPLICIT_LITTLE])
+            .with_presentation_context(CT_CLASS, vec![IMPLICIT_LITTLE])
             // Secondary Capture and High-Throughput JPEG 2000 are not read.
-            .with_presentation_context("1.2.840.10008.5.1.4.1.1.7", vec![IMPLICIT])
-            .with_presentation_context(NM, vec!["1.2.840.10008.1.2.4.201"]);
+            .with_presentation_context("1.2.840.10008.5.1.4.1.1.7", vec![IMPLICIT_LITTLE])
+            .with_presentation_context(NM_CLASS, vec!["1.2.840.10008.1.2.4.201"]);
         options
             .establish(to)
             .map(Self)
@@ -221,7 +222,7 @@ impl Scu {
     }
 
     pub fn echo(&mut self) -> u16 {
-        let set = command(0x0030, VERIFICATION, None);
+        let set = command(0x0030, VERIFICATION_CLASS, None);
         self.send(PDataValueType::Command, 1, set, true);
         self.status()
     }
@@ -229,8 +230,8 @@ impl Scu {
     /// Sends an object and returns the status.
     pub fn store(&mut self, object: &Object) -> u16 {
         let (context, syntax) = match object.class {
-            NM => (3, EXPLICIT),
-            _ => (5, IMPLICIT),
+            NM_CLASS => (3, EXPLICIT_LITTLE),
+            _ => (5, IMPLICIT_LITTLE),
         };
         let set = command(0x0001, object.class, Some(&object.instance));
         self.send(PDataValueType::Command, context, set, true);

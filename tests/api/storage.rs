@@ -9,7 +9,7 @@ use std::time::Duration;
 use ventriform_store::Store;
 
 /// More than any disk has.
-const ENDLESS: &str = "1000000GiB";
+const ENDLESS_SPACE: &str = "1000000GiB";
 
 #[tokio::test]
 async fn below_the_reserve_uploads_and_jobs_are_refused_and_reads_go_on() {
@@ -18,7 +18,7 @@ async fn below_the_reserve_uploads_and_jobs_are_refused_and_reads_go_on() {
     let model = app.model("sphere").await;
     let data = app.stop().await;
     let app = TestApp::on(data, crate::helpers::fake_engine(), |settings| {
-        settings.min_free = ENDLESS.parse().unwrap();
+        settings.min_free = ENDLESS_SPACE.parse().unwrap();
     })
     .await;
     let upload = || app.post("/v1/volumes").body(volume("other"));

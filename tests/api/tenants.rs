@@ -208,7 +208,7 @@ fn local(settings: &mut Settings) {
 }
 
 /// Files of every model, segmentation and template here.
-const MADE: [&str; 4] = ["mesh.glb", "mesh.stl", "mesh.ply", "mesh.json"];
+const MESH_FILES: [&str; 4] = ["mesh.glb", "mesh.stl", "mesh.ply", "mesh.json"];
 
 #[tokio::test]
 async fn no_route_shows_or_changes_what_another_tenant_has() {
@@ -246,7 +246,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 let file = path.rsplit('/').next().unwrap();
                 let renamed = ["/v1/beats/", "/v1/comparisons/"];
                 let renamed = renamed.iter().any(|other| path.starts_with(other));
-                let made = MADE.contains(&file) && !renamed;
+                let made = MESH_FILES.contains(&file) && !renamed;
                 let unmade = file.contains('.') && !made;
                 assert!(
                     unmade || status == StatusCode::OK,

@@ -8,8 +8,8 @@ use prost::Message;
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-const TRACE: &str = "0af7651916cd43dd8448eb211c80319c";
-const CALLER: &str = "b7ad6b7169203331";
+const TRACE_ID: &str = "0af7651916cd43dd8448eb211c80319c";
+const CALLER_SPAN_ID: &str = "b7ad6b7169203331";
 
 /// The spans in the requests that a collector got.
 pub fn spans_of(collector: &Receiver) -> Vec<Span> {
@@ -39,7 +39,7 @@ async fn a_job_belongs_to_the_trace_of_the_request_that_filed_it() {
     let volume = app.volume("brief").await;
     let answer = app
         .post("/v1/jobs")
-        .header("traceparent", format!("00-{TRACE}-{CALLER}-01"))
+        .header("traceparent", format!("00-{TRACE_ID}-{CALLER_SPAN_ID}-01"))
         .json(&json!({ "volume": volume }));
     let answer = answer.send().await.unwrap();
     let continued = answer.headers()["traceparent"].to_str().unwrap().to_owned();
@@ -48,17 +48,17 @@ async fn a_job_belongs_to_the_trace_of_the_request_that_filed_it() {
     app.stop().await;
 
     let spans = spans_of(&collector);
-    let of_trace = spans.iter().filter(|span| hex(&span.trace_id) == TRACE);
+    let of_trace = spans.iter().filter(|span| hex(&span.trace_id) == TRACE_ID);
     let of_trace: Vec<&Span> = of_trace.collect();
     let named = |name: &str| {
         let found = of_trace.iter().find(|span| span.name == name);
         *found.unwrap_or_else(|| panic!("no span `{name}` in {of_trace:#?}"))
     };
     let request = named("POST /v1/jobs");
-    assert_eq!(hex(&request.parent_span_id), CALLER);
+    assert_eq!(hex(&request.parent_span_id), CALLER_SPAN_ID);
     assert_eq!(
         continued,
-        format!("00-{TRACE}-{}-01", hex(&request.span_id))
+        format!("00-{TRACE_ID}-{}-01", hex(&request.span_id))
     );
     let whole = named("job model");
     assert_eq!(whole.parent_span_id, request.span_id);
@@ -81,7 +81,7 @@ async fn a_job_belongs_to_the_trace_of_the_request_that_filed_it() {
         .iter()
         .find(|span| span.name == "POST /v1/volumes")
         .unwrap();
-    assert_ne!(hex(&upload.trace_id), TRACE);
+    assert_ne!(hex(&upload.trace_id), TRACE_ID);
     assert!(upload.parent_span_id.is_empty());
 }
 
@@ -92,7 +92,7 @@ async fn a_job_keeps_its_trace_over_a_restart() {
     let volume = app.volume("slow").await;
     let answer = app
         .post("/v1/jobs")
-        .header("traceparent", format!("00-{TRACE}-{CALLER}-01"))
+        .header("traceparent", format!("00-{TRACE_ID}-{CALLER_SPAN_ID}-01"))
         .json(&json!({ "volume": volume }));
     let job = answer.send().await.unwrap().json().await.unwrap();
     app.until(&job, &["running"]).await;
@@ -110,7 +110,7 @@ async fn a_job_keeps_its_trace_over_a_restart() {
     app.stop().await;
     let spans = spans_of(&collector);
     let whole = spans.iter().find(|span| span.name == "job model").unwrap();
-    assert_eq!(hex(&whole.trace_id), TRACE);
+    assert_eq!(hex(&whole.trace_id), TRACE_ID);
 }
 
 #[tokio::test]

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use ventriform_service::config::Settings;
 use ventriform_service::hooks::SigningSecret;
 
-const SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
+const HOOK_SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 
 /// A service that may tell programs on this machine, and does not wait long before it tries again.
 fn local(settings: &mut Settings) {
@@ -53,13 +53,13 @@ async fn ends_of_jobs_are_told_signed_and_once() {
     let receiver = Receiver::willing().await;
     let url = format!("{}/hook?a=b", receiver.url);
     for (words, state) in [("sphere", "succeeded"), ("fail", "failed")] {
-        let job = file(&app, words, json!({"url": url, "secret": SECRET})).await;
+        let job = file(&app, words, json!({"url": url, "secret": HOOK_SECRET})).await;
         let told = delivery_until(&app, &job, "delivered").await;
         let request = receiver.received().last().unwrap().clone();
         assert_eq!(request.path, "/hook");
         assert_eq!(request.header("webhook-id"), text(&told["id"]));
         assert_eq!(request.header("content-type"), "application/json");
-        let secret: SigningSecret = SECRET.parse().unwrap();
+        let secret: SigningSecret = HOOK_SECRET.parse().unwrap();
         let seconds: i64 = request.header("webhook-timestamp").parse().unwrap();
         let body = String::from_utf8(request.body.to_vec()).unwrap();
         let signature = secret.sign(&text(&told["id"]), seconds, &body);
@@ -116,7 +116,7 @@ async fn what_fails_is_tried_again_under_the_same_id_and_time_is_given_as_asked(
     let job = file(
         &app,
         "sphere",
-        json!({"url": receiver.url, "secret": SECRET}),
+        json!({"url": receiver.url, "secret": HOOK_SECRET}),
     )
     .await;
     let told = delivery_until(&app, &job, "delivered").await;
@@ -198,7 +198,7 @@ async fn deliveries_survive_a_restart_and_erased_jobs() {
     let app = TestApp::with(local).await;
     let port = crate::helpers::quiet_port();
     let url = format!("http://127.0.0.1:{port}/hook");
-    let job = file(&app, "sphere", json!({"url": url, "secret": SECRET})).await;
+    let job = file(&app, "sphere", json!({"url": url, "secret": HOOK_SECRET})).await;
     app.until(&job, &["succeeded"]).await;
     let erased = app
         .delete(&text(&job["links"]["self"]))

@@ -5,7 +5,7 @@ use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 use ventriform_service::access::{Quota, Scope};
 
-const ITEMS: &str = "/dicom-web/workitems";
+const ITEMS_PATH: &str = "/dicom-web/workitems";
 
 fn scheduled() -> Value {
     json!([{
@@ -51,7 +51,7 @@ async fn created(app: &TestApp, uid: &str) -> String {
     let answer = send(
         app,
         Method::POST,
-        &format!("{ITEMS}?workitem={uid}"),
+        &format!("{ITEMS_PATH}?workitem={uid}"),
         &scheduled(),
     )
     .await;
@@ -71,11 +71,11 @@ async fn item(app: &TestApp, path: &str) -> Value {
 async fn a_work_item_is_created_claimed_changed_and_completed() {
     let app = TestApp::start().await;
     let path = created(&app, "1.2.840.1").await;
-    assert_eq!(path, format!("{ITEMS}/1.2.840.1"));
+    assert_eq!(path, format!("{ITEMS_PATH}/1.2.840.1"));
     let again = send(
         &app,
         Method::POST,
-        &format!("{ITEMS}?1.2.840.1"),
+        &format!("{ITEMS_PATH}?1.2.840.1"),
         &scheduled(),
     )
     .await;
@@ -242,9 +242,9 @@ async fn a_uid_that_is_none_is_refused_by_the_name_under_which_it_came() {
     let app = TestApp::start().await;
     let mut named = scheduled();
     named[0]["00080018"] = json!({"vr": "UI", "Value": ["1.2.x"]});
-    let in_query = format!("{ITEMS}?workitem=1.2.x");
+    let in_query = format!("{ITEMS_PATH}?workitem=1.2.x");
     for (path, body, field) in [
-        (ITEMS, &named, "00080018"),
+        (ITEMS_PATH, &named, "00080018"),
         (in_query.as_str(), &scheduled(), "workitem"),
     ] {
         let refused = send(&app, Method::POST, path, body).await;
@@ -260,7 +260,7 @@ async fn work_items_are_searched_and_belong_to_a_tenant() {
     for number in 0..5 {
         created(&app, &format!("1.2.840.4.{number}")).await;
     }
-    let claimed = format!("{ITEMS}/1.2.840.4.0/state");
+    let claimed = format!("{ITEMS_PATH}/1.2.840.4.0/state");
     send(
         &app,
         Method::PUT,
@@ -278,7 +278,11 @@ async fn work_items_are_searched_and_belong_to_a_tenant() {
         ("?limit=2&offset=4", 1),
         ("?limit=3", 3),
     ] {
-        let answer = app.get(&format!("{ITEMS}{query}")).send().await.unwrap();
+        let answer = app
+            .get(&format!("{ITEMS_PATH}{query}"))
+            .send()
+            .await
+            .unwrap();
         if count == 0 {
             assert_eq!(answer.status(), StatusCode::NO_CONTENT, "{query}");
             continue;
@@ -287,19 +291,19 @@ async fn work_items_are_searched_and_belong_to_a_tenant() {
         assert_eq!(found.as_array().unwrap().len(), count, "{query}");
     }
     let unknown = app
-        .get(&format!("{ITEMS}?Nonsense=1"))
+        .get(&format!("{ITEMS_PATH}?Nonsense=1"))
         .send()
         .await
         .unwrap();
     problem(unknown, 400, "unknown-parameter").await;
-    let nameless = send(&app, Method::POST, ITEMS, &scheduled()).await;
+    let nameless = send(&app, Method::POST, ITEMS_PATH, &scheduled()).await;
     let location = nameless.headers()["location"].to_str().unwrap();
     assert!(
         location.starts_with("/dicom-web/workitems/2.25."),
         "{location}"
     );
     let bare = json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}]);
-    let bare = send(&app, Method::POST, ITEMS, &bare).await;
+    let bare = send(&app, Method::POST, ITEMS_PATH, &bare).await;
     assert_eq!(bare.status(), StatusCode::CREATED);
     assert!(bare.headers().contains_key("warning"));
     for (body, code) in [
@@ -307,10 +311,10 @@ async fn work_items_are_searched_and_belong_to_a_tenant() {
         (json!([]), "malformed-json"),
         (state("IN PROGRESS", None), "invalid-field"),
     ] {
-        problem(send(&app, Method::POST, ITEMS, &body).await, 400, code).await;
+        problem(send(&app, Method::POST, ITEMS_PATH, &body).await, 400, code).await;
     }
 
-    let path = format!("{ITEMS}/1.2.840.4.1");
+    let path = format!("{ITEMS_PATH}/1.2.840.4.1");
     let (_, reader) = key(app.data.path(), Scope::Read, "default", Quota::default()).await;
     let (_, other) = key(app.data.path(), Scope::Admin, "other", Quota::default()).await;
     closed(&app).await;
@@ -322,7 +326,7 @@ async fn work_items_are_searched_and_belong_to_a_tenant() {
     )
     .await;
     problem(other.get(&path).send().await.unwrap(), 404, "not-found").await;
-    let none = other.get(ITEMS).send().await.unwrap();
+    let none = other.get(ITEMS_PATH).send().await.unwrap();
     assert_eq!(none.status(), StatusCode::NO_CONTENT);
     let (to, claim) = (format!("{path}/state"), state("IN PROGRESS", Some("9.9")));
     let foreign = send(&other, Method::PUT, &to, &claim).await;

@@ -204,7 +204,7 @@ fn use_paths(tokens: &[String]) -> Vec<(Vec<String>, String)> {
     let mut prefixes: Vec<Vec<String>> = vec![Vec::new()];
     let mut path: Vec<String> = Vec::new();
     let mut alias = None;
-    let mut words = tokens.iter().chain(std::iter::once(&*COMMA));
+    let mut words = tokens.iter().chain(std::iter::once(&*COMMA_TOKEN));
     while let Some(token) = words.next() {
         match token.as_str() {
             "::" => {}
@@ -229,7 +229,7 @@ fn use_paths(tokens: &[String]) -> Vec<(Vec<String>, String)> {
     found
 }
 
-static COMMA: std::sync::LazyLock<String> = std::sync::LazyLock::new(|| ",".to_owned());
+static COMMA_TOKEN: std::sync::LazyLock<String> = std::sync::LazyLock::new(|| ",".to_owned());
 
 fn is_word(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_')
@@ -292,16 +292,16 @@ fn tokens(text: &str) -> Vec<String> {
 
 /// The tokens without what `#[cfg(test)]` marks.
 fn without_tests(tokens: Vec<String>) -> Vec<String> {
-    const MARK: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
+    const TEST_MARK: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();
     let mut at = 0;
     while at < tokens.len() {
         if tokens[at..]
             .iter()
-            .zip(MARK)
+            .zip(TEST_MARK)
             .filter(|(a, b)| a == b)
             .count()
-            < MARK.len()
+            < TEST_MARK.len()
         {
             kept.push(tokens[at].clone());
             at += 1;
@@ -309,7 +309,7 @@ fn without_tests(tokens: Vec<String>) -> Vec<String> {
         }
         // The marked item ends with its block, or with a semicolon where it has none.
         let mut depth = 0;
-        for token in &tokens[at + MARK.len()..] {
+        for token in &tokens[at + TEST_MARK.len()..] {
             at += 1;
             match token.as_str() {
                 "{" => depth += 1,
@@ -320,7 +320,7 @@ fn without_tests(tokens: Vec<String>) -> Vec<String> {
                 break;
             }
         }
-        at += MARK.len();
+        at += TEST_MARK.len();
     }
     kept
 }

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates of the workspace: the folder, and those of ours that each depends on.
-const CRATES: &[(&str, &[&str])] = &[
+const CRATE_USES: &[(&str, &[&str])] = &[
     ("crates/ventriform", &[]),
     ("crates/service", &["ventriform"]),
     ("crates/store", &["ventriform-service"]),
@@ -27,8 +27,8 @@ const CRATES: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// What one crate may not depend on, whatever it uses today, unless by a feature.
-const FORBIDDEN: &[(&str, &[&str])] = &[
+/// The crates that one crate may not depend on, whatever it uses today, unless by a feature.
+const FORBIDDEN_CRATES: &[(&str, &[&str])] = &[
     ("crates/ventriform", SERVICE_CRATES),
     (
         "crates/service",
@@ -40,7 +40,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
 
 /// Each module of the library and the modules it uses, in reading order: a module uses only what
 /// stands above it.
-const LIBRARY: &[(&str, &[&str])] = &[
+const LIBRARY_USES: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("geometry", &[]),
     ("numeric", &["geometry"]),
@@ -286,7 +286,7 @@ const LIBRARY: &[(&str, &[&str])] = &[
 ];
 
 /// The same for the service.
-const SERVICE: &[(&str, &[&str])] = &[
+const SERVICE_USES: &[(&str, &[&str])] = &[
     ("records", &[]),
     ("error", &["records"]),
     ("dicom_tags", &[]),
@@ -452,7 +452,7 @@ const SERVICE_CRATES: &[&str] = &[
 ];
 
 /// Standard-library facilities that would make a result depend on more than its input.
-const IMPURE: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];
+const IMPURE_NAMES: &[&str] = &["std::time", "std::env", "std::net", "HashMap", "HashSet"];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -485,7 +485,10 @@ fn used_modules(folder: &str) -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn modules_use_exactly_what_the_tables_say() {
     let mut wrong = Vec::new();
-    for (folder, uses) in [("crates/ventriform", LIBRARY), ("crates/service", SERVICE)] {
+    for (folder, uses) in [
+        ("crates/ventriform", LIBRARY_USES),
+        ("crates/service", SERVICE_USES),
+    ] {
         let table: BTreeMap<String, BTreeSet<String>> = uses
             .iter()
             .map(|(module, uses)| {
@@ -525,7 +528,7 @@ fn modules_use_exactly_what_the_tables_say() {
 
 #[test]
 fn no_module_uses_one_that_stands_below_it() {
-    for table in [LIBRARY, SERVICE] {
+    for table in [LIBRARY_USES, SERVICE_USES] {
         for (at, (module, uses)) in table.iter().enumerate() {
             for used in *uses {
                 assert!(
@@ -540,7 +543,7 @@ fn no_module_uses_one_that_stands_below_it() {
 #[test]
 fn no_files_use_each_other_in_a_circle() {
     let mut told = Vec::new();
-    for (folder, _) in CRATES {
+    for (folder, _) in CRATE_USES {
         for circle in circles(&Sources::read(&src(folder)).arrows()) {
             let files: Vec<String> = circle.iter().map(|m: &ModulePath| m.join("::")).collect();
             told.push(format!("{folder}: {}", files.join(", ")));
@@ -572,7 +575,7 @@ fn dependencies(folder: &str) -> BTreeSet<String> {
 
 #[test]
 fn a_crate_depends_on_the_crates_below_it_alone() {
-    for (folder, ours) in CRATES {
+    for (folder, ours) in CRATE_USES {
         let found = dependencies(folder);
         let found: BTreeSet<&str> = found
             .iter()
@@ -581,7 +584,7 @@ fn a_crate_depends_on_the_crates_below_it_alone() {
             .collect();
         assert_eq!(found, ours.iter().copied().collect(), "{folder}");
     }
-    for (folder, forbidden) in FORBIDDEN {
+    for (folder, forbidden) in FORBIDDEN_CRATES {
         let found = dependencies(folder);
         for name in *forbidden {
             let name = name.replace('_', "-");
@@ -602,7 +605,7 @@ fn the_library_knows_no_clock_and_no_environment() {
         let text = fs::read_to_string(&path).expect("a source file");
         let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or("");
         for line in code.lines().map(str::trim).filter(|l| !l.starts_with("//")) {
-            for name in IMPURE {
+            for name in IMPURE_NAMES {
                 let at_word = line.find(name).is_some_and(|at| {
                     !line[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':')
                 });
@@ -617,7 +620,7 @@ fn the_library_knows_no_clock_and_no_environment() {
 
 #[test]
 fn every_module_opens_with_its_method() {
-    let folders = CRATES.iter().map(|(folder, _)| src(folder));
+    let folders = CRATE_USES.iter().map(|(folder, _)| src(folder));
     for path in folders.flat_map(|folder| rust_files(&folder)) {
         let text = fs::read_to_string(&path).expect("a source file");
         assert!(

@@ -23,15 +23,15 @@ use ventriform_service::records::{Product, Resource};
 pub struct Beats;
 
 /// The mesh that stands for a beat where one is asked for: the wall at end diastole.
-const MESH: &str = end_mesh(BeatEnd::Diastole);
+const DIASTOLE_MESH: &str = end_mesh(BeatEnd::Diastole);
 const REPORT_FILE: &str = "beat.json";
 
 impl ProductCollection for Beats {
-    const RESOURCE: Resource = Resource::Beat;
+    const RESOURCE_KIND: Resource = Resource::Beat;
     type Body = BeatBody;
-    const MESHES: &'static [&'static str] = &[MESH, end_mesh(BeatEnd::Systole)];
-    const MESH: &'static str = MESH;
-    const FILES: &'static [&'static str] = FILE_NAMES;
+    const MESH_NAMES: &'static [&'static str] = &[DIASTOLE_MESH, end_mesh(BeatEnd::Systole)];
+    const MAIN_MESH: &'static str = DIASTOLE_MESH;
+    const FILE_NAMES: &'static [&'static str] = FILE_NAMES;
     const NUMBERED_FILES: Option<&'static str> = Some(GATE_FILE_PATTERN);
 
     fn is_numbered_mesh(stem: &str) -> bool {
@@ -104,7 +104,7 @@ impl BeatLinks {
 /// The answers that a client which waits for a beat may ask for: the report, or the mesh at end diastole.
 fn offers() -> Vec<Offer> {
     let report = Offer::new("application/json", REPORT_FILE);
-    let meshes = Offer::meshes(MESH).into_iter();
+    let meshes = Offer::meshes(DIASTOLE_MESH).into_iter();
     std::iter::once(report)
         .chain(meshes.filter(|offer| offer.media_type != "application/json"))
         .collect()

@@ -42,13 +42,13 @@ use ventriform_service::records::{
 /// One kind of stored thing.
 pub trait Collection: 'static {
     /// The kind: its ids, its noun, its path.
-    const RESOURCE: Resource;
+    const RESOURCE_KIND: Resource;
 
     /// Whether a caller may give it names of its own, and search by them.
-    const TAGGED: bool = false;
+    const CARRIES_TAGS: bool = false;
 
     /// Whether it is of a scan, by which it is searched.
-    const SCANNED: bool = true;
+    const SEARCHED_BY_SCAN: bool = true;
 
     /// A row of the catalogue.
     type Row: Send;
@@ -80,8 +80,8 @@ pub trait Collection: 'static {
 
 /// `GET /v1/{plural}`, `GET /v1/{plural}/{id}` and `DELETE /v1/{plural}/{id}`.
 pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
-    let (noun, plural) = (C::RESOURCE.noun(), C::RESOURCE.plural());
-    let label = C::RESOURCE.label();
+    let (noun, plural) = (C::RESOURCE_KIND.noun(), C::RESOURCE_KIND.plural());
+    let label = C::RESOURCE_KIND.label();
     let operation = |method, path: &str, id, summary| {
         Documented::new(method, format!("/v1/{plural}{path}"), plural, id, summary)
     };
@@ -94,10 +94,10 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .parameters::<PageQuery>()
     .json::<ListBody<C>>("A page, newest first")
     .answers::<ListProblems>();
-    if C::TAGGED {
+    if C::CARRIES_TAGS {
         listing = listing.parameters::<TagQuery>();
     }
-    if C::SCANNED {
+    if C::SEARCHED_BY_SCAN {
         listing = listing.parameters::<ScanQuery>();
     }
     let lookup = operation(
@@ -128,7 +128,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     .empty_answer("204", "Erased")
     .answers::<EraseProblems>()
     .answers::<LookupProblems>();
-    if C::RESOURCE == Resource::Volume {
+    if C::RESOURCE_KIND == Resource::Volume {
         erasure = erasure.parameters::<CascadeQuery>();
     }
     [
@@ -141,14 +141,14 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 /// The tenant's row of that id, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Owned<C::Row>> {
     let catalogue = app.service.items().catalogue();
-    let found = if Resource::of(id) == Some(C::RESOURCE) {
+    let found = if Resource::of(id) == Some(C::RESOURCE_KIND) {
         C::row(catalogue, tenant, id).await?
     } else {
         None
     };
     match found {
         Some(row) => Ok(row),
-        None => Err(missing(catalogue, tenant, C::RESOURCE, id).await),
+        None => Err(missing(catalogue, tenant, C::RESOURCE_KIND, id).await),
     }
 }
 
@@ -162,15 +162,15 @@ async fn list<C: Collection>(
     mut query: QueryReader,
 ) -> Answer<(HeaderMap, Json<ListBody<C>>)> {
     let mut filter = ItemFilter::default();
-    if C::TAGGED {
+    if C::CARRIES_TAGS {
         filter.tags = query.take::<TagQuery>()?.filter(&app)?;
     }
-    if C::SCANNED {
+    if C::SEARCHED_BY_SCAN {
         filter.scan = query.take::<ScanQuery>()?.into();
     }
     let page = query.all::<PageQuery>()?.charged().await?;
     let (catalogue, tenant) = (app.service.items().catalogue(), &caller.tenant);
-    let plan = catalogue.plan_items(tenant, C::RESOURCE, &filter, page);
+    let plan = catalogue.plan_items(tenant, C::RESOURCE_KIND, &filter, page);
     let page = charged_by_bytes(page, plan.await?).await?;
     let page = C::rows(catalogue, tenant, &filter, page).await?;
     let next_cursor = next_cursor(&page);
@@ -180,7 +180,7 @@ async fn list<C: Collection>(
         .map(|row| C::body(&app, caller.scope, row))
         .collect::<Result<_, _>>()?;
     let mut headers = HeaderMap::new();
-    if C::RESOURCE == Resource::Volume {
+    if C::RESOURCE_KIND == Resource::Volume {
         let limit = HeaderValue::from(app.service.settings.body_limit.0);
         let limit = [b"max-size=", limit.as_bytes()].concat();
         headers.extend(HeaderValue::from_bytes(&limit).map(|limit| (UPLOAD_LIMIT, limit)));
@@ -205,7 +205,9 @@ async fn show<C: Collection>(
     };
     let catalogue = app.service.items().catalogue();
     let asker = (&caller.tenant, scans::sees_patients(caller.scope));
-    let kept = app.answers.get(catalogue, asker, C::RESOURCE, &id, read);
+    let kept = app
+        .answers
+        .get(catalogue, asker, C::RESOURCE_KIND, &id, read);
     let ControlFlow::<Infallible, _>::Continue(answer) = kept.await?;
     Ok(answer.answer(&headers))
 }
@@ -218,11 +220,19 @@ async fn erase<C: Collection>(
     query: QueryReader,
     headers: HeaderMap,
 ) -> Answer {
-    let cascade = match C::RESOURCE {
+    let cascade = match C::RESOURCE_KIND {
         Resource::Volume => query.all::<CascadeQuery>()?.cascade.unwrap_or(false),
         _ => query.all().map(|()| false)?,
     };
-    erasures::erase(&app, (&caller, &agent), C::RESOURCE, id, cascade, &headers).await
+    erasures::erase(
+        &app,
+        (&caller, &agent),
+        C::RESOURCE_KIND,
+        id,
+        cascade,
+        &headers,
+    )
+    .await
 }
 
 /// A page of things: `{"models": [...], "next_cursor": "..."}`.
@@ -234,7 +244,7 @@ struct ListBody<C: Collection> {
 impl<C: Collection> Serialize for ListBody<C> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
-        map.serialize_entry(C::RESOURCE.plural(), &self.items)?;
+        map.serialize_entry(C::RESOURCE_KIND.plural(), &self.items)?;
         if let Some(cursor) = &self.next_cursor {
             map.serialize_entry("next_cursor", cursor)?;
         }
@@ -255,7 +265,7 @@ impl<C: Collection> ToSchema for ListBody<C> {
 
 impl<C: Collection> PartialSchema for ListBody<C> {
     fn schema() -> RefOr<Schema> {
-        let plural = C::RESOURCE.plural();
+        let plural = C::RESOURCE_KIND.plural();
         let items = ArrayBuilder::new()
             .items(Ref::from_schema_name(C::Body::name()))
             .description(Some(format!("The {plural}, newest first.")));

@@ -32,11 +32,11 @@ const REPORT_FILE: &str = "comparison.json";
 const STRESS_MESH: &str = mesh_of(WhichScan::Stress);
 
 impl ProductCollection for Comparisons {
-    const RESOURCE: Resource = Resource::Comparison;
+    const RESOURCE_KIND: Resource = Resource::Comparison;
     type Body = ComparisonBody;
-    const MESHES: &'static [&'static str] = &[STRESS_MESH, mesh_of(WhichScan::Rest)];
-    const MESH: &'static str = STRESS_MESH;
-    const FILES: &'static [&'static str] = FILE_NAMES;
+    const MESH_NAMES: &'static [&'static str] = &[STRESS_MESH, mesh_of(WhichScan::Rest)];
+    const MAIN_MESH: &'static str = STRESS_MESH;
+    const FILE_NAMES: &'static [&'static str] = FILE_NAMES;
     const REPORT_FILE: &'static str = REPORT_FILE;
     const FILE_SCHEMA: &'static str = "ComparisonFileName";
     const FILE_HELP: &'static str = "`comparison.json` (the report), `report.html` (made on request; it names patient, study and series of the scan at \
@@ -107,7 +107,7 @@ fn offers() -> Vec<Offer> {
     ]
 }
 
-const FIELDS: [&str; 10] = [
+const BODY_FIELDS: [&str; 10] = [
     "stress",
     "rest",
     "normals",
@@ -162,8 +162,11 @@ pub async fn create_comparison(
     }
     let trace_parent = super::observe::trace_parent(&request);
     let object = json_object(request).await?;
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = object
+        .keys()
+        .find(|name| !BODY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &BODY_FIELDS));
     }
     let work = app.service.work_of(Resource::Comparison.noun())?;
     let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;

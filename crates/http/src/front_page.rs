@@ -16,7 +16,7 @@ use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use include_dir::{Dir, include_dir};
 
-static BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
+static PAGE_BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
 
 const INDEX_FILE: &str = "index.html";
 
@@ -72,7 +72,7 @@ fn index(root: &str, headers: &HeaderMap) -> Option<Response> {
     if root == PAGE_ROOT {
         return file(INDEX_FILE, HTML_TYPE, REVALIDATED_CACHE_CONTROL, headers);
     }
-    let page = BUNDLE.get_file(INDEX_FILE)?.contents_utf8()?;
+    let page = PAGE_BUNDLE.get_file(INDEX_FILE)?.contents_utf8()?;
     let page = page.replace(&format!("\"{PAGE_ROOT}"), &format!("\"{root}"));
     Some(described(
         page.into_response(),
@@ -97,7 +97,10 @@ pub async fn asset(Path(name): Path<String>, headers: HeaderMap) -> Response {
 
 /// The picture that browsers ask every site for, also when they show a report.
 pub async fn icon(headers: HeaderMap) -> Response {
-    let assets = BUNDLE.get_dir("assets").into_iter().flat_map(Dir::files);
+    let assets = PAGE_BUNDLE
+        .get_dir("assets")
+        .into_iter()
+        .flat_map(Dir::files);
     let mut names = assets.filter_map(|file| file.path().to_str());
     let name = names.find(|name| name.contains("/icon-") && name.ends_with(".svg"));
     match name.and_then(|name| file(name, "image/svg+xml", REVALIDATED_CACHE_CONTROL, &headers)) {
@@ -116,10 +119,10 @@ fn file(
     let packed = [("br", ".br"), ("gzip", ".gz")]
         .into_iter()
         .find_map(|(coding, ending)| {
-            let content = BUNDLE.get_file(format!("{name}{ending}"))?;
+            let content = PAGE_BUNDLE.get_file(format!("{name}{ending}"))?;
             accepts(headers, coding).then_some((Some(coding), content))
         });
-    let (coding, content) = packed.or_else(|| Some((None, BUNDLE.get_file(name)?)))?;
+    let (coding, content) = packed.or_else(|| Some((None, PAGE_BUNDLE.get_file(name)?)))?;
     let mut response = described(content.contents().into_response(), media_type, kept);
     if let Some(coding) = coding {
         let coding = HeaderValue::from_static(coding);

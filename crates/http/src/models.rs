@@ -21,9 +21,10 @@ use ventriform_service::records::{Product, Resource};
 pub struct Models;
 
 impl ProductCollection for Models {
-    const RESOURCE: Resource = Resource::Model;
+    const RESOURCE_KIND: Resource = Resource::Model;
     type Body = ModelBody;
-    const FILES: &'static [&'static str] = &["report.json", files::REPORT_PAGE, "distance.json"];
+    const FILE_NAMES: &'static [&'static str] =
+        &["report.json", files::REPORT_PAGE, "distance.json"];
     const FILE_SCHEMA: &'static str = "FileName";
     const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
         (signed distances of the model's vertices and triangles to the surface) and \

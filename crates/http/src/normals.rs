@@ -34,11 +34,11 @@ const NORMALS_FILE: &str = "normals.json";
 pub struct Normals;
 
 impl ProductCollection for Normals {
-    const RESOURCE: Resource = Resource::Normals;
-    const SCANNED: bool = false;
+    const RESOURCE_KIND: Resource = Resource::Normals;
+    const SEARCHED_BY_SCAN: bool = false;
     type Body = NormalsBody;
-    const MESHES: &'static [&'static str] = &[];
-    const FILES: &'static [&'static str] = &[NORMALS_FILE];
+    const MESH_NAMES: &'static [&'static str] = &[];
+    const FILE_NAMES: &'static [&'static str] = &[NORMALS_FILE];
     const FILE_SCHEMA: &'static str = "NormalsFileName";
     const FILE_HELP: &'static str = "The limits, as `ventriform segment --normals` takes them and `ventriform normals build` writes them.";
     type FileAnswer = openapi::NormalsFileAnswer;
@@ -106,7 +106,7 @@ pub struct NormalsQuery {
     name: Option<String>,
 }
 
-const FIELDS: [&str; 7] = [
+const BODY_FIELDS: [&str; 7] = [
     "name",
     "cases",
     "parameters",
@@ -175,8 +175,11 @@ pub async fn create_normals(
     };
     drop(counting);
     let counting = reserve_job(&app, &caller, &headers).await?;
-    if let Some(name) = object.keys().find(|name| !FIELDS.contains(&name.as_str())) {
-        return Err(unknown("field", name, &FIELDS));
+    if let Some(name) = object
+        .keys()
+        .find(|name| !BODY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &BODY_FIELDS));
     }
     let work = service.work_of(Resource::Normals.noun())?;
     let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;

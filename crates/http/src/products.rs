@@ -49,22 +49,22 @@ use ventriform_service::work::{UploadFacts, part};
 /// One kind of product.
 pub trait ProductCollection: 'static {
     /// The kind: its ids, its noun, its path.
-    const RESOURCE: Resource;
+    const RESOURCE_KIND: Resource;
 
     /// Whether it is made of a scan, by which it is searched.
-    const SCANNED: bool = true;
+    const SEARCHED_BY_SCAN: bool = true;
 
     /// The product as JSON.
     type Body: From<Presented> + Serialize + ToSchema + Send;
 
     /// The names, without extension, of the meshes it may have in every format.
-    const MESHES: &'static [&'static str] = &["mesh"];
+    const MESH_NAMES: &'static [&'static str] = &["mesh"];
 
     /// The mesh that stands for the product where only one is asked for.
-    const MESH: &'static str = "mesh";
+    const MAIN_MESH: &'static str = "mesh";
 
     /// The names of the files it may have beside its meshes.
-    const FILES: &'static [&'static str];
+    const FILE_NAMES: &'static [&'static str];
 
     /// The form, as a regular expression, of further names, of which each product has as many as its scan has parts.
     const NUMBERED_FILES: Option<&'static str> = None;
@@ -88,8 +88,8 @@ pub trait ProductCollection: 'static {
 }
 
 impl<P: ProductCollection> Collection for P {
-    const RESOURCE: Resource = P::RESOURCE;
-    const SCANNED: bool = P::SCANNED;
+    const RESOURCE_KIND: Resource = P::RESOURCE_KIND;
+    const SEARCHED_BY_SCAN: bool = P::SEARCHED_BY_SCAN;
     type Row = Product;
     type Body = P::Body;
 
@@ -111,7 +111,9 @@ impl<P: ProductCollection> Collection for P {
         filter: &ItemFilter,
         page: ListRequest,
     ) -> Result<ListPage<Owned<Product>>, StoreError> {
-        catalogue.products(tenant, P::RESOURCE, filter, page).await
+        catalogue
+            .products(tenant, P::RESOURCE_KIND, filter, page)
+            .await
     }
 }
 
@@ -142,8 +144,8 @@ impl Presented {
 /// `GET /v1/{plural}/{id}/mesh` and `GET /v1/{plural}/{id}/{file}`; and
 /// `GET /v1/{plural}/{id}/report` if there are reports.
 pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
-    let (noun, plural) = (P::RESOURCE.noun(), P::RESOURCE.plural());
-    let label = P::RESOURCE.label();
+    let (noun, plural) = (P::RESOURCE_KIND.noun(), P::RESOURCE_KIND.plural());
+    let label = P::RESOURCE_KIND.label();
     let download = |path: &str, id: &str, summary: String| {
         let path = format!("/v1/{plural}/{{id}}/{path}");
         Documented::new(HttpMethod::Get, path, plural, id.to_owned(), summary).id(label)
@@ -153,7 +155,7 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         &format!("get_{noun}_mesh"),
         format!("Download a {label}'s mesh"),
     )
-    .description(match P::MESH {
+    .description(match P::MAIN_MESH {
         "mesh" => "In the format that `Accept` asks for; GLB if it allows any.".to_owned(),
         stem => format!("`{stem}.*` in the format that `Accept` asks for; GLB if it allows any."),
     })
@@ -171,10 +173,10 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
         .segment("file", "The file's name".into(), names)
         .parameters::<ConditionalHeaders>()
         .answers::<P::FileAnswer>();
-    if !P::MESHES.is_empty() {
+    if !P::MESH_NAMES.is_empty() {
         file = file.parameters::<PartQuery>();
     }
-    if !dicom::objects(P::RESOURCE).is_empty() {
+    if !dicom::objects(P::RESOURCE_KIND).is_empty() {
         file = file
             .parameters::<DeidentifyQuery>()
             .answers::<DicomProblems>();
@@ -185,17 +187,17 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
             .answers::<LookupProblems>()
     };
     let mut routes = vec![shared(file).served_by(get(get_file::<P>))];
-    if !P::MESHES.is_empty() {
+    if !P::MESH_NAMES.is_empty() {
         routes.push(shared(mesh).served_by(get(get_mesh::<P>)));
     }
-    if P::FILES.contains(&P::REPORT_FILE) {
+    if P::FILE_NAMES.contains(&P::REPORT_FILE) {
         let report = download(
             "report",
             &format!("get_{noun}_report"),
             format!("Read a {label}'s report"),
         )
         .parameters::<ConditionalHeaders>();
-        let report = if P::FILES.contains(&files::REPORT_PAGE) {
+        let report = if P::FILE_NAMES.contains(&files::REPORT_PAGE) {
             report
                 .description("JSON, or an HTML page if `Accept` prefers `text/html`.")
                 .answers::<ReportAnswer>()
@@ -353,7 +355,7 @@ impl Offer {
 
     /// The report of products of that kind, and the page if they have one.
     fn reports<P: ProductCollection>() -> Vec<Self> {
-        let page = P::FILES.contains(&files::REPORT_PAGE);
+        let page = P::FILE_NAMES.contains(&files::REPORT_PAGE);
         let page = page.then(|| Self::new("text/html", files::REPORT_PAGE));
         std::iter::once(Self::new("application/json", P::REPORT_FILE))
             .chain(page)
@@ -402,7 +404,7 @@ async fn kept<P: ProductCollection>(app: &App, tenant: &Tenant, id: &str) -> Ans
     let kept = app.products.get(
         app.service.items().catalogue(),
         asker,
-        P::RESOURCE,
+        P::RESOURCE_KIND,
         id,
         read,
     );
@@ -435,10 +437,10 @@ async fn get_mesh<P: ProductCollection>(
     headers: HeaderMap,
 ) -> Answer {
     let Some(Word(part)) = query.part else {
-        return get_offered::<P>(&app, &caller, &id, &headers, &Offer::meshes(P::MESH)).await;
+        return get_offered::<P>(&app, &caller, &id, &headers, &Offer::meshes(P::MAIN_MESH)).await;
     };
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
-    let offers = Offer::meshes(P::MESH);
+    let offers = Offer::meshes(P::MAIN_MESH);
     let offer = choose(&headers, &offers)?;
     let mut response = send_part(&app, &product, &offer.file, part, &headers).await?;
     response
@@ -541,7 +543,7 @@ async fn get_file<P: ProductCollection>(
     query: QueryReader,
     headers: HeaderMap,
 ) -> Answer {
-    let object = dicom::object_named(P::RESOURCE, &name);
+    let object = dicom::object_named(P::RESOURCE_KIND, &name);
     let (mut part, mut deidentify) = (None, false);
     if object.is_some() || name == files::REPORT_PAGE {
         deidentify = query.all::<DeidentifyQuery>()?.deidentify.unwrap_or(false);
@@ -552,7 +554,7 @@ async fn get_file<P: ProductCollection>(
     }
     let names = file_names::<P>();
     if P::NUMBERED_FILES.is_none() && !names.contains(&name) {
-        return Err(no_such_file(P::RESOURCE, &name, &names));
+        return Err(no_such_file(P::RESOURCE_KIND, &name, &names));
     }
     let product = kept::<P>(&app, &caller.tenant, &id).await?;
     if let Some(Word(part)) = part {
@@ -733,7 +735,7 @@ fn is_mesh<P: ProductCollection>(name: &str) -> bool {
 
 /// The names of the meshes that a product of that kind may have, in every format.
 fn mesh_names<P: ProductCollection>() -> impl Iterator<Item = String> {
-    P::MESHES.iter().flat_map(|name| {
+    P::MESH_NAMES.iter().flat_map(|name| {
         let named = |format: Format| format!("{name}.{}", format.extension());
         Format::ALL.map(named)
     })
@@ -742,8 +744,8 @@ fn mesh_names<P: ProductCollection>() -> impl Iterator<Item = String> {
 /// All names of files that a product of that kind may have.
 fn file_names<P: ProductCollection>() -> Vec<String> {
     let meshes = mesh_names::<P>();
-    let others = P::FILES.iter().map(|name| (*name).to_owned());
-    let objects = dicom::objects(P::RESOURCE).iter();
+    let others = P::FILE_NAMES.iter().map(|name| (*name).to_owned());
+    let objects = dicom::objects(P::RESOURCE_KIND).iter();
     let objects = objects.map(|object| object.file_name().to_owned());
     meshes.chain(others).chain(objects).collect()
 }

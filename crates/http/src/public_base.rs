@@ -29,7 +29,7 @@ const X_FORWARDED_PREFIX: HeaderName = HeaderName::from_static("x-forwarded-pref
 const LONGEST_HOST: usize = 260;
 
 tokio::task_local! {
-    static CURRENT: Arc<PublicBase>;
+    static REQUEST_BASE: Arc<PublicBase>;
 }
 
 /// The parts that are known beforehand.
@@ -120,18 +120,18 @@ impl PublicBase {
 
     /// That of the request that the current task answers; `None` for work that belongs to none.
     pub fn current() -> Option<Arc<Self>> {
-        CURRENT.try_with(Arc::clone).ok()
+        REQUEST_BASE.try_with(Arc::clone).ok()
     }
 
     /// Runs the answering of a request that was sent to this address.
     pub async fn scope<T>(self: Arc<Self>, answer: impl Future<Output = T>) -> T {
-        CURRENT.scope(self, answer).await
+        REQUEST_BASE.scope(self, answer).await
     }
 }
 
 /// A path of this service as the client of the current request has to write it.
 pub fn public_path(path: &str) -> String {
-    let prefixed = CURRENT.try_with(|base| format!("{}{path}", base.prefix()));
+    let prefixed = REQUEST_BASE.try_with(|base| format!("{}{path}", base.prefix()));
     prefixed.unwrap_or_else(|_| path.to_owned())
 }
 

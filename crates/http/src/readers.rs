@@ -28,11 +28,11 @@ const PROFILE_FILE: &str = "profile.json";
 pub struct Readers;
 
 impl ProductCollection for Readers {
-    const RESOURCE: Resource = Resource::Reader;
-    const SCANNED: bool = false;
+    const RESOURCE_KIND: Resource = Resource::Reader;
+    const SEARCHED_BY_SCAN: bool = false;
     type Body = ReaderBody;
-    const MESHES: &'static [&'static str] = &[];
-    const FILES: &'static [&'static str] = &[PROFILE_FILE];
+    const MESH_NAMES: &'static [&'static str] = &[];
+    const FILE_NAMES: &'static [&'static str] = &[PROFILE_FILE];
     const FILE_SCHEMA: &'static str = "ReaderFileName";
     const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
     type FileAnswer = openapi::ReaderFileAnswer;

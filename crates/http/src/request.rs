@@ -134,9 +134,9 @@ pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
 /// # Errors
 /// 422 if it is another value.
 pub fn parameters_of(object: &Map<String, Value>) -> Answer<&Map<String, Value>> {
-    static EMPTY: LazyLock<Map<String, Value>> = LazyLock::new(Map::new);
+    static EMPTY_OBJECT: LazyLock<Map<String, Value>> = LazyLock::new(Map::new);
     match object.get("parameters") {
-        None => Ok(&EMPTY),
+        None => Ok(&EMPTY_OBJECT),
         Some(Value::Object(parameters)) => Ok(parameters),
         Some(_) => Err(
             Problem::invalid_field("parameters", "`parameters` must be a JSON object.")

@@ -24,10 +24,10 @@ const MASK_FILE: &str = "mask.nii.gz";
 pub struct Segmentations;
 
 impl ProductCollection for Segmentations {
-    const RESOURCE: Resource = Resource::Segmentation;
+    const RESOURCE_KIND: Resource = Resource::Segmentation;
     type Body = SegmentationBody;
-    const MESHES: &'static [&'static str] = &["mesh", "mesh_anatomical", "mesh_apparent"];
-    const FILES: &'static [&'static str] = &[
+    const MESH_NAMES: &'static [&'static str] = &["mesh", "mesh_anatomical", "mesh_apparent"];
+    const FILE_NAMES: &'static [&'static str] = &[
         MASK_FILE,
         "mask_anatomical.nii.gz",
         "mask_apparent.nii.gz",

@@ -34,10 +34,10 @@ pub const MESH_SIZE: Size = Size(TEMPLATE_BYTES);
 pub struct Templates;
 
 impl ProductCollection for Templates {
-    const RESOURCE: Resource = Resource::Template;
-    const SCANNED: bool = false;
+    const RESOURCE_KIND: Resource = Resource::Template;
+    const SEARCHED_BY_SCAN: bool = false;
     type Body = TemplateBody;
-    const FILES: &'static [&'static str] = &[];
+    const FILE_NAMES: &'static [&'static str] = &[];
     const FILE_SCHEMA: &'static str = "TemplateFileName";
     const FILE_HELP: &'static str = "The mesh in each format.";
     type FileAnswer = openapi::MeshAnswer;

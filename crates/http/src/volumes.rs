@@ -37,8 +37,8 @@ const PREVIEW_CACHE_CONTROL: &str = "private, max-age=3600";
 pub struct Volumes;
 
 impl Collection for Volumes {
-    const RESOURCE: Resource = Resource::Volume;
-    const TAGGED: bool = true;
+    const RESOURCE_KIND: Resource = Resource::Volume;
+    const CARRIES_TAGS: bool = true;
     type Row = StoredVolume;
     type Body = VolumeBody;
 

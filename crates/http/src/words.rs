@@ -23,9 +23,9 @@ pub trait Named: Copy + 'static {
     /// All values.
     const ALL: &'static [Self];
     /// The name of the type in the OpenAPI document.
-    const SCHEMA: &'static str;
+    const SCHEMA_NAME: &'static str;
     /// The description of the type there; parameters have one of their own.
-    const DESCRIPTION: Option<&'static str>;
+    const SCHEMA_DESCRIPTION: Option<&'static str>;
 
     /// The name of a value.
     fn as_str(self) -> &'static str;
@@ -39,8 +39,8 @@ macro_rules! named {
 
         impl Named for $type {
             const ALL: &'static [Self] = &<$type>::ALL;
-            const SCHEMA: &'static str = $schema;
-            const DESCRIPTION: Option<&'static str> = $description;
+            const SCHEMA_NAME: &'static str = $schema;
+            const SCHEMA_DESCRIPTION: Option<&'static str> = $description;
 
             fn as_str(self) -> &'static str {
                 self.as_str()
@@ -82,13 +82,13 @@ impl<T: Named> Serialize for Word<T> {
 impl<T: Named> PartialSchema for Word<T> {
     fn schema() -> RefOr<Schema> {
         let word = ObjectBuilder::new().schema_type(Type::String);
-        let word = word.description(T::DESCRIPTION);
+        let word = word.description(T::SCHEMA_DESCRIPTION);
         Schema::from(word.enum_values(Some(words::<T>()))).into()
     }
 }
 
 impl<T: Named> ToSchema for Word<T> {
     fn name() -> Cow<'static, str> {
-        T::SCHEMA.into()
+        T::SCHEMA_NAME.into()
     }
 }

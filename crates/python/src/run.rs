@@ -29,7 +29,7 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalPro
 const LOOK_EVERY: Duration = Duration::from_millis(25);
 
 /// The pool of this process, by its number.
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+static PROCESS_POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -37,11 +37,11 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 /// Imports NumPy, which the first array does otherwise: a signal that arrives then would be a panic.
 fn import_numpy(py: Python<'_>) -> PyResult<()> {
-    static IMPORTED: AtomicBool = AtomicBool::new(false);
-    if !IMPORTED.load(Ordering::Relaxed) {
+    static NUMPY_IMPORTED: AtomicBool = AtomicBool::new(false);
+    if !NUMPY_IMPORTED.load(Ordering::Relaxed) {
         py.import("numpy")?;
         PyArray1::<f64>::zeros(py, 0, false);
-        IMPORTED.store(true, Ordering::Relaxed);
+        NUMPY_IMPORTED.store(true, Ordering::Relaxed);
     }
     Ok(())
 }
@@ -49,7 +49,7 @@ fn import_numpy(py: Python<'_>) -> PyResult<()> {
 /// The pool of this process. It is asked for with the interpreter held, so that no other thread holds the lock while a
 /// process is forked.
 fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
-    let mut kept = lock(&POOL);
+    let mut kept = lock(&PROCESS_POOL);
     let process = std::process::id();
     if let Some((owner, pool)) = &*kept
         && *owner == process

@@ -6,8 +6,8 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde_json::{Map, Number, Value};
 use ventriform::parameters::{
     BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, CalibrationChoice, ComparisonChoice,
-    FIT_SPECS, Kind, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec, Parameters,
-    SPECS, WithFit,
+    FIT_SPECS, Kind, MODEL_SPECS, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec,
+    Parameters, WithFit,
 };
 use ventriform_service::work::problems::Explain;
 
@@ -113,7 +113,7 @@ fn number(value: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
 #[pyfunction]
 pub fn parameter_tables(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let tables = PyDict::new(py);
-    tables.set_item("generate", rows(py, SPECS)?)?;
+    tables.set_item("generate", rows(py, MODEL_SPECS)?)?;
     tables.set_item("segment", rows(py, FIT_SPECS)?)?;
     let calibrate = rows(py, WithFit::<CalibrationChoice>::fit_specs())?;
     tables.set_item("calibrate", calibrate)?;

@@ -8,7 +8,7 @@ use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
 tokio::task_local! {
-    static CURRENT: ClientAddress;
+    static REQUEST_CLIENT: ClientAddress;
 }
 
 /// The address of a client, or its network where a host can take any address of it.
@@ -33,12 +33,14 @@ impl ClientAddress {
     /// The client of the request that the current task answers. Work that belongs to no request
     /// counts as that of the unspecified address.
     pub fn current() -> Self {
-        CURRENT.try_with(|client| *client).unwrap_or(Self::NONE)
+        REQUEST_CLIENT
+            .try_with(|client| *client)
+            .unwrap_or(Self::NONE)
     }
 
     /// Runs the answering of a request of this client.
     pub async fn scope<T>(self, answer: impl Future<Output = T>) -> T {
-        CURRENT.scope(self, answer).await
+        REQUEST_CLIENT.scope(self, answer).await
     }
 }
 

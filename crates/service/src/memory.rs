@@ -183,7 +183,7 @@ fn busy() -> ServiceError {
 pub struct Ledger(Arc<tokio::sync::Mutex<HeldMemory>>);
 
 tokio::task_local! {
-    static LEDGER: Ledger;
+    static REQUEST_LEDGER: Ledger;
 }
 
 impl Ledger {
@@ -194,7 +194,7 @@ impl Ledger {
 
     /// Runs the answering of the request.
     pub async fn scope<T>(self, answer: impl Future<Output = T>) -> T {
-        LEDGER.scope(self, answer).await
+        REQUEST_LEDGER.scope(self, answer).await
     }
 
     /// Holds `bytes` and no more: all that an answer needs which is in memory as a whole.
@@ -219,7 +219,7 @@ impl Ledger {
 /// # Errors
 /// `busy` if the client's share has not as much within two seconds.
 pub async fn charge(bytes: u64) -> Result<(), ServiceError> {
-    match LEDGER.try_with(Ledger::clone) {
+    match REQUEST_LEDGER.try_with(Ledger::clone) {
         Ok(ledger) => ledger.0.lock().await.grow(bytes).await,
         Err(_) => Ok(()),
     }

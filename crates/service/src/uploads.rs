@@ -24,7 +24,7 @@ use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::progress::Monitor;
-use ventriform::volume::gates::GATES;
+use ventriform::volume::gates::GATE_COUNTS;
 use ventriform::volume::order_by_numbers;
 
 /// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
@@ -144,12 +144,12 @@ impl Arriving<'_> {
 }
 
 /// The extension of a gzipped file.
-const GZIPPED: &str = "nii.gz";
+const GZIPPED_EXTENSION: &str = "nii.gz";
 
 /// The extension that the first bytes of the content imply.
 fn kind_by_content(head: &[u8]) -> &'static str {
     match head {
-        [0x1f, 0x8b, ..] => GZIPPED,
+        [0x1f, 0x8b, ..] => GZIPPED_EXTENSION,
         [b'P', b'K', 3, 4, ..] => "zip",
         _ if head.get(128..132) == Some(b"DICM") => "dcm",
         _ => "nii",
@@ -164,7 +164,7 @@ fn may_be_nifti(head: &[u8]) -> bool {
         .first_chunk()
         .map(|bytes| [u32::from_le_bytes(*bytes), u32::from_be_bytes(*bytes)]);
     let stated = length.is_some_and(|both| both.iter().any(|length| HEADER_BYTES.contains(length)));
-    stated || kind_by_content(head) == GZIPPED
+    stated || kind_by_content(head) == GZIPPED_EXTENSION
 }
 
 /// `hdr` or `img`, which only the file's name can tell apart.
@@ -286,7 +286,7 @@ impl VolumeUpload {
 
     /// Whether the files may be one gate each, so that their order has a meaning. Only reading them tells.
     fn may_be_gates(&self) -> bool {
-        GATES.contains(&self.files.len()) && self.files.iter().all(|file| file.may_be_gate)
+        GATE_COUNTS.contains(&self.files.len()) && self.files.iter().all(|file| file.may_be_gate)
     }
 
     /// The files under their final names: `volume` with its extension for one file or a pair, else

@@ -31,7 +31,7 @@ use ventriform_tools::{cases, name_of};
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
 /// The columns after those of the case itself.
-const FIGURES: [&str; 17] = [
+const FIGURE_COLUMNS: [&str; 17] = [
     "jaccard_apparent",
     "jaccard_anatomical",
     "active",
@@ -58,7 +58,7 @@ fn main() -> Result<()> {
         .par_iter()
         .map(|(set, case)| row(set, case))
         .collect::<Result<_>>()?;
-    println!("set,case,heart,motion_mm,{}", FIGURES.join(","));
+    println!("set,case,heart,motion_mm,{}", FIGURE_COLUMNS.join(","));
     println!("{}", rows.join("\n"));
     Ok(())
 }
@@ -79,9 +79,9 @@ fn row(set: &str, case: &Path) -> Result<String> {
     Ok(row)
 }
 
-/// The values of [`FIGURES`] as far as the case has them.
-fn figures(case: &Path) -> Result<[Option<f64>; FIGURES.len()]> {
-    let mut figures = [None; FIGURES.len()];
+/// The values of [`FIGURE_COLUMNS`] as far as the case has them.
+fn figures(case: &Path) -> Result<[Option<f64>; FIGURE_COLUMNS.len()]> {
+    let mut figures = [None; FIGURE_COLUMNS.len()];
     let both = [WallEdge::Apparent, WallEdge::Anatomical];
     let [apparent, anatomical] = match both.map(|edge| segmented(case, edge)) {
         [Ok(apparent), Ok(anatomical)] => [apparent, anatomical],

@@ -52,7 +52,7 @@ fn main() -> Result<()> {
     cases.retain(|path| path.exists());
     cases.sort();
     println!("change    wall  cavity  worst segment: mean  max  above 5 %");
-    for (name, change) in CHANGES {
+    for (name, change) in SCAN_CHANGES {
         let mut rows = Vec::new();
         for path in &cases {
             let scan = read(path)?.volume;
@@ -75,7 +75,7 @@ fn main() -> Result<()> {
 /// Changed copies of a scan, given a point in the heart and the uptake that counts as 100 %.
 type Change = fn(&Volume, &Vec3, f64) -> Vec<Volume>;
 
-const CHANGES: [(&str, Change); 5] = [
+const SCAN_CHANGES: [(&str, Change); 5] = [
     ("shift", |scan, heart, _| {
         let spacing = scan.frame.spacing();
         [[0.3, 0.5, 0.7], [0.5, 0.2, 0.4], [0.7, 0.8, 0.1]]

@@ -16,7 +16,10 @@ pub struct ModelQuery;
 
 impl IntoParams for ModelQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        ModelParameters::SPECS.iter().map(parameter_of).collect()
+        ModelParameters::PARAMETER_SPECS
+            .iter()
+            .map(parameter_of)
+            .collect()
     }
 }
 
@@ -25,7 +28,10 @@ pub struct SegmentationQuery;
 
 impl IntoParams for SegmentationQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        FitParameters::SPECS.iter().map(parameter_of).collect()
+        FitParameters::PARAMETER_SPECS
+            .iter()
+            .map(parameter_of)
+            .collect()
     }
 }
 
@@ -35,7 +41,7 @@ pub struct BeatQuery;
 impl IntoParams for BeatQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let of_fit = GatedParameters::fit_specs().map(parameter_of);
-        let own = BeatChoice::SPECS.iter().map(parameter_of);
+        let own = BeatChoice::PARAMETER_SPECS.iter().map(parameter_of);
         own.chain(of_fit).collect()
     }
 }
@@ -46,7 +52,7 @@ pub struct ComparisonQuery;
 impl IntoParams for ComparisonQuery {
     fn into_params(_: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
         let of_fit = ComparisonParameters::fit_specs().map(parameter_of);
-        let own = ComparisonChoice::SPECS.iter().map(parameter_of);
+        let own = ComparisonChoice::PARAMETER_SPECS.iter().map(parameter_of);
         own.chain(of_fit).collect()
     }
 }

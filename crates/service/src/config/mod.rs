@@ -832,7 +832,7 @@ mod tests {
         assert_eq!(endpoint(&[standard, own]).otlp_endpoint.0, None);
     }
 
-    const PACS: &str = "[[archives]]
+    const PACS_SECTION: &str = "[[archives]]
 name = \"pacs\"
 dicomweb = \"https://10.0.0.5/dicom-web\"
 username_env = \"PACS_USER\"
@@ -842,7 +842,7 @@ tenants = [\"default\"]
 
     #[test]
     fn archives_are_read_and_their_credentials_are_not_in_the_file() {
-        let (mut settings, _) = load(Flags::default(), &[], Some(PACS)).unwrap();
+        let (mut settings, _) = load(Flags::default(), &[], Some(PACS_SECTION)).unwrap();
         let [pacs] = &settings.archives.0[..] else {
             panic!("{:?}", settings.archives);
         };
@@ -858,16 +858,28 @@ tenants = [\"default\"]
         for (text, field) in [
             ("archives = 1".to_owned(), "archives"),
             ("archives = [1]".to_owned(), "archives[0].name"),
-            (format!("{PACS}dicomwebb = \"a\""), "archives[0].dicomwebb"),
-            (format!("{PACS}ca_file = 1"), "archives[0].ca_file"),
-            (format!("{PACS}{PACS}"), "archives[1].name"),
-            (PACS.replace("https", "gopher"), "archives[0].dicomweb"),
-            (PACS.replace("[\"default\"]", "[]"), "archives[0].tenants"),
             (
-                PACS.replace("[\"default\"]", "[\"a/b\"]"),
+                format!("{PACS_SECTION}dicomwebb = \"a\""),
+                "archives[0].dicomwebb",
+            ),
+            (format!("{PACS_SECTION}ca_file = 1"), "archives[0].ca_file"),
+            (format!("{PACS_SECTION}{PACS_SECTION}"), "archives[1].name"),
+            (
+                PACS_SECTION.replace("https", "gopher"),
+                "archives[0].dicomweb",
+            ),
+            (
+                PACS_SECTION.replace("[\"default\"]", "[]"),
                 "archives[0].tenants",
             ),
-            (PACS.replace("[\"default\"]", "1"), "archives[0].tenants"),
+            (
+                PACS_SECTION.replace("[\"default\"]", "[\"a/b\"]"),
+                "archives[0].tenants",
+            ),
+            (
+                PACS_SECTION.replace("[\"default\"]", "1"),
+                "archives[0].tenants",
+            ),
         ] {
             let error = load(Flags::default(), &[], Some(&text)).unwrap_err();
             assert!(error.to_string().contains(&format!("{field}:")), "{error}");
@@ -911,7 +923,7 @@ tenants = [\"default\"]
             ..Flags::default()
         };
         let variables = [("VENTRIFORM_WORKERS", "4")];
-        let (settings, origins) = load(flags, &variables, Some(PACS)).unwrap();
+        let (settings, origins) = load(flags, &variables, Some(PACS_SECTION)).unwrap();
         let printed = settings.print(&origins);
         assert!(printed.contains("workers = \"4\" # variable"));
         assert!(printed.contains("retention = \"30d\" # flag"));

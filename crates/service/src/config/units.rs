@@ -147,7 +147,7 @@ pub struct AwsVariables(pub Vec<(String, String)>);
 
 impl AwsVariables {
     /// The variables that are read.
-    const NAMES: [&str; 14] = [
+    const VARIABLE_NAMES: [&str; 14] = [
         "AWS_ENDPOINT_URL",
         "AWS_ENDPOINT_URL_S3",
         "AWS_ENDPOINT_URL_STS",
@@ -167,7 +167,7 @@ impl AwsVariables {
     /// Those that are set and not empty.
     pub fn read(variable: impl Fn(&str) -> Option<String>) -> Self {
         let value = |name: &str| variable(name).filter(|value| !value.is_empty());
-        let names = Self::NAMES.into_iter();
+        let names = Self::VARIABLE_NAMES.into_iter();
         Self(
             names
                 .filter_map(|name| Some((name.to_owned(), value(name)?)))
@@ -187,9 +187,9 @@ impl fmt::Debug for AwsVariables {
 /// The word that stands for the absence of a value.
 pub trait Keyword {
     /// The word.
-    const WORD: &'static str;
+    const KEYWORD_TEXT: &'static str;
     /// The permitted texts, for error messages.
-    const EXPECTED: &'static str;
+    const PERMITTED_TEXTS: &'static str;
 }
 
 /// A value, or a keyword if there is none.
@@ -200,12 +200,16 @@ impl<T: FromStr, K: Keyword> FromStr for OrKeyword<T, K> {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == K::WORD {
+        if text == K::KEYWORD_TEXT {
             return Ok(Self(None, PhantomData));
         }
         match text.parse() {
             Ok(value) => Ok(Self(Some(value), PhantomData)),
-            Err(_) => Err(format!("give `{}` or {}", K::WORD, K::EXPECTED)),
+            Err(_) => Err(format!(
+                "give `{}` or {}",
+                K::KEYWORD_TEXT,
+                K::PERMITTED_TEXTS
+            )),
         }
     }
 }
@@ -214,7 +218,7 @@ impl<T: fmt::Display, K: Keyword> fmt::Display for OrKeyword<T, K> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
             Some(value) => value.fmt(f),
-            None => f.write_str(K::WORD),
+            None => f.write_str(K::KEYWORD_TEXT),
         }
     }
 }
@@ -224,8 +228,8 @@ impl<T: fmt::Display, K: Keyword> fmt::Display for OrKeyword<T, K> {
 pub struct Auto;
 
 impl Keyword for Auto {
-    const WORD: &'static str = "auto";
-    const EXPECTED: &'static str = "a whole number from 1";
+    const KEYWORD_TEXT: &'static str = "auto";
+    const PERMITTED_TEXTS: &'static str = "a whole number from 1";
 }
 
 /// The keyword `auto` in place of a size.
@@ -233,8 +237,8 @@ impl Keyword for Auto {
 pub struct AutoSize;
 
 impl Keyword for AutoSize {
-    const WORD: &'static str = "auto";
-    const EXPECTED: &'static str = "a size such as 256MiB, or 0B for none";
+    const KEYWORD_TEXT: &'static str = "auto";
+    const PERMITTED_TEXTS: &'static str = "a size such as 256MiB, or 0B for none";
 }
 
 /// The keyword `sqlite`.
@@ -242,8 +246,8 @@ impl Keyword for AutoSize {
 pub struct InFolder;
 
 impl Keyword for InFolder {
-    const WORD: &'static str = "sqlite";
-    const EXPECTED: &'static str = "a URL such as postgres://user@host:5432/name; characters such as @ : / in a user or password \
+    const KEYWORD_TEXT: &'static str = "sqlite";
+    const PERMITTED_TEXTS: &'static str = "a URL such as postgres://user@host:5432/name; characters such as @ : / in a user or password \
          are written as %40 %3A %2F";
 }
 
@@ -258,8 +262,8 @@ pub type MinFree = OrKeyword<Size, AutoSize>;
 pub struct Off;
 
 impl Keyword for Off {
-    const WORD: &'static str = "off";
-    const EXPECTED: &'static str = "a time such as 12h or 30d";
+    const KEYWORD_TEXT: &'static str = "off";
+    const PERMITTED_TEXTS: &'static str = "a time such as 12h or 30d";
 }
 
 /// A number from 1, or `auto`: what fits the machine.
@@ -273,8 +277,8 @@ pub type Retention = OrKeyword<Span, Off>;
 pub struct NoAddress;
 
 impl Keyword for NoAddress {
-    const WORD: &'static str = "off";
-    const EXPECTED: &'static str = "an address with a port, such as 127.0.0.1:11112";
+    const KEYWORD_TEXT: &'static str = "off";
+    const PERMITTED_TEXTS: &'static str = "an address with a port, such as 127.0.0.1:11112";
 }
 
 /// An address to listen on; `off` is none.
@@ -288,8 +292,8 @@ pub type OtlpEndpoint = OrKeyword<String, Off>;
 pub struct General;
 
 impl Keyword for General {
-    const WORD: &'static str = "retention";
-    const EXPECTED: &'static str = "`off` or a time such as 12h or 30d";
+    const KEYWORD_TEXT: &'static str = "retention";
+    const PERMITTED_TEXTS: &'static str = "`off` or a time such as 12h or 30d";
 }
 
 /// How long things of one kind are kept, or `retention`: as long as things of the other kinds.
@@ -397,8 +401,8 @@ impl FromStr for OptionalPath {
 
     fn from_str(text: &str) -> Result<Self, String> {
         match text {
-            "" => Err(format!("give `{}` or a path", Off::WORD)),
-            Off::WORD => Ok(Self(None)),
+            "" => Err(format!("give `{}` or a path", Off::KEYWORD_TEXT)),
+            Off::KEYWORD_TEXT => Ok(Self(None)),
             path => Ok(Self(Some(path.into()))),
         }
     }
@@ -408,7 +412,7 @@ impl fmt::Display for OptionalPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.0 {
             Some(path) => path.display().fmt(f),
-            None => f.write_str(Off::WORD),
+            None => f.write_str(Off::KEYWORD_TEXT),
         }
     }
 }
@@ -418,8 +422,8 @@ impl fmt::Display for OptionalPath {
 pub struct NoLimit;
 
 impl Keyword for NoLimit {
-    const WORD: &'static str = "off";
-    const EXPECTED: &'static str = "a limit such as 1000, or 10GiB for sizes";
+    const KEYWORD_TEXT: &'static str = "off";
+    const PERMITTED_TEXTS: &'static str = "a limit such as 1000, or 10GiB for sizes";
 }
 
 /// A limit, or `off`.

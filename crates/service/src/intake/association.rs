@@ -6,7 +6,7 @@
 
 use super::command::{Command, LONGEST_COMMAND, Operation, status};
 use super::negotiate::{
-    APPLICATION_CONTEXT, Context, Contexts, VERIFICATION, longest_of, negotiate,
+    APPLICATION_CONTEXT, Context, Contexts, VERIFICATION_CLASS, longest_of, negotiate,
 };
 use super::observer::AssociationEnd;
 use super::receive::{Incoming, ReceiveError, Stated};
@@ -384,11 +384,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
         };
         let target = match (command.operation(), command.has_data_set) {
             (Operation::Cancel, false) => return Ok(()),
-            (Operation::Echo, false) if context.class == VERIFICATION => {
+            (Operation::Echo, false) if context.class == VERIFICATION_CLASS => {
                 Target::Ignored(status::SUCCESS)
             }
             (Operation::Store, true) => target(self.service, &command, context).await,
-            (Operation::Store, false) => Target::Ignored(status::MISTYPED),
+            (Operation::Store, false) => Target::Ignored(status::MISTYPED_ARGUMENT),
             _ => Target::Ignored(status::UNRECOGNISED_OPERATION),
         };
         let follows = command.has_data_set;
@@ -478,13 +478,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
 /// Where the object of a C-STORE goes.
 async fn target(service: &Service, command: &Command, context: &Context) -> Target {
     let (Some(class), Some(instance)) = (&command.sop_class, &command.sop_instance) else {
-        return Target::Ignored(status::MISTYPED);
+        return Target::Ignored(status::MISTYPED_ARGUMENT);
     };
     if *class != context.class {
         return Target::Ignored(status::CLASS_NOT_SUPPORTED);
     }
     let Ok(start) = file_start(class, instance, &context.transfer_syntax) else {
-        return Target::Ignored(status::MISTYPED);
+        return Target::Ignored(status::MISTYPED_ARGUMENT);
     };
     let begun = async {
         let mut object = service.receiver.begin().await?;

@@ -15,12 +15,12 @@ const LONGEST_COMMENT: usize = 64;
 mod elements {
     pub const GROUP_LENGTH: u16 = 0x0000;
     pub const SOP_CLASS: u16 = 0x0002;
-    pub const FIELD: u16 = 0x0100;
+    pub const COMMAND_FIELD: u16 = 0x0100;
     pub const MESSAGE_ID: u16 = 0x0110;
     pub const RESPONSE_TO: u16 = 0x0120;
     pub const DATA_SET: u16 = 0x0800;
     pub const STATUS: u16 = 0x0900;
-    pub const COMMENT: u16 = 0x0902;
+    pub const ERROR_COMMENT: u16 = 0x0902;
     pub const SOP_INSTANCE: u16 = 0x1000;
 }
 
@@ -46,7 +46,7 @@ pub mod status {
     /// There is no such operation here.
     pub const UNRECOGNISED_OPERATION: u16 = 0x0211;
     /// A required element is missing.
-    pub const MISTYPED: u16 = 0x0212;
+    pub const MISTYPED_ARGUMENT: u16 = 0x0212;
 }
 
 /// A request.
@@ -90,7 +90,7 @@ impl Command {
             let value = value.trim_end_matches(['\0', ' ']);
             (!value.is_empty()).then(|| value.to_owned())
         };
-        let field = short(elements::FIELD)?;
+        let field = short(elements::COMMAND_FIELD)?;
         if field & 0x8000 != 0 {
             return None;
         }
@@ -133,7 +133,10 @@ impl Command {
         if let Some(class) = &self.sop_class {
             put(elements::SOP_CLASS, &padded(class, 0));
         }
-        put(elements::FIELD, &(self.field | 0x8000).to_le_bytes());
+        put(
+            elements::COMMAND_FIELD,
+            &(self.field | 0x8000).to_le_bytes(),
+        );
         put(elements::RESPONSE_TO, &self.message.to_le_bytes());
         put(elements::DATA_SET, &NO_DATA_SET.to_le_bytes());
         put(elements::STATUS, &status.to_le_bytes());
@@ -141,7 +144,7 @@ impl Command {
             let end = comment.len().min(LONGEST_COMMENT);
             let end = (0..=end).rev().find(|end| comment.is_char_boundary(*end));
             put(
-                elements::COMMENT,
+                elements::ERROR_COMMENT,
                 &padded(&comment[..end.unwrap_or(0)], b' '),
             );
         }

@@ -8,7 +8,7 @@ use dicom_ul::pdu::{
 use std::collections::BTreeMap;
 
 /// Verification SOP Class.
-pub const VERIFICATION: &str = "1.2.840.10008.1.1";
+pub const VERIFICATION_CLASS: &str = "1.2.840.10008.1.1";
 /// DICOM Application Context.
 pub const APPLICATION_CONTEXT: &str = "1.2.840.10008.3.1.1.1";
 
@@ -46,7 +46,7 @@ pub fn negotiate(request: &AssociationRQ, offer: &Offer) -> (AssociationAC, Cont
     for proposed in &request.presentation_contexts {
         let class = proposed.abstract_syntax.trim_end_matches(['\0', ' ']);
         let syntaxes: &[&str] = match class {
-            VERIFICATION => &[IMPLICIT_LITTLE, EXPLICIT_LITTLE],
+            VERIFICATION_CLASS => &[IMPLICIT_LITTLE, EXPLICIT_LITTLE],
             class if offer.classes.iter().any(|own| own == class) => &offer.transfer_syntaxes,
             _ => &[],
         };
@@ -131,7 +131,7 @@ mod tests {
             called_ae_title: "B".into(),
             application_context_name: APPLICATION_CONTEXT.into(),
             presentation_contexts: vec![
-                proposed(1, VERIFICATION, &["1.9", IMPLICIT_LITTLE]),
+                proposed(1, VERIFICATION_CLASS, &["1.9", IMPLICIT_LITTLE]),
                 proposed(3, "1.2.3\0", &["1.8", "1.9", EXPLICIT_LITTLE]),
                 proposed(5, "1.2.3", &["1.8"]),
                 proposed(7, "1.2.4", &[IMPLICIT_LITTLE]),

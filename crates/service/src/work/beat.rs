@@ -31,7 +31,7 @@ impl Work for BeatWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let (mut items, library) = named_models(parameters);
-        items.extend(named_item(parameters, limits::NORMALS));
+        items.extend(named_item(parameters, limits::NORMALS_FIELD));
         Needs {
             items,
             library,

@@ -19,7 +19,7 @@ use ventriform::rest_stress::{ComparisonOrder, from_files};
 use ventriform::volume::ReadLimits;
 
 /// The parameter that names the scan at rest.
-pub(super) const REST: &str = "rest";
+pub(super) const REST_FIELD: &str = "rest";
 
 /// Compares rest and stress of one patient.
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +35,7 @@ impl Work for ComparisonWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let (mut items, library) = named_models(parameters);
-        let named = [REST, limits::NORMALS];
+        let named = [REST_FIELD, limits::NORMALS_FIELD];
         items.extend((named.iter()).filter_map(|field| named_item(parameters, field)));
         Needs {
             items,
@@ -53,8 +53,9 @@ impl Work for ComparisonWork {
         volume: Option<&str>,
         parameters: &Map<String, Value>,
     ) -> Result<(), Failure> {
-        let wrong = |detail: &str| Failure::new(Fault::Request, "invalid-field", detail).at(REST);
-        match parameters.get(REST).and_then(Value::as_str) {
+        let wrong =
+            |detail: &str| Failure::new(Fault::Request, "invalid-field", detail).at(REST_FIELD);
+        match parameters.get(REST_FIELD).and_then(Value::as_str) {
             None => Err(wrong("The scan at rest is missing.")
                 .fix("Give in `rest` the id of a stored volume, or in a form the file `rest`.")),
             Some(rest) if Some(rest) == volume => Err(wrong("Stress and rest are one volume.")
@@ -70,7 +71,10 @@ impl Work for ComparisonWork {
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
         let parameters =
             ComparisonParameters::from_json(&input.parameters).map_err(|error| error.explain())?;
-        let rest = input.items.get(REST).ok_or_else(|| volume_missing(REST))?;
+        let rest = input
+            .items
+            .get(REST_FIELD)
+            .ok_or_else(|| volume_missing(REST_FIELD))?;
         let normals = limits::of_input(input)?;
         let order = ComparisonOrder {
             stress: &volume_files(&input.files),

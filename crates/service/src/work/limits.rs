@@ -8,7 +8,7 @@ use ventriform::normals::NormalLimits;
 use ventriform::report::{NormalsSummary, object};
 
 /// The parameter that names normal limits.
-pub(super) const NORMALS: &str = "normals";
+pub(super) const NORMALS_FIELD: &str = "normals";
 /// The file of normal limits.
 pub(super) const NORMALS_FILE: &str = "normals.json";
 
@@ -39,7 +39,7 @@ pub(super) fn output(limits: &NormalLimits) -> WorkOutput {
 /// # Errors
 /// If their file is missing or cannot be read.
 pub(super) fn of_input(input: &WorkInput) -> Result<Option<NormalLimits>, WorkError> {
-    let Some(item) = input.items.get(NORMALS) else {
+    let Some(item) = input.items.get(NORMALS_FIELD) else {
         return Ok(None);
     };
     let bytes = item.read(NORMALS_FILE).map_err(|e| unreadable_model(&e))?;

@@ -15,9 +15,9 @@ use ventriform::text::is_printable;
 use ventriform::volume::ReadLimits;
 
 /// The parameter with the cohort's table.
-const CASES: &str = "cases";
+const CASES_FIELD: &str = "cases";
 /// The parameter with the name of the limits.
-const NAME: &str = "name";
+const NAME_FIELD: &str = "name";
 /// Most rows of a table.
 pub const MOST_CASES: usize = 1000;
 /// Longest text of a row, bytes.
@@ -40,19 +40,19 @@ struct Parameters {
 impl Parameters {
     fn of(object: &Map<String, Value>) -> Result<Self, Failure> {
         let mut object = object.clone();
-        let name = match object.remove(NAME) {
+        let name = match object.remove(NAME_FIELD) {
             None => "normals".to_owned(),
             Some(Value::String(name)) => name,
-            Some(_) => return Err(wrong(NAME, "`name` must be a text.")),
+            Some(_) => return Err(wrong(NAME_FIELD, "`name` must be a text.")),
         };
         check_name(&name).map_err(|error| match error {
             NotAdded::Refused(failure) => failure,
-            _ => wrong(NAME, "The name cannot be used."),
+            _ => wrong(NAME_FIELD, "The name cannot be used."),
         })?;
-        let cases = match object.remove(CASES) {
-            None => return Err(wrong(CASES, "`cases` is missing.")),
+        let cases = match object.remove(CASES_FIELD) {
+            None => return Err(wrong(CASES_FIELD, "`cases` is missing.")),
             Some(Value::Array(cases)) => cases,
-            Some(_) => return Err(wrong(CASES, "`cases` must be a list.")),
+            Some(_) => return Err(wrong(CASES_FIELD, "`cases` must be a list.")),
         };
         let fits = NormalsParameters::from_json(&object).map_err(|error| error.explain())?;
         Ok(Self {
@@ -64,9 +64,9 @@ impl Parameters {
 
     fn to_json(&self) -> Map<String, Value> {
         let mut all = self.fits.to_json();
-        all.insert(NAME.into(), self.name.clone().into());
+        all.insert(NAME_FIELD.into(), self.name.clone().into());
         let cases = serde_json::to_value(&self.cases);
-        all.insert(CASES.into(), cases.expect("rows are plain data"));
+        all.insert(CASES_FIELD.into(), cases.expect("rows are plain data"));
         all
     }
 }
@@ -78,12 +78,12 @@ fn table(rows: Vec<Value>) -> Result<Vec<CohortCase>, Failure> {
             "The table has {} rows; it may have 1 to {MOST_CASES}.",
             rows.len()
         );
-        return Err(wrong(CASES, detail));
+        return Err(wrong(CASES_FIELD, detail));
     }
     let mut names = BTreeSet::new();
     let mut cases = Vec::with_capacity(rows.len());
     for (number, row) in rows.into_iter().enumerate() {
-        let place = |field: &str| format!("{CASES}[{number}]{field}");
+        let place = |field: &str| format!("{CASES_FIELD}[{number}]{field}");
         let case: CohortCase = serde_json::from_value(row)
             .map_err(|error| wrong(&place(""), format!("The row cannot be read: {error}.")))?;
         for (field, text) in [
@@ -109,7 +109,7 @@ fn table(rows: Vec<Value>) -> Result<Vec<CohortCase>, Failure> {
             && (!names.contains(rest) || *rest == case.case)
         {
             let detail = "No other row has this name.";
-            return Err(wrong(&format!("{CASES}[{number}].rest_case"), detail));
+            return Err(wrong(&format!("{CASES_FIELD}[{number}].rest_case"), detail));
         }
     }
     Ok(cases)
@@ -126,12 +126,12 @@ fn wrong(field: &str, detail: impl Into<String>) -> Failure {
 
 /// The volume of the first row of `parameters`, which is the job's own.
 pub fn first_volume(parameters: &Map<String, Value>) -> Option<String> {
-    let first = parameters.get(CASES)?.get(0)?;
+    let first = parameters.get(CASES_FIELD)?.get(0)?;
     Some(first.get("volume")?.as_str()?.to_owned())
 }
 
 fn place_of(number: usize) -> String {
-    format!("{CASES}[{number}].volume")
+    format!("{CASES_FIELD}[{number}].volume")
 }
 
 impl Work for NormalsWork {
@@ -140,7 +140,7 @@ impl Work for NormalsWork {
     }
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
-        let cases = parameters.get(CASES).and_then(Value::as_array);
+        let cases = parameters.get(CASES_FIELD).and_then(Value::as_array);
         let volumes = cases.into_iter().flatten().enumerate();
         let items = volumes.filter_map(|(number, case)| {
             let volume = case.get("volume")?.as_str()?;
@@ -156,7 +156,9 @@ impl Work for NormalsWork {
     fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
         match given {
             GivenParameters::Json(object) => Ok(Parameters::of(object)?.to_json()),
-            GivenParameters::Text(_) => Err(wrong(CASES, "The table is part of a JSON body.")),
+            GivenParameters::Text(_) => {
+                Err(wrong(CASES_FIELD, "The table is part of a JSON body."))
+            }
         }
     }
 
@@ -207,7 +209,7 @@ impl Work for NormalsWork {
         let limits =
             of_scans(&scans, &options, &|_, _| (), monitor).map_err(|error| match error {
                 BuildError::Cancelled(cancelled) => cancelled.into(),
-                error => WorkError::Failed(error.explain().at(CASES)),
+                error => WorkError::Failed(error.explain().at(CASES_FIELD)),
             })?;
         Ok(limits::output(&limits))
     }

@@ -57,12 +57,12 @@ pub(super) const BEAT_FILES: &[&str] = &[
     END_MESHES[1],
     "curve.svg",
     "phase.svg",
-    BeatPage::MAPS[0].0,
-    BeatPage::MAPS[1].0,
-    BeatPage::MAPS[2].0,
-    BeatPage::MAPS[3].0,
-    BeatPage::MAPS[4].0,
-    BeatPage::MAPS[5].0,
+    BeatPage::POLAR_MAPS[0].0,
+    BeatPage::POLAR_MAPS[1].0,
+    BeatPage::POLAR_MAPS[2].0,
+    BeatPage::POLAR_MAPS[3].0,
+    BeatPage::POLAR_MAPS[4].0,
+    BeatPage::POLAR_MAPS[5].0,
 ];
 
 /// The slices of a comparison, stress above rest.
@@ -72,13 +72,13 @@ const COMPARISON_SLICES: &str = "slices.png";
 pub(super) const COMPARISON_FILES: &[&str] = &[
     "comparison.json",
     COMPARISON_SLICES,
-    ComparisonPage::MAPS[0].0,
-    ComparisonPage::MAPS[1].0,
-    ComparisonPage::MAPS[2].0,
-    ComparisonPage::MAPS[3].0,
-    ComparisonPage::MAPS[4].0,
-    ComparisonPage::MAPS[5].0,
-    ComparisonPage::MAPS[6].0,
+    ComparisonPage::POLAR_MAPS[0].0,
+    ComparisonPage::POLAR_MAPS[1].0,
+    ComparisonPage::POLAR_MAPS[2].0,
+    ComparisonPage::POLAR_MAPS[3].0,
+    ComparisonPage::POLAR_MAPS[4].0,
+    ComparisonPage::POLAR_MAPS[5].0,
+    ComparisonPage::POLAR_MAPS[6].0,
 ];
 
 /// The wall at end diastole and at end systole.
@@ -162,7 +162,7 @@ pub(super) fn beat_page(
     let systole = read_json::decode(&required(read, END_MESHES[1])?)?;
     let curve = optional(read, "curve.svg")?;
     let phase = optional(read, "phase.svg")?;
-    let maps = maps(read, &BeatPage::MAPS)?;
+    let maps = maps(read, &BeatPage::POLAR_MAPS)?;
     Ok(report::beat_page(&BeatPage {
         report: &report,
         curve: curve.as_deref(),
@@ -184,7 +184,7 @@ pub(super) fn comparison_page(
     let report = required(read, "comparison.json")?;
     let report: ComparisonReport = from_json("comparison.json", &report)?;
     let slices = optional(read, COMPARISON_SLICES)?;
-    let maps = maps(read, &ComparisonPage::MAPS)?;
+    let maps = maps(read, &ComparisonPage::POLAR_MAPS)?;
     Ok(report::comparison_page(&ComparisonPage {
         report: &report,
         slices: slices.as_deref(),

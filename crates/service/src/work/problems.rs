@@ -693,7 +693,7 @@ pub(super) fn broken_result(error: &dyn Display) -> Failure {
 fn undecoded_advice(field: &str) -> String {
     let correct = "correct Specific Character Set (0008,0005) or the value in the file (its warnings \
                    say what is wrong)";
-    if StatedIdentity::FIELDS.contains(&field) {
+    if StatedIdentity::FIELD_NAMES.contains(&field) {
         format!(
             "State `{field}` (PUT .../identity, or --{}), or {correct}, or ask for de-identified \
          objects.",
@@ -716,7 +716,7 @@ pub(super) fn identity_needed(error: &DicomError, volume: &str) -> Failure {
 /// A statement about a scan has a field that is not known.
 pub(super) fn unknown_identity(name: &str) -> Failure {
     let name: String = name.chars().take(80).collect();
-    let known = StatedIdentity::FIELDS.join(", ");
+    let known = StatedIdentity::FIELD_NAMES.join(", ");
     Failure::new(
         Fault::Request,
         "invalid-field",

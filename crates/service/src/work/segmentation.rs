@@ -35,7 +35,7 @@ impl Work for SegmentationWork {
 
     fn needs(&self, parameters: &Map<String, Value>) -> Needs {
         let (mut items, library) = named_models(parameters);
-        let named = ["expert", "reader", limits::NORMALS];
+        let named = ["expert", "reader", limits::NORMALS_FIELD];
         items.extend((named.iter()).filter_map(|field| named_item(parameters, field)));
         Needs {
             items,

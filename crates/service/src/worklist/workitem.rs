@@ -16,7 +16,7 @@ use crate::records::{Tenant, Timestamp};
 use serde_json::{Map, Value};
 
 /// The SOP class Unified Procedure Step Push.
-const PUSH: &str = "1.2.840.10008.5.1.4.34.6.1";
+const UPS_PUSH_CLASS: &str = "1.2.840.10008.5.1.4.34.6.1";
 
 /// Attributes that an item of the Performed Procedure Sequence must have when the work is completed
 /// (PS3.4 table CC.2.5-3, final state).
@@ -248,7 +248,7 @@ impl Workitem {
             completed = true;
         }
         attributes.remove(TRANSACTION_UID);
-        attributes.put(SOP_CLASS_UID, "UI", PUSH);
+        attributes.put(SOP_CLASS_UID, "UI", UPS_PUSH_CLASS);
         attributes.put(SOP_INSTANCE_UID, "UI", uid);
         let mut item = Self {
             tenant: tenant.clone(),

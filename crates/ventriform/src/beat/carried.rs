@@ -11,7 +11,7 @@ use crate::model::wall::{self, RayCoordinates, VentricleWall};
 
 /// Shares of the thickness beyond the wall that a node may have: nodes of a smooth surface lie a little beside the
 /// rays' means.
-const SHARES: [f64; 2] = [-0.5, 1.5];
+const DEPTH_LIMITS: [f64; 2] = [-0.5, 1.5];
 
 /// The nodes of a mesh in the coordinates of the wall.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ impl CarriedNodes {
             CarriedNode {
                 arc_share: arc / nodes.rim(&still.rim).max(1e-6),
                 turn,
-                depth: depth.clamp(SHARES[0], SHARES[1]),
+                depth: depth.clamp(DEPTH_LIMITS[0], DEPTH_LIMITS[1]),
             }
         };
         Self(vertices.iter().map(node).collect())

@@ -7,7 +7,7 @@
 //!
 //! 1. Each gate is blurred a little, because the largest of many noisy values is too large.
 //! 2. The largest value is taken within [`REACH_MM`] of the middle of the wall, where the fit has it in that gate.
-//! 3. The gates' values become [`HARMONICS`] harmonics, from which the width of a gate is taken off.
+//! 3. The gates' values become [`COUNT_HARMONICS`] harmonics, from which the width of a gate is taken off.
 //!
 //! Not guaranteed: that a bright neighbour within reach, such as gut, is told from the wall.
 
@@ -26,13 +26,13 @@ const SAMPLE_STEP_MM: f64 = 1.0;
 /// Gaussian blur of a gate before it is sampled, sigma in mm.
 const BLUR_MM: f64 = 3.0;
 /// Harmonics of the counts: noise of single rays hides higher ones.
-const HARMONICS: usize = 2;
+const COUNT_HARMONICS: usize = 2;
 
 /// The largest count on each ray of the wall through the beat.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WallCounts {
     /// For every ray: the mean, then cosines and sines of the harmonics.
-    coefficients: Vec<[f64; 1 + 2 * HARMONICS]>,
+    coefficients: Vec<[f64; 1 + 2 * COUNT_HARMONICS]>,
 }
 
 impl WallCounts {
@@ -66,9 +66,9 @@ impl WallCounts {
     /// Through the values of each gate on each ray.
     fn through(gates: &[Vec<f64>]) -> Self {
         let width = 1.0 / gates.len() as f64;
-        let bases = gate_harmonics(HARMONICS, gates.len());
+        let bases = gate_harmonics(COUNT_HARMONICS, gates.len());
         let of_ray = |ray: usize| {
-            let mut of = [0.0; 1 + 2 * HARMONICS];
+            let mut of = [0.0; 1 + 2 * COUNT_HARMONICS];
             of[0] = gates.iter().map(|gate| gate[ray]).sum::<f64>() * width;
             // Cosines and sines at equal steps are orthogonal, so least squares are one division.
             for (index, of) in of[1..].iter_mut().enumerate() {
@@ -86,8 +86,8 @@ impl WallCounts {
 
     /// The counts of every ray at `turns` of the beat; not below 0.
     pub fn at(&self, turns: f64) -> Vec<f64> {
-        let basis = harmonics(HARMONICS, turns, 0.0);
-        let value = |of: &[f64; 1 + 2 * HARMONICS]| {
+        let basis = harmonics(COUNT_HARMONICS, turns, 0.0);
+        let value = |of: &[f64; 1 + 2 * COUNT_HARMONICS]| {
             let moving: f64 = of[1..].iter().zip(&basis).map(|(c, b)| c * b).sum();
             (of[0] + moving).max(0.0)
         };
@@ -113,12 +113,12 @@ mod tests {
         let curve = |turns: f64| {
             100.0 + 20.0 * (TAU * (turns - 0.1)).cos() + 5.0 * (TAU * 2.0 * (turns - 0.3)).sin()
         };
-        const MOMENTS: usize = 200;
+        const MOMENTS_PER_GATE: usize = 200;
         for gates in [6, 7, 8, 16] {
             let mean = |gate: usize| {
-                let moment = |n: usize| gate as f64 + (n as f64 + 0.5) / MOMENTS as f64;
-                let all = (0..MOMENTS).map(|n| curve(moment(n) / gates as f64));
-                vec![all.sum::<f64>() / MOMENTS as f64]
+                let moment = |n: usize| gate as f64 + (n as f64 + 0.5) / MOMENTS_PER_GATE as f64;
+                let all = (0..MOMENTS_PER_GATE).map(|n| curve(moment(n) / gates as f64));
+                vec![all.sum::<f64>() / MOMENTS_PER_GATE as f64]
             };
             let counts = WallCounts::through(&(0..gates).map(mean).collect::<Vec<_>>());
             for turns in [0.0, 0.2, 0.55, 0.9] {

@@ -20,7 +20,7 @@ use super::objective::{Objective, VALUE_SCALE};
 use crate::progress::{Cancelled, Monitor};
 
 /// Share of the curvature at a typical step that is added: no unknown is left without.
-const DAMPING: f64 = 1e-3;
+const DAMPING_SHARE: f64 = 1e-3;
 /// Curvature that every unknown has at least where nothing is added for the sake of steps.
 const LEAST_CURVATURE: f64 = 1e-4;
 /// Reach of the blur that is followed, voxels: 2.4 standard deviations of a width of 12 mm.
@@ -75,7 +75,7 @@ impl Curvature {
                 let mut matrix = image * share;
                 priors.add(objective, &unknowns, &mut matrix);
                 for (n, unknown) in unknowns.iter().enumerate() {
-                    matrix[(n, n)] += DAMPING * VALUE_SCALE / typical[*unknown].powi(2);
+                    matrix[(n, n)] += DAMPING_SHARE * VALUE_SCALE / typical[*unknown].powi(2);
                 }
                 Ok(Block {
                     factors: Cholesky::new(matrix),
@@ -487,7 +487,7 @@ mod tests {
             let direction = DVector::from_fn(count, |n, _| (n as f64 * 0.7).sin());
             let factors = block.factors.as_ref().unwrap();
             let found = factors.l() * (factors.l().transpose() * &direction);
-            const BY: f64 = 2e-3;
+            const PROBE_STEP: f64 = 2e-3;
             let gradient = |by: f64| {
                 let mut moved = unknowns.clone();
                 for (n, unknown) in block.unknowns.iter().enumerate() {
@@ -497,7 +497,7 @@ mod tests {
                 objective.evaluate(&moved, &mut gradient, &monitor).unwrap();
                 DVector::from_fn(count, |n, _| gradient[block.unknowns[n]])
             };
-            let expected = (gradient(BY) - gradient(-BY)) / (2.0 * BY);
+            let expected = (gradient(PROBE_STEP) - gradient(-PROBE_STEP)) / (2.0 * PROBE_STEP);
             let off = (&found - &expected).norm() / expected.norm();
             assert!(off < 0.1, "{off} of a block of {count}");
         }

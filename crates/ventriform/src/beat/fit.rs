@@ -351,8 +351,8 @@ fn start_of(
     priors: &Priors,
 ) -> Vec<f64> {
     /// Activity outside of the wall and in the cavity, as shares of the wall's.
-    const OUTSIDE: f64 = 0.15;
-    const BLOOD: f64 = 0.12;
+    const OUTSIDE_ACTIVITY: f64 = 0.15;
+    const BLOOD_ACTIVITY: f64 = 0.12;
     let thickness = priors.mean_thickness_mm;
     let recovered = (thickness / (0.95 * resolution_mm)).min(1.0);
     let mut unknowns = vec![0.0; layout.len()];
@@ -361,10 +361,10 @@ fn start_of(
         unknowns[layout.thickness().start + node] = thickness;
         let peak = relative[node].clamp(0.05, 1.5);
         unknowns[layout.uptake().start + node] = (peak / recovered).ln();
-        unknowns[layout.outside().start + node] = OUTSIDE.ln();
+        unknowns[layout.outside().start + node] = OUTSIDE_ACTIVITY.ln();
     }
     unknowns[layout.rim()].copy_from_slice(&still.rim);
-    unknowns[layout.blood()] = BLOOD.ln();
+    unknowns[layout.blood()] = BLOOD_ACTIVITY.ln();
     unknowns
 }
 
@@ -510,13 +510,13 @@ impl BeatFit {
 fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
     /// Distance of the strips of wall that are added up, mm, and their pieces about the axis.
     const STRIP_MM: f64 = 1.0;
-    const PIECES: usize = 48;
+    const PIECES_PER_TURN: usize = 48;
     let layout = &objective.layout;
     let state: WallState = objective.conservation.state(layout, unknowns, basis);
     let rim = &unknowns[layout.rim()];
     let radius = objective.coordinates.cap_radius;
     let cap_arc = objective.coordinates.cap_arc();
-    let angle = TAU / PIECES as f64;
+    let angle = TAU / PIECES_PER_TURN as f64;
     let (mut cavity, mut wall) = (0.0, 0.0);
     let strips = ((layout.rows - 1) as f64 * ROW_SPACING_MM / STRIP_MM) as usize;
     for strip in 0..strips {
@@ -528,8 +528,8 @@ fn volumes(objective: &Objective, unknowns: &[f64], basis: &[f64]) -> Volumes {
                 r * r / 2.0 * angle * STRIP_MM * state.stretch
             }
         };
-        for piece in 0..PIECES {
-            let column = piece as f64 / PIECES as f64 * COLUMNS as f64;
+        for piece in 0..PIECES_PER_TURN {
+            let column = piece as f64 / PIECES_PER_TURN as f64 * COLUMNS as f64;
             let nodes = Nodes::at(layout.rows, arc, column);
             let (mid, thick) = (nodes.value(&state.mid_wall), nodes.value(&state.thickness));
             let on = ((nodes.rim(rim) - arc) / STRIP_MM + 0.5).clamp(0.0, 1.0);

@@ -543,8 +543,8 @@ pub(super) mod tests {
             let sizes = gradient[range.clone()].iter().map(|g| g.abs());
             let largest = sizes.fold(0.0, f64::max);
             for at in range.clone().step_by(step) {
-                const BY: f64 = 1e-3;
-                let slope = (value(at, BY) - value(at, -BY)) / (2.0 * BY);
+                const PROBE_STEP: f64 = 1e-3;
+                let slope = (value(at, PROBE_STEP) - value(at, -PROBE_STEP)) / (2.0 * PROBE_STEP);
                 let off = (slope - gradient[at]).abs();
                 // Images are 32-bit floats, and a voxel may pass the kink of a ramp. Gates add up to unknowns that one
                 // of them changes more.

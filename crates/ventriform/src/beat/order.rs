@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 
 /// Orders that are tried at random.
 const RANDOM_ORDERS: usize = 2000;
-const SEED: u64 = 1;
+const ORDER_SEED: u64 = 1;
 
 /// The share of orders that are as smooth as the given one, itself included; 1 where all gates are equal.
 pub(super) fn share_as_smooth(images: &[Vec<f32>], weights: &[f32]) -> f64 {
@@ -29,7 +29,7 @@ pub(super) fn share_as_smooth(images: &[Vec<f32>], weights: &[f32]) -> f64 {
     };
     let mut order: Vec<usize> = (0..count).collect();
     let given = length(&order);
-    let mut random = Pcg64Mcg::seed_from_u64(SEED);
+    let mut random = Pcg64Mcg::seed_from_u64(ORDER_SEED);
     let as_smooth = (0..RANDOM_ORDERS)
         .filter(|_| {
             order[1..].shuffle(&mut random);

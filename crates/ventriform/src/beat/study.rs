@@ -6,7 +6,7 @@
 
 use super::error::BeatError;
 use crate::grid::Volume;
-use crate::grid::gates::{GATES, SAME_PLACE_MM};
+use crate::grid::gates::{GATE_COUNTS, SAME_PLACE_MM};
 use crate::progress::{Cancelled, Monitor};
 
 /// Share of its counts whose loss is told of a gate.
@@ -34,11 +34,11 @@ impl GatedStudy {
     /// # Errors
     /// [`BeatError`]: fewer gates than 6 or more than 32, gates on different grids, a gate without counts.
     pub fn new(gates: Vec<Volume>, monitor: &Monitor) -> Result<Self, BeatError> {
-        if !GATES.contains(&gates.len()) {
+        if !GATE_COUNTS.contains(&gates.len()) {
             return Err(BeatError::GateCount {
                 found: gates.len(),
-                least: *GATES.start(),
-                most: *GATES.end(),
+                least: *GATE_COUNTS.start(),
+                most: *GATE_COUNTS.end(),
             });
         }
         let first = &gates[0];

@@ -311,7 +311,7 @@ mod tests {
         folder
     }
 
-    const FILES: [&str; 6] = [
+    const CASE_FILES: [&str; 6] = [
         "t1/spect.nii.gz",
         "t1/lv_expert_img.nii.gz",
         "b/spect.nii",
@@ -322,7 +322,7 @@ mod tests {
 
     #[test]
     fn without_a_manifest_names_decide() {
-        let folder = folder_of(&FILES, None);
+        let folder = folder_of(&CASE_FILES, None);
         let cohort = Cohort::open(folder.path(), None).unwrap();
         assert_eq!(
             (&cohort.templates[..], &cohort.patients[..]),
@@ -340,7 +340,7 @@ mod tests {
     fn a_manifest_decides_and_its_missing_cases_are_named() {
         let text = r#"[{"case":"b","role":"template"},{"case":"t1","role":"test"},
                        {"case":"gone","role":"test"},{"case":"../x","role":"test"}]"#;
-        let folder = folder_of(&FILES, Some(text));
+        let folder = folder_of(&CASE_FILES, Some(text));
         let cohort = Cohort::open(folder.path(), None).unwrap();
         assert_eq!(cohort.templates, ["b"]);
         assert_eq!(cohort.patients, ["t1"]);
@@ -350,11 +350,11 @@ mod tests {
 
     #[test]
     fn a_broken_manifest_is_a_problem_and_not_the_end() {
-        let folder = folder_of(&FILES, Some("{"));
+        let folder = folder_of(&CASE_FILES, Some("{"));
         let cohort = Cohort::open(folder.path(), None).unwrap();
         assert_eq!(cohort.templates, ["t1"]);
         assert_eq!(cohort.problems[0].0, "manifest.json");
-        let lone = folder_of(&FILES[..1], None);
+        let lone = folder_of(&CASE_FILES[..1], None);
         assert!(Cohort::open(lone.path(), None).is_err());
     }
 }

@@ -185,7 +185,7 @@ pub struct VertexField {
 
 impl VertexField {
     /// All names that a field may have.
-    pub const NAMES: [&'static str; 2] = ["Uptake", "Distance"];
+    pub const FIELD_NAMES: [&'static str; 2] = ["Uptake", "Distance"];
 }
 
 impl Metadata {

@@ -116,7 +116,9 @@ pub fn document(
     let written: Written =
         serde_json::from_slice(bytes).map_err(|e| ReadMeshError::Json(e.to_string()))?;
     let field = written.fields.iter().find_map(|(name, values)| {
-        let name = VertexField::NAMES.into_iter().find(|known| known == name)?;
+        let name = VertexField::FIELD_NAMES
+            .into_iter()
+            .find(|known| known == name)?;
         let values = values.as_array()?.iter();
         let values: Vec<f64> = values.map(|x| x.as_f64().unwrap_or(f64::NAN)).collect();
         Some(VertexField {

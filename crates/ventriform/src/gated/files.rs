@@ -161,7 +161,10 @@ impl GatedHeart {
             found.map(|file| file.bytes.as_slice())
         };
         let picture = |(name, _)| Some((name, bytes(name)?));
-        let maps: Vec<(&str, &[u8])> = BeatPage::MAPS.into_iter().filter_map(picture).collect();
+        let maps: Vec<(&str, &[u8])> = BeatPage::POLAR_MAPS
+            .into_iter()
+            .filter_map(picture)
+            .collect();
         let page = report::beat_page(&BeatPage {
             report: &self.report(),
             curve: bytes("curve.svg"),

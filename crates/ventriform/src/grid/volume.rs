@@ -168,7 +168,7 @@ impl Volume {
 mod tests {
     use super::*;
 
-    const ROWS: [[f64; 4]; 4] = [
+    const AFFINE_ROWS: [[f64; 4]; 4] = [
         [2.0, 0.0, 0.0, -7.0],
         [0.0, 3.0, 0.0, 5.0],
         [0.0, 0.5, -4.0, 11.0],
@@ -179,8 +179,8 @@ mod tests {
     fn the_affine_is_taken_in_the_named_frame() {
         let make = |affine| Volume::from_array(vec![0.0, 1.0, f32::NAN, 3.0], [2, 2, 1], affine);
         let (lps, ras) = (
-            make(Affine::Lps(ROWS)).unwrap(),
-            make(Affine::Ras(ROWS)).unwrap(),
+            make(Affine::Lps(AFFINE_ROWS)).unwrap(),
+            make(Affine::Ras(AFFINE_ROWS)).unwrap(),
         );
         let index = Vec3::new(1.0, 1.0, 0.0);
         assert_eq!(lps.frame.to_patient(&index), Vec3::new(-5.0, 8.0, 11.5));
@@ -195,27 +195,30 @@ mod tests {
             Volume::from_array(voxels.to_vec(), shape, Affine::Ras(rows)).unwrap_err()
         };
         let shape = [2, 0, 1];
-        assert_eq!(make(&[], shape, ROWS), ArrayError::Shape { shape });
+        assert_eq!(make(&[], shape, AFFINE_ROWS), ArrayError::Shape { shape });
         let shape = [usize::MAX, 2, 1];
-        assert_eq!(make(&[], shape, ROWS), ArrayError::Shape { shape });
+        assert_eq!(make(&[], shape, AFFINE_ROWS), ArrayError::Shape { shape });
         let counts = ArrayError::Count {
             needed: 4,
             found: 3,
         };
-        assert_eq!(make(&[0.0; 3], [2, 2, 1], ROWS), counts);
+        assert_eq!(make(&[0.0; 3], [2, 2, 1], AFFINE_ROWS), counts);
         let infinite = ArrayError::Infinite { index: 1 };
-        assert_eq!(make(&[0.0, f32::INFINITY], [2, 1, 1], ROWS), infinite);
-        let mut rows = ROWS;
+        assert_eq!(
+            make(&[0.0, f32::INFINITY], [2, 1, 1], AFFINE_ROWS),
+            infinite
+        );
+        let mut rows = AFFINE_ROWS;
         rows[3][3] = 0.0;
         assert_eq!(
             make(&[0.0], [1; 3], rows),
             ArrayError::LastRow { row: [0.0; 4] }
         );
-        let mut rows = ROWS;
+        let mut rows = AFFINE_ROWS;
         rows[0][0] = f64::NAN;
         assert_eq!(make(&[0.0], [1; 3], rows), SingularAffine.into());
         assert!(
-            !Volume::from_array(vec![f32::NAN], [1; 3], Affine::Lps(ROWS))
+            !Volume::from_array(vec![f32::NAN], [1; 3], Affine::Lps(AFFINE_ROWS))
                 .unwrap()
                 .integral
         );

@@ -15,7 +15,7 @@ use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 /// Rows of the apical third (segments 13 to 17).
 const APICAL_ROWS: Range<usize> = 0..RAY_ROWS / 3;
 /// Sectors about the axis.
-const SECTORS: usize = 6;
+const SECTOR_COUNT: usize = 6;
 /// Share of the brightest wall that no sector of a dark apex exceeds. Apices that are thin, not infarcted, keep three
 /// quarters and more in most sectors.
 const DARK_SECTOR_SHARE: f64 = 0.7;
@@ -44,8 +44,8 @@ pub(super) fn dark_apex_uptake(
     let mut all: Vec<f64> = uptake.iter().flatten().copied().collect();
     all.sort_by(f64::total_cmp);
     let brightest = mean(all[all.len() * 3 / 4..].iter().copied())?;
-    let width = RAY_COLUMNS / SECTORS;
-    let sectors = (0..SECTORS).map(|sector| {
+    let width = RAY_COLUMNS / SECTOR_COUNT;
+    let sectors = (0..SECTOR_COUNT).map(|sector| {
         let places = APICAL_ROWS.flat_map(|row| {
             (0..width).map(move |column| row * RAY_COLUMNS + sector * width + column)
         });

@@ -77,7 +77,7 @@ impl Logistic {
 mod tests {
     use super::*;
 
-    const MODEL: Logistic = Logistic {
+    const TWO_TERM_MODEL: Logistic = Logistic {
         intercept: -1.0,
         terms: &[
             Term::new("first", 2.0, 0.5, 1.5),
@@ -88,10 +88,10 @@ mod tests {
     #[test]
     fn the_chance_is_the_logistic_function_of_the_weighted_sum() {
         let chance = |log_odds: f64| 1.0 / (1.0 + (-log_odds).exp());
-        assert!((MODEL.probability(&[2.0, 0.0]) - chance(-1.0)).abs() < 1e-12);
-        assert!((MODEL.probability(&[2.5, 1.0]) - chance(0.2)).abs() < 1e-12);
-        assert!((MODEL.probability(&[99.0, 0.0]) - chance(5.0)).abs() < 1e-12);
-        assert!((MODEL.unlimited_probability(&[2.0, 10.0]) - chance(-4.0)).abs() < 1e-12);
-        assert!((MODEL.unlimited_probability(&[5.0, 0.0]) - chance(8.0)).abs() < 1e-12);
+        assert!((TWO_TERM_MODEL.probability(&[2.0, 0.0]) - chance(-1.0)).abs() < 1e-12);
+        assert!((TWO_TERM_MODEL.probability(&[2.5, 1.0]) - chance(0.2)).abs() < 1e-12);
+        assert!((TWO_TERM_MODEL.probability(&[99.0, 0.0]) - chance(5.0)).abs() < 1e-12);
+        assert!((TWO_TERM_MODEL.unlimited_probability(&[2.0, 10.0]) - chance(-4.0)).abs() < 1e-12);
+        assert!((TWO_TERM_MODEL.unlimited_probability(&[5.0, 0.0]) - chance(8.0)).abs() < 1e-12);
     }
 }

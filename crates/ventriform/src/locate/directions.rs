@@ -34,8 +34,8 @@ impl Compass {
 
     /// The compass of [`directions`]. It is made once in the life of the process.
     pub fn of_directions() -> &'static Self {
-        static MADE: LazyLock<Compass> = LazyLock::new(Compass::new);
-        &MADE
+        static SHARED_COMPASS: LazyLock<Compass> = LazyLock::new(Compass::new);
+        &SHARED_COMPASS
     }
 
     fn new() -> Self {

@@ -384,16 +384,16 @@ mod tests {
     /// A torso with lungs, liver and heart, cut off above and below, that is turned by `turn`;
     /// seen in a cube with edges of `edge` mm.
     fn torso(turn: &Rotation3<f64>, edge: f64) -> Volume {
-        const SPACING: f64 = 6.0;
-        let n = (edge / SPACING) as usize;
+        const SPACING_MM: f64 = 6.0;
+        let n = (edge / SPACING_MM) as usize;
         let shape = [n; 3];
-        let frame = VoxelToPatient::centred(shape, [SPACING; 3], Vec3::zeros()).unwrap();
+        let frame = VoxelToPatient::centred(shape, [SPACING_MM; 3], Vec3::zeros()).unwrap();
         let ball = |p: &Vec3, at: [f64; 3], radius: f64| (p - Vec3::from(at)).norm() < radius;
         Volume::sampled(shape, frame, |p| {
             let p = turn.inverse() * p;
             let inside = (p.x / 170.0).powi(2) + (p.y / 115.0).powi(2) < 1.0;
             match (inside, p.z.abs() < 150.0) {
-                (true, true) if ball(&p, HEART, 35.0) => 10.0,
+                (true, true) if ball(&p, HEART_CENTRE_MM, 35.0) => 10.0,
                 (true, true) if ball(&p, [-80.0, 0.0, -60.0], 70.0) => 6.0,
                 (true, true) if p.z > -20.0 && ball(&p, [-85.0, 0.0, 60.0], 80.0) => 0.4,
                 (true, true) if p.z > 20.0 && ball(&p, [90.0, 20.0, 80.0], 70.0) => 0.4,
@@ -403,10 +403,10 @@ mod tests {
         })
     }
 
-    const HEART: [f64; 3] = [40.0, -30.0, -20.0];
+    const HEART_CENTRE_MM: [f64; 3] = [40.0, -30.0, -20.0];
 
     fn seen(volume: &Volume, turn: &Rotation3<f64>) -> PatientOrientation {
-        let heart = turn * Vec3::from(HEART);
+        let heart = turn * Vec3::from(HEART_CENTRE_MM);
         PatientOrientation::of_body(volume, &heart, &Monitor::silent()).unwrap()
     }
 
@@ -468,7 +468,7 @@ mod tests {
         assert_eq!(seen(&nothing, &turn), PatientOrientation::FRAME);
         // A heart in the dark.
         let volume = torso(&turn, 480.0);
-        let heart = turn * Vec3::from(HEART);
+        let heart = turn * Vec3::from(HEART_CENTRE_MM);
         let mut alone = volume.clone();
         alone
             .voxels

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::marker::PhantomData;
 
-const FORMAT: MeshFormat = MeshFormat::Gltf;
+const OWN_FORMAT: MeshFormat = MeshFormat::Gltf;
 /// Most nodes, meshes, accessors ... of a file.
 const MAX_ITEMS: usize = 1024;
 /// Longest JSON document, bytes, without the buffers in it.
@@ -473,7 +473,7 @@ impl Reader<'_> {
 
 fn broken(place: String, reason: String) -> MeshFileError {
     MeshFileError::Damaged {
-        format: FORMAT,
+        format: OWN_FORMAT,
         place,
         reason,
     }
@@ -485,7 +485,7 @@ fn missing(what: &str, number: usize) -> MeshFileError {
 
 fn unsupported(what: String) -> MeshFileError {
     MeshFileError::Unsupported {
-        format: FORMAT,
+        format: OWN_FORMAT,
         what,
     }
 }

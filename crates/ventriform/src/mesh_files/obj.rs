@@ -7,7 +7,7 @@ use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
 
-const FORMAT: MeshFormat = MeshFormat::Obj;
+const OWN_FORMAT: MeshFormat = MeshFormat::Obj;
 
 /// Statements that say nothing of the surface.
 const SKIPPED_STATEMENTS: [&[u8]; 17] = [
@@ -66,7 +66,7 @@ pub(super) fn is_obj(start: &[u8]) -> bool {
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    let mut cursor = Cursor::new(bytes, FORMAT);
+    let mut cursor = Cursor::new(bytes, OWN_FORMAT);
     let mut said = Said::default();
     let mut vertices: Vec<Vec3> = Vec::new();
     let mut faces = Faces::default();
@@ -96,14 +96,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
             Some(word) => {
                 let shown = word[..word.len().min(32)].escape_ascii();
                 return Err(MeshFileError::Unsupported {
-                    format: FORMAT,
+                    format: OWN_FORMAT,
                     what: format!("the statement `{shown}`"),
                 });
             }
         }
         if line.ends_with(b"\\") {
             return Err(MeshFileError::Unsupported {
-                format: FORMAT,
+                format: OWN_FORMAT,
                 what: "lines that continue after a backslash".into(),
             });
         }

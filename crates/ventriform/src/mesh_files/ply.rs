@@ -11,7 +11,7 @@ use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
 
-const FORMAT: MeshFormat = MeshFormat::Ply;
+const OWN_FORMAT: MeshFormat = MeshFormat::Ply;
 /// Most properties of an element, and most elements.
 const MAX_PROPERTIES: usize = 256;
 
@@ -36,7 +36,7 @@ struct Element {
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    let mut cursor = Cursor::new(bytes, FORMAT);
+    let mut cursor = Cursor::new(bytes, OWN_FORMAT);
     let (encoding, elements, said) = header(&mut cursor)?;
     let mut vertices = Vec::new();
     let mut faces = Faces::default();
@@ -74,7 +74,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
     }
     if faces.triangles.is_empty() && elements.iter().any(|e| e.name == b"tristrips") {
         return Err(MeshFileError::Unsupported {
-            format: FORMAT,
+            format: OWN_FORMAT,
             what: "triangle strips (tristrips)".into(),
         });
     }
@@ -100,7 +100,7 @@ fn points(
         .any(|place| element.properties[*place].kind.bytes() == 1)
     {
         return Err(MeshFileError::Unsupported {
-            format: FORMAT,
+            format: OWN_FORMAT,
             what: "coordinates of one byte".into(),
         });
     }

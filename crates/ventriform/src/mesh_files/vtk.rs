@@ -11,7 +11,7 @@ use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
 
-const FORMAT: MeshFormat = MeshFormat::Vtk;
+const OWN_FORMAT: MeshFormat = MeshFormat::Vtk;
 
 /// The layout of a list of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +24,7 @@ enum Cells {
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
     let mut reader = Reader {
-        cursor: Cursor::new(bytes, FORMAT),
+        cursor: Cursor::new(bytes, OWN_FORMAT),
         binary: false,
     };
     let version = reader.cursor.line()?.unwrap_or_default();
@@ -52,7 +52,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
                 let kind = reader.cursor.word()?.unwrap_or_default();
                 if !kind.eq_ignore_ascii_case(b"POLYDATA") {
                     return Err(MeshFileError::Unsupported {
-                        format: FORMAT,
+                        format: OWN_FORMAT,
                         what: format!("a DATASET of kind {}, not POLYDATA", kind.escape_ascii()),
                     });
                 }
@@ -64,7 +64,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
                 let kind = reader.kind()?;
                 if kind.bytes() == 1 {
                     return Err(MeshFileError::Unsupported {
-                        format: FORMAT,
+                        format: OWN_FORMAT,
                         what: "coordinates of one byte".into(),
                     });
                 }
@@ -133,7 +133,7 @@ impl Reader<'_> {
     fn kind(&mut self) -> Result<NumberType, MeshFileError> {
         let word = self.cursor.word()?.unwrap_or_default().to_ascii_lowercase();
         let kind = kind_of(&word).ok_or_else(|| MeshFileError::Unsupported {
-            format: FORMAT,
+            format: OWN_FORMAT,
             what: format!("numbers of type `{}`", word.escape_ascii()),
         })?;
         self.cursor.line()?;
@@ -236,7 +236,7 @@ impl Reader<'_> {
                 self.texts(entries)?;
                 continue;
             }
-            self.cursor = Cursor::new(before, FORMAT);
+            self.cursor = Cursor::new(before, OWN_FORMAT);
             let kind = self.kind()?;
             let entries = self.require(entries, 1, kind)?;
             if self.binary {

@@ -14,7 +14,7 @@ use crate::geometry::Vec3;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 
-const FORMAT: MeshFormat = MeshFormat::Vtp;
+const OWN_FORMAT: MeshFormat = MeshFormat::Vtp;
 /// Most pieces of a file.
 const MAX_PIECES: usize = 64;
 /// Deepest tags.
@@ -55,7 +55,11 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
         at = tag.end;
         if tag.closes {
             if path.pop() != Some(tag.name) {
-                return Err(damaged(FORMAT, at, "a tag closes another than the last"));
+                return Err(damaged(
+                    OWN_FORMAT,
+                    at,
+                    "a tag closes another than the last",
+                ));
             }
             continue;
         }
@@ -63,7 +67,8 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
             (b"VTKFile", _) => file.open(&tag)?,
             (b"AppendedData", _) => {
                 let begin = xml::find(bytes, at, b"_");
-                let begin = begin.ok_or_else(|| damaged(FORMAT, at, "no `_` begins the data"))?;
+                let begin =
+                    begin.ok_or_else(|| damaged(OWN_FORMAT, at, "no `_` begins the data"))?;
                 file.appended = &bytes[begin + 1..];
                 file.raw = tag.value(b"encoding") == Some(b"raw");
                 break;
@@ -71,7 +76,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
             (b"Piece", _) => {
                 if pieces.len() == MAX_PIECES {
                     return Err(damaged(
-                        FORMAT,
+                        OWN_FORMAT,
                         at,
                         format!("more than {MAX_PIECES} pieces"),
                     ));
@@ -109,7 +114,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
         }
         if !tag.empty {
             if path.len() == MAX_TAG_DEPTH {
-                return Err(damaged(FORMAT, at, "the tags nest too deep"));
+                return Err(damaged(OWN_FORMAT, at, "the tags nest too deep"));
             }
             path.push(tag.name);
         }
@@ -150,7 +155,7 @@ struct File<'a> {
 impl File<'_> {
     fn open(&mut self, tag: &Tag<'_>) -> Result<(), MeshFileError> {
         let unsupported = |what: String| MeshFileError::Unsupported {
-            format: FORMAT,
+            format: OWN_FORMAT,
             what,
         };
         let kind = tag.value(b"type").unwrap_or_default();
@@ -188,7 +193,7 @@ impl File<'_> {
         let count = points.len() / 3;
         if points.len() % 3 != 0 || piece.stated_points.is_some_and(|n| n != count as u64) {
             return Err(MeshFileError::Damaged {
-                format: FORMAT,
+                format: OWN_FORMAT,
                 place: "Points".into(),
                 reason: format!(
                     "the array has {} numbers, and the piece states {} points",
@@ -213,7 +218,7 @@ impl File<'_> {
                     None
                 };
                 let cell = cell.ok_or_else(|| MeshFileError::Damaged {
-                    format: FORMAT,
+                    format: OWN_FORMAT,
                     place: "offsets".into(),
                     reason: format!("a cell leads from {begin} to {end} of {}", corners.len()),
                 })?;
@@ -239,11 +244,11 @@ impl File<'_> {
     /// The numbers of an array.
     fn numbers(&mut self, array: Array<'_>) -> Result<Vec<f64>, MeshFileError> {
         let kind = array.kind.ok_or_else(|| MeshFileError::Unsupported {
-            format: FORMAT,
+            format: OWN_FORMAT,
             what: "an array of points or cells without a type of numbers".into(),
         })?;
         if let Content::Text(text) = array.content {
-            let mut cursor = Cursor::new(text.trim_ascii(), FORMAT);
+            let mut cursor = Cursor::new(text.trim_ascii(), OWN_FORMAT);
             let mut numbers = Vec::new();
             while !cursor.rest().is_empty() {
                 numbers.push(cursor.number()?);
@@ -253,7 +258,7 @@ impl File<'_> {
         // Numbers take eight bytes of memory each.
         if kind.bytes() == 1 {
             return Err(MeshFileError::Unsupported {
-                format: FORMAT,
+                format: OWN_FORMAT,
                 what: "points or cells of one byte".into(),
             });
         }
@@ -269,7 +274,7 @@ impl File<'_> {
     fn text(&mut self, array: Array<'_>) -> Result<Vec<u8>, MeshFileError> {
         let bytes = match array.content {
             Content::Text(text) => {
-                let mut cursor = Cursor::new(text, FORMAT);
+                let mut cursor = Cursor::new(text, OWN_FORMAT);
                 let mut bytes = Vec::new();
                 while let Some(word) = cursor.word()? {
                     let code = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
@@ -386,7 +391,7 @@ impl File<'_> {
 
 fn broken(reason: String) -> MeshFileError {
     MeshFileError::Damaged {
-        format: FORMAT,
+        format: OWN_FORMAT,
         place: "an array".into(),
         reason,
     }
@@ -413,26 +418,26 @@ fn array<'a>(bytes: &'a [u8], tag: &Tag<'a>) -> Result<Array<'a>, MeshFileError>
         let end = xml::find(bytes, tag.end, b"<").unwrap_or(bytes.len());
         &bytes[tag.end..end]
     };
-    let content = match tag.value(b"format").unwrap_or(b"ascii") {
-        b"ascii" => Content::Text(text),
-        b"binary" => Content::Base64(text),
-        b"appended" => {
-            let offset = tag.value(b"offset").and_then(whole);
-            let offset = offset.and_then(|o| usize::try_from(o).ok());
-            Content::Appended(
-                offset
-                    .ok_or_else(|| damaged(FORMAT, tag.end, "an appended array has no offset"))?,
-            )
-        }
-        other => {
-            let shown = other.escape_ascii();
-            return Err(damaged(
-                FORMAT,
-                tag.end,
-                format!("the format `{shown}` is unknown"),
-            ));
-        }
-    };
+    let content =
+        match tag.value(b"format").unwrap_or(b"ascii") {
+            b"ascii" => Content::Text(text),
+            b"binary" => Content::Base64(text),
+            b"appended" => {
+                let offset = tag.value(b"offset").and_then(whole);
+                let offset = offset.and_then(|o| usize::try_from(o).ok());
+                Content::Appended(offset.ok_or_else(|| {
+                    damaged(OWN_FORMAT, tag.end, "an appended array has no offset")
+                })?)
+            }
+            other => {
+                let shown = other.escape_ascii();
+                return Err(damaged(
+                    OWN_FORMAT,
+                    tag.end,
+                    format!("the format `{shown}` is unknown"),
+                ));
+            }
+        };
     Ok(Array { kind, content })
 }
 

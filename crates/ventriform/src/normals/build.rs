@@ -2,7 +2,7 @@
 //!
 //! 1. Every scan starts with the scale of its own median; mean and standard deviation follow from the scaled scans.
 //! 2. Scale and pattern of every scan are matched to them ([`matched_places`]), and mean, deviation and the patterns'
-//!    covariance follow from what is left, in [`ROUNDS`] rounds.
+//!    covariance follow from what is left, in [`MATCHING_ROUNDS`] rounds.
 //! 3. The relative variance is smoothed over neighbouring places, because a dozen or two people tell that of one
 //!    place badly, and is at least that of [`LEAST_RELATIVE_SD`]. It grows by 1/n, the variance of the mean.
 //!
@@ -26,7 +26,7 @@ use crate::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
 use rayon::prelude::*;
 
 /// Rounds of matching.
-const ROUNDS: usize = 4;
+const MATCHING_ROUNDS: usize = 4;
 /// Least standard deviation as a share of the mean.
 const LEAST_RELATIVE_SD: f64 = 0.03;
 /// The standard deviation of the first round, as a share of the mean.
@@ -186,7 +186,7 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
         sd: only_known(&|index| FIRST_RELATIVE_SD * mean[index]),
         covariance: TermMatrix::zeros(),
     };
-    for _ in 0..ROUNDS {
+    for _ in 0..MATCHING_ROUNDS {
         let precision = limits.precision();
         let matched: Vec<(Vec<Option<f64>>, Option<Coefficients>)> = scans
             .iter()

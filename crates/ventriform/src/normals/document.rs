@@ -2,7 +2,7 @@
 
 use super::error::NormalsError;
 use super::kind::{GroupSex, ScanKind, yes_or_no};
-use super::pattern::TERMS;
+use super::pattern::PATTERN_TERMS;
 use super::sizes::{FEWEST_CASES, NORMALS_SCHEMA_VERSION};
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use crate::text::{at_most, hex};
@@ -114,7 +114,7 @@ pub struct LimitMap {
     pub sd: Vec<Vec<Option<f64>>>,
     /// Covariance of the coefficients by which healthy people differ from the mean as a whole: of 2 r - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a,
     /// r sin 2a, with the way r from apex (0) to base (1) and the angle a from lateral over anterior. `sd` is what is left beside these.
-    pub pattern_covariance: [[f64; TERMS]; TERMS],
+    pub pattern_covariance: [[f64; PATTERN_TERMS]; PATTERN_TERMS],
 }
 
 /// Limits of a figure of the whole heart, or of a segment.
@@ -419,7 +419,7 @@ impl NormalLimits {
             }
             let mut covariance = group.map.pattern_covariance.iter().flatten();
             if covariance.any(|x| !x.is_finite())
-                || (0..TERMS).any(|n| group.map.pattern_covariance[n][n] < 0.0)
+                || (0..PATTERN_TERMS).any(|n| group.map.pattern_covariance[n][n] < 0.0)
             {
                 return Err(field(
                     at("map.pattern_covariance"),

@@ -47,7 +47,7 @@ pub use error::NormalsError;
 pub use flags::NormalsFlag;
 pub use kind::{GroupSex, ScanKind, Sex, yes_or_no};
 pub use matching::{MATCHED_Z, Matched, matched};
-pub use pattern::{Coefficients, TERMS, TermMatrix};
+pub use pattern::{Coefficients, PATTERN_TERMS, TermMatrix};
 pub use perfusion::{
     DEFICIT_OF_FULL_SCORE, FigureBeside, HeartFigure, NormalsUsed, Perfusion, SegmentPerfusion,
     TerritoryPerfusion, Z_LIMIT, apply, summed_percent,

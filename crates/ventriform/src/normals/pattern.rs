@@ -1,6 +1,6 @@
 //! The patterns in which healthy hearts differ from their mean as a whole: attenuation, the apex's own uptake, the position in the chest.
 //!
-//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`TERMS`] smooth functions of the place, with
+//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`PATTERN_TERMS`] smooth functions of the place, with
 //! coefficients that vary from person to person. Their covariance among the healthy is part of the limits. It is the
 //! prior of a scan's own coefficients, so that what healthy people vary in is taken off before a place is called low,
 //! while a defect, which no healthy person has, hardly is.
@@ -10,16 +10,16 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
 
 /// Number of functions.
-pub const TERMS: usize = 6;
+pub const PATTERN_TERMS: usize = 6;
 /// Neighbouring places are not independent: as many of them count as one.
 const CORRELATED_PLACES: f64 = 40.0;
 /// Least share of the mean that a scan's pattern leaves.
 const LEAST_SHARE: f64 = 0.3;
 
 /// Coefficients of the functions.
-pub type Coefficients = SVector<f64, TERMS>;
+pub type Coefficients = SVector<f64, PATTERN_TERMS>;
 /// A matrix over the functions.
-pub type TermMatrix = SMatrix<f64, TERMS, TERMS>;
+pub type TermMatrix = SMatrix<f64, PATTERN_TERMS, PATTERN_TERMS>;
 
 /// The functions at a place. With the way r from apex (0) to base (1) and the angle a from lateral over anterior: 2 r
 /// - 1, r cos a, r sin a, (2 r - 1)² - 1/3, r cos 2a, r sin 2a.
@@ -53,18 +53,20 @@ pub(super) struct RatioAt {
 /// Level and coefficients of these ratios, about `precision`, the inverse of the coefficients' covariance; `None`
 /// without places, or if the level is not above 0.
 pub(super) fn fitted(ratios: &[RatioAt], precision: &TermMatrix) -> Option<(f64, Coefficients)> {
-    const ALL: usize = TERMS + 1;
-    let mut system = SMatrix::<f64, ALL, ALL>::zeros();
-    let mut right = SVector::<f64, ALL>::zeros();
+    const UNKNOWNS_OF_FIT: usize = PATTERN_TERMS + 1;
+    let mut system = SMatrix::<f64, UNKNOWNS_OF_FIT, UNKNOWNS_OF_FIT>::zeros();
+    let mut right = SVector::<f64, UNKNOWNS_OF_FIT>::zeros();
     for at in ratios {
         let terms = terms_at(at.index);
-        let row = SVector::<f64, ALL>::from_fn(|n, _| if n == 0 { 1.0 } else { terms[n - 1] });
+        let row = SVector::<f64, UNKNOWNS_OF_FIT>::from_fn(
+            |n, _| if n == 0 { 1.0 } else { terms[n - 1] },
+        );
         let weight = at.area / (at.relative_sd * at.relative_sd * CORRELATED_PLACES);
         system += row * row.transpose() * weight;
         right += row * (weight * (at.ratio - 1.0));
     }
-    for a in 0..TERMS {
-        for b in 0..TERMS {
+    for a in 0..PATTERN_TERMS {
+        for b in 0..PATTERN_TERMS {
             system[(a + 1, b + 1)] += precision[(a, b)];
         }
     }

@@ -10,20 +10,22 @@ use crate::geometry::random::{Purpose, stream, uniform};
 use crate::polar::{Level, RAY_COLUMNS, RAY_ROWS, segment_at};
 use std::sync::LazyLock;
 
-const PLACES: usize = RAY_ROWS * RAY_COLUMNS;
+const PLACE_COUNT: usize = RAY_ROWS * RAY_COLUMNS;
 
 /// A wall whose apex takes the first 5 rows and whose last 3 rows are masked.
 fn wall(uptake: impl Fn(usize, usize) -> f64) -> ScanPlaces {
     let at = |index: usize| (index / RAY_COLUMNS, index % RAY_COLUMNS);
     ScanPlaces {
-        uptake: (0..PLACES)
+        uptake: (0..PLACE_COUNT)
             .map(|index| {
                 let (row, column) = at(index);
                 (row < RAY_ROWS - 3).then(|| uptake(row, column))
             })
             .collect(),
-        area: (0..PLACES).map(|index| 1.0 + at(index).0 as f64).collect(),
-        segment: (0..PLACES)
+        area: (0..PLACE_COUNT)
+            .map(|index| 1.0 + at(index).0 as f64)
+            .collect(),
+        segment: (0..PLACE_COUNT)
             .map(|index| {
                 let (row, column) = at(index);
                 let level = Level::ALL
@@ -44,7 +46,7 @@ fn person(seed: u64) -> HealthyScan {
     let mut random = stream(seed, Purpose::Measure);
     let scale = 0.5 + uniform(&mut random);
     let tilt = 0.1 * (uniform(&mut random) - 0.5);
-    let noise: Vec<f64> = (0..PLACES)
+    let noise: Vec<f64> = (0..PLACE_COUNT)
         .map(|_| 1.0 + 0.1 * (uniform(&mut random) - 0.5))
         .collect();
     let places = wall(|row, column| {
@@ -80,9 +82,9 @@ fn people(number: u64) -> Vec<HealthyScan> {
 }
 
 fn group() -> NormalGroup {
-    static GROUP: LazyLock<NormalGroup> =
+    static HEALTHY_GROUP: LazyLock<NormalGroup> =
         LazyLock::new(|| group_of(&kind(), &people(14)).unwrap().0);
-    GROUP.clone()
+    HEALTHY_GROUP.clone()
 }
 
 fn file() -> NormalLimits {
@@ -135,7 +137,7 @@ fn limits_of_equal_hearts_are_that_heart_and_the_least_deviation() {
         .collect();
     let limits = limits_of(&scans.iter().collect::<Vec<_>>());
     let known: Vec<f64> = limits.mean.iter().flatten().copied().collect();
-    assert_eq!(known.len(), PLACES - 3 * RAY_COLUMNS);
+    assert_eq!(known.len(), PLACE_COUNT - 3 * RAY_COLUMNS);
     let level = known.iter().sum::<f64>() / known.len() as f64;
     assert!((level - 1.0).abs() < 1e-12);
     let expected = |index: usize| even(index / RAY_COLUMNS, 0);
@@ -205,7 +207,7 @@ fn a_defect_of_known_depth_has_the_score_of_the_formula() {
         });
         let found = figures(&scan, &limits).unwrap();
         let (mut area, mut dark, mut score, mut low, mut severity) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for index in 0..PLACES {
+        for index in 0..PLACE_COUNT {
             let (Some(mean), Some(sd)) = (limits.mean[index], limits.sd[index]) else {
                 continue;
             };

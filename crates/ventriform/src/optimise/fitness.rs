@@ -134,14 +134,15 @@ impl FitnessFunction {
 mod tests {
     use super::*;
 
-    const LENGTHS: Lengths = Lengths {
+    const MESH_LENGTHS: Lengths = Lengths {
         voxel: 2.0,
         edge: 12.0,
     };
 
     #[test]
     fn a_perfect_configuration_has_fitness_one_in_the_normalised_form() {
-        let fitness = FitnessFunction::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], LENGTHS);
+        let fitness =
+            FitnessFunction::new(FitnessForm::Normalised, [1.0, 2.0, 3.0, 4.0], MESH_LENGTHS);
         let perfect = FitnessTerms {
             c: 1.0,
             ..FitnessTerms::default()
@@ -160,16 +161,16 @@ mod tests {
             c: 1.25,
             d: 0.5,
         };
-        let raw = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&terms);
+        let raw = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).of(&terms);
         assert!((raw - (5.0 + 2.0 + 0.8 + 4.0) / 4.0).abs() < 1e-12);
-        let robust = FitnessFunction::new(FitnessForm::Robust, [1.0; 4], LENGTHS).of(&terms);
+        let robust = FitnessFunction::new(FitnessForm::Robust, [1.0; 4], MESH_LENGTHS).of(&terms);
         let expected = 1.0 / 0.2f64.to_degrees() + 1.0 / 0.5f64.to_degrees() + 0.8 + 2.0;
         assert!((robust - expected / 4.0).abs() < 1e-12);
         let flat = FitnessTerms {
             c: 1.0,
             ..FitnessTerms::default()
         };
-        let capped = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], LENGTHS).of(&flat);
+        let capped = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).of(&flat);
         assert!((capped - (20.0 + 20.0 + 1.0 + 20.0) / 4.0).abs() < 1e-12);
     }
 }

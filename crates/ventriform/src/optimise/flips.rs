@@ -295,7 +295,7 @@ mod tests {
     use crate::optimise::{Reference, configurations};
     use crate::surface::Surface;
 
-    const LENGTHS: Lengths = Lengths {
+    const MESH_LENGTHS: Lengths = Lengths {
         voxel: 2.0,
         edge: 12.0,
     };
@@ -349,7 +349,7 @@ mod tests {
 
     fn rules(form: FitnessForm, gain: Gain, guard: f64) -> FlipRules {
         FlipRules {
-            fitness: FitnessFunction::new(form, [1.0; 4], LENGTHS),
+            fitness: FitnessFunction::new(form, [1.0; 4], MESH_LENGTHS),
             gain,
             guard,
         }
@@ -363,7 +363,7 @@ mod tests {
             let state = configurations(&mesh, &reference).unwrap();
             let edges = mesh.triangles.len() as f64 * 1.5;
             for form in [FitnessForm::Raw, FitnessForm::Normalised] {
-                let fitness = FitnessFunction::new(form, [1.0, 2.0, 0.5, 1.0], LENGTHS);
+                let fitness = FitnessFunction::new(form, [1.0, 2.0, 0.5, 1.0], MESH_LENGTHS);
                 let before = state.mean(&fitness) * edges;
                 for h in state.half_edges().edges().step_by(3) {
                     let found = state.candidate(h, &fitness, Gain::Total, 0.0, -1e9);
@@ -627,7 +627,8 @@ mod tests {
         let (mut loose, mut guarded) = (0, 0);
         for (mesh, reference) in cases() {
             let state = configurations(&mesh, &reference).unwrap();
-            let fitness = FitnessFunction::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], LENGTHS);
+            let fitness =
+                FitnessFunction::new(FitnessForm::Robust, [0.0, 0.0, 0.0, 1.0], MESH_LENGTHS);
             let square = |corners: &[VertexId]| {
                 let sum: Vec3 = corners.iter().map(|v| mesh.vertices[v.index()]).sum();
                 let middle = sum / corners.len() as f64;

@@ -40,7 +40,7 @@ impl BeatChoice {
 impl Parameters for BeatChoice {
     type Draft = Self;
 
-    const SPECS: &'static [ParameterSpec<Self>] = BEAT_SPECS;
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = BEAT_SPECS;
 
     fn finish(choice: Self) -> Result<Self, ParameterError> {
         Ok(choice)
@@ -93,7 +93,7 @@ pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
 ];
 
 impl BesideFit for BeatChoice {
-    const WORK: &'static str = "a beat";
+    const WORK_NOUN: &'static str = "a beat";
     const WITHOUT_USE: &'static [(&'static str, &'static str)] = &[
         ("frame", "all gates are fitted together"),
         ("expert", NO_EXPERT),

@@ -10,7 +10,7 @@ pub struct CalibrationChoice;
 impl Parameters for CalibrationChoice {
     type Draft = Self;
 
-    const SPECS: &'static [ParameterSpec<Self>] = &[];
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = &[];
 
     fn finish(choice: Self) -> Result<Self, ParameterError> {
         Ok(choice)
@@ -20,7 +20,7 @@ impl Parameters for CalibrationChoice {
 const NO_LIMITS: &str = "no scan is compared with normal limits";
 
 impl BesideFit for CalibrationChoice {
-    const WORK: &'static str = "a profile";
+    const WORK_NOUN: &'static str = "a profile";
     const WITHOUT_USE: &'static [(&'static str, &'static str)] = &[
         ("model", "the built-in hearts are fitted"),
         ("expert", "the reader's masks are in the cohort"),

@@ -18,7 +18,9 @@ pub(super) fn read_back_unchanged<P: Parameters + PartialEq + Debug>(lists: &[&[
 
 /// Checks that the defaults in the table are those of the code.
 pub(super) fn table_states_defaults<P: Parameters + PartialEq + Debug + Default>() {
-    let stated = P::SPECS.iter().filter(|spec| !spec.default.is_empty());
+    let stated = P::PARAMETER_SPECS
+        .iter()
+        .filter(|spec| !spec.default.is_empty());
     let stated = P::from_pairs(stated.map(|spec| (spec.name, spec.default)));
     assert_eq!(stated.unwrap(), P::default());
 }

@@ -42,7 +42,7 @@ pub struct Correction {
 
 impl Correction {
     /// The parameters of a fit that a correction states, by their names in its table.
-    const NAMES: [&str; 4] = ["center", "axis", "base", "segments_from"];
+    const CORRECTED_PARAMETERS: [&str; 4] = ["center", "axis", "base", "segments_from"];
 
     /// Puts the correction into the parameters of the fit to its scan.
     pub fn correct(&self, parameters: &mut FitParameters) {
@@ -71,14 +71,17 @@ impl ComparisonChoice {
                 .cloned()
         };
         let of_scan = |name: &str| Some((format!("{}_{name}", scan.as_str()), stated(name)?));
-        Correction::NAMES.into_iter().filter_map(of_scan).collect()
+        Correction::CORRECTED_PARAMETERS
+            .into_iter()
+            .filter_map(of_scan)
+            .collect()
     }
 }
 
 impl Parameters for ComparisonChoice {
     type Draft = Self;
 
-    const SPECS: &'static [ParameterSpec<Self>] = COMPARISON_SPECS;
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = COMPARISON_SPECS;
 
     fn finish(choice: Self) -> Result<Self, ParameterError> {
         Ok(choice)
@@ -236,7 +239,7 @@ const ONE_SCAN: &str =
     "the heart lies elsewhere in each of both scans: `stress_center`, `rest_center` and their like";
 
 impl BesideFit for ComparisonChoice {
-    const WORK: &'static str = "a comparison";
+    const WORK_NOUN: &'static str = "a comparison";
     const WITHOUT_USE: &'static [(&'static str, &'static str)] = &[
         ("frame", "the gates of both scans are added up"),
         ("expert", NO_EXPERT),

@@ -16,9 +16,9 @@ use serde_json::{Value, json};
 impl Parameters for FitParameters {
     type Draft = Self;
 
-    const SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = FIT_SPECS;
 
-    const ALIASES: &'static [(&'static str, &'static str)] =
+    const NAME_ALIASES: &'static [(&'static str, &'static str)] =
         &[("template", "model"), ("centre", "center")];
 
     fn finish(parameters: Self) -> Result<Self, ParameterError> {

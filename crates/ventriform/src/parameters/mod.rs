@@ -1,7 +1,7 @@
 //! The parameters of a model, of a fit, of a beat, of a comparison and of normal limits, by the names that users give
 //! them.
 //!
-//! Tables, [`SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`] and [`NORMALS_SPECS`], define names, types,
+//! Tables, [`MODEL_SPECS`], [`FIT_SPECS`], [`BEAT_SPECS`], [`COMPARISON_SPECS`] and [`NORMALS_SPECS`], define names, types,
 //! ranges, defaults and help texts for the command line, query strings, the JSON of jobs and the OpenAPI document. Text or JSON goes
 //! in; [`ModelParameters`], [`FitParameters`] or [`WithFit`] come out, with every value of the right type and in its
 //! range, or a [`ParameterError`] with the name of the first invalid parameter.
@@ -34,7 +34,7 @@ pub use model::ModelParameters;
 pub use normals::{CohortCase, NORMALS_SPECS, NormalsChoice, NormalsParameters};
 #[cfg(feature = "schema")]
 pub use schema::schema_of;
-pub use specs::SPECS;
+pub use specs::MODEL_SPECS;
 pub use table::{ParameterSpec, Parameters};
 pub use with_fit::{BesideFit, WithFit};
 

@@ -16,7 +16,7 @@ pub struct NormalsChoice {
 impl Parameters for NormalsChoice {
     type Draft = Self;
 
-    const SPECS: &'static [ParameterSpec<Self>] = NORMALS_SPECS;
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = NORMALS_SPECS;
 
     fn finish(choice: Self) -> Result<Self, ParameterError> {
         Ok(choice)
@@ -38,10 +38,10 @@ pub const NORMALS_SPECS: &[ParameterSpec<NormalsChoice>] = &[ParameterSpec {
 
 const NO_EXPERT: &str = "limits are compared with no expert's mask";
 const EACH_SCAN: &str = "the heart lies elsewhere in each scan";
-const TABLE: &str = "the cohort's table states it for each scan";
+const STATED_BY_TABLE: &str = "the cohort's table states it for each scan";
 
 impl BesideFit for NormalsChoice {
-    const WORK: &'static str = "normal limits";
+    const WORK_NOUN: &'static str = "normal limits";
     const WITHOUT_USE: &'static [(&'static str, &'static str)] = &[
         ("model", "the built-in hearts are fitted"),
         ("kept_model", "the built-in hearts are fitted"),
@@ -53,10 +53,10 @@ impl BesideFit for NormalsChoice {
         ("mesh_frame", NO_EXPERT),
         ("reader", "limits draw no wall"),
         ("normals", "they are what is built"),
-        ("sex", TABLE),
-        ("protocol", TABLE),
-        ("tracer", TABLE),
-        ("attenuation_corrected", TABLE),
+        ("sex", STATED_BY_TABLE),
+        ("protocol", STATED_BY_TABLE),
+        ("tracer", STATED_BY_TABLE),
+        ("attenuation_corrected", STATED_BY_TABLE),
         ("organ", "only left ventricles have normal limits"),
         ("mask_grid", "limits have no masks"),
         ("center", EACH_SCAN),

@@ -74,12 +74,17 @@ impl PartialSchema for NormalsParameters {
 
 fn with_fit<C: BesideFit>() -> RefOr<Schema> {
     let of_fit = WithFit::<C>::fit_specs().map(|spec| (spec.name, schema_of(spec)));
-    let own = C::SPECS.iter().map(|spec| (spec.name, schema_of(spec)));
-    object_with(&format!("The parameters of {}", C::WORK), of_fit.chain(own))
+    let own = C::PARAMETER_SPECS
+        .iter()
+        .map(|spec| (spec.name, schema_of(spec)));
+    object_with(
+        &format!("The parameters of {}", C::WORK_NOUN),
+        of_fit.chain(own),
+    )
 }
 
 fn object_of<P: Parameters>(description: &str) -> RefOr<Schema> {
-    let rows = P::SPECS.iter();
+    let rows = P::PARAMETER_SPECS.iter();
     object_with(description, rows.map(|spec| (spec.name, schema_of(spec))))
 }
 

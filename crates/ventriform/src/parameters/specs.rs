@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 impl Parameters for ModelParameters {
     type Draft = ModelDraft;
 
-    const SPECS: &'static [ParameterSpec<Self>] = SPECS;
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>] = MODEL_SPECS;
 
     fn finish(draft: ModelDraft) -> Result<Self, ParameterError> {
         Self::settle(draft)
@@ -19,7 +19,7 @@ impl Parameters for ModelParameters {
 }
 
 /// Every parameter of a model, in the order in which the stages use them.
-pub const SPECS: &[ParameterSpec<ModelParameters>] = &[
+pub const MODEL_SPECS: &[ParameterSpec<ModelParameters>] = &[
     integer!(
         "points",
         retile.points,

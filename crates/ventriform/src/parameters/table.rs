@@ -146,10 +146,10 @@ pub trait Parameters: Sized + 'static {
     type Draft: Default;
 
     /// The table, in the order in which the stages use the values.
-    const SPECS: &'static [ParameterSpec<Self>];
+    const PARAMETER_SPECS: &'static [ParameterSpec<Self>];
 
     /// Alternative names: (alternative, name in the table).
-    const ALIASES: &'static [(&'static str, &'static str)] = &[];
+    const NAME_ALIASES: &'static [(&'static str, &'static str)] = &[];
 
     /// Fills in the defaults that depend on other parameters.
     ///
@@ -187,7 +187,7 @@ pub trait Parameters: Sized + 'static {
     /// Every parameter that is set, by name, including defaults. [`Parameters::from_json`] reads it
     /// back.
     fn to_json(&self) -> Map<String, Value> {
-        Self::SPECS
+        Self::PARAMETER_SPECS
             .iter()
             .map(|spec| (spec.name.to_owned(), (spec.write)(self)))
             .filter(|(_, value)| !value.is_null())
@@ -262,13 +262,16 @@ impl<P: Parameters> ParameterSpec<P> {
 /// # Errors
 /// A [`ParameterError`] with the nearest known name.
 fn find<P: Parameters>(name: &str) -> Result<&'static ParameterSpec<P>, ParameterError> {
-    let alias = P::ALIASES.iter().find(|(other, _)| *other == name);
+    let alias = P::NAME_ALIASES.iter().find(|(other, _)| *other == name);
     let own = alias.map_or(name, |(_, own)| own);
-    let names = || P::SPECS.iter().map(|spec| spec.name);
-    P::SPECS.iter().find(|s| s.name == own).ok_or_else(|| {
-        let aliases = P::ALIASES.iter().map(|(other, _)| *other);
-        unknown(name, &names().collect::<Vec<_>>(), aliases)
-    })
+    let names = || P::PARAMETER_SPECS.iter().map(|spec| spec.name);
+    P::PARAMETER_SPECS
+        .iter()
+        .find(|s| s.name == own)
+        .ok_or_else(|| {
+            let aliases = P::NAME_ALIASES.iter().map(|(other, _)| *other);
+            unknown(name, &names().collect::<Vec<_>>(), aliases)
+        })
 }
 
 /// The error about a name that is none of `names` and `aliases`, with the nearest of them.

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 /// Parameters of work beside those of its fits.
 pub trait BesideFit: Parameters + Default {
     /// The work, with its article.
-    const WORK: &'static str;
+    const WORK_NOUN: &'static str;
     /// Parameters of a fit that the work has no use for, and why.
     const WITHOUT_USE: &'static [(&'static str, &'static str)];
 }
@@ -63,22 +63,22 @@ impl<C: BesideFit> WithFit<C> {
     ) -> Result<Self, ParameterError> {
         let (mut own, mut of_fit) = (Vec::new(), Vec::new());
         for (name, value) in given {
-            if C::SPECS.iter().any(|spec| spec.name == name) {
+            if C::PARAMETER_SPECS.iter().any(|spec| spec.name == name) {
                 own.push((name, value));
                 continue;
             }
             if let Some(why) = why_unused::<C>(name) {
                 return Err(ParameterError {
                     field: name.into(),
-                    message: format!("{} has no use for it: {why}", C::WORK),
+                    message: format!("{} has no use for it: {why}", C::WORK_NOUN),
                     fix: "Leave it out.".into(),
                 });
             }
-            let aliases = || FitParameters::ALIASES.iter().map(|(other, _)| *other);
+            let aliases = || FitParameters::NAME_ALIASES.iter().map(|(other, _)| *other);
             let mut known = Self::fit_specs().map(|spec| spec.name);
             if !known.any(|known| known == name) && !aliases().any(|alias| alias == name) {
                 let names = Self::fit_specs().map(|spec| spec.name);
-                let names = names.chain(C::SPECS.iter().map(|spec| spec.name));
+                let names = names.chain(C::PARAMETER_SPECS.iter().map(|spec| spec.name));
                 return Err(unknown(name, &names.collect::<Vec<_>>(), aliases()));
             }
             of_fit.push((name, value));

@@ -6,7 +6,7 @@
 //! 1. The image's end of a column: where its values fall below [`END_SHARE`] of the column's own level (its largest
 //!    value in [`LEVEL_ROWS`]), seen from the base. A wall's end, blurred, has half of its height there, whatever the
 //!    blur.
-//! 2. The image's ends less the rim: a robust fit of a level and a tilt ([`TERMS`] numbers; columns far from it
+//! 2. The image's ends less the rim: a robust fit of a level and a tilt ([`TILT_TERMS`] numbers; columns far from it
 //!    hardly count, [`OUTLIER_MM`]) says by how much the whole rim is off.
 //! 3. A column whose image ends beyond the fit, or up to [`FOLLOWED_MM`] before it, ends where its image does. One
 //!    that ends more than [`DEFECT_MM`] before it is dark, not short: a defect, which must show, so the muscle ends
@@ -28,7 +28,7 @@ const END_SHARE: f64 = 0.5;
 /// Rows whose largest value is a column's level.
 const LEVEL_ROWS: std::ops::Range<usize> = 14..27;
 /// Numbers of the fit: level, cosine and sine of the angle.
-const TERMS: usize = 3;
+const TILT_TERMS: usize = 3;
 /// Distance from the fit at which a column counts half, mm.
 const OUTLIER_MM: f64 = 3.0;
 /// Rounds of reweighting.
@@ -91,14 +91,14 @@ fn image_end(largest: &[f64], column: usize) -> f64 {
 fn fitted(values: &[f64; RAY_COLUMNS]) -> [f64; RAY_COLUMNS] {
     let terms = |column: usize| {
         let (sin, cos) = (TAU * (column as f64 + 0.5) / RAY_COLUMNS as f64).sin_cos();
-        SVector::<f64, TERMS>::new(1.0, cos, sin)
+        SVector::<f64, TILT_TERMS>::new(1.0, cos, sin)
     };
     let mut sorted = *values;
     sorted.sort_by(f64::total_cmp);
-    let mut found = SVector::<f64, TERMS>::new(sorted[RAY_COLUMNS / 2], 0.0, 0.0);
+    let mut found = SVector::<f64, TILT_TERMS>::new(sorted[RAY_COLUMNS / 2], 0.0, 0.0);
     for _ in 0..REWEIGHTING_ROUNDS {
-        let mut system = SMatrix::<f64, TERMS, TERMS>::zeros();
-        let mut right = SVector::<f64, TERMS>::zeros();
+        let mut system = SMatrix::<f64, TILT_TERMS, TILT_TERMS>::zeros();
+        let mut right = SVector::<f64, TILT_TERMS>::zeros();
         for (column, value) in values.iter().enumerate() {
             let terms = terms(column);
             let odd = (value - terms.dot(&found)) / OUTLIER_MM;

@@ -193,7 +193,7 @@ const PROFILE_FORMAT: &str = "ventriform-reader-profile";
 /// The names of the distances and the greatest that are believed, mm.
 const MAX_OFFSETS_MM: [(&str, f64); 3] = [("endocardium", 8.0), ("epicardium", 8.0), ("rim", 20.0)];
 /// The levels that are believed.
-const LEVELS: RangeInclusive<f64> = 0.1..=0.95;
+const PLAUSIBLE_LEVELS: RangeInclusive<f64> = 0.1..=0.95;
 /// Longest JSON that is read, bytes.
 pub const MOST_BYTES: usize = 1 << 20;
 /// Most masks of a profile.
@@ -367,9 +367,10 @@ impl ProfileDocument {
                     return Err(refused("offsets_mm", other));
                 }
                 let level = self.level.ok_or_else(|| refused("level", missing))?;
-                let within = LEVELS.contains(&level.value) && LEVELS.contains(&level.mean);
+                let within = PLAUSIBLE_LEVELS.contains(&level.value)
+                    && PLAUSIBLE_LEVELS.contains(&level.mean);
                 if !(within && (0.0..=1.0).contains(&level.spread)) {
-                    let (least, most) = (LEVELS.start(), LEVELS.end());
+                    let (least, most) = (PLAUSIBLE_LEVELS.start(), PLAUSIBLE_LEVELS.end());
                     let reason =
                         format!("it must lie from {least} to {most}, its spread from 0 to 1");
                     return Err(refused("level", reason));

@@ -39,7 +39,7 @@ pub struct BeatPage<'a> {
 
 impl BeatPage<'_> {
     /// The polar maps of a beat, by file name, in their order, each with its title.
-    pub const MAPS: [(&'static str, &'static str); 8] = [
+    pub const POLAR_MAPS: [(&'static str, &'static str); 8] = [
         ("polar.svg", "Uptake, all gates"),
         ("polar_ed.svg", "Uptake, end diastole"),
         ("polar_es.svg", "Uptake, end systole"),
@@ -68,7 +68,7 @@ pub fn beat_page(page: &BeatPage) -> String {
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             (curves(page))
-            (polar_maps(&BeatPage::MAPS, page.maps, &hint))
+            (polar_maps(&BeatPage::POLAR_MAPS, page.maps, &hint))
             (normal_limits(perfusion))
             section {
                 h2 { "Gates and segments" }

@@ -33,7 +33,7 @@ pub struct ComparisonPage<'a> {
 
 impl ComparisonPage<'_> {
     /// The polar maps of a comparison, by file name, in their order, each with its title.
-    pub const MAPS: [(&'static str, &'static str); 7] = [
+    pub const POLAR_MAPS: [(&'static str, &'static str); 7] = [
         ("polar_stress.svg", "Stress"),
         ("polar_rest.svg", "Rest"),
         ("polar_difference.svg", "Rest less stress"),
@@ -61,7 +61,7 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
             (document::notes("Reasons to look closer", reasons))
             (document::notes("Please note", warnings.map(String::as_str)))
             (slices(page))
-            (polar_maps(&ComparisonPage::MAPS, page.maps, MAPS_HINT))
+            (polar_maps(&ComparisonPage::POLAR_MAPS, page.maps, MAPS_HINT))
             section {
                 h2 { "Territories and segments" }
                 (territories(report))

@@ -81,7 +81,7 @@ impl ComparedHearts {
     /// series of the scan at stress as far as `scan` does.
     pub fn page(&self, files: &[NamedFile], scan: Option<&Provenance>) -> NamedFile {
         let picture = |(name, _)| Some((name, content(files, name)?));
-        let maps: Vec<(&str, &[u8])> = (ComparisonPage::MAPS.into_iter())
+        let maps: Vec<(&str, &[u8])> = (ComparisonPage::POLAR_MAPS.into_iter())
             .filter_map(picture)
             .collect();
         let page = report::comparison_page(&ComparisonPage {

@@ -30,14 +30,14 @@ const LABEL_WIDTH_PX: usize = 84;
 /// Black rows between kinds of slices.
 const GAP_PX: usize = 10;
 /// Slices in a row.
-const SLICES: usize = 8;
+const SLICES_PER_ROW: usize = 8;
 /// Shares of the long axis, from the apex, at which the first and the last short-axis slice lie.
 const SHORT_ENDS_SHARE: [f64; 2] = [0.06, 0.94];
 /// Distance from the long axis of the outermost long-axis slices, as a share of its length.
 const LONG_ENDS_SHARE: f64 = 0.28;
 /// Height of a label, pixels.
 const LABEL_PX: f64 = 13.0;
-const INK: [u8; 3] = [235; 3];
+const INK_RGB: [u8; 3] = [235; 3];
 
 /// The three kinds of slices, in the order of their rows.
 #[derive(Clone, Copy)]
@@ -91,13 +91,13 @@ impl HeartFrame {
     fn slice(&self, kind: Kind, number: usize) -> (Vec3, Vec3, Vec3) {
         let middle = (self.apex + self.base) / 2.0;
         let across = |direction: Vec3| {
-            let share = 2.0 * number as f64 / (SLICES - 1) as f64 - 1.0;
+            let share = 2.0 * number as f64 / (SLICES_PER_ROW - 1) as f64 - 1.0;
             middle + direction * (share * LONG_ENDS_SHARE * self.length_mm())
         };
         match kind {
             Kind::Short => {
                 let [first, last] = SHORT_ENDS_SHARE;
-                let share = number as f64 / (SLICES - 1) as f64;
+                let share = number as f64 / (SLICES_PER_ROW - 1) as f64;
                 let along = first + (last - first) * share;
                 let place = self.apex + (self.base - self.apex) * along;
                 (place, self.lateral, -self.anterior)
@@ -136,7 +136,7 @@ pub(super) fn png(
         ),
         (WhichScan::Rest, &hearts.rest, 0.0),
     ];
-    let width = LABEL_WIDTH_PX + SLICES * CELL_PX;
+    let width = LABEL_WIDTH_PX + SLICES_PER_ROW * CELL_PX;
     let height = 6 * CELL_PX + 2 * GAP_PX;
     let mut picture = Image::filled(width, height, [0; 3]);
     for (row, (scan, heart, turn)) in scans.into_iter().enumerate() {
@@ -155,7 +155,7 @@ pub(super) fn png(
         let field = Field::cut_out(heart.image(), Some(&about), 0.0, monitor)?;
         for (place, kind) in Kind::ALL.into_iter().enumerate() {
             let top = (2 * place + row) * CELL_PX + place * GAP_PX;
-            for number in 0..SLICES {
+            for number in 0..SLICES_PER_ROW {
                 monitor.check()?;
                 let slice = frame.slice(kind, number);
                 let left = LABEL_WIDTH_PX + number * CELL_PX;
@@ -198,7 +198,7 @@ fn label(picture: &mut Image<3>, top: usize, kind: Kind, scan: WhichScan) {
             middle: [LABEL_WIDTH_PX as f64 / 2.0, centre + offset],
             text,
             size: LABEL_PX,
-            ink: INK,
+            ink: INK_RGB,
             rim: None,
         };
         shape.paint(picture);

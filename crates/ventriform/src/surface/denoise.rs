@@ -494,13 +494,13 @@ mod tests {
     use crate::mesh::shapes;
     use crate::surface::smoothing::taubin;
 
-    const RADIUS: f64 = 30.0;
+    const RADIUS_MM: f64 = 30.0;
     /// Steepness of the test image, per mm.
-    const STEEPNESS: f64 = 5.0;
+    const STEEPNESS_PER_MM: f64 = 5.0;
 
     /// A sphere whose vertices lie `noise` mm off in the mean, correlated over a few edges.
     fn noisy(noise: f64) -> TriMesh {
-        let mut mesh = shapes::icosphere(RADIUS, 5);
+        let mut mesh = shapes::icosphere(RADIUS_MM, 5);
         let mut state = 1u64;
         let mut heights: Vec<f64> = (mesh.vertices.iter())
             .map(|_| {
@@ -523,14 +523,14 @@ mod tests {
         heights.iter_mut().for_each(|h| *h -= mean);
         let square = heights.iter().map(|h| h * h).sum::<f64>() / heights.len() as f64;
         for (v, h) in mesh.vertices.iter_mut().zip(&heights) {
-            *v *= 1.0 + noise * h / square.sqrt() / RADIUS;
+            *v *= 1.0 + noise * h / square.sqrt() / RADIUS_MM;
         }
         mesh
     }
 
     fn denoised(mesh: &mut TriMesh) -> SurfaceNoise {
         let even = taubin(&mesh.vertices, &mesh.triangles, 15);
-        let image = |p: &Vec3| STEEPNESS * (2.0 * RADIUS - p.norm());
+        let image = |p: &Vec3| STEEPNESS_PER_MM * (2.0 * RADIUS_MM - p.norm());
         let silent = Monitor::silent();
         denoise(mesh, &even, image, 2.0, &silent)
             .unwrap()
@@ -540,7 +540,7 @@ mod tests {
 
     /// Root mean square of the distances from the sphere.
     fn error(mesh: &TriMesh) -> f64 {
-        let square = |v: &Vec3| (v.norm() - RADIUS).powi(2);
+        let square = |v: &Vec3| (v.norm() - RADIUS_MM).powi(2);
         (mesh.vertices.iter().map(square).sum::<f64>() / mesh.vertices.len() as f64).sqrt()
     }
 
@@ -551,14 +551,14 @@ mod tests {
             let found = denoised(&mut mesh);
             let ratio = found.offset_mm / noise;
             assert!((0.7..1.3).contains(&ratio), "{found:?}");
-            let intensity = found.offset_mm * STEEPNESS;
+            let intensity = found.offset_mm * STEEPNESS_PER_MM;
             assert!(
                 (found.intensity / intensity - 1.0).abs() < 0.01,
                 "{found:?}"
             );
             assert!((2.0..8.0).contains(&found.correlation_mm), "{found:?}");
             assert!(error(&mesh) < 0.4 * noise, "{noise}: {}", error(&mesh));
-            let exact = shapes::icosphere(RADIUS, 5).volume();
+            let exact = shapes::icosphere(RADIUS_MM, 5).volume();
             // The radius by little more than a thousandth.
             let ratio = mesh.volume() / exact;
             assert!((ratio - 1.0).abs() < 4e-3, "{noise}: {ratio} of the volume");
@@ -584,7 +584,7 @@ mod tests {
         }
         let found = denoised(&mut mesh);
         assert!((0.05..0.2).contains(&found.offset_mm), "{found:?}");
-        let left = mesh.vertices[0].norm() - RADIUS;
+        let left = mesh.vertices[0].norm() - RADIUS_MM;
         assert!(left > 2.5, "{left} mm of 3");
     }
 
@@ -604,7 +604,7 @@ mod tests {
 
     #[test]
     fn a_few_triangles_have_no_noise() {
-        let mut mesh = shapes::icosphere(RADIUS, 1);
+        let mut mesh = shapes::icosphere(RADIUS_MM, 1);
         let even = mesh.vertices.clone();
         let silent = Monitor::silent();
         let found = denoise(&mut mesh, &even, |p| -p.norm(), 2.0, &silent).unwrap();

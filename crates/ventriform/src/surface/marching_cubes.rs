@@ -16,7 +16,7 @@
 
 use rayon::prelude::*;
 
-use super::table::{CASES, Case};
+use super::table::{CUBE_CASES, Case};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::labels::{Labels, following, set_bits};
@@ -82,7 +82,7 @@ pub fn marching_cubes(
     frame: &VoxelToPatient,
     monitor: &Monitor,
 ) -> Result<TriMesh, MarchingCubesError> {
-    let cases = &*CASES;
+    let cases = &*CUBE_CASES;
     let [rows, planes] = labels.rows();
     // Pass 1: what every row and every slab of cells will write.
     let slabs: Vec<(Vec<RowCount>, usize)> = (0..planes)
@@ -482,7 +482,7 @@ mod tests {
                         }
                     }
                     let case = (0..8).fold(0, |c, b| c | usize::from(at(corner(b)) >= iso) << b);
-                    let case = &CASES[case];
+                    let case = &CUBE_CASES[case];
                     for t in case.edges[..3 * usize::from(case.count)].chunks(3) {
                         triangles.push([vertex[&t[0]], vertex[&t[1]], vertex[&t[2]]]);
                     }

@@ -39,7 +39,8 @@ pub struct Case {
 }
 
 /// All cases, by the byte of inside corners.
-pub static CASES: LazyLock<[Case; 256]> = LazyLock::new(|| std::array::from_fn(|c| case(c as u8)));
+pub static CUBE_CASES: LazyLock<[Case; 256]> =
+    LazyLock::new(|| std::array::from_fn(|c| case(c as u8)));
 
 /// The edge between two corners that differ in one bit.
 pub const fn edge_between(a: u8, b: u8) -> u8 {
@@ -206,7 +207,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn triangles(c: u8) -> Vec<[u8; 3]> {
-        let case = &CASES[c as usize];
+        let case = &CUBE_CASES[c as usize];
         case.edges[..3 * usize::from(case.count)]
             .chunks(3)
             .map(|t| [t[0], t[1], t[2]])

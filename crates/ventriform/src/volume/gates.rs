@@ -10,7 +10,7 @@ use super::nifti::grid::StatedGrid;
 use super::open::Reading;
 use super::provenance::Provenance;
 use super::{Volume, VolumeError};
-pub use crate::grid::gates::GATES;
+pub use crate::grid::gates::GATE_COUNTS;
 
 /// The gates of a study and the facts of its files.
 #[derive(Debug, Clone)]

@@ -14,7 +14,7 @@ use super::summary::{Coherence, LabelCounts, NO_LABEL, Tally, judge, summarise};
 use super::{Provenance, Segment, Volume, VolumeError};
 use crate::draw::Image;
 use crate::geometry::frame::{VOXEL_MM, VoxelToPatient};
-use crate::grid::gates::GATES;
+use crate::grid::gates::GATE_COUNTS;
 use crate::mesh::TriMesh;
 use crate::progress::Monitor;
 
@@ -364,7 +364,7 @@ pub(super) fn array_header<'a>(
         scaling: None,
         file_shape,
         frames,
-        gated: GATES.contains(&frames),
+        gated: GATE_COUNTS.contains(&frames),
         shape,
         placement,
         unit: LengthUnit::Millimetre,

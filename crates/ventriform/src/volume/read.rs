@@ -13,7 +13,7 @@ use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
 use super::{LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
-use crate::grid::gates::GATES;
+use crate::grid::gates::GATE_COUNTS;
 use crate::mesh::TriMesh;
 use crate::mesh_files::MeshStatement;
 use crate::progress::Monitor;
@@ -56,7 +56,7 @@ pub fn read_gates(
 ) -> Result<GatedReading, VolumeError> {
     let opened = open(files, limits, monitor);
     // Files of one gate each are not one volume.
-    let apart = (2..=*GATES.end()).contains(&files.len())
+    let apart = (2..=*GATE_COUNTS.end()).contains(&files.len())
         && match &opened {
             Ok(opened) => opened.file.header().frames == 1,
             Err(
@@ -129,7 +129,7 @@ pub fn hold_gates(
     let header = opened.file.header();
     let stated = opened.file.gate_timings().into_iter().next();
     let each = stated.unwrap_or_default().gates_of_interval(header.frames);
-    Ok(GATES.contains(&each) && (header.gated || gated))
+    Ok(GATE_COUNTS.contains(&each) && (header.gated || gated))
 }
 
 /// Gates that have together more voxels than a volume may.

@@ -5,7 +5,7 @@
 use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
-use crate::grid::gates::GATES;
+use crate::grid::gates::GATE_COUNTS;
 
 /// Unpacked bytes that are examined.
 const EXAMINED_BYTES: usize = 1024;
@@ -136,7 +136,7 @@ impl<'a> Sorted<'a> {
 
     /// Whether so many NIfTI files, found in the archive or folder `inside`, can be one gate each.
     fn may_be_gates(&self, singles: usize, inside: Option<&str>) -> bool {
-        GATES.contains(&singles) && inside.is_none() && self.empty.is_empty()
+        GATE_COUNTS.contains(&singles) && inside.is_none() && self.empty.is_empty()
     }
 
     /// A header and the file with its voxels: the `.img` of the same name, or the only `.img`, or the

@@ -32,7 +32,7 @@ const BASE_MM: f64 = 14.0;
 /// Width of a point in the gates, mm.
 const RESOLUTION_MM: f64 = 13.0;
 const SPACING_MM: f64 = 4.5;
-const GATES: usize = 8;
+const GATE_COUNT: usize = 8;
 
 /// Semi-axes of the cavity across and along the axis, mm, at a share of the contraction (0 end diastole, 1 end
 /// systole).
@@ -89,10 +89,11 @@ fn gate(index: usize) -> Volume {
     let centre = Vec3::new(20.0, -20.0, 30.0);
     let frame = VoxelToPatient::centred(shape, [SPACING_MM; 3], centre).expect("a grid");
     let axis = Vec3::new(0.64, -0.60, -0.48).normalize();
-    const MOMENTS: usize = 5;
+    const MOMENTS_PER_GATE: usize = 5;
     let mut sum = vec![0.0f32; 64_000];
-    for moment in 0..MOMENTS {
-        let turns = (index as f64 + (moment as f64 + 0.5) / MOMENTS as f64) / GATES as f64;
+    for moment in 0..MOMENTS_PER_GATE {
+        let turns =
+            (index as f64 + (moment as f64 + 0.5) / MOMENTS_PER_GATE as f64) / GATE_COUNT as f64;
         let share = contraction(turns);
         let [across, along] = cavity_axes(share);
         let thickness = thickness_mm(share);
@@ -118,7 +119,7 @@ fn gate(index: usize) -> Volume {
         let scene = Volume::sampled(shape, frame.clone(), activity);
         sum.iter_mut()
             .zip(scene.voxels)
-            .for_each(|(sum, v)| *sum += v / MOMENTS as f32);
+            .for_each(|(sum, v)| *sum += v / MOMENTS_PER_GATE as f32);
     }
     blur_by(RESOLUTION_MM, &mut sum, shape);
     Volume {
@@ -131,7 +132,7 @@ fn gate(index: usize) -> Volume {
 
 fn gates() -> &'static [Volume] {
     static GATES_MADE: OnceLock<Vec<Volume>> = OnceLock::new();
-    GATES_MADE.get_or_init(|| (0..GATES).map(gate).collect())
+    GATES_MADE.get_or_init(|| (0..GATE_COUNT).map(gate).collect())
 }
 
 /// The beat of gates in separate files.
@@ -153,8 +154,8 @@ fn beat_of(gates: &[Volume], choice: BeatChoice) -> Result<GatedHeart, GatedErro
 }
 
 fn whole() -> &'static GatedHeart {
-    static WHOLE: OnceLock<GatedHeart> = OnceLock::new();
-    WHOLE.get_or_init(|| beat_of(gates(), BeatChoice::default()).expect("a beat"))
+    static WHOLE_BEAT: OnceLock<GatedHeart> = OnceLock::new();
+    WHOLE_BEAT.get_or_init(|| beat_of(gates(), BeatChoice::default()).expect("a beat"))
 }
 
 fn codes(heart: &GatedHeart) -> Vec<String> {
@@ -382,7 +383,7 @@ fn gates_that_show_no_beat_have_no_ejection_fraction() {
 fn a_flat_study_has_no_ejection_fraction() {
     let count = gates()[0].voxels.len();
     let mean: Vec<f32> = (0..count)
-        .map(|at| gates().iter().map(|gate| gate.voxels[at]).sum::<f32>() / GATES as f32)
+        .map(|at| gates().iter().map(|gate| gate.voxels[at]).sum::<f32>() / GATE_COUNT as f32)
         .collect();
     for noise in [0.0, 3.0] {
         let mut state = 1u32;
@@ -394,7 +395,7 @@ fn a_flat_study_has_no_ejection_fraction() {
             voxels: mean.iter().map(|v| v + noise * draw()).collect(),
             ..gates()[0].clone()
         };
-        let flat: Vec<Volume> = (0..GATES).map(&mut gate).collect();
+        let flat: Vec<Volume> = (0..GATE_COUNT).map(&mut gate).collect();
         let heart = beat_of(&flat, BeatChoice::default()).unwrap();
         assert!(
             codes(&heart).contains(&"no_contraction".to_owned()),
@@ -459,7 +460,7 @@ fn a_gate_with_few_counts_is_left_out_of_the_curve() {
 /// The gates, each voxel as `change` makes it of its value, its place and the turns of the cycle.
 fn changed(change: impl Fn(f32, &Vec3, f64) -> f32) -> Vec<Volume> {
     let changed = |(index, gate): (usize, &Volume)| {
-        let turns = (index as f64 + 0.5) / GATES as f64;
+        let turns = (index as f64 + 0.5) / GATE_COUNT as f64;
         let [columns, rows, _] = gate.shape;
         let place = |at: usize| {
             let index = [at % columns, at / columns % rows, at / columns / rows];
@@ -561,7 +562,7 @@ fn the_report_says_which_way_is_up() {
 fn every_gate_has_a_mesh_that_does_not_meet_itself() {
     let heart = whole();
     let meshes = heart.beat.fit.carried(&heart.wall.mesh, &heart.wall.wall);
-    assert_eq!(meshes.len(), GATES);
+    assert_eq!(meshes.len(), GATE_COUNT);
     for mesh in &meshes {
         assert_eq!(mesh.triangles, heart.wall.mesh.triangles);
         assert_eq!(self_intersections(mesh).len(), 0);
@@ -696,7 +697,7 @@ fn files_of_gates_are_read_in_the_order_of_their_numbers() {
     let read = |files: &[VolumeFile]| {
         read_gates(files, false, &ReadLimits::default(), &Monitor::silent()).unwrap()
     };
-    let mut files: Vec<_> = (0..GATES)
+    let mut files: Vec<_> = (0..GATE_COUNT)
         .map(|index| named(index, format!("gate{}.nii.gz", index + 5)))
         .collect();
     files.sort_by(|a, b| a.name().cmp(b.name()));
@@ -707,7 +708,7 @@ fn files_of_gates_are_read_in_the_order_of_their_numbers() {
         warnings.contains("8 files of one volume each")
             && warnings.contains("numbers in their names")
     );
-    assert_eq!(numbered.facts.gates.unwrap().number, GATES);
+    assert_eq!(numbered.facts.gates.unwrap().number, GATE_COUNT);
     let files: Vec<_> = "hbdfgcae"
         .chars()
         .zip(0..)
@@ -791,18 +792,21 @@ fn four_dimensional_of(gates: &[Volume], seconds: f32) -> Vec<u8> {
 }
 
 /// Slope of the stored numbers, which no binary number is.
-const SLOPE: f32 = 0.0613;
+const STORED_SLOPE: f32 = 0.0613;
 
-/// The gates as whole numbers times [`SLOPE`], and these numbers.
+/// The gates as whole numbers times [`STORED_SLOPE`], and these numbers.
 fn quantised() -> (Vec<Volume>, Vec<u16>) {
     let numbers = |gate: &Volume| -> Vec<u16> {
-        let stored = gate.voxels.iter().map(|v| (v / SLOPE).round() as u16);
+        let stored = gate
+            .voxels
+            .iter()
+            .map(|v| (v / STORED_SLOPE).round() as u16);
         stored.collect()
     };
     let stored: Vec<Vec<u16>> = gates().iter().map(numbers).collect();
     let rescaled = |(gate, stored): (&Volume, &Vec<u16>)| Volume {
         voxels: (stored.iter())
-            .map(|n| (f64::from(*n) * f64::from(SLOPE)) as f32)
+            .map(|n| (f64::from(*n) * f64::from(STORED_SLOPE)) as f32)
             .collect(),
         ..gate.clone()
     };
@@ -814,7 +818,7 @@ fn quantised() -> (Vec<Volume>, Vec<u16>) {
 fn nuclear(stored: &[u16], rejected: u16) -> Vec<u8> {
     let gate = &gates()[0];
     let slices = gate.shape[2];
-    let frames = GATES * slices;
+    let frames = GATE_COUNT * slices;
     let text = |tag, vr, text: &str| DataElement::new(tag, vr, PrimitiveValue::from(text));
     let shorts =
         |tag, numbers: Vec<u16>| DataElement::new(tag, VR::US, PrimitiveValue::U16(numbers.into()));
@@ -879,7 +883,7 @@ fn nuclear(stored: &[u16], rejected: u16) -> Vec<u8> {
             VR::DS,
             &SPACING_MM.to_string(),
         ),
-        text(tags::RESCALE_SLOPE, VR::DS, &SLOPE.to_string()),
+        text(tags::RESCALE_SLOPE, VR::DS, &STORED_SLOPE.to_string()),
         text(tags::RESCALE_INTERCEPT, VR::DS, "0"),
         DataElement::new(
             tags::FRAME_INCREMENT_POINTER,

@@ -13,10 +13,10 @@ use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 use ventriform::volume::{ReadLimits, Volume, VolumeFile};
 
 /// Mid and apical segments of the LAD.
-const LAD: [u8; 4] = [7, 8, 13, 14];
+const LAD_SEGMENTS: [u8; 4] = [7, 8, 13, 14];
 
 fn scan(seed: u64, severity: f64) -> Volume {
-    let defects = LAD.map(|segment| PerfusionDefect { segment, severity });
+    let defects = LAD_SEGMENTS.map(|segment| PerfusionDefect { segment, severity });
     let parameters = PhantomParameters {
         shape: [64; 3],
         spacing_mm: [4.4; 3],
@@ -71,7 +71,7 @@ fn a_defect_at_stress_alone_is_reversible_and_one_in_both_is_fixed() {
     assert!(change.fixed_percent < 2.0, "{}", change.fixed_percent);
     let losses = |in_defect: bool| {
         let own = change.segments.iter();
-        own.filter(move |own| LAD.contains(&(own.segment as u8)) == in_defect)
+        own.filter(move |own| LAD_SEGMENTS.contains(&(own.segment as u8)) == in_defect)
             .map(|own| own.figures.difference_points.unwrap())
     };
     let least = losses(true).fold(f64::MAX, f64::min);

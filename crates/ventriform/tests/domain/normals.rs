@@ -16,8 +16,8 @@ use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_pe
 use ventriform::volume::{ReadLimits, VolumeFile};
 
 /// Healthy hearts of the limits, and the first seed of others.
-const PEOPLE: u64 = 14;
-const OTHERS: u64 = 100;
+const HEALTHY_PEOPLE: u64 = 14;
+const OTHERS_SEED: u64 = 100;
 
 fn scan(seed: u64, defects: &[PerfusionDefect]) -> Vec<u8> {
     let base = PhantomParameters {
@@ -43,10 +43,10 @@ fn options() -> NormalsOptions {
 }
 
 /// Limits of the healthy hearts, and one of the table that is not there.
-static LIMITS: LazyLock<NormalLimits> = LazyLock::new(|| {
+static HEALTHY_LIMITS: LazyLock<NormalLimits> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let mut table = "case,file,sex,protocol,tracer,attenuation_corrected,healthy\n".to_owned();
-    for seed in 0..PEOPLE {
+    for seed in 0..HEALTHY_PEOPLE {
         fs::write(folder.path().join(format!("n{seed}.nii")), scan(seed, &[])).unwrap();
         let sex = if seed % 2 == 0 { "F" } else { "M" };
         table += &format!("n{seed},n{seed}.nii,{sex},rest,none (simulated),no,yes\n");
@@ -68,7 +68,7 @@ fn judged(bytes: Vec<u8>, kind: &ScanKind) -> Result<SegmentedVolume, Segmentati
         auto: true,
         models: Vec::new(),
         reader: None,
-        normals: Some(&LIMITS),
+        normals: Some(&HEALTHY_LIMITS),
         parameters: &parameters,
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
@@ -85,12 +85,12 @@ fn kind() -> ScanKind {
 
 #[test]
 fn limits_name_their_people_and_say_that_they_are_simulated() {
-    assert!(LIMITS.simulated);
-    let group = &LIMITS.groups[0];
+    assert!(HEALTHY_LIMITS.simulated);
+    let group = &HEALTHY_LIMITS.groups[0];
     assert_eq!(group.sex.as_str(), "mixed");
-    assert!(group.cases.len() >= 12, "{:?}", LIMITS.excluded);
+    assert!(group.cases.len() >= 12, "{:?}", HEALTHY_LIMITS.excluded);
     let reason = |case: &str| {
-        let found = LIMITS
+        let found = HEALTHY_LIMITS
             .excluded
             .iter()
             .find(|excluded| excluded.case == case);
@@ -106,13 +106,13 @@ fn limits_name_their_people_and_say_that_they_are_simulated() {
         .map(|limit| limit.figure.as_str())
         .collect();
     assert_eq!(names, ["cavity_ml", "wall_ml"]);
-    let read = NormalLimits::from_json(LIMITS.to_json().as_bytes()).unwrap();
-    assert_eq!(read, *LIMITS);
+    let read = NormalLimits::from_json(HEALTHY_LIMITS.to_json().as_bytes()).unwrap();
+    assert_eq!(read, *HEALTHY_LIMITS);
 }
 
 #[test]
 fn a_healthy_heart_lies_within_and_a_dark_segment_below() {
-    let healthy = judged(scan(OTHERS, &[]), &kind()).unwrap();
+    let healthy = judged(scan(OTHERS_SEED, &[]), &kind()).unwrap();
     let found = healthy.perfusion.as_ref().unwrap();
     assert!(found.extent_percent < 5.0, "{}", found.extent_percent);
     for segment in [4, 10, 12] {
@@ -120,7 +120,7 @@ fn a_healthy_heart_lies_within_and_a_dark_segment_below() {
             segment,
             severity: 0.9,
         };
-        let ill = judged(scan(OTHERS, &[defect]), &kind()).unwrap();
+        let ill = judged(scan(OTHERS_SEED, &[defect]), &kind()).unwrap();
         let found = ill.perfusion.as_ref().unwrap();
         let scored = found
             .segments
@@ -168,7 +168,7 @@ fn a_scan_of_another_kind_is_refused_with_what_there_is() {
         protocol: Some("stress".to_owned()),
         ..kind()
     };
-    let error = judged(scan(OTHERS, &[]), &other).unwrap_err();
+    let error = judged(scan(OTHERS_SEED, &[]), &other).unwrap_err();
     assert!(
         matches!(
             error,

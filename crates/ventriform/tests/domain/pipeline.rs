@@ -16,8 +16,8 @@ use ventriform::volume::{self, ReadLimits, Volume, VolumeFile};
 
 /// A simulated scan, small enough for many runs.
 fn scan() -> &'static [u8] {
-    static SCAN: OnceLock<Vec<u8>> = OnceLock::new();
-    SCAN.get_or_init(|| {
+    static PACKED_SCAN: OnceLock<Vec<u8>> = OnceLock::new();
+    PACKED_SCAN.get_or_init(|| {
         let parameters = PhantomParameters {
             shape: [72; 3],
             spacing_mm: [4.0; 3],

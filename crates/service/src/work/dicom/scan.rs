@@ -25,7 +25,7 @@ use ventriform::volume::{self, AffineSource, Provenance, ReadLimits, ReadOptions
 /// the study or the patient is unknown.
 pub fn check_stated(scan: &ScanIdentity, stated: &Map<String, Value>) -> Result<(), Failure> {
     for (name, value) in stated {
-        if !StatedIdentity::FIELDS.contains(&name.as_str()) {
+        if !StatedIdentity::FIELD_NAMES.contains(&name.as_str()) {
             return Err(unknown_identity(name));
         }
         if !value.is_string() {

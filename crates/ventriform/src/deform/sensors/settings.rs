@@ -116,7 +116,7 @@ impl EdgeShift {
 mod tests {
     use super::*;
 
-    const SHIFT: EdgeShift = EdgeShift {
+    const EDGE_SHIFT: EdgeShift = EdgeShift {
         inner: 1.0,
         outer: 2.0,
         rim: 3.0,
@@ -126,8 +126,9 @@ mod tests {
     /// About an axis along z from the base at 0 to the apex at 40, at x = 5.
     #[test]
     fn a_sensor_is_on_the_side_that_it_faces() {
-        let at =
-            |place: [f64; 3], normal: [f64; 3]| SHIFT.at(&Vec3::from(place), &Vec3::from(normal));
+        let at = |place: [f64; 3], normal: [f64; 3]| {
+            EDGE_SHIFT.at(&Vec3::from(place), &Vec3::from(normal))
+        };
         let slanted = [0.6f64, 0.0, 0.8];
         for z in [2.0, 20.0, 39.0] {
             assert_eq!(at([25.0, 0.0, z], [-1.0, 0.0, 0.0]), (WallSide::Inner, 1.0));
@@ -163,7 +164,7 @@ mod tests {
         assert_ne!(at([25.0, 0.0, 21.0], [0.0, 0.0, -1.0]).0, WallSide::Rim);
         let point = EdgeShift {
             axis: [Vec3::zeros(); 2],
-            ..SHIFT
+            ..EDGE_SHIFT
         };
         assert_eq!(point.at(&Vec3::z(), &-Vec3::z()), (WallSide::Inner, 1.0));
         assert_eq!(point.at(&-Vec3::z(), &-Vec3::z()), (WallSide::Outer, 2.0));

@@ -24,7 +24,7 @@ const MOST_BYTES: u64 = 4 << 20;
 /// Most cases.
 const MOST_CASES: usize = 5000;
 /// Columns that must be there.
-const COLUMNS: [&str; 7] = [
+const REQUIRED_COLUMNS: [&str; 7] = [
     "case",
     "file",
     "sex",
@@ -70,7 +70,7 @@ pub enum TableError {
     #[error("{TABLE_FILE}: {0}")]
     Csv(#[from] csv::Error),
     /// A column is missing.
-    #[error("{TABLE_FILE} has no column {column}; it needs {}", COLUMNS.join(", "))]
+    #[error("{TABLE_FILE} has no column {column}; it needs {}", REQUIRED_COLUMNS.join(", "))]
     Column {
         /// The column.
         column: &'static str,
@@ -132,7 +132,7 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<CohortRow>, TableError> {
         head.iter()
             .position(|column| column.trim_start_matches('\u{feff}') == name)
     };
-    for column in COLUMNS {
+    for column in REQUIRED_COLUMNS {
         place(column).ok_or(TableError::Column { column })?;
     }
     let mut rows: Vec<CohortRow> = Vec::new();
@@ -216,10 +216,10 @@ fn row(
 mod tests {
     use super::*;
 
-    const HEAD: &str = "case,file,sex,protocol,tracer,attenuation_corrected,healthy";
+    const HEADER_LINE: &str = "case,file,sex,protocol,tracer,attenuation_corrected,healthy";
 
     fn parsed(lines: &str) -> Result<Vec<CohortRow>, TableError> {
-        parse(format!("{HEAD}\n{lines}\n").as_bytes())
+        parse(format!("{HEADER_LINE}\n{lines}\n").as_bytes())
     }
 
     #[test]

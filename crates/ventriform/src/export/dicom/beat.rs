@@ -12,7 +12,7 @@
 use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::structured_report::{
-    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES, WALL_SEGMENTS, concept, figure,
+    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, WALL_SEGMENTS, concept, figure,
     finding_site, group, measured, text, tracking, within,
 };
 use super::uid::Uids;
@@ -189,7 +189,7 @@ impl<'a> DicomBeat<'a> {
         if self.report.phase.reliable {
             content.extend(measured(self.report, PHASE_FIGURES));
         }
-        content.push(text("CONTAINS", dcm("121106", "Comment"), RANGES));
+        content.push(text("CONTAINS", dcm("121106", "Comment"), RANGES_COMMENT));
         let flags = self.report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
         groups.push(group("1501", content));

@@ -56,9 +56,9 @@ const fn code(value: &'static str, scheme: &'static str, meaning: &'static str) 
 
 pub(super) const ANATOMICAL_STRUCTURE: Code = sct("91723000", "Anatomical Structure");
 /// PS3.16 has the ventricle and its wall, but not its cavity.
-pub(super) const CAVITY: Code = own("LV-CAVITY", "Cavity of left ventricle");
+pub(super) const LV_CAVITY: Code = own("LV-CAVITY", "Cavity of left ventricle");
 pub(super) const DEFORMABLE_MODELS: Code = dcm("123111", "Deformable Models");
-pub(super) const SEGMENTATION: Code = dcm("113076", "Segmentation");
+pub(super) const SEGMENTATION_STEP: Code = dcm("113076", "Segmentation");
 pub(super) const SOURCE_FOR_PROCESSING: Code =
     dcm("121322", "Source image for image processing operation");
 pub(super) const MILLIMETRE: Code = ucum("mm", "mm");
@@ -136,11 +136,11 @@ impl Structure {
         let cavity = cavity.then_some(LabelSegment {
             entry: LabelEntry {
                 value: 2,
-                name: CAVITY.meaning,
+                name: LV_CAVITY.meaning,
                 colour: CAVITY_COLOUR,
             },
             category: ANATOMICAL_STRUCTURE,
-            kind: CAVITY,
+            kind: LV_CAVITY,
         });
         [Some(whole), cavity].into_iter().flatten().collect()
     }

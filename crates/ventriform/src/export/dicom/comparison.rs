@@ -237,16 +237,16 @@ impl<'a> DicomComparison<'a> {
     }
 }
 
-const RATIO: Code = ucum("1", "no units");
-const SCORE: Code = ucum("{score}", "score");
-const DEFECT: Code = sct(
+const NO_UNITS: Code = ucum("1", "no units");
+const SCORE_UNIT: Code = ucum("{score}", "score");
+const DEFECT_EXTENT: Code = sct(
     "427751006",
     "Extent of cardiac perfusion defect (observable entity)",
 );
-const PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
+const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 const VOLUME: Code = sct("118565006", "Volume");
-const REVERSIBLE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
-const FIXED: Code = own("FIXED", "Share below the threshold in both scans");
+const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
+const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");
 const SEGMENT_SCORE: Code = own("SCORE", "Perfusion score, 0 normal to 4 absent");
 
 /// Measurements of both scans together.
@@ -257,14 +257,14 @@ const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
             "428832008",
             "Transient ischemic dilatation ratio of left ventricular cavity",
         ),
-        RATIO,
+        NO_UNITS,
     ),
-    figure(|r| Some(r.reversible_percent), REVERSIBLE, PERCENT),
-    figure(|r| Some(r.fixed_percent), FIXED, PERCENT),
+    figure(|r| Some(r.reversible_percent), REVERSIBLE_SHARE, PERCENT),
+    figure(|r| Some(r.fixed_percent), FIXED_SHARE, PERCENT),
     figure(
         |r| r.sds.map(f64::from),
         loinc("82644-6", "Summed difference score"),
-        SCORE,
+        SCORE_UNIT,
     ),
     figure(
         |r| r.beat.as_ref()?.ef_change_points,
@@ -277,21 +277,29 @@ const STRESS_SCORE: &[Figure<ComparisonReport>] = &[
     figure(
         |r| r.sss.map(f64::from),
         loinc("82648-7", "Summed stress score"),
-        SCORE,
+        SCORE_UNIT,
     ),
-    figure(|r| r.beat.as_ref()?.stress_ef_percent, EJECTION, PERCENT),
+    figure(
+        |r| r.beat.as_ref()?.stress_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
 ];
 
 const REST_SCORE: &[Figure<ComparisonReport>] = &[
     figure(
         |r| r.srs.map(f64::from),
         own("SRS", "Summed rest score"),
-        SCORE,
+        SCORE_UNIT,
     ),
-    figure(|r| r.beat.as_ref()?.rest_ef_percent, EJECTION, PERCENT),
+    figure(
+        |r| r.beat.as_ref()?.rest_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
 ];
 
-const EJECTION: Code = sct("70822001", "Cardiac ejection fraction");
+const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");
 
 /// Measurements of one scan.
 const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
@@ -306,7 +314,7 @@ const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
             Some(perfusion) => Some(perfusion.extent_percent),
             None => Some(s.polar.as_ref()?.extent_percent),
         },
-        DEFECT,
+        DEFECT_EXTENT,
         PERCENT,
     ),
     figure(
@@ -317,18 +325,22 @@ const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
 ];
 
 const TERRITORY_FIGURES: &[Figure<ComparedTerritoryReport>] = &[
-    figure(|t| Some(t.uptake.reversible_percent), REVERSIBLE, PERCENT),
-    figure(|t| Some(t.uptake.fixed_percent), FIXED, PERCENT),
+    figure(
+        |t| Some(t.uptake.reversible_percent),
+        REVERSIBLE_SHARE,
+        PERCENT,
+    ),
+    figure(|t| Some(t.uptake.fixed_percent), FIXED_SHARE, PERCENT),
 ];
 
 const SEGMENT_AT_STRESS: &[Figure<ComparedSegmentReport>] = &[
-    sr::mean(|s| s.uptake.stress_percent, PERFUSION, PERCENT),
-    figure(|s| s.stress_score.map(f64::from), SEGMENT_SCORE, SCORE),
+    sr::mean(|s| s.uptake.stress_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| s.stress_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
 ];
 
 const SEGMENT_AT_REST: &[Figure<ComparedSegmentReport>] = &[
-    sr::mean(|s| s.uptake.rest_percent, PERFUSION, PERCENT),
-    figure(|s| s.rest_score.map(f64::from), SEGMENT_SCORE, SCORE),
+    sr::mean(|s| s.uptake.rest_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| s.rest_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
 ];
 
 const SEGMENT_CHANGE: &[Figure<ComparedSegmentReport>] = &[
@@ -343,7 +355,7 @@ const SEGMENT_CHANGE: &[Figure<ComparedSegmentReport>] = &[
                 .difference_points
                 .map(|_| s.uptake.reversible_percent)
         },
-        REVERSIBLE,
+        REVERSIBLE_SHARE,
         PERCENT,
     ),
 ];

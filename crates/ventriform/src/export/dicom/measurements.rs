@@ -9,11 +9,12 @@
 //! measured, not at the figure. The volumes of the anatomical
 //! wall and cavity have the ends of the interval that holds the true one. A figure that the report lacks is left out.
 
-use super::codes::{CAVITY, Code, MILLIMETRE, dcm, own, sct, ucum};
+use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::structured_report::{
-    self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES, SeriesReference, WALL_SEGMENTS,
-    concept, figure, finding_site, group, image, mean, measured, text, tracking, within,
+    self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, SeriesReference,
+    WALL_SEGMENTS, concept, figure, finding_site, group, image, mean, measured, text, tracking,
+    within,
 };
 use super::{DicomObject, DicomResults};
 use crate::polar::PolarSegment;
@@ -21,31 +22,35 @@ use crate::report::SegmentationReport;
 use dicom_dictionary_std::{tags, uids};
 
 const VOLUME: Code = sct("118565006", "Volume");
-const MASS: Code = sct("118538004", "Mass");
-const THICKNESS: Code = dcm("122445", "Wall Thickness");
-const DEFECT: Code = sct(
+const WALL_MASS: Code = sct("118538004", "Mass");
+const WALL_THICKNESS: Code = dcm("122445", "Wall Thickness");
+const DEFECT_EXTENT: Code = sct(
     "427751006",
     "Extent of cardiac perfusion defect (observable entity)",
 );
-const PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
+const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 
-const RATIO: Code = ucum("1", "no units");
+const NO_UNITS: Code = ucum("1", "no units");
 
 /// Measurements of the whole structure. A new figure of the report is a new line here.
 const STRUCTURE_FIGURES: &[Figure<SegmentationReport>] = &[
     figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
-    figure(|r| r.mass_g, MASS, GRAM),
-    mean(|r| r.wall_thickness_mm, THICKNESS, MILLIMETRE),
-    figure(|r| Some(r.polar.as_ref()?.extent_percent), DEFECT, PERCENT),
+    figure(|r| r.mass_g, WALL_MASS, GRAM),
+    mean(|r| r.wall_thickness_mm, WALL_THICKNESS, MILLIMETRE),
+    figure(
+        |r| Some(r.polar.as_ref()?.extent_percent),
+        DEFECT_EXTENT,
+        PERCENT,
+    ),
     figure(
         |r| Some(r.measures?.jaccard),
         own("JACCARD", "Jaccard index with the expert's mask"),
-        RATIO,
+        NO_UNITS,
     ),
     figure(
         |r| Some(r.measures?.dice),
         own("DICE", "Dice index with the expert's mask"),
-        RATIO,
+        NO_UNITS,
     ),
     figure(
         |r| r.measures?.contour_distance_mm,
@@ -70,33 +75,33 @@ struct Part {
     figures: &'static [Figure<SegmentationReport>],
 }
 
-const APPARENT: Code = own("APPARENT", "With the blur of the image");
-const ANATOMICAL: Code = own("ANATOMICAL", "Without the blur of the image");
+const WITH_BLUR: Code = own("APPARENT", "With the blur of the image");
+const WITHOUT_BLUR: Code = own("ANATOMICAL", "Without the blur of the image");
 
 const WALL_FIGURES: [Part; 5] = [
     Part {
         name: "cavity",
         method: None,
-        site: Some(CAVITY),
+        site: Some(LV_CAVITY),
         figures: &[figure(|r| r.volumes_ml.cavity, VOLUME, MILLILITRE)],
     },
     Part {
         name: "apparent wall",
-        method: Some(APPARENT),
+        method: Some(WITH_BLUR),
         site: None,
         figures: &[
             figure(|r| Some(r.volumes_ml.apparent?.wall), VOLUME, MILLILITRE),
             mean(
                 |r| Some(r.thickness_mm?.apparent.mean),
-                THICKNESS,
+                WALL_THICKNESS,
                 MILLIMETRE,
             ),
         ],
     },
     Part {
         name: "apparent cavity",
-        method: Some(APPARENT),
-        site: Some(CAVITY),
+        method: Some(WITH_BLUR),
+        site: Some(LV_CAVITY),
         figures: &[figure(
             |r| Some(r.volumes_ml.apparent?.cavity),
             VOLUME,
@@ -105,7 +110,7 @@ const WALL_FIGURES: [Part; 5] = [
     },
     Part {
         name: "anatomical wall",
-        method: Some(ANATOMICAL),
+        method: Some(WITHOUT_BLUR),
         site: None,
         figures: &[
             within(
@@ -114,15 +119,15 @@ const WALL_FIGURES: [Part; 5] = [
             ),
             mean(
                 |r| Some(r.thickness_mm?.anatomical.mean),
-                THICKNESS,
+                WALL_THICKNESS,
                 MILLIMETRE,
             ),
         ],
     },
     Part {
         name: "anatomical cavity",
-        method: Some(ANATOMICAL),
-        site: Some(CAVITY),
+        method: Some(WITHOUT_BLUR),
+        site: Some(LV_CAVITY),
         figures: &[within(
             figure(
                 |r| Some(r.volumes_ml.anatomical?.cavity),
@@ -136,8 +141,8 @@ const WALL_FIGURES: [Part; 5] = [
 
 /// Measurements of each of them.
 const SEGMENT_FIGURES: &[Figure<PolarSegment>] = &[
-    mean(|s| s.mean_percent, PERFUSION, PERCENT),
-    figure(|s| Some(s.extent_percent), DEFECT, PERCENT),
+    mean(|s| s.mean_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| Some(s.extent_percent), DEFECT_EXTENT, PERCENT),
 ];
 
 /// Puts everything that is particular to this object.
@@ -215,7 +220,10 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
         let comment = dcm("121106", "Comment");
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
-        let ranges = report.volumes_ml.anatomical_interval.map(|_| RANGES);
+        let ranges = report
+            .volumes_ml
+            .anatomical_interval
+            .map(|_| RANGES_COMMENT);
         content.extend(ranges.map(|ranges| text("CONTAINS", comment, ranges)));
     }
     group(if images.is_some() { "1411" } else { "1501" }, content)

@@ -5,7 +5,7 @@
 //! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order of the slices if the
 //! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
 
-use super::codes::{CAVITY, SEGMENTATION};
+use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
 use super::data_set::DataSet;
 use super::source::for_processing;
 use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm, put_segment};
@@ -86,7 +86,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     if results.cavity.is_some() {
         let mut segment = DataSet::new();
         let tracking = results.uids.uid("tracking of the cavity");
-        put_segment(&mut segment, 2, CAVITY, CAVITY.meaning, &tracking);
+        put_segment(&mut segment, 2, LV_CAVITY, LV_CAVITY.meaning, &tracking);
         put_look(&mut segment, CAVITY_CIELAB);
         segments.push(segment);
         set.text(tags::SEGMENTS_OVERLAP, "NO");
@@ -184,7 +184,7 @@ fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize)
     if let Some(source) = results.scan.slice_reference(k) {
         let mut derivation = DataSet::new();
         derivation.item(tags::SOURCE_IMAGE_SEQUENCE, for_processing(source));
-        derivation.code(tags::DERIVATION_CODE_SEQUENCE, SEGMENTATION);
+        derivation.code(tags::DERIVATION_CODE_SEQUENCE, SEGMENTATION_STEP);
         group.item(tags::DERIVATION_IMAGE_SEQUENCE, derivation);
     }
     group

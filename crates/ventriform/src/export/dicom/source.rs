@@ -116,7 +116,7 @@ pub(super) fn for_processing(mut reference: DataSet) -> DataSet {
 
 impl StatedIdentity {
     /// The names of all fields.
-    pub const FIELDS: [&str; 10] = [
+    pub const FIELD_NAMES: [&str; 10] = [
         "patient_id",
         "patient_name",
         "patient_birth_date",

@@ -28,13 +28,13 @@ type Interval<T> = fn(&T) -> Option<[f64; 2]>;
 
 /// The distance that the true value may lie below a figure, and above it (CID 225).
 /// The comment of a group with intervals: no code says how sure a range is.
-pub(super) const RANGES: &str =
+pub(super) const RANGES_COMMENT: &str =
     "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
 
-const BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
-const ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
+const RANGE_BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
+const RANGE_ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
 
-pub(super) const MEAN: Code = sct("373098007", "Mean");
+pub(super) const MEAN_VALUE: Code = sct("373098007", "Mean");
 pub(super) const MILLILITRE: Code = ucum("ml", "milliliter");
 pub(super) const GRAM: Code = ucum("g", "gram");
 pub(super) const PERCENT: Code = ucum("%", "Percent");
@@ -69,7 +69,7 @@ pub(super) const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: C
         value,
         concept,
         unit,
-        derivation: Some(MEAN),
+        derivation: Some(MEAN_VALUE),
         interval: None,
     }
 }
@@ -248,7 +248,7 @@ pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
         let derivation = (figure.derivation).map(|code| concept("HAS CONCEPT MOD", derived, code));
         let interval = figure.interval.and_then(|interval| interval(source));
         let ends = interval.into_iter().flat_map(|[low, high]| {
-            let ends = [(BELOW, value - low), (ABOVE, high - value)];
+            let ends = [(RANGE_BELOW, value - low), (RANGE_ABOVE, high - value)];
             ends.map(|(name, range)| number("HAS PROPERTIES", name, round(range), figure.unit))
         });
         let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();

@@ -18,7 +18,7 @@ use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use nalgebra::Matrix3;
 use std::collections::{BTreeMap, BTreeSet};
 
-const SHAPE: [usize; 3] = [30, 26, 22];
+const SCAN_SHAPE: [usize; 3] = [30, 26, 22];
 
 fn moment() -> Moment {
     Moment {
@@ -47,7 +47,7 @@ fn provenance() -> Provenance {
         frame_of_reference_uid: some("1.2.3.4.9"),
         sop_class_uid: some(uids::NUCLEAR_MEDICINE_IMAGE_STORAGE),
         sop_instance_uid: some("1.2.3.4.5.6"),
-        slice_frames: (1..=SHAPE[2] as u32).rev().collect(),
+        slice_frames: (1..=SCAN_SHAPE[2] as u32).rev().collect(),
         ..Provenance::default()
     }
 }
@@ -97,7 +97,7 @@ impl Scene {
         for vertex in &mut mesh.vertices {
             *vertex += frame.to_patient(&middle) - centre + Vec3::new(1.0, -2.0, 3.0);
         }
-        let mask = voxelise(&mesh, SHAPE, &frame);
+        let mask = voxelise(&mesh, SCAN_SHAPE, &frame);
         assert!(mask.count() > 500);
         let mut report = first_report();
         report.volumes_ml.wall = 101.25;
@@ -109,7 +109,7 @@ impl Scene {
             reason: "The wall is thin; größer als üblich.".into(),
         }];
         Self {
-            scan: SourceScan::new(provenance, frame, SHAPE, placed, moment()),
+            scan: SourceScan::new(provenance, frame, SCAN_SHAPE, placed, moment()),
             mask,
             mesh,
             report,
@@ -205,7 +205,7 @@ fn the_mask_lies_where_it_was_made() {
         let along_column = Vec3::from_column_slice(&cosines[3..]);
         let bytes = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
         let frames = items(&set, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
-        assert_eq!(frames.len(), SHAPE[2]);
+        assert_eq!(frames.len(), SCAN_SHAPE[2]);
         let mut last = f64::NEG_INFINITY;
         let mut found = BTreeSet::new();
         let (mut bit, mut expected) = (0, 0);
@@ -216,15 +216,15 @@ fn the_mask_lies_where_it_was_made() {
             let height = corner.dot(&along_row.cross(&along_column));
             assert!(height > last, "frames follow each other along the normal");
             last = height;
-            for row in 0..SHAPE[1] {
-                for column in 0..SHAPE[0] {
+            for row in 0..SCAN_SHAPE[1] {
+                for column in 0..SCAN_SHAPE[0] {
                     let at = corner
                         + along_row * (spacing[1] * column as f64)
                         + along_column * (spacing[0] * row as f64);
                     let index = scene.scan.frame.to_voxel(&at);
                     let voxel = [0, 1, 2].map(|axis| index[axis].round() as usize);
                     assert!((index - Vec3::from(voxel.map(|x| x as f64))).norm() < 1e-6);
-                    let place = voxel[0] + SHAPE[0] * (voxel[1] + SHAPE[1] * voxel[2]);
+                    let place = voxel[0] + SCAN_SHAPE[0] * (voxel[1] + SCAN_SHAPE[1] * voxel[2]);
                     let set = bytes[bit / 8] >> (bit % 8) & 1 == 1;
                     assert_eq!(set, scene.mask.voxels[place]);
                     expected += usize::from(set);
@@ -234,7 +234,7 @@ fn the_mask_lies_where_it_was_made() {
                         let derivation = only(frame, tags::DERIVATION_IMAGE_SEQUENCE);
                         let source = only(derivation, tags::SOURCE_IMAGE_SEQUENCE);
                         let stored = text(source, tags::REFERENCED_FRAME_NUMBER);
-                        assert_eq!(stored, (SHAPE[2] - voxel[2]).to_string());
+                        assert_eq!(stored, (SCAN_SHAPE[2] - voxel[2]).to_string());
                         assert_eq!(
                             text(source, tags::REFERENCED_SOP_INSTANCE_UID),
                             "1.2.3.4.5.6"
@@ -243,7 +243,7 @@ fn the_mask_lies_where_it_was_made() {
                 }
             }
         }
-        assert_eq!(found.len(), SHAPE.iter().product::<usize>());
+        assert_eq!(found.len(), SCAN_SHAPE.iter().product::<usize>());
         assert_eq!(expected, scene.mask.count());
     }
 }
@@ -252,7 +252,7 @@ fn the_mask_lies_where_it_was_made() {
 #[test]
 fn the_cavity_is_a_segment_of_its_own() {
     let scene = straight();
-    let mut cavity = Mask::empty(SHAPE);
+    let mut cavity = Mask::empty(SCAN_SHAPE);
     for (voxel, set) in cavity.voxels.iter_mut().enumerate() {
         *set = voxel % 7 == 3 && !scene.mask.voxels[voxel];
     }
@@ -267,16 +267,16 @@ fn the_cavity_is_a_segment_of_its_own() {
     assert_eq!(text(&set, tags::SEGMENTS_OVERLAP), "NO");
     assert_eq!(
         text(&set, tags::NUMBER_OF_FRAMES),
-        (2 * SHAPE[2]).to_string()
+        (2 * SCAN_SHAPE[2]).to_string()
     );
     let frames = items(&set, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
     let place = |frame: usize| {
         let position = only(&frames[frame], tags::PLANE_POSITION_SEQUENCE);
         numbers(position, tags::IMAGE_POSITION_PATIENT)
     };
-    for k in 0..SHAPE[2] {
-        assert_eq!(place(k), place(SHAPE[2] + k));
-        for (number, frame) in [(1.0, k), (2.0, SHAPE[2] + k)] {
+    for k in 0..SCAN_SHAPE[2] {
+        assert_eq!(place(k), place(SCAN_SHAPE[2] + k));
+        for (number, frame) in [(1.0, k), (2.0, SCAN_SHAPE[2] + k)] {
             let segment = only(&frames[frame], tags::SEGMENT_IDENTIFICATION_SEQUENCE);
             assert_eq!(numbers(segment, tags::REFERENCED_SEGMENT_NUMBER), [number]);
             let content = only(&frames[frame], tags::FRAME_CONTENT_SEQUENCE);
@@ -300,7 +300,7 @@ fn the_contours_enclose_the_mask() {
         let scene = Scene::new(axes, provenance(), true);
         let set = scene.read(DicomObject::Contours);
         let region = only(&set, tags::ROI_CONTOUR_SEQUENCE);
-        let mut filled = Mask::empty(SHAPE);
+        let mut filled = Mask::empty(SCAN_SHAPE);
         for contour in items(region, tags::CONTOUR_SEQUENCE) {
             let points = numbers(contour, tags::CONTOUR_DATA);
             let count: usize = text(contour, tags::NUMBER_OF_CONTOUR_POINTS)
@@ -315,15 +315,15 @@ fn the_contours_enclose_the_mask() {
             assert!(points.iter().all(|p| (p.z - slice as f64).abs() < 1e-3));
             let source = only(contour, tags::CONTOUR_IMAGE_SEQUENCE);
             let stored = text(source, tags::REFERENCED_FRAME_NUMBER);
-            assert_eq!(stored, (SHAPE[2] - slice).to_string());
-            for row in 0..SHAPE[1] {
-                for column in 0..SHAPE[0] {
+            assert_eq!(stored, (SCAN_SHAPE[2] - slice).to_string());
+            for row in 0..SCAN_SHAPE[1] {
+                for column in 0..SCAN_SHAPE[0] {
                     let (x, y) = (column as f64, row as f64);
                     let crossings = (0..points.len()).filter(|i| {
                         let (a, b) = (points[*i], points[(i + 1) % points.len()]);
                         (a.y > y) != (b.y > y) && x < a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y)
                     });
-                    let place = column + SHAPE[0] * (row + SHAPE[1] * slice);
+                    let place = column + SCAN_SHAPE[0] * (row + SCAN_SHAPE[1] * slice);
                     filled.voxels[place] ^= crossings.count() % 2 == 1;
                 }
             }
@@ -541,7 +541,7 @@ fn what_could_not_be_decoded_makes_no_object() {
         ..provenance()
     };
     let of = |scan: Provenance| Scene::new(Matrix3::identity(), scan, true);
-    for field in StatedIdentity::FIELDS
+    for field in StatedIdentity::FIELD_NAMES
         .iter()
         .chain(&["study_time", "series_uid"])
     {

@@ -46,7 +46,7 @@ const HEART_SHAPES: [HeartShape; 4] = [
     ("long", [85.0, 65.0, 11.0, 25.0], 0.0),
 ];
 
-static TEMPLATES: OnceLock<Vec<NamedTemplate>> = OnceLock::new();
+static READ_TEMPLATES: OnceLock<Vec<NamedTemplate>> = OnceLock::new();
 
 #[derive(Deserialize)]
 struct Heart {
@@ -61,7 +61,7 @@ struct Heart {
 /// # Errors
 /// [`Cancelled`].
 pub fn templates(monitor: &Monitor<'_>) -> Result<Vec<NamedTemplate>, Cancelled> {
-    if let Some(templates) = TEMPLATES.get() {
+    if let Some(templates) = READ_TEMPLATES.get() {
         return Ok(templates.clone());
     }
     let hearts: Vec<Heart> =
@@ -83,7 +83,7 @@ pub fn templates(monitor: &Monitor<'_>) -> Result<Vec<NamedTemplate>, Cancelled>
         })
     };
     let read: Vec<NamedTemplate> = hearts.into_iter().map(read).collect::<Result<_, _>>()?;
-    Ok(TEMPLATES.get_or_init(|| read).clone())
+    Ok(READ_TEMPLATES.get_or_init(|| read).clone())
 }
 
 /// Makes the hearts again, as the file that is embedded. Coordinates are micrometres.

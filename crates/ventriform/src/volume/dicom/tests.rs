@@ -133,8 +133,8 @@ fn with_meta(uid: &'static str, data_set: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-const X: [f64; 3] = [0.6, 0.8, 0.0];
-const Y: [f64; 3] = [0.0, 0.0, -1.0];
+const ROW_DIRECTION: [f64; 3] = [0.6, 0.8, 0.0];
+const COLUMN_DIRECTION: [f64; 3] = [0.0, 0.0, -1.0];
 
 /// 3 columns, 2 rows, 4 slices of 0..24, oblique, slices 5 mm apart backwards.
 fn slices() -> Elements {
@@ -284,7 +284,7 @@ fn sequences_of_unknown_representation_are_in_implicit_vr() {
 #[test]
 fn slices_lie_where_the_standard_puts_them() {
     let reading = read_elements(&slices()).unwrap();
-    let (x, y) = (Vec3::from(X), Vec3::from(Y));
+    let (x, y) = (Vec3::from(ROW_DIRECTION), Vec3::from(COLUMN_DIRECTION));
     for (i, j, k) in [(0, 0, 0), (2, 0, 0), (0, 1, 0), (0, 0, 3), (2, 1, 3)] {
         let [i, j, k] = [i, j, k].map(f64::from);
         // Columns are 4 mm apart, rows 2.5, slices 5 against row x column.

@@ -6,7 +6,7 @@ use crate::volume::nifti::{self, StoredType};
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
-const SHAPE: [usize; 3] = [12, 9, 7];
+const GRID_SHAPE: [usize; 3] = [12, 9, 7];
 
 fn frame() -> VoxelToPatient {
     let turn = nalgebra::Rotation3::from_euler_angles(0.2, -0.4, 1.1);
@@ -15,11 +15,11 @@ fn frame() -> VoxelToPatient {
 }
 
 fn volume(value: impl Fn([usize; 3]) -> f32) -> Volume {
-    let [nx, ny, nz] = SHAPE;
+    let [nx, ny, nz] = GRID_SHAPE;
     let at = |v: usize| [v % nx, v / nx % ny, v / nx / ny];
     let voxels: Vec<f32> = (0..nx * ny * nz).map(|v| value(at(v))).collect();
     Volume {
-        shape: SHAPE,
+        shape: GRID_SHAPE,
         integral: voxels.iter().all(|v| v.is_nan() || v.fract() == 0.0),
         voxels,
         frame: frame(),
@@ -167,7 +167,7 @@ fn one_lattice_in_any_storage_gives_the_same_voxels() {
     let any = MaskChoice::default();
     let original = of(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
     let silent = Monitor::silent();
-    let grid = (SHAPE, &original.frame);
+    let grid = (GRID_SHAPE, &original.frame);
     let mut stored = 0;
     for order in [
         [0, 1, 2],
@@ -207,7 +207,7 @@ fn one_lattice_in_any_storage_gives_the_same_voxels() {
                         v / shape[0] / shape[1],
                     ]);
                     let inside = p.map(|x| usize::try_from(x).unwrap_or(usize::MAX));
-                    mask.voxels[v] = (0..3).all(|a| inside[a] < SHAPE[a]) && wall(inside);
+                    mask.voxels[v] = (0..3).all(|a| inside[a] < GRID_SHAPE[a]) && wall(inside);
                 }
                 let turned = GivenMask {
                     mask,
@@ -248,12 +248,12 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
         with(turned.matrix() * linear, origin),
     ];
     for other in &others {
-        let grid = (SHAPE, &original.frame);
+        let grid = (GRID_SHAPE, &original.frame);
         let refused = other.on(grid, false, &silent).unwrap_err();
         let GivenMaskError::OtherGrid { mask, grid } = &refused else {
             panic!("{refused}");
         };
-        assert_eq!((mask.shape, grid.shape), (SHAPE, SHAPE));
+        assert_eq!((mask.shape, grid.shape), (GRID_SHAPE, GRID_SHAPE));
         assert!(
             refused
                 .to_string()
@@ -266,7 +266,9 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
         with(linear * (1.0 + 3e-7), origin),
         with(linear, origin.add_scalar(1e-5)),
     ] {
-        let placed = near.on((SHAPE, &original.frame), false, &silent).unwrap();
+        let placed = near
+            .on((GRID_SHAPE, &original.frame), false, &silent)
+            .unwrap();
         assert_eq!(
             (placed.mask, placed.resampled),
             (original.mask.clone(), false)
@@ -274,10 +276,10 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
     }
     // Half a voxel and less away, the nearest voxel is the same; each voxel in eight parts, too.
     let placed = others[0]
-        .on((SHAPE, &original.frame), true, &silent)
+        .on((GRID_SHAPE, &original.frame), true, &silent)
         .unwrap();
     assert_eq!((&placed.mask, placed.resampled), (&original.mask, true));
-    let fine_shape = SHAPE.map(|n| 2 * n);
+    let fine_shape = GRID_SHAPE.map(|n| 2 * n);
     let mut fine = Mask::empty(fine_shape);
     for v in 0..fine.voxels.len() {
         let p = [v % 24, v / 24 % 18, v / (24 * 18)].map(|x| x / 2);
@@ -293,8 +295,13 @@ fn other_lattices_are_refused_with_both_geometries_or_resampled() {
         structure: None,
         surface: None,
     };
-    assert!(fine.on((SHAPE, &original.frame), false, &silent).is_err());
-    let placed = fine.on((SHAPE, &original.frame), true, &silent).unwrap();
+    assert!(
+        fine.on((GRID_SHAPE, &original.frame), false, &silent)
+            .is_err()
+    );
+    let placed = fine
+        .on((GRID_SHAPE, &original.frame), true, &silent)
+        .unwrap();
     assert_eq!(placed.mask, original.mask);
 }
 
@@ -336,7 +343,7 @@ fn voxels_beyond_the_border_are_lost_only_if_few_and_held_otherwise() {
         }
     };
     let refused = moved(5.0)
-        .on((SHAPE, &mask.frame), true, &silent)
+        .on((GRID_SHAPE, &mask.frame), true, &silent)
         .unwrap_err();
     assert!(
         matches!(refused, GivenMaskError::Elsewhere { .. }),
@@ -392,7 +399,7 @@ fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
     let grid = frame();
     let centre = grid.to_patient(&Vec3::new(5.3, 4.1, 2.8));
     mesh.vertices.iter_mut().for_each(|p| *p += centre);
-    let wanted = voxelise(&mesh, SHAPE, &grid);
+    let wanted = voxelise(&mesh, GRID_SHAPE, &grid);
     let text = |mesh: &TriMesh, head: &str| {
         let points = mesh
             .vertices
@@ -417,7 +424,7 @@ fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
     let any = MaskChoice::default();
     let given = read(text(&mesh, "# SPACE=LPS UNIT=mm\n"), &any).unwrap();
     assert_eq!(given.structure, None);
-    let placed = given.on((SHAPE, &grid), false, &silent).unwrap();
+    let placed = given.on((GRID_SHAPE, &grid), false, &silent).unwrap();
     assert_eq!(placed.mask, wanted);
     assert!(!placed.resampled);
     // The voxels of its own grid tell its size.
@@ -430,13 +437,13 @@ fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
         .iter_mut()
         .for_each(|p| (p.x, p.y) = (-p.x, -p.y));
     let lost = read(text(&turned, ""), &any).unwrap();
-    let lost = lost.on((SHAPE, &grid), false, &silent).unwrap_err();
+    let lost = lost.on((GRID_SHAPE, &grid), false, &silent).unwrap_err();
     assert!(matches!(lost, GivenMaskError::Elsewhere { .. }), "{lost}");
     let mut ras = any.clone();
     ras.mesh.frame = Some(crate::mesh_files::MeshFrame::Ras);
     let found = read(text(&turned, ""), &ras).unwrap();
     assert_eq!(
-        found.on((SHAPE, &grid), false, &silent).unwrap().mask,
+        found.on((GRID_SHAPE, &grid), false, &silent).unwrap().mask,
         wanted
     );
     // Metres are told by the size.
@@ -447,7 +454,7 @@ fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
     let mut metres = any.clone();
     metres.mesh.unit = Some(crate::mesh_files::MeshUnit::Metre);
     let found = read(text(&small, "# wavefront\n"), &metres).unwrap();
-    let found = found.on((SHAPE, &grid), false, &silent).unwrap().mask;
+    let found = found.on((GRID_SHAPE, &grid), false, &silent).unwrap().mask;
     let differ = found
         .voxels
         .iter()

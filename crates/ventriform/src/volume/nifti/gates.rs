@@ -8,7 +8,7 @@
 
 use super::super::gate_timing::GateTiming;
 use super::header::Header;
-use crate::grid::gates::GATES;
+use crate::grid::gates::GATE_COUNTS;
 
 /// Longest R-R interval, seconds: 24 beats per minute.
 const LONGEST_BEAT: f64 = 2.5;
@@ -33,7 +33,7 @@ pub(super) fn contradiction(header: &Header) -> Option<String> {
             header.intent_code
         ));
     }
-    let most = *GATES.end();
+    let most = *GATE_COUNTS.end();
     if volumes > most {
         return Some(format!(
             "dim[4] is {volumes}, more than the {most} gates of a heart beat"

@@ -109,7 +109,7 @@ fn complaint(result: Result<Reading, VolumeError>) -> (&'static str, String) {
     }
 }
 
-const RAMP: [f32; 24] = {
+const RAMP_VALUES: [f32; 24] = {
     let mut ramp = [0.0; 24];
     let mut n = 0;
     while n < 24 {
@@ -123,7 +123,7 @@ const RAMP: [f32; 24] = {
 fn both_byte_orders_give_the_same() {
     for big_endian in [false, true] {
         let reading = File::new(big_endian).read().unwrap();
-        assert_eq!(reading.volume.voxels, RAMP);
+        assert_eq!(reading.volume.voxels, RAMP_VALUES);
         assert_eq!(reading.volume.shape, [4, 3, 2]);
         let order = [ByteOrder::Little, ByteOrder::Big][usize::from(big_endian)];
         assert_eq!(reading.facts.byte_order, order);
@@ -146,7 +146,11 @@ fn every_real_type_is_read() {
             for n in 0..24 {
                 file.push(of(n));
             }
-            assert_eq!(file.read().unwrap().volume.voxels, RAMP, "type {code}");
+            assert_eq!(
+                file.read().unwrap().volume.voxels,
+                RAMP_VALUES,
+                "type {code}"
+            );
         }
     }
     check(2, |n| [n]);
@@ -193,7 +197,7 @@ fn slope_and_intercept_apply_unless_the_slope_is_none() {
     assert_eq!(with(-2.0, 0.0).unwrap().volume.voxels[3], -6.0);
     for slope in [0.0, f32::NAN] {
         let reading = with(slope, 7.0).unwrap();
-        assert_eq!(reading.volume.voxels, RAMP);
+        assert_eq!(reading.volume.voxels, RAMP_VALUES);
         assert!(reading.facts.warnings[0].contains("scl_inter 7"));
     }
     assert_eq!(complaint(with(f32::INFINITY, 0.0)).0, "scl_slope");
@@ -218,7 +222,7 @@ fn vox_offset_is_where_the_voxels_are() {
     between[..4].copy_from_slice(&48_i32.to_le_bytes());
     file.bytes.splice(352..352, between);
     for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
-        assert_eq!(read_bytes(&bytes).unwrap().volume.voxels, RAMP);
+        assert_eq!(read_bytes(&bytes).unwrap().volume.voxels, RAMP_VALUES);
     }
     for wrong in [f32::NAN, f32::INFINITY, -1.0, 0.0, 351.0, 352.5] {
         file.reals(108, &[wrong]);
@@ -294,7 +298,7 @@ fn of_several_volumes_one_must_be_named() {
     );
     let second = |bytes: &[u8]| read_files(&[bytes], Some(1)).unwrap();
     for bytes in [file.bytes.clone(), gzip(&file.bytes)] {
-        assert_eq!(second(&bytes).volume.voxels, RAMP[12..]);
+        assert_eq!(second(&bytes).volume.voxels, RAMP_VALUES[12..]);
         assert_eq!(second(&bytes).facts.frame, Some(1));
     }
     let third = read_files(&[&file.bytes], Some(2)).err();
@@ -585,7 +589,7 @@ fn pairs_come_in_any_order_and_packing() {
         (&packed_image, &header),
     ] {
         let reading = read_files(&[a, b], None).unwrap();
-        assert_eq!(reading.volume.voxels, RAMP);
+        assert_eq!(reading.volume.voxels, RAMP_VALUES);
         assert_eq!(reading.facts.format, FileFormat::Nifti1Pair);
     }
     assert!(matches!(
@@ -604,9 +608,9 @@ fn gzip_members_padding_damage_and_cuts() {
     for part in bytes.chunks(97) {
         members.extend(gzip(part));
     }
-    assert_eq!(read_bytes(&members).unwrap().volume.voxels, RAMP);
+    assert_eq!(read_bytes(&members).unwrap().volume.voxels, RAMP_VALUES);
     members.extend([0; 512]);
-    assert_eq!(read_bytes(&members).unwrap().volume.voxels, RAMP);
+    assert_eq!(read_bytes(&members).unwrap().volume.voxels, RAMP_VALUES);
     let packed = gzip(&bytes);
     for cut in 3..packed.len() {
         assert!(read_bytes(&packed[..cut]).is_err(), "cut at {cut}");
@@ -625,7 +629,7 @@ fn what_follows_the_voxels_is_not_unpacked() {
     let mut bytes = File::new(false).bytes;
     bytes.resize(bytes.len() + (64 << 20), 0);
     let reading = read_bytes(&gzip(&bytes)).unwrap();
-    assert_eq!(reading.volume.voxels, RAMP);
+    assert_eq!(reading.volume.voxels, RAMP_VALUES);
     assert!(reading.facts.warnings[0].contains("were ignored"));
 }
 
@@ -868,7 +872,7 @@ fn version_2_is_read() {
         }
         let reading = file.read().unwrap();
         assert_eq!(reading.facts.format, FileFormat::Nifti2);
-        assert_eq!(reading.volume.voxels, RAMP.map(|v| v / 4.0));
+        assert_eq!(reading.volume.voxels, RAMP_VALUES.map(|v| v / 4.0));
         assert_eq!(reading.facts.spacing_mm, [3.5; 3]);
         file.put(16 + 8, i64::MAX.to_le_bytes());
         assert!(matches!(file.read(), Err(VolumeError::TooLarge { .. })));
@@ -1074,7 +1078,7 @@ fn mask_of(reading: &Reading) -> Vec<u8> {
 }
 
 /// The fields of a header that state the place: pixdim, xyzt_units, both codes, quaternion, offset, srow.
-const PLACE: [std::ops::Range<usize>; 4] = [76..108, 123..124, 252..280, 280..328];
+const PLACE_FIELDS: [std::ops::Range<usize>; 4] = [76..108, 123..124, 252..280, 280..328];
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
@@ -1110,7 +1114,7 @@ proptest! {
         }
         let reading = file.read().unwrap();
         let mask = mask_of(&reading);
-        for range in PLACE {
+        for range in PLACE_FIELDS {
             prop_assert_eq!(&mask[range.clone()], &file.bytes[range.clone()], "bytes {:?}", range);
         }
         let dim = 40..40 + 2 * (1 + 3 + trailing);

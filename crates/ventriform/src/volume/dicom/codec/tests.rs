@@ -26,16 +26,16 @@ fn reason(compression: Compression, bytes: &[u8], layout: FrameLayout) -> String
     }
 }
 
-const J2K: Compression = Compression::Jpeg2000 { irreversible: true };
+const JPEG_2000: Compression = Compression::Jpeg2000 { irreversible: true };
 const J2K_REVERSIBLE: Compression = Compression::Jpeg2000 {
     irreversible: false,
 };
-const LOSSLESS: Compression = Compression::Jpeg(Process::Lossless);
-const BASELINE: Compression = Compression::Jpeg(Process::Baseline);
-const LS: Compression = Compression::JpegLs { near: true };
+const LOSSLESS_JPEG: Compression = Compression::Jpeg(Process::Lossless);
+const BASELINE_JPEG: Compression = Compression::Jpeg(Process::Baseline);
+const JPEG_LS: Compression = Compression::JpegLs { near: true };
 
 /// A chessboard of 0 and 65535, irreversible at a ratio of 12, by OpenJPEG 2.5.2.
-const BOARD: &str = "\
+const UNSIGNED_BOARD: &str = "\
     ff4fff5100290000000000200000002000000000000000000000002000000020000000000000000000010f0101ff\
     52000c00000001000504040000ff5c002342b720b6f0b6f0b6c0af00af00aee0a750a750a76890059005904797d3\
     97d39762ff640025000143726561746564206279204f70656e4a5045472076657273696f6e20322e352e32ff9000\
@@ -71,24 +71,30 @@ fn a_code_stream_of_another_size_takes_no_memory() {
         huge.extend(number.to_be_bytes());
     }
     huge.extend([0, 1, 15, 1, 1]);
-    assert!(reason(J2K, &huge, layout).contains("60000 columns"));
+    assert!(reason(JPEG_2000, &huge, layout).contains("60000 columns"));
     // As many columns and rows as stated, but in 4096 million tiles.
     let mut tiles = huge.clone();
     tiles[8..16].copy_from_slice(&[0, 0, 0, 4, 0, 0, 0, 3]);
     tiles[16..24].copy_from_slice(&[0; 8]);
-    decoded(J2K, &tiles, layout).unwrap_err();
+    decoded(JPEG_2000, &tiles, layout).unwrap_err();
     let jpeg = [
         0xff, 0xd8, 0xff, 0xc3, 0, 11, 16, 0xff, 0xff, 0xff, 0xff, 1, 1, 0x11, 0,
     ];
-    assert!(reason(LOSSLESS, &jpeg, layout).contains("65535 columns"));
-    for compression in [Compression::Rle, LOSSLESS, BASELINE, LS, J2K] {
+    assert!(reason(LOSSLESS_JPEG, &jpeg, layout).contains("65535 columns"));
+    for compression in [
+        Compression::Rle,
+        LOSSLESS_JPEG,
+        BASELINE_JPEG,
+        JPEG_LS,
+        JPEG_2000,
+    ] {
         decoded(compression, &[], layout).unwrap_err();
     }
 }
 
 #[test]
 fn wavelets_that_overshoot_end_at_the_range() {
-    let numbers = decoded(J2K, &bytes(BOARD), square(32)).unwrap();
+    let numbers = decoded(JPEG_2000, &bytes(UNSIGNED_BOARD), square(32)).unwrap();
     let (numbers, _) = numbers.as_chunks::<2>();
     let numbers: Vec<u16> = numbers.iter().map(|n| u16::from_le_bytes(*n)).collect();
     // By OpenJPEG: 86 numbers are 0, 82 are 65535, and this is how the first row begins.
@@ -105,7 +111,7 @@ fn wavelets_that_overshoot_end_at_the_range() {
         signed: true,
         ..square(32)
     };
-    let numbers = decoded(J2K, &bytes(SIGNED_BOARD), layout).unwrap();
+    let numbers = decoded(JPEG_2000, &bytes(SIGNED_BOARD), layout).unwrap();
     let (numbers, _) = numbers.as_chunks::<2>();
     let numbers: Vec<i16> = numbers.iter().map(|n| i16::from_le_bytes(*n)).collect();
     assert_eq!(numbers.iter().filter(|v| **v == -2048).count(), 67);
@@ -115,10 +121,10 @@ fn wavelets_that_overshoot_end_at_the_range() {
 
 #[test]
 fn what_the_syntax_does_not_allow_is_refused_by_name() {
-    let board = bytes(BOARD);
+    let board = bytes(UNSIGNED_BOARD);
     let layout = square(32);
     assert!(reason(J2K_REVERSIBLE, &board, layout).contains("irreversible"));
-    for other in [Compression::Rle, LOSSLESS, BASELINE, LS] {
+    for other in [Compression::Rle, LOSSLESS_JPEG, BASELINE_JPEG, JPEG_LS] {
         decoded(other, &board, layout).unwrap_err();
     }
     let sot = board
@@ -133,7 +139,10 @@ fn what_the_syntax_does_not_allow_is_refused_by_name() {
         (&[0xff, 0x50, 0, 8, 0, 2, 0, 0, 0, 0], "CAP"),
         (&[0xff, 0x74, 0, 2], "FF74"),
     ] {
-        assert!(reason(J2K, &with(segment), layout).contains(name), "{name}");
+        assert!(
+            reason(JPEG_2000, &with(segment), layout).contains(name),
+            "{name}"
+        );
     }
     let cod = board
         .windows(2)
@@ -144,20 +153,20 @@ fn what_the_syntax_does_not_allow_is_refused_by_name() {
         frame[place] = value;
         frame
     };
-    assert!(reason(J2K, &changed(cod + 12, 0x40), layout).contains("High-Throughput"));
-    assert!(reason(J2K, &changed(6, 0x40), layout).contains("Rsiz"));
-    assert!(reason(J2K, &changed(43, 2), layout).contains("subsampled"));
-    assert!(reason(J2K, &changed(cod + 7, 33), layout).contains("33 layers"));
-    decoded(J2K, &changed(cod + 13, 1), layout).unwrap_err();
+    assert!(reason(JPEG_2000, &changed(cod + 12, 0x40), layout).contains("High-Throughput"));
+    assert!(reason(JPEG_2000, &changed(6, 0x40), layout).contains("Rsiz"));
+    assert!(reason(JPEG_2000, &changed(43, 2), layout).contains("subsampled"));
+    assert!(reason(JPEG_2000, &changed(cod + 7, 33), layout).contains("33 layers"));
+    decoded(JPEG_2000, &changed(cod + 13, 1), layout).unwrap_err();
     for length in 0..board.len() - 2 {
-        decoded(J2K, &board[..length], layout).unwrap_err();
+        decoded(JPEG_2000, &board[..length], layout).unwrap_err();
     }
 }
 
 #[test]
 fn code_blocks_and_layers_are_counted_before_decoding() {
     // 1024 x 1024 numbers in blocks of 4 x 4, 32 layers: 2 million parts in 120 bytes.
-    let mut frame = bytes(BOARD);
+    let mut frame = bytes(UNSIGNED_BOARD);
     frame[8..16].copy_from_slice(&[0, 0, 4, 0, 0, 0, 4, 0]);
     frame[24..32].copy_from_slice(&[0, 0, 4, 0, 0, 0, 4, 0]);
     let cod = frame
@@ -166,11 +175,11 @@ fn code_blocks_and_layers_are_counted_before_decoding() {
         .unwrap();
     frame[cod + 7] = 32;
     frame[cod + 10..cod + 12].copy_from_slice(&[0, 0]);
-    assert!(reason(J2K, &frame, square(1024)).contains("more than 262144 code blocks"));
+    assert!(reason(JPEG_2000, &frame, square(1024)).contains("more than 262144 code blocks"));
     // The same in tiles of one number.
-    let mut frame = bytes(BOARD);
+    let mut frame = bytes(UNSIGNED_BOARD);
     frame[24..32].copy_from_slice(&[0, 0, 0, 1, 0, 0, 0, 1]);
-    let error = reason(J2K, &frame, square(32));
+    let error = reason(JPEG_2000, &frame, square(32));
     assert!(error.contains("has 0 of 1 parts"), "{error}");
 }
 
@@ -221,7 +230,7 @@ fn decoding_stops_when_it_is_told_to() {
     let (mut calls, mut most) = (0, usize::MAX);
     let mut run = |most: &mut usize| {
         calls = 0;
-        decode(LOSSLESS, &frame, layout, &mut || {
+        decode(LOSSLESS_JPEG, &frame, layout, &mut || {
             calls += 1;
             if calls > *most {
                 Err(Cancelled)

@@ -134,8 +134,8 @@ fn layout(columns: usize, rows: usize, size: usize) -> FrameLayout {
     }
 }
 
-const LOSSLESS: Compression = Compression::Jpeg(Process::Lossless);
-const BASELINE: Compression = Compression::Jpeg(Process::Baseline);
+const LOSSLESS_JPEG: Compression = Compression::Jpeg(Process::Lossless);
+const BASELINE_JPEG: Compression = Compression::Jpeg(Process::Baseline);
 
 fn reason(bytes: &[u8], compression: Compression, layout: FrameLayout) -> String {
     match decoded(compression, bytes, layout) {
@@ -158,7 +158,7 @@ fn every_predictor_width_point_transform_and_restart_gives_the_image() {
                     };
                     let image = image(columns * rows, bits);
                     let packed = encode(&image, columns, options);
-                    let bytes = decoded(LOSSLESS, &packed, layout(columns, rows, 2)).unwrap();
+                    let bytes = decoded(LOSSLESS_JPEG, &packed, layout(columns, rows, 2)).unwrap();
                     let (numbers, _) = bytes.as_chunks::<2>();
                     let numbers = numbers.iter().map(|n| i32::from(u16::from_le_bytes(*n)));
                     let expected = image.iter().map(|v| v >> point << point);
@@ -192,26 +192,26 @@ fn damaged_lossless_frames_are_refused() {
     };
     // Restarts out of order, missing or within a row.
     let order = changed(at([0xff, 0xd1]) + 1, 0xd2);
-    assert!(reason(&order, LOSSLESS, layout).contains("restart FF D1"));
+    assert!(reason(&order, LOSSLESS_JPEG, layout).contains("restart FF D1"));
     let none = changed(at([0xff, 0xdd]) + 5, 0);
-    assert!(reason(&none, LOSSLESS, layout).contains("cut off"));
+    assert!(reason(&none, LOSSLESS_JPEG, layout).contains("cut off"));
     let within = changed(at([0xff, 0xdd]) + 5, 7);
-    assert!(reason(&within, LOSSLESS, layout).contains("no multiple"));
+    assert!(reason(&within, LOSSLESS_JPEG, layout).contains("no multiple"));
     let scan = at([0xff, 0xda]);
     for (place, value) in [(7, 0), (7, 8), (8, 1), (9, 12), (4, 2), (5, 9), (6, 0x30)] {
-        decoded(LOSSLESS, &changed(scan + place, value), layout).unwrap_err();
+        decoded(LOSSLESS_JPEG, &changed(scan + place, value), layout).unwrap_err();
     }
     for length in 0..good.len() - 2 {
-        decoded(LOSSLESS, &good[..length], layout).unwrap_err();
+        decoded(LOSSLESS_JPEG, &good[..length], layout).unwrap_err();
     }
     // More numbers than the frame has, a second scan, another frame header.
     let more = encode(&[&image[..], &image[..]].concat(), columns, options);
     let mut more = more;
     let rows_at = more.windows(2).position(|two| two == [0xff, 0xc3]).unwrap() + 6;
     more[rows_at] = rows as u8;
-    decoded(LOSSLESS, &more, layout).unwrap_err();
+    decoded(LOSSLESS_JPEG, &more, layout).unwrap_err();
     let again = [&good[..good.len() - 2], &good[scan..]].concat();
-    assert!(reason(&again, LOSSLESS, layout).contains("FF DA"));
+    assert!(reason(&again, LOSSLESS_JPEG, layout).contains("FF DA"));
     for (code, name) in [
         (0xc0, "baseline JPEG"),
         (0xc1, "extended sequential"),
@@ -221,16 +221,19 @@ fn damaged_lossless_frames_are_refused() {
         (0xf7, "JPEG-LS"),
     ] {
         let other = changed(at([0xff, 0xc3]) + 1, code);
-        assert!(reason(&other, LOSSLESS, layout).contains(name), "{name}");
+        assert!(
+            reason(&other, LOSSLESS_JPEG, layout).contains(name),
+            "{name}"
+        );
     }
-    assert!(reason(&good, BASELINE, layout).contains("baseline JPEG only"));
+    assert!(reason(&good, BASELINE_JPEG, layout).contains("baseline JPEG only"));
     // Padding to an even length, and a missing end, are read.
-    decoded(LOSSLESS, &[&good[..], &[0]].concat(), layout).unwrap();
-    decoded(LOSSLESS, &good[..good.len() - 2], layout).unwrap();
+    decoded(LOSSLESS_JPEG, &[&good[..], &[0]].concat(), layout).unwrap();
+    decoded(LOSSLESS_JPEG, &good[..good.len() - 2], layout).unwrap();
 }
 
 /// Two blocks with a restart between them, quality 90, by libjpeg-turbo; and its numbers.
-const RESTARTED: &str = "\
+const RESTARTED_JPEG: &str = "\
     ffd8ffe000104a46494600010100000100010000ffdb004300030202030202030303030403030405080505040405\
     0a070706080c0a0c0c0b0a0b0b0d0e12100d0e110e0b0b1016101113141515150c0f171816141812141514ffc000\
     0b080007000901011100ffc40014000100000000000000000000000000000008ffc40021100000050207000000000\
@@ -244,19 +247,22 @@ const RESTARTED_NUMBERS: [u8; 63] = [
 
 #[test]
 fn baseline_frames_are_those_of_libjpeg() {
-    let good = super::super::tests::bytes(RESTARTED);
+    let good = super::super::tests::bytes(RESTARTED_JPEG);
     let layout = layout(9, 7, 1);
-    assert_eq!(decoded(BASELINE, &good, layout).unwrap(), RESTARTED_NUMBERS);
+    assert_eq!(
+        decoded(BASELINE_JPEG, &good, layout).unwrap(),
+        RESTARTED_NUMBERS
+    );
     for length in 0..good.len() - 2 {
-        decoded(BASELINE, &good[..length], layout).unwrap_err();
+        decoded(BASELINE_JPEG, &good[..length], layout).unwrap_err();
     }
     let frame = good.windows(2).position(|two| two == [0xff, 0xc0]).unwrap();
     let mut progressive = good.clone();
     progressive[frame + 1] = 0xc2;
-    assert!(reason(&progressive, BASELINE, layout).contains("progressive JPEG"));
+    assert!(reason(&progressive, BASELINE_JPEG, layout).contains("progressive JPEG"));
     let scan = good.windows(2).position(|two| two == [0xff, 0xda]).unwrap();
     let again = [&good[..good.len() - 2], &good[scan..]].concat();
-    assert!(reason(&again, BASELINE, layout).contains("FF DA"));
+    assert!(reason(&again, BASELINE_JPEG, layout).contains("FF DA"));
 }
 
 #[test]
