@@ -23,6 +23,11 @@ pub struct BeatChoice {
 }
 
 impl BeatChoice {
+    /// The stated mass of the left ventricle's muscle, g.
+    pub fn stated_muscle_g(&self) -> Option<f64> {
+        self.mass_g
+    }
+
     /// The first parameter that lies outside of its range: name, value, least and greatest.
     pub fn out_of_range(&self) -> Option<(&'static str, f64, [f64; 2])> {
         [

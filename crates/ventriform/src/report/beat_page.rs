@@ -121,11 +121,7 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
         let few = "Few beats were rejected".to_owned();
         checks.push((!raised("beats_rejected"), few));
     }
-    if report
-        .parameters
-        .get("mass_g")
-        .is_some_and(|mass| !mass.is_null())
-    {
+    if report.has_stated_mass() {
         let met = "The wall has the mass that was given".to_owned();
         checks.push((!raised("mass_not_met"), met));
     }
@@ -173,7 +169,7 @@ fn figures(report: &BeatReport) -> Markup {
             with_interval("end-systolic volume", report.esv_interval_ml, 0),
         ),
         figure(report.sv_ml, 0, "ml", "stroke volume"),
-        figure(report.mass_g, 0, "g", "mass of the wall (1.05 g/ml)"),
+        figure(report.muscle_g(), 0, "g", "mass of the wall (1.05 g/ml)"),
         figure(
             rates.map(|rates| rates.peak_ejection_edv_per_s),
             2,

@@ -314,7 +314,7 @@ fn size_rows(report: &SegmentationReport) -> Vec<Option<HeadlineFigure>> {
             "mean thickness of the anatomical wall",
         ),
         figure(
-            report.mass_g,
+            report.muscle_g(),
             0,
             "g",
             "mass of the anatomical wall (1.05 g/ml)",

@@ -251,7 +251,7 @@ const BEAT_FIGURES: &[Figure<BeatReport>] = &[
         ),
         |r| r.ef_interval_percent,
     ),
-    figure(|r| Some(r.mass_g), dcm("122447", "Wall Mass"), GRAM),
+    figure(|r| Some(r.muscle_g()), dcm("122447", "Wall Mass"), GRAM),
     figure(
         |r| Some(r.rates.as_ref()?.peak_ejection_edv_per_s),
         dcm("122616", "Peak Ejection Rate"),

@@ -35,7 +35,7 @@ const NO_UNITS: Code = ucum("1", "no units");
 /// Measurements of the whole structure. A new figure of the report is a new line here.
 const STRUCTURE_FIGURES: &[Figure<SegmentationReport>] = &[
     figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
-    figure(|r| r.mass_g, WALL_MASS, GRAM),
+    figure(SegmentationReport::muscle_g, WALL_MASS, GRAM),
     mean(|r| r.wall_thickness_mm, WALL_THICKNESS, MILLIMETRE),
     figure(
         |r| Some(r.polar.as_ref()?.extent_percent),
