@@ -345,15 +345,8 @@ impl Watcher {
     fn segment(&self, scan: &Path) -> bool {
         let monitor = Monitor::new(self, self.token.clone());
         let parameters = FitParameters::default();
-        let order = SegmentationOrder {
-            volume: &[VolumeFile::at(scan)],
-            expert: None,
-            auto: true,
-            models: Vec::new(),
-            reader: None,
-            normals: None,
-            parameters: &parameters,
-        };
+        let files = [VolumeFile::at(scan)];
+        let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
         match from_files(&order, &ReadLimits::default(), &monitor) {
             Ok(made) => match made.files(&Format::ALL, None, &monitor) {
                 Ok(_) => false,

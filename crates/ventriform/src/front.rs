@@ -82,15 +82,7 @@ pub fn segment(
     scan: &Scan,
     parameters: &FitParameters,
 ) -> Result<SegmentedVolume, SegmentationError> {
-    let order = SegmentationOrder {
-        volume: &scan.files,
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters,
-    };
+    let order = SegmentationOrder::of_built_in_hearts(&scan.files, parameters);
     segmentation::from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }
 

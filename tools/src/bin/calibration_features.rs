@@ -136,15 +136,8 @@ fn segmented(
 ) -> std::result::Result<SegmentedVolume, SegmentationError> {
     let mut parameters = FitParameters::default();
     parameters.deform.edge = edge;
-    let order = SegmentationOrder {
-        volume: &[VolumeFile::at(case.join("spect.nii.gz"))],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &parameters,
-    };
+    let files = [VolumeFile::at(case.join("spect.nii.gz"))];
+    let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }
 

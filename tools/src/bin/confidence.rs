@@ -52,15 +52,8 @@ fn line(case: &Path) -> Result<String> {
     let with_edge = |edge| {
         let mut parameters = FitParameters::default();
         parameters.deform.edge = edge;
-        let order = SegmentationOrder {
-            volume: &file("spect.nii.gz"),
-            expert: None,
-            auto: true,
-            models: Vec::new(),
-            reader: None,
-            normals: None,
-            parameters: &parameters,
-        };
+        let files = file("spect.nii.gz");
+        let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
         from_files(&order, &limits, &monitor)
     };
     let both = [WallEdge::Apparent, WallEdge::Anatomical];

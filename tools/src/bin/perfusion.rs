@@ -90,14 +90,10 @@ fn row(folder: &Path, case: &CohortRow, limits: &NormalLimits) -> Result<Row> {
         },
         ..FitParameters::default()
     };
+    let files = [VolumeFile::at(&file)];
     let order = SegmentationOrder {
-        volume: &[VolumeFile::at(&file)],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
         normals: Some(limits),
-        parameters: &parameters,
+        ..SegmentationOrder::of_built_in_hearts(&files, &parameters)
     };
     let made = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;
     let found = made.perfusion.as_ref().context("no limits were applied")?;

@@ -193,15 +193,8 @@ fn surface_of(mask: &Path) -> Result<TriMesh> {
 fn segmented(case: &Path, edge: WallEdge) -> Result<SegmentedVolume> {
     let mut parameters = FitParameters::default();
     parameters.deform.edge = edge;
-    let order = SegmentationOrder {
-        volume: &[VolumeFile::at(case.join("spect.nii.gz"))],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &parameters,
-    };
+    let files = [VolumeFile::at(case.join("spect.nii.gz"))];
+    let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
     Ok(from_files(
         &order,
         &ReadLimits::default(),

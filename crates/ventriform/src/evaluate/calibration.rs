@@ -314,15 +314,8 @@ struct ReadCase {
 impl ReadCase {
     fn of(case: &CalibrationCase, parameters: &FitParameters) -> Result<Self, String> {
         let monitor = Monitor::silent();
-        let order = SegmentationOrder {
-            volume: &[VolumeFile::at(&case.scan)],
-            expert: None,
-            auto: true,
-            models: Vec::new(),
-            reader: None,
-            normals: None,
-            parameters,
-        };
+        let files = [VolumeFile::at(&case.scan)];
+        let order = SegmentationOrder::of_built_in_hearts(&files, parameters);
         let made = from_files(&order, &ReadLimits::default(), &monitor);
         let made = made.map_err(|error| error.to_string())?;
         let volume = &made.reading.volume;

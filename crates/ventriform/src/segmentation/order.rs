@@ -25,6 +25,21 @@ pub struct SegmentationOrder<'a> {
     pub parameters: &'a FitParameters,
 }
 
+impl<'a> SegmentationOrder<'a> {
+    /// The built-in hearts alone are fitted to the volume in these files: no mask, no reader, no normal limits.
+    pub fn of_built_in_hearts(volume: &'a [VolumeFile], parameters: &'a FitParameters) -> Self {
+        Self {
+            volume,
+            expert: None,
+            auto: true,
+            models: Vec::new(),
+            reader: None,
+            normals: None,
+            parameters,
+        }
+    }
+}
+
 /// A reader's profile with its name in the report.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedReader {

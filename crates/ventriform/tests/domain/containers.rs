@@ -81,15 +81,8 @@ fn dicom(volume: &Volume, position: [&str; 3], spacing: [&str; 3]) -> Vec<u8> {
 
 fn segmented(file: VolumeFile) -> Vec<NamedFile> {
     let parameters = FitParameters::default();
-    let order = SegmentationOrder {
-        volume: &[file],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &parameters,
-    };
+    let files = [file];
+    let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
     let monitor = Monitor::silent();
     let made = from_files(&order, &ReadLimits::default(), &monitor).unwrap();
     made.files(&Format::ALL, None, &monitor).unwrap()

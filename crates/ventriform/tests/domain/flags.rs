@@ -28,15 +28,9 @@ fn scan(parameters: &PhantomParameters) -> Phantom {
 
 fn segmented(volume: &Volume) -> Result<Fit, SegmentationError> {
     let bytes = nifti::write(volume, StoredType::Float32, false).unwrap();
-    let order = SegmentationOrder {
-        volume: &[VolumeFile::in_memory("scan.nii", bytes)],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &FitParameters::default(),
-    };
+    let files = [VolumeFile::in_memory("scan.nii", bytes)];
+    let parameters = FitParameters::default();
+    let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
     let segmented = from_files(&order, &ReadLimits::default(), &Monitor::silent())?;
     Ok(segmented.segmentation.fit)
 }

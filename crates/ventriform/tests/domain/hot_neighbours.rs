@@ -26,15 +26,8 @@ fn scan(change: impl FnOnce(&mut PhantomParameters)) -> Phantom {
 fn segmented(scan: &Phantom, edge: &str) -> SegmentedVolume {
     let bytes = nifti::write(&scan.volume, StoredType::Int16, false).unwrap();
     let parameters = FitParameters::from_pairs([("edge", edge)]).unwrap();
-    let order = SegmentationOrder {
-        volume: &[VolumeFile::in_memory("scan.nii", bytes)],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &parameters,
-    };
+    let files = [VolumeFile::in_memory("scan.nii", bytes)];
+    let order = SegmentationOrder::of_built_in_hearts(&files, &parameters);
     from_files(&order, &ReadLimits::default(), &Monitor::silent()).unwrap()
 }
 

@@ -62,14 +62,10 @@ fn judged(bytes: Vec<u8>, kind: &ScanKind) -> Result<SegmentedVolume, Segmentati
         scan: kind.clone(),
         ..FitParameters::default()
     };
+    let files = [VolumeFile::in_memory("scan.nii", bytes)];
     let order = SegmentationOrder {
-        volume: &[VolumeFile::in_memory("scan.nii", bytes)],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
         normals: Some(&HEALTHY_LIMITS),
-        parameters: &parameters,
+        ..SegmentationOrder::of_built_in_hearts(&files, &parameters)
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }

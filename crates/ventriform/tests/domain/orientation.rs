@@ -146,15 +146,7 @@ fn file(volume: &Volume, mirrored: Option<usize>, code: u8) -> Vec<VolumeFile> {
 
 fn segmented(files: &[VolumeFile], pairs: &[(&str, &str)]) -> Segmentation {
     let parameters = FitParameters::from_pairs(pairs.iter().copied()).unwrap();
-    let order = SegmentationOrder {
-        volume: files,
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters: &parameters,
-    };
+    let order = SegmentationOrder::of_built_in_hearts(files, &parameters);
     let made = from_files(&order, &ReadLimits::default(), &Monitor::silent());
     made.unwrap().segmentation
 }

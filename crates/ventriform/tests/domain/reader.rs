@@ -62,17 +62,13 @@ fn segmented(
     profile: Option<ReaderProfile>,
     parameters: &FitParameters,
 ) -> Result<SegmentedVolume, SegmentationError> {
+    let files = [VolumeFile::at(scan)];
     let order = SegmentationOrder {
-        volume: &[VolumeFile::at(scan)],
-        expert: None,
-        auto: true,
-        models: Vec::new(),
         reader: profile.map(|profile| NamedReader {
             name: "one".into(),
             profile,
         }),
-        normals: None,
-        parameters,
+        ..SegmentationOrder::of_built_in_hearts(&files, parameters)
     };
     from_files(&order, &ReadLimits::default(), &Monitor::silent())
 }

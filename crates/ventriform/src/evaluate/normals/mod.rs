@@ -293,15 +293,7 @@ fn fitted(
         let figures = beat_figures(&made.segmentation, &made.beat);
         return Ok((made.segmentation, figures));
     }
-    let order = SegmentationOrder {
-        volume: files,
-        expert: None,
-        auto: true,
-        models: Vec::new(),
-        reader: None,
-        normals: None,
-        parameters,
-    };
+    let order = SegmentationOrder::of_built_in_hearts(files, parameters);
     let made =
         segmentation::from_files(&order, limits, monitor).map_err(|error| error.to_string())?;
     let figures = heart_figures(&made.segmentation);
