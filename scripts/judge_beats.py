@@ -43,6 +43,11 @@ def variants(gated, folder):
         yield name, path
 
 
+def lag(late, early):
+    """The lag of an angle behind another, degrees, -180 to 180."""
+    return (late - early + 180) % 360 - 180
+
+
 def mean_phase(segments, numbers):
     """Circular mean of the phases of these segments, degrees."""
     turns = [np.radians(s["phase_degrees"]) for s in segments if s["segment"] in numbers and s["phase_degrees"] is not None]
@@ -53,14 +58,14 @@ def phase_error(found, true):
     """Deviation of the errors of the phases of segments that contract, about their median, degrees."""
     true = {s["segment"]: s["phase_degrees"] for s in true if s["contraction"] > 0.5}
     pairs = [(s["phase_degrees"], true[s["segment"]]) for s in found if s["phase_degrees"] is not None and true.get(s["segment"]) is not None]
-    errors = np.array([(found - true + 180) % 360 - 180 for found, true in pairs])
+    errors = np.array([lag(found, true) for found, true in pairs])
     return np.std(errors - np.median(errors))
 
 
 def lateness(segments, delayed):
     """How much later these segments are than the others, degrees."""
     others = [s["segment"] for s in segments if s["segment"] not in delayed]
-    return (mean_phase(segments, delayed) - mean_phase(segments, others) + 180) % 360 - 180
+    return lag(mean_phase(segments, delayed), mean_phase(segments, others))
 
 
 def area_under_curve(scores, truths):
