@@ -1,10 +1,11 @@
 // The pictures of scripts/pictures.sh, which sets PROGRAM, CHROMIUM and PICTURES: a service of its own, a phantom, the page.
 
-import { spawn, spawnSync } from "node:child_process";
+import { spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
+import { start } from "./service.mjs";
 
 const { PROGRAM, CHROMIUM, PICTURES } = process.env;
 const PATIENCE_MS = 120_000;
@@ -12,19 +13,9 @@ const PATIENCE_MS = 120_000;
 const folder = mkdtempSync(join(tmpdir(), "pictures-"));
 const made = spawnSync(PROGRAM, ["phantom", "-o", join(folder, "phantom"), "--defect", "7:0.7", "--defect", "13:0.7"], { encoding: "utf8" });
 if (made.status !== 0) throw new Error(made.stderr);
-const service = spawn(PROGRAM, ["serve", "--listen", "127.0.0.1:0", "--data-dir", join(folder, "data")]);
+const service = start(PROGRAM, join(folder, "data"));
 try {
-  const address = await new Promise((found, fail) => {
-    let log = "";
-    const read = chunk => {
-      log += chunk;
-      const match = /http:\/\/127[0-9.:]+/.exec(log);
-      if (match) found(match[0]);
-    };
-    service.stdout.on("data", read);
-    service.stderr.on("data", read);
-    service.on("exit", () => fail(new Error(log)));
-  });
+  const address = await service.address;
   const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
   const context = await browser.newContext({ viewport: { width: 1440, height: 900 }, colorScheme: "light", deviceScaleFactor: 0.8 });
   const page = await context.newPage();
@@ -54,6 +45,6 @@ try {
   await alone.screenshot({ path: join(PICTURES, "wall.png") });
   await browser.close();
 } finally {
-  service.kill();
+  service.child.kill();
   rmSync(folder, { recursive: true, force: true });
 }

@@ -13,7 +13,7 @@ done
 [ ${#missing[@]} -eq 0 ] || { apt-get update -qq && apt-get install -y -qq "${missing[@]}"; } >/dev/null
 tools=$PWD/target/test-tools/pictures
 mkdir -p "$tools" docs/pictures
-cp web/package.json web/package-lock.json scripts/pictures.mjs "$tools/"
+cp web/package.json web/package-lock.json scripts/pictures.mjs web/tests/service.mjs "$tools/"
 [ -d "$tools/node_modules/playwright-core" ] || (cd "$tools" && npm install --silent --no-fund --no-audit)
 export PROGRAM=$(realpath -m "${PROGRAM:-target/debug/ventriform}") CHROMIUM=${CHROMIUM:-/usr/bin/chromium} PICTURES=$PWD/docs/pictures
 [ -x "$PROGRAM" ] || cargo build --quiet --bins

@@ -3,7 +3,7 @@
 // Every view is looked at by axe-core; anything that the console reports, that the policy forbids, or that leaves this
 // machine fails the check.
 
-import { spawn, spawnSync } from "node:child_process";
+import { spawnSync } from "node:child_process";
 import { createRequire } from "node:module";
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, truncateSync, writeFileSync } from "node:fs";
 import net from "node:net";
@@ -15,6 +15,7 @@ import { chromium } from "playwright-core";
 import { comparisons } from "./comparison.mjs";
 import { gated, gatedNm, nm, pair, series, small } from "./nm.mjs";
 import { reports, samePolarMap } from "./report.mjs";
+import { start } from "./service.mjs";
 
 const { PROGRAM, SCREENSHOTS, CHROMIUM } = process.env;
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -30,7 +31,7 @@ const tabs = new Map();
 /** Starts a service with a data folder of its own; returns its address and folder. */
 async function service(...flags) {
   const data = mkdtempSync(join(tmpdir(), "page-"));
-  const child = spawn(PROGRAM, ["serve", "--listen", "127.0.0.1:0", "--data-dir", join(data, "data"), ...flags]);
+  const { child, address } = start(PROGRAM, join(data, "data"), ...flags);
   const stopped = new Promise(done => child.on("exit", done));
   const stop = async () => {
     child.kill();
@@ -40,18 +41,7 @@ async function service(...flags) {
     await stop();
     rmSync(data, { recursive: true, force: true });
   });
-  const address = await new Promise((found, fail) => {
-    let log = "";
-    const read = chunk => {
-      log += chunk;
-      const match = /http:\/\/127[0-9.:]+/.exec(log);
-      if (match) found(match[0]);
-    };
-    child.stdout.on("data", read);
-    child.stderr.on("data", read);
-    child.on("exit", () => fail(new Error(log)));
-  });
-  return { address, data: join(data, "data"), stop };
+  return { address: await address, data: join(data, "data"), stop };
 }
 
 /** A tab that fails the check if anything is wrong behind the view. */
