@@ -29,6 +29,8 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 OUTPUT = ROOT / "crates/ventriform/src/judge/calibration.rs"
 TABLE = ROOT / "scripts/calibration/features.csv"
+# Size of a cavity from which that of others is counted.
+USUAL_CAVITY_ML = 55.0
 
 REPRODUCED = """\
 The committed table has the cohort, 316 scans of the simulator's seeds 2101, 701, 911, 2103 and 411 (42 scans each of
@@ -97,12 +99,12 @@ def of_shape(row):
 
 def log_size(row):
     """Logarithm of the cavity's size over a usual one's."""
-    return math.log(max(row["cavity_ml"], 1.0) / 55.0)
+    return math.log(max(row["cavity_ml"], 1.0) / USUAL_CAVITY_ML)
 
 
 def of_set(wall):
     """Terms of a good fit by several models. The wall of a small or a large heart agrees less with a fitted one that lies off by as much."""
-    return {"mean log odds": figure(f"log_odds_{wall}"), "ln cavity / 55 ml": log_size,
+    return {"mean log odds": figure(f"log_odds_{wall}"), f"ln cavity / {USUAL_CAVITY_ML:g} ml": log_size,
             "its square": lambda row: log_size(row) ** 2}
 
 
@@ -140,13 +142,16 @@ MODELS = {
         target=moved, terms={"ln gain": log_gain, "log odds by shape": of_shape}),
 }
 
-HEADER = """\
+HEADER = f"""\
 //! Constants of the logistic models. Written by `scripts/calibrate.py`: do not edit.
 //!
 //! In: figures of fits to simulated hearts. Out: for each model of `confidence.rs` the intercept, and
 //! of each term the mean and the standard deviation over the calibration set and the weight.
 
-use super::logistic::{Logistic, Term};
+use super::logistic::{{Logistic, Term}};
+
+/// Size of a cavity, ml, from which that of others is counted.
+pub const USUAL_CAVITY_ML: f64 = {USUAL_CAVITY_ML};
 
 """
 

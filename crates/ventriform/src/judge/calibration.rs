@@ -5,6 +5,9 @@
 
 use super::logistic::{Logistic, Term};
 
+/// Size of a cavity, ml, from which that of others is counted.
+pub const USUAL_CAVITY_ML: f64 = 55.0;
+
 /// A fit of the apparent wall with a Jaccard index below 0.75.
 pub const BAD_FIT_APPARENT: Logistic = Logistic {
     intercept: -2.524,

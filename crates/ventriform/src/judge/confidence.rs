@@ -17,7 +17,7 @@
 //! displacement in the last views only leaves an image of one heart in one position, which may not be its position in
 //! another image. docs/evaluation.md has the sets, the areas under the curve, and what else was tried.
 
-use super::calibration;
+use super::calibration::{self, USUAL_CAVITY_ML};
 use super::evidence::Evidence;
 use super::motion::Views;
 use crate::deform::{FittedModel, WallEdge};
@@ -65,9 +65,6 @@ pub fn of_set(chances: &[f64], best: &Evidence, edge: WallEdge) -> f64 {
         .unlimited_probability(&[mean, size, square, best.dark, log_gain(views)]),
     }
 }
-
-/// Size of a cavity, ml, from which that of others is counted.
-const USUAL_CAVITY_ML: f64 = 55.0;
 
 /// Factor of the chance of a good fit whose position was found by a part of the wall alone: of 13 such fits
 /// to hearts that are refused without a hint, whose chances have a mean of 0.64, 3 have a Jaccard index of 0.75 or
