@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::field_of_view::mean_of_brightest_quarter;
 use crate::geometry::bvh::Aabb;
 use crate::grid::Volume;
 use crate::grid::field::Field;
@@ -41,9 +42,10 @@ pub(super) fn dark_apex_uptake(
         )
     };
     let uptake: Vec<Option<f64>> = (0..RAY_ROWS * RAY_COLUMNS).map(largest).collect();
-    let mut all: Vec<f64> = uptake.iter().flatten().copied().collect();
-    all.sort_by(f64::total_cmp);
-    let brightest = mean(all[all.len() * 3 / 4..].iter().copied())?;
+    let brightest = mean_of_brightest_quarter(uptake.iter().flatten().copied().collect());
+    if brightest.is_nan() || brightest <= 0.0 {
+        return None;
+    }
     let width = RAY_COLUMNS / SECTOR_COUNT;
     let sectors = (0..SECTOR_COUNT).map(|sector| {
         let places = APICAL_ROWS.flat_map(|row| {

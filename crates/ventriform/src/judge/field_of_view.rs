@@ -71,7 +71,11 @@ fn bright_uptake(wall: &VentricleWall, volume: &Volume) -> f64 {
         let value = inside.then(|| volume.voxels[i + volume.shape[0] * (j + volume.shape[1] * k)]);
         value.filter(|value| value.is_finite()).map(f64::from)
     });
-    let mut values: Vec<f64> = in_the_middle.collect();
+    mean_of_brightest_quarter(in_the_middle.collect())
+}
+
+/// The mean of the brightest quarter of these values; 0 without any.
+pub(super) fn mean_of_brightest_quarter(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let brightest = &values[values.len() * 3 / 4..];
     brightest.iter().sum::<f64>() / brightest.len().max(1) as f64
