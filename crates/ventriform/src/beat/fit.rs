@@ -206,8 +206,10 @@ pub fn fit(
             let Minimised {
                 objective,
                 unknowns,
+                curvature,
                 ..
             } = made;
+            drop(curvature);
             let still = vec![0.0; 2 * harmonic_count];
             let found_ml = volumes(&objective, &unknowns, &still).wall_ml;
             let mean = objective.mean_thickness(&unknowns) * muscle_ml / found_ml;
@@ -224,9 +226,12 @@ pub fn fit(
     let Minimised {
         objective,
         unknowns,
-        phase_noise_degrees,
+        curvature,
         steps,
     } = made;
+    let phase_noise_degrees = curvature.map_or(0.0, |curvature| {
+        noise::phase_noise_degrees(&objective, &unknowns, &curvature)
+    });
     Ok(BeatFit {
         objective,
         unknowns,
@@ -279,7 +284,8 @@ fn share_outside(volume: &Volume, points: &[Vec3], weights: &[f32]) -> f64 {
 struct Minimised {
     objective: Objective,
     unknowns: Vec<f64>,
-    phase_noise_degrees: f64,
+    /// The curvature that the last stage went by.
+    curvature: Option<Curvature>,
     steps: usize,
 }
 
@@ -295,7 +301,7 @@ fn minimise(
     let ef_at = |objective: &Objective, point: &[f64]| {
         ejection_fraction(&curve(objective, point, CURVE_MOMENTS, 0.0))
     };
-    let mut phase_noise_degrees = 0.0;
+    let mut last_curvature = None;
     let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
     for stage_steps in stages {
         objective.take_motion_off(resolution_mm, &unknowns);
@@ -322,13 +328,13 @@ fn minimise(
         unknowns = found.point;
         steps += found.steps;
         if stage_steps.is_none() {
-            phase_noise_degrees = noise::phase_noise_degrees(&objective, &unknowns, &curvature);
+            last_curvature = Some(curvature);
         }
     }
     monitor.report(Stage::Beat, 1.0)?;
     Ok(Minimised {
         unknowns,
-        phase_noise_degrees,
+        curvature: last_curvature,
         steps,
         objective,
     })
