@@ -122,12 +122,11 @@ const BODY_FIELDS: [&str; 10] = [
 
 /// Compare rest and stress
 ///
-/// `stress` and `rest` are volumes, or segmentations or beats, whose volumes are then compared: both are fitted anew by one
-/// model, as beats if both are gated. What was corrected of a segmentation or a beat (`center`, `axis`, `base`,
-/// `segments_from`) is kept unless `parameters` say otherwise (`stress_center`, `rest_axis`, ...). `normals` names normal limits, by which both are scored. Or the body is a form with
-/// the files `stress` and `rest`; everything else is then a query parameter. The service files a job and answers 202 with
-/// it. With `Prefer: wait=60` it waits up to 60 seconds for the job to end and answers 200 with what `Accept` asks for: the
-/// report (`application/json`), or slices of stress above those of rest.
+/// `stress` and `rest` name volumes, or segmentations or beats of them. One model is fitted anew to both; scans that are both
+/// gated become beats. Corrections of a named segmentation or beat (`center`, `axis`, `base`, `segments_from`) are kept unless
+/// `parameters` state others (`stress_center`, `rest_axis`, ...). `normals` names the normal limits that score both. A form
+/// has the files `stress` and `rest`, and everything else in the query. The answer is 202 with the job, or with
+/// `Prefer: wait=60`, once it has ended, 200 with the report (`application/json`) or the slices of stress above those of rest.
 #[utoipa::path(post, path = "/v1/comparisons", tag = "comparisons",
     request_body(content(
         (openapi::ComparisonRequest = "application/json"),
