@@ -39,6 +39,7 @@ mod postgres;
 mod query;
 mod received;
 mod s3;
+mod schema;
 mod space;
 mod sqlite;
 mod sqlite_repair;
@@ -560,7 +561,7 @@ async fn is_migrated(database: &Path) -> Result<bool, sqlx::Error> {
         .fetch_one(&mut connection)
         .await?;
     connection.close().await?;
-    Ok(usize::try_from(done) == Ok(sqlx::migrate!("src/migrations").iter().count()))
+    Ok(usize::try_from(done) == Ok(schema::sqlite().iter().count()))
 }
 
 /// Whether a folder for items or received objects holds anything.

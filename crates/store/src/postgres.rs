@@ -25,6 +25,7 @@
 
 use super::faults;
 use super::query::jitter;
+use super::schema;
 use sqlx::migrate::MigrateError;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
@@ -153,7 +154,7 @@ pub(super) async fn open(
 /// Brings the tables to the current version. Newer ones are left as they are if they say that this version works on
 /// them: then another process is already of the next version, and this one is started once more beside it.
 async fn bring_up(connection: &mut PgConnection) -> Result<(), MigrateError> {
-    let mut migrations = sqlx::migrate!("src/migrations_postgres");
+    let mut migrations = schema::postgres();
     let own = migrations.iter().map(|migration| migration.version).max();
     let noted = sqlx::query_scalar("SELECT to_regclass('oldest_program') IS NOT NULL");
     if noted.fetch_one(&mut *connection).await? {

@@ -1,5 +1,6 @@
 //! The database file: one connection for writing, a few for reading.
 
+use super::schema;
 use super::writer::Writer;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
@@ -31,7 +32,7 @@ pub(super) async fn open(path: &Path, wait: Duration) -> Result<(Writer, SqliteP
         .test_before_acquire(false)
         .connect_with(options.clone())
         .await?;
-    sqlx::migrate!("src/migrations").run(&readers).await?;
+    schema::sqlite().run(&readers).await?;
     Ok((Writer::new(&options, wait), readers))
 }
 
