@@ -105,6 +105,21 @@ library_alone() {
     ! cargo tree --package ventriform --edges normal --prefix none | grep -E '^(axum|tokio|sqlx|reqwest) '
 }
 
+# Every program of tests, as FOLDER<tab>PROGRAM, with the folder in which cargo would start it.
+test_programs() {
+  cargo test --no-run --message-format=json-render-diagnostics |
+    sed -nE 's/.*"manifest_path":"([^"]*)\/Cargo.toml".*"profile":\{[^}]*"test":true\}.*"executable":"([^"]+)".*/\1\t\2/p'
+}
+# Runs the programs named on standard input one after another.
+run_programs() {
+  local folder program status=0
+  while IFS=$'\t' read -r folder program; do
+    printf '\n     Running %s\n' "${program#"$PWD/"}"
+    (cd "$folder" && exec "$program" --show-output) </dev/null || status=1
+  done
+  return $status
+}
+
 need cc build-essential
 # The tests start a server of their own; Debian keeps its programs off the path.
 ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || need no-such-command postgresql
@@ -119,8 +134,17 @@ check "library without the service" library_alone
 check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
 
 say "cargo test"
-cargo test --no-fail-fast -- --show-output 2>&1 | tee "$log"
-cargo_status=${PIPESTATUS[0]}
+test_programs >"$tools/programs"
+cargo_status=$?
+# Side by side: the library's tests compute all the time, the service's wait for half of theirs.
+grep -F "$PWD/crates/ventriform	" "$tools/programs" | run_programs >"$tools/library.log" 2>&1 &
+library=$!
+grep -vF "$PWD/crates/ventriform	" "$tools/programs" | run_programs 2>&1 | tee "$log"
+[ "${PIPESTATUS[1]}" -eq 0 ] || cargo_status=1
+wait "$library" || cargo_status=1
+tee -a "$log" <"$tools/library.log"
+cargo test --doc -- --show-output 2>&1 | tee -a "$log"
+[ "${PIPESTATUS[0]}" -eq 0 ] || cargo_status=1
 read -r p f i < <(awk '/^test result:/ { p += $4; f += $6; i += $8 } END { print p + 0, f + 0, i + 0 }' "$log")
 # A test without its data prints `skipped: why` and returns. The harness counts it as passed.
 s=$(grep -c '^skipped: ' "$log")
