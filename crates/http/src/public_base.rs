@@ -5,8 +5,8 @@
 //! `X-Forwarded-Host`, `X-Forwarded-Port` and `X-Forwarded-Prefix`, or `proto` and `host` of `Forwarded`
 //! (RFC 7239). Of a list, as many values count from its right as there are trusted proxies
 //! ([`trusted_hops`]): the leftmost of them, which the outermost trusted proxy has written. What stands before it could
-//! have been made up by the client. If `X-Forwarded-*` and `Forwarded` disagree, neither is used. Prefixes are
-//! joined in their order. Values that cannot be part of an address are not used. Without a prefix from a proxy, the
+//! have been made up by the client. If `X-Forwarded-*` and `Forwarded` disagree, neither is used. The prefixes
+//! that count are joined in their order. Values that cannot be part of an address are not used. Without a prefix from a proxy, the
 //! setting `base_path` is the path.
 //!
 //! Requests may come with `base_path` or without, so a proxy may strip it or not.
@@ -93,7 +93,11 @@ impl PublicBase {
         });
         let prefixes = headers.get_all(X_FORWARDED_PREFIX).iter();
         let prefixes = prefixes.flat_map(|value| value.to_str().unwrap_or("?").split(','));
+        let prefixes: Vec<&str> = prefixes.collect();
+        let made_up = prefixes.len().saturating_sub(hops);
         let joined: String = prefixes
+            .into_iter()
+            .skip(made_up)
             .map(|prefix| prefix.trim().trim_end_matches('/'))
             .collect();
         Self {
@@ -247,8 +251,16 @@ mod tests {
             ("x-forwarded-proto", "http"),
             ("x-forwarded-proto", "https"),
             ("x-forwarded-host", "evil.example, heart.example"),
+            ("x-forwarded-prefix", "/evil"),
+            ("x-forwarded-prefix", "/heart"),
         ];
-        assert_eq!(seen("10.1.2.3", &made_up), "https://heart.example/own");
+        assert_eq!(seen("10.1.2.3", &made_up), "https://heart.example/heart");
+        let listed = [
+            ("host", "backend"),
+            ("x-forwarded-for", "198.51.100.1, 203.0.113.7, 10.2.2.2"),
+            ("x-forwarded-prefix", "/evil, /outer, /inner"),
+        ];
+        assert_eq!(seen("10.1.2.3", &listed), "http://backend/outer/inner");
         let disagreeing = [
             ("host", "backend"),
             ("x-forwarded-host", "evil.example"),
