@@ -73,7 +73,7 @@ struct RevokeArgs {
 }
 
 /// Who acts in the audit trail.
-const AUDIT_AGENT: &str = "command line";
+pub(super) const AUDIT_AGENT: &str = "command line";
 
 /// Runs the command.
 ///

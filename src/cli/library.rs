@@ -1,5 +1,6 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
+use super::keys::AUDIT_AGENT;
 use super::mesh_args::{MeshArgs, mesh_bytes};
 use super::output::say;
 use super::serve::settings_beside;
@@ -9,9 +10,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
 use ventriform::volume::ReadLimits;
+use ventriform_service::access::{AccessStore, Activity, AuditEvent};
 use ventriform_service::config::DatabaseUrl;
 use ventriform_service::items::{Items, NotAdded, TemplateSource};
-use ventriform_service::records::{Failure, ProductRoom, SystemClock, Tenant};
+use ventriform_service::records::{Clock, Failure, ProductRoom, SystemClock, Tenant};
 use ventriform_service::work::{Engine, TEMPLATE_BYTES};
 use ventriform_store::{Store, StoreSettings};
 
@@ -70,9 +72,13 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             bytes: settings.quota_bytes.0.map(|size| size.0),
         };
         for path in &args.models {
-            let id = add(&items, &engine, path, args, room)
+            let (id, new) = add(&items, &engine, path, args, room)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
+            let activity = Activity::of_added(new);
+            let now = SystemClock.now();
+            let event = AuditEvent::new(now, activity, Tenant::default(), AUDIT_AGENT.into());
+            store.rows.append(&[event.on(&id)]).await?;
             say!("{id} {}", name(path));
         }
         Ok(())
@@ -85,7 +91,7 @@ async fn add(
     path: &Path,
     args: &ImportArgs,
     room: ProductRoom,
-) -> Result<String> {
+) -> Result<(String, bool)> {
     let organ = &args.organ;
     let mesh = mesh_bytes(path, TEMPLATE_BYTES)?;
     let output = engine
@@ -100,13 +106,13 @@ async fn add(
         library: args.library.then_some(true),
     };
     let added = items.add_template(source, organ, output, room).await;
-    let (template, _) = added.map_err(|error| match error {
+    let (template, new) = added.map_err(|error| match error {
         NotAdded::Refused(failure) | NotAdded::TooMany(failure) | NotAdded::TooLarge(failure) => {
             refused(&failure)
         }
         NotAdded::Store(error) => error.into(),
     })?;
-    Ok(template.item.id)
+    Ok((template.item.id, new))
 }
 
 fn refused(failure: &Failure) -> anyhow::Error {

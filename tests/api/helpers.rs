@@ -33,7 +33,7 @@ use ventriform_service::records::{
     Clock, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock,
 };
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
-use ventriform_store::{open_database, open_rows};
+use ventriform_store::{SqlStore, open_database, open_rows};
 
 /// Time for which a test waits for a job or another event before it fails.
 const EVENT_PATIENCE: Duration = Duration::from_secs(60);
@@ -267,16 +267,21 @@ pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (Stri
         expires_at: None,
     };
     let (key, text) = ApiKey::make(request, now).unwrap();
-    let store = if on_postgres() {
+    let store = rows_of(data).await;
+    let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
+    store.add_key(&key, &event.on(&key.id)).await.unwrap();
+    (key.id, text)
+}
+
+/// The rows of the service on that data folder, beside it.
+pub async fn rows_of(data: &Path) -> Arc<SqlStore> {
+    if on_postgres() {
         let url = super::postgres::database_of(data).await.0.unwrap();
         let settings = super::postgres::reached_at(url);
         open_database(data, Some(&settings)).await.unwrap()
     } else {
         open_rows(data).await.unwrap()
-    };
-    let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), "test".into());
-    store.add_key(&key, &event.on(&key.id)).await.unwrap();
-    (key.id, text)
+    }
 }
 
 /// Waits until the service asks for credentials.

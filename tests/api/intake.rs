@@ -1,7 +1,7 @@
 //! Objects that come by C-STORE and STOW-RS.
 
 use crate::dicom::{JANE, Patient, nm_of};
-use crate::helpers::{Service, TestApp, fake_engine, key, problem, text};
+use crate::helpers::{Service, TestApp, fake_engine, key, problem, rows_of, text};
 use crate::scu::{CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, slice};
 use dicom_ul::pdu::{PDataValueType, Pdu};
 use reqwest::StatusCode;
@@ -17,7 +17,7 @@ use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::volume::{ReadLimits, Volume};
 use ventriform_http::ServeError;
 use ventriform_program::server::start;
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::access::{AccessStore, Quota, Scope};
 use ventriform_service::config::Settings;
 use ventriform_service::start::OpenError;
 use ventriform_service::work::Engine;
@@ -150,9 +150,58 @@ async fn a_multi_frame_image_is_a_volume_at_once_and_stored_once() {
     assert_eq!(scu.store(&other), 0);
     scu.release();
     assert_eq!(settled(&app, 1).await[0]["state"], "stored");
+    let made = app.json("/v1/audit?agent=intake:CAMERA").await.to_string();
+    assert!(made.contains(&text(&groups[0]["volume"])), "{made}");
     let audit = app.json("/v1/audit?agent=CAMERA").await;
     assert!(!audit["events"].as_array().unwrap().is_empty());
     assert!(!audit.to_string().contains("CANARY"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_object_is_acknowledged_when_its_row_of_the_trail_is_on_disk() {
+    let (app, address) = service(|_| {}).await;
+    let rows = rows_of(app.data.path()).await;
+    let mut scu = Scu::open(address);
+    assert_eq!(scu.store(&nuclear("1.2.3", 1, "RECON TOMO")), 0);
+    // What is only noted is written within a second.
+    let trail = rows.links(0, 1000).await.unwrap();
+    scu.release();
+    let group = text(&settled(&app, 1).await[0]["id"]);
+    let row = |event: &str| event.contains(&group) && event.contains("\"CAMERA\"");
+    assert!(trail.iter().any(|link| row(&link.event)), "{trail:?}");
+}
+
+#[tokio::test]
+async fn a_request_that_breaks_off_leaves_a_row_for_what_it_has_stored() {
+    let (app, _) = service(|_| {}).await;
+    let mut body = related(&[nuclear("1.2.3", 1, "RECON TOMO").file()]);
+    // The next object begins and does not end.
+    body.truncate(body.len() - b"--b--\r\n".len());
+    body.extend_from_slice(b"--b\r\nContent-Type: application/dicom\r\n\r\nhalf");
+    let address = app.url.trim_start_matches("http://").parse().unwrap();
+    let mut stream = connect(address);
+    let head = format!(
+        "POST /dicom-web/studies HTTP/1.1\r\nHost: {address}\r\nContent-Type: {RELATED}\r\n\
+         Content-Length: {}\r\n\r\n",
+        body.len() + 1000
+    );
+    stream.write_all(head.as_bytes()).unwrap();
+    stream.write_all(&body).unwrap();
+    let deadline = Instant::now() + PATIENCE;
+    while intake(&app).await.is_empty() {
+        assert!(Instant::now() < deadline, "nothing is stored");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    drop(stream);
+    let group = text(&intake(&app).await[0]["id"]);
+    loop {
+        let rows = app.json(&format!("/v1/audit?object={group}")).await;
+        if rows["events"][0]["action"] == "C" {
+            return;
+        }
+        assert!(Instant::now() < deadline, "{rows}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -233,6 +282,8 @@ async fn a_rule_starts_its_job_once_whatever_is_sent_again() {
     };
     send(address, &object);
     let job = settled(&app, 1).await[0]["job"].clone();
+    let filed = app.json("/v1/audit?agent=rule:1").await;
+    assert!(filed.to_string().contains(&text(&job)), "{filed}");
     send(address, &object);
     let data = app.stop().await;
     let (app, address) = on(data, rules).await;

@@ -13,14 +13,14 @@ use std::net::TcpListener;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use ventriform_http::{ServeError, document_json};
 use ventriform_program::server::start;
 use ventriform_service::access::{
-    AccessStore, Activity, AuditEvent, BrokenLink, Quota, Scope, verify,
+    AccessStore, Activity, Agent, AuditEvent, BrokenLink, Quota, Recorder, Scope, verify,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::records::{Clock, SystemClock, Tenant};
+use ventriform_service::records::{Clock, StoreError, SystemClock, Tenant};
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
@@ -586,6 +586,63 @@ async fn the_trail_holds_no_secret_and_no_text_of_a_client() {
             assert!(!link.event.contains(secret), "{}", link.event);
         }
     }
+}
+
+/// The job is filed before the answer is known, and the answer is a problem.
+#[tokio::test]
+async fn what_a_request_that_fails_has_changed_is_in_the_trail() {
+    let app = TestApp::start().await;
+    let request = app.post("/v1/models").header("prefer", "wait=30");
+    let failed = status(request.body(volume("fail"))).await;
+    assert!(!failed.is_success(), "{failed}");
+    let jobs = app.json("/v1/jobs").await;
+    let job = &jobs["jobs"][0];
+    let trail = app.json("/v1/audit?limit=100").await;
+    let trail = trail["events"].as_array().unwrap();
+    for (item, action) in [(&job["volume"], "C"), (&job["id"], "E")] {
+        let item = text(item);
+        let mut rows = trail
+            .iter()
+            .filter(|row| object(row) == item && row["action"] == action);
+        assert!(rows.next().is_some(), "{action} {item}: {trail:?}");
+        assert!(rows.next().is_none(), "twice: {action} {item}: {trail:?}");
+    }
+}
+
+/// A request whose connection is reset is dropped wherever it waits.
+#[tokio::test]
+async fn a_change_and_its_row_go_on_without_the_request() {
+    let (_folder, store) = trail(1).await;
+    let recorder = Arc::new(Recorder::start(store.clone(), Arc::new(SystemClock)));
+    let agent = Agent::new(recorder, Arc::new(SystemClock), Tenant::default(), "x");
+    let (go, gone) = tokio::sync::oneshot::channel::<()>();
+    let change = async move {
+        gone.await.unwrap();
+        Ok::<_, StoreError>("vol_9")
+    };
+    let done = |volume: &&str| Some((Activity::Update, (*volume).to_owned()));
+    tokio::select! {
+        biased;
+        _ = agent.change(change, done) => panic!("it waits"),
+        () = std::future::ready(()) => {}
+    }
+    assert!(!agent.has_acted());
+    go.send(()).unwrap();
+    let until = Instant::now() + Duration::from_secs(10);
+    loop {
+        let links = store.links(1, 10).await.unwrap();
+        if let [link] = &links[..] {
+            assert!(link.event.contains("vol_9"), "{}", link.event);
+            break;
+        }
+        assert!(Instant::now() < until, "{links:?}");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert!(agent.has_acted() && !agent.lacks_rows());
+    // What changes nothing leaves no row.
+    let nothing = agent.change(async { Ok::<_, StoreError>(()) }, |()| None);
+    nothing.await.unwrap();
+    assert_eq!(store.links(1, 10).await.unwrap().len(), 1);
 }
 
 fn event(at: i64) -> AuditEvent {

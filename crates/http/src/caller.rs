@@ -5,12 +5,14 @@ use super::problem::{Answer, Problem};
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
-use ventriform_service::access::{Identity, Quota, Scope};
+use ventriform_service::access::{Agent, Identity, Quota, Scope};
 use ventriform_service::records::{Tenant, Timestamp};
 
 /// Who sent the request.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Caller {
+    /// The agent in the audit trail for which it changes something.
+    pub by: Agent,
     /// Whose items and jobs it sees.
     pub tenant: Tenant,
     /// Its name, for people who read the log.
@@ -58,8 +60,9 @@ impl Caller {
 
 impl Caller {
     /// The caller of that identity, with the limits that apply to it.
-    pub fn of(identity: &Identity, quota: Quota) -> Self {
+    pub fn of(identity: &Identity, quota: Quota, by: Agent) -> Self {
         Self {
+            by,
             tenant: identity.tenant.clone(),
             name: identity.name.clone(),
             scope: identity.scope,

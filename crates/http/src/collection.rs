@@ -7,7 +7,6 @@
 use super::app::App;
 use super::caller::Caller;
 use super::erasures::{self, CascadeQuery, ReceiptBody};
-use super::guard::Agent;
 use super::openapi::{
     CachedHeaders, Documented, EraseProblems, ErasureHeader, ListProblems, LookupProblems,
     UnchangedAnswer,
@@ -20,10 +19,10 @@ use super::request::PathSegments;
 use super::scans::{self, ScanQuery};
 use super::tags::TagQuery;
 use super::validators::ValidatedJson;
+use axum::Json;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
 use axum::routing::{delete, get};
-use axum::{Extension, Json};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::borrow::Cow;
@@ -215,7 +214,6 @@ async fn show<C: Collection>(
 async fn erase<C: Collection>(
     State(app): State<App>,
     caller: Caller,
-    Extension(agent): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
     query: QueryReader,
     headers: HeaderMap,
@@ -224,15 +222,7 @@ async fn erase<C: Collection>(
         Resource::Volume => query.all::<CascadeQuery>()?.cascade.unwrap_or(false),
         _ => query.all().map(|()| false)?,
     };
-    erasures::erase(
-        &app,
-        (&caller, &agent),
-        C::RESOURCE_KIND,
-        id,
-        cascade,
-        &headers,
-    )
-    .await
+    erasures::erase(&app, &caller, C::RESOURCE_KIND, id, cascade, &headers).await
 }
 
 /// A page of things: `{"models": [...], "next_cursor": "..."}`.

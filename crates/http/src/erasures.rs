@@ -2,7 +2,7 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::guard::{Agent, AlreadyRecorded};
+use super::guard::AlreadyRecorded;
 use super::links::{path_of, rfc3339};
 use super::openapi::{ListProblems, LookupProblems};
 use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
@@ -176,7 +176,7 @@ pub struct ReceiptQuery {
 /// 404 or 410 if the caller's tenant has no such item, 409 if it must stay.
 pub async fn erase(
     app: &App,
-    (caller, agent): (&Caller, &Agent),
+    caller: &Caller,
     kind: Resource,
     id: String,
     cascade: bool,
@@ -187,7 +187,7 @@ pub async fn erase(
         tenant: caller.tenant.clone(),
         id: id.clone(),
         cascade,
-        by: agent.of_erasure(),
+        by: caller.by.of_erasure(),
         reason: ErasureReason::Request,
     };
     let erased = if Resource::of(&id) == Some(kind) {

@@ -16,6 +16,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
+use ventriform_service::access::Activity;
 use ventriform_service::intake::IntakeGroup;
 
 /// Objects that make up one volume.
@@ -165,7 +166,11 @@ pub async fn forget_received(
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer<StatusCode> {
-    let removed = app.service.intake.store.remove(&caller.tenant, &id).await?;
+    let store = app.service.intake.store.clone();
+    let (tenant, group, forgotten) = (caller.tenant.clone(), id.clone(), id.clone());
+    let remove = async move { store.remove(&tenant, &group).await };
+    let done = move |removed: &Option<_>| removed.as_ref().map(|_| (Activity::Delete, forgotten));
+    let removed = caller.by.change(remove, done).await?;
     let files = removed.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,

@@ -3,7 +3,7 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::guard::{Agent, AlreadyRecorded};
+use super::guard::AlreadyRecorded;
 use super::links::rfc3339;
 use super::openapi::{ListProblems, LookupProblems, UploadProblems};
 use super::pagination::{PageQuery, next_cursor};
@@ -136,14 +136,13 @@ const KEY_FIELDS: [&str; 6] = [
 pub async fn create_key(
     State(app): State<App>,
     caller: Caller,
-    Extension(by): Extension<Agent>,
     _: NoQuery,
     request: Request,
 ) -> Answer {
     let now = app.service.now();
     let wanted = read(&json_object(request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
-    let event = by.event(Activity::KeyCreated, now).on(&key.id);
+    let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
     app.service.access.add_key(&key, &event).await?;
     app.guard.gate.refresh();
     let location = public_path(&format!("/v1/keys/{}", key.id));
@@ -195,7 +194,6 @@ pub async fn list_keys(
 pub async fn revoke_key(
     State(app): State<App>,
     caller: Caller,
-    Extension(by): Extension<Agent>,
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
 ) -> Answer {
@@ -209,7 +207,7 @@ pub async fn revoke_key(
         .fix("Take an id from the list at GET /v1/keys."));
     }
     let now = app.service.now();
-    let event = by.event(Activity::KeyRevoked, now).on(&id);
+    let event = caller.by.event(Activity::KeyRevoked, now).on(&id);
     app.service.access.revoke_key(&id, now, &event).await?;
     app.guard.gate.refresh();
     Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())

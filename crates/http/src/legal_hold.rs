@@ -14,6 +14,7 @@ use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 use ventriform::text::is_printable;
+use ventriform_service::access::Activity;
 use ventriform_service::records::LegalHold;
 
 /// Put a volume on legal hold
@@ -42,7 +43,7 @@ pub async fn hold_volume(
         since: app.service.now(),
         by: caller.name.clone(),
     };
-    set(&app, &caller, &id, Some(&hold)).await?;
+    set(&app, &caller, &id, Some(hold.clone())).await?;
     Ok(Json(hold.into()))
 }
 
@@ -65,9 +66,17 @@ pub async fn release_volume(
     Ok(StatusCode::NO_CONTENT)
 }
 
-async fn set(app: &App, caller: &Caller, id: &str, hold: Option<&LegalHold>) -> Answer<()> {
-    let catalogue = app.service.items().catalogue();
-    if catalogue.set_legal_hold(&caller.tenant, id, hold).await? {
+async fn set(app: &App, caller: &Caller, id: &str, hold: Option<LegalHold>) -> Answer<()> {
+    let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
+    let (volume, held) = (id.to_owned(), id.to_owned());
+    let set = async move {
+        let catalogue = items.catalogue();
+        catalogue
+            .set_legal_hold(&tenant, &volume, hold.as_ref())
+            .await
+    };
+    let done = move |set: &bool| set.then_some((Activity::Update, held));
+    if caller.by.change(set, done).await? {
         Ok(())
     } else {
         find::<Volumes>(app, &caller.tenant, id).await.map(|_| ())

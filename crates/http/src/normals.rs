@@ -168,7 +168,8 @@ pub async fn create_normals(
         None
     };
     let Some(mut object) = object.filter(|object| !object.contains_key("format")) else {
-        let added_normals = service.add_normals(tenant, name, bytes, caller.quota, &counting);
+        let added_normals =
+            service.add_normals(&caller.by, tenant, name, bytes, caller.quota, &counting);
         let (stored, new) = added_normals.await?;
         let body = NormalsBody::from(Presented::of(&app, stored));
         return Ok(added(new, &body.id, &body));

@@ -132,7 +132,8 @@ pub async fn create_reader(
         .require_product_room(tenant, Resource::Reader)
         .await?;
     let profile = json_bytes(request).await?;
-    let added_reader = service.add_reader(tenant, name, profile, caller.quota, &counting);
+    let added_reader =
+        service.add_reader(&caller.by, tenant, name, profile, caller.quota, &counting);
     let (stored, new) = added_reader.await?;
     let body = ReaderBody::from(Presented::of(&app, stored));
     Ok(added(new, &body.id, &body))

@@ -7,16 +7,14 @@
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
-use super::guard::{Agent, AlreadyRecorded};
 use super::limits::BodyLimits;
 use super::memory::charge;
 use super::negotiate::require_offer;
 use super::openapi::{StowAnswers, UploadProblems};
-use super::problem::{Answer, Problem, body};
+use super::problem::{Answer, body};
 use super::query::NoQuery;
 use super::quota::reserve_upload;
 use super::request::{PathSegments, media_type, refuse_content_encoding};
-use axum::Extension;
 use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, header};
@@ -24,8 +22,7 @@ use axum::response::IntoResponse;
 use futures::{Stream, StreamExt, TryStreamExt};
 use multer::Multipart;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
-use ventriform_service::access::{Activity, NotRecorded};
+use ventriform_service::access::Agent;
 use ventriform_service::archive::{RelatedType, Unparsed};
 use ventriform_service::dicom_tags::{
     FAILED_SOP_SEQUENCE, FAILURE_REASON, OTHER_FAILURES_SEQUENCE, REFERENCED_SOP_CLASS_UID,
@@ -62,11 +59,10 @@ const NOT_UNDERSTOOD: u16 = 0xC000;
 pub async fn store_instances(
     State(app): State<App>,
     caller: Caller,
-    Extension(agent): Extension<Agent>,
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    store(&app, &caller, &agent, None, request).await
+    store(&app, &caller, None, request).await
 }
 
 /// Store DICOM objects of a study
@@ -82,12 +78,11 @@ pub async fn store_instances(
 pub async fn store_study_instances(
     State(app): State<App>,
     caller: Caller,
-    Extension(agent): Extension<Agent>,
     PathSegments(study): PathSegments<String>,
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    store(&app, &caller, &agent, Some(study), request).await
+    store(&app, &caller, Some(study), request).await
 }
 
 /// The outcome of the objects of a request.
@@ -99,7 +94,6 @@ struct Outcome {
     failed: Vec<(String, String, u16)>,
     /// Failure reasons of parts of which not even that is known.
     others: Vec<u16>,
-    groups: BTreeSet<String>,
 }
 
 impl Outcome {
@@ -174,6 +168,7 @@ impl Outcome {
 /// A request under way.
 struct Storing<'a> {
     app: &'a App,
+    by: Agent,
     study: Option<String>,
     origin: Origin,
     session: Session,
@@ -205,9 +200,9 @@ impl Storing<'_> {
         };
         let stored = match object {
             Ok(incoming) => {
-                receiver
-                    .store(incoming, stated, &self.origin, &mut self.session)
-                    .await
+                let (by, session) = (&self.by, &mut self.session);
+                let stored = receiver.store(by, incoming, stated, &self.origin, session);
+                stored.await
             }
             Err(error) => {
                 receiver.note(Protocol::StowRs, &Err(&error), 0);
@@ -218,10 +213,9 @@ impl Storing<'_> {
             }
         };
         match stored {
-            Ok((group, header)) => {
+            Ok((_, header)) => {
                 let stored = (header.sop_class, header.sop_instance);
                 self.outcome.stored.push(stored);
-                self.outcome.groups.insert(group);
             }
             Err(refused) => self.outcome.refuse(refused),
         }
@@ -259,13 +253,7 @@ impl Storing<'_> {
     }
 }
 
-async fn store(
-    app: &App,
-    caller: &Caller,
-    agent: &Agent,
-    study: Option<String>,
-    request: Request,
-) -> Answer {
+async fn store(app: &App, caller: &Caller, study: Option<String>, request: Request) -> Answer {
     require_offer(request.headers(), &ANSWER_TYPES)?;
     refuse_content_encoding(request.headers())?;
     let limits = BodyLimits::of(&request)?;
@@ -273,6 +261,7 @@ async fn store(
     charge(REQUEST_MEMORY).await?;
     let mut storing = Storing {
         app,
+        by: caller.by.clone(),
         study,
         origin: Origin {
             tenant: caller.tenant.clone(),
@@ -300,19 +289,12 @@ async fn store(
     if outcome.stored.is_empty() && outcome.failed.is_empty() && outcome.others.is_empty() {
         return Err(body::malformed_related("it has no part"));
     }
-    let now = app.service.now();
-    for group in &outcome.groups {
-        let event = agent.event(Activity::Create, now).on(group);
-        let recorded = app.service.recorder.record(event).await;
-        recorded.map_err(|NotRecorded| not_recorded())?;
-    }
     let headers = [
         (header::CONTENT_TYPE, ANSWER_TYPES[0]),
         (header::CACHE_CONTROL, "no-store"),
     ];
     let module = outcome.module().to_string();
-    let recorded = Extension(AlreadyRecorded);
-    Ok((outcome.status(), headers, recorded, module).into_response())
+    Ok((outcome.status(), headers, module).into_response())
 }
 
 /// The boundary of a body of several objects; `None` for a body that is one.
@@ -336,16 +318,6 @@ fn boundary(headers: &HeaderMap) -> Answer<Option<String>> {
     let boundary =
         boundary.ok_or_else(|| body::malformed_related("Content-Type has no `boundary`"))?;
     Ok(Some(boundary))
-}
-
-fn not_recorded() -> Problem {
-    Problem::new(
-        StatusCode::SERVICE_UNAVAILABLE,
-        "audit-unavailable",
-        "The objects are stored, but the audit trail could not be written.",
-    )
-    .fix("Ask the operator to look at the log and at the disk, then send the request again.")
-    .header(header::RETRY_AFTER, "10")
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`.
 
 use super::app::App;
+use super::caller::Caller;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
 use axum::extract::Request;
@@ -15,7 +16,8 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
 use ventriform::text::is_printable;
-use ventriform_service::records::{TagFilter, Tags, Tenant};
+use ventriform_service::access::Activity;
+use ventriform_service::records::{TagFilter, Tags};
 
 /// Longest external id, characters.
 pub const EXTERNAL_ID_LENGTH: usize = 128;
@@ -112,17 +114,25 @@ const CHANGE_TRIES: usize = 100;
 /// fails.
 pub async fn change<'a>(
     app: &App,
-    tenant: &Tenant,
+    caller: &Caller,
     id: &str,
     request: Request,
     tags_of: impl Fn() -> BoxFuture<'a, Answer<Tags>>,
 ) -> Answer<()> {
     let patch = merge_patch(request).await?;
-    let catalogue = app.service.items().catalogue();
     for _ in 0..CHANGE_TRIES {
         let before = tags_of().await?;
         let after = merged(app, before.clone(), &patch)?;
-        if catalogue.change_tags(tenant, id, &before, &after).await? {
+        let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
+        let (item, id) = (id.to_owned(), id.to_owned());
+        let change = async move {
+            let changed = items
+                .catalogue()
+                .change_tags(&tenant, &item, &before, &after);
+            changed.await
+        };
+        let done = move |changed: &bool| changed.then_some((Activity::Update, id));
+        if caller.by.change(change, done).await? {
             return Ok(());
         }
     }

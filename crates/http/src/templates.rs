@@ -21,6 +21,7 @@ use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
 use ventriform::mesh_files::MeshStatement;
 use ventriform::model::Organ;
+use ventriform_service::access::Activity;
 use ventriform_service::config::Size;
 use ventriform_service::error::ServiceError;
 use ventriform_service::items::{TemplateSource, check_name};
@@ -178,6 +179,7 @@ pub async fn create_template(
         library: query.library,
     };
     let added_template = service.add_template(
+        &caller.by,
         source,
         organ.as_str(),
         mesh,
@@ -224,11 +226,14 @@ pub async fn update_template(
             }
             (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
-        app.service
-            .items()
-            .catalogue()
-            .set_library(tenant, &id, library)
-            .await?;
+        let items = app.service.items().clone();
+        let (tenant, template, id) = (tenant.clone(), id.clone(), id.clone());
+        let set = async move {
+            let catalogue = items.catalogue();
+            catalogue.set_library(&tenant, &template, library).await
+        };
+        let done = move |set: &bool| set.then_some((Activity::Update, id));
+        caller.by.change(set, done).await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::of(&app, template).into()))

@@ -318,7 +318,7 @@ pub async fn create_volume(
     }
     let stored = app
         .service
-        .store_volume(&caller.tenant, upload.volume, &tags);
+        .store_volume(&caller.by, &caller.tenant, upload.volume, &tags);
     let stored = stored.await?;
     let volume = stored.volume;
     let body = VolumeBody::of(&app, caller.scope, volume)?;
@@ -347,7 +347,7 @@ pub async fn update_volume(
         let found = find::<Volumes>(&app, &caller.tenant, &id);
         found.map_ok(|volume| volume.ownership.tags).boxed()
     };
-    tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
+    tags::change(&app, &caller, &id, request, tags_of).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(VolumeBody::of(&app, caller.scope, volume)?))
 }

@@ -24,6 +24,7 @@ use std::time::{Duration, Instant};
 use utoipa::IntoParams;
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
+use ventriform_service::access::Activity;
 use ventriform_service::dicom_tags::{
     PROCEDURE_STEP_STATE, SOP_INSTANCE_UID, TRANSACTION_UID,
     UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
@@ -118,12 +119,12 @@ pub async fn create_workitem(
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
-    match app
-        .service
-        .worklist
-        .add_workitem(&item, MAX_WORKITEMS)
-        .await?
-    {
+    let (worklist, created) = (app.service.worklist.clone(), uid.clone());
+    let add = async move { worklist.add_workitem(&item, MAX_WORKITEMS).await };
+    let done = move |added: &AddedWorkitem| {
+        (*added == AddedWorkitem::Done).then_some((Activity::Create, created))
+    };
+    match caller.by.change(add, done).await? {
         AddedWorkitem::Done => {}
         AddedWorkitem::Exists => {
             return Err(Problem::new(
@@ -440,7 +441,13 @@ async fn change(
         if size > before && size as u64 > limit.0 {
             return Err(body::too_large(limit));
         }
-        if done == Change::Already || app.service.worklist.change_workitem(&item).await? {
+        if done == Change::Already {
+            return Ok(done);
+        }
+        let (worklist, uid) = (app.service.worklist.clone(), item.uid.clone());
+        let change = async move { worklist.change_workitem(&item).await };
+        let recorded = move |changed: &bool| changed.then_some((Activity::Update, uid));
+        if caller.by.change(change, recorded).await? {
             return Ok(done);
         }
     }

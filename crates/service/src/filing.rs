@@ -3,13 +3,13 @@
 //! In: a [`JobOrder`]. Out: a job that is on disk. The tenant's quotas and the limit of the queue are checked here, and
 //! an order under the same idempotency key gets the same job.
 
-use crate::access::Quota;
+use crate::access::{Activity, Agent, Done, Quota};
 use crate::error::{Refusal, ServiceError, shorten};
 use crate::jobs::Work;
 use crate::quotas::{Addition, Counting};
 use crate::records::{
-    Failure, Fault, Filed, Idempotency, Job, JobWebhook, NewJob, Priority, Resource, SendOrder,
-    SeriesSource, Tags, Tenant, content_id, rfc3339,
+    Deleted, Failure, Fault, Filed, Idempotency, Interrupted, Job, JobWebhook, NewJob, Priority,
+    Resource, SendOrder, SeriesSource, StoreError, Tags, Tenant, content_id, rfc3339,
 };
 use crate::service::Service;
 use serde_json::{Map, Value, json};
@@ -22,6 +22,8 @@ const LONGEST_RETRY_S: f64 = 60.0;
 /// An order of a job, without its work.
 #[derive(Clone)]
 pub struct JobOrder {
+    /// Who orders it.
+    pub by: Agent,
     /// The owner of the job.
     pub tenant: Tenant,
     /// The tenant's names for the job.
@@ -44,8 +46,9 @@ pub struct JobOrder {
 
 impl JobOrder {
     /// An order without anything optional.
-    pub fn new(tenant: Tenant, quota: Quota) -> Self {
+    pub fn new(by: Agent, tenant: Tenant, quota: Quota) -> Self {
         Self {
+            by,
             tenant,
             tags: Tags::default(),
             priority: Priority::default(),
@@ -150,10 +153,40 @@ impl Service {
         counting: &Counting,
     ) -> Result<Job, ServiceError> {
         work.check_order(volume.as_deref(), &parameters)?;
+        let (by, tenant) = (order.by.clone(), order.tenant.clone());
         let job = order.into_job(work, volume, parameters);
         self.count(&job, counting).await?;
-        let filed = self.queue.file(&job).await?;
-        self.accepted(&job.tenant, filed).await
+        let filed = self.file(&by, job).await?;
+        self.accepted(&tenant, filed).await
+    }
+
+    /// Writes the row of a job, and that of its filing.
+    async fn file(&self, by: &Agent, job: NewJob) -> Result<Filed, StoreError> {
+        let queue = self.queue.clone();
+        let file = async move { queue.file(&job).await };
+        by.change(file, filed_by).await
+    }
+
+    /// Cancels a waiting job for `by`, or asks a running one to stop.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn interrupt_job(&self, by: &Agent, id: &str) -> Result<Interrupted, StoreError> {
+        let (queue, id) = (self.queue.clone(), id.to_owned());
+        let interrupt = async move { queue.interrupt(&id).await };
+        by.change(interrupt, interrupted_by).await
+    }
+
+    /// Erases the record of a job that has ended, for `by`.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn delete_job(&self, by: &Agent, id: &str) -> Result<Deleted, StoreError> {
+        let (queue, job, id) = (self.queue.clone(), id.to_owned(), id.to_owned());
+        let delete = async move { queue.delete_job(&job).await };
+        let done =
+            move |deleted: &Deleted| (*deleted == Deleted::Done).then_some((Activity::Delete, id));
+        by.change(delete, done).await
     }
 
     /// Counts the texts of a job that is about to be filed. Those of one that is filed already, told by its
@@ -287,6 +320,24 @@ impl Service {
     }
 }
 
+/// The act of filing a job, unless it was filed before.
+fn filed_by(filed: &Filed) -> Option<Done> {
+    match filed {
+        Filed::New(job) => Some((Activity::Execute, job.id.clone())),
+        _ => None,
+    }
+}
+
+/// The act of cancelling a job, unless it has ended.
+fn interrupted_by(outcome: &Interrupted) -> Option<Done> {
+    match outcome {
+        Interrupted::Cancelled(job) | Interrupted::Asked(job) => {
+            Some((Activity::Delete, job.id.clone()))
+        }
+        Interrupted::Finished(_) | Interrupted::Unknown => None,
+    }
+}
+
 fn key_reused() -> ServiceError {
     let detail = "This key was already used for another request.";
     Failure::new(Fault::Request, "idempotency-key-reused", detail)
@@ -297,6 +348,8 @@ fn key_reused() -> ServiceError {
 
 /// A job that nobody's request orders: a rule or a procedure of the settings does.
 pub struct UnattendedJob<'a> {
+    /// The agent of that entry.
+    pub by: Agent,
     /// The entry of the settings that orders it: `rule` or `procedure`.
     pub ordered_by: &'static str,
     /// Its owner.
@@ -341,12 +394,12 @@ impl Service {
             key: Some(job.key.clone()),
             source: job.source,
             send,
-            ..JobOrder::new(job.tenant.clone(), quota)
+            ..JobOrder::new(job.by.clone(), job.tenant.clone(), quota)
         };
         let volume = job.volume.map(str::to_owned);
         let new = order.into_job(work, volume, parameters);
         self.count(&new, &counting).await?;
-        let filed = self.queue.file(&new).await?;
+        let filed = self.file(&job.by, new).await?;
         drop(counting);
         match filed {
             Filed::New(job) | Filed::Same(job) => Ok(job.id),

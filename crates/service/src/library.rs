@@ -3,10 +3,10 @@
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets the
 //! same limits; here they are refused before the body is read, and read under the budget of decoding.
 
-use crate::access::Quota;
+use crate::access::{Activity, Agent, Done, Quota};
 use crate::decoding::LITTLE_MEMORY;
 use crate::error::{Refusal, ServiceError};
-use crate::items::{NotAdded, TemplateSource};
+use crate::items::{NotAdded, TemplateSource, WorkOutput};
 use crate::quotas::Counting;
 use crate::records::{ItemFilter, ListRequest, Owned, Product, ProductRoom, Resource, Tenant};
 use crate::service::Service;
@@ -23,6 +23,11 @@ const LIMITS_MEMORY_PER_BYTE: u64 = 26;
 /// A product with its owner's record, and whether it is new.
 pub type Added = (Owned<Product>, bool);
 
+/// The act of adding a product.
+fn added_by((product, new): &Added) -> Option<Done> {
+    Some((Activity::of_added(*new), product.item.id.clone()))
+}
+
 impl From<NotAdded> for ServiceError {
     fn from(error: NotAdded) -> Self {
         match error {
@@ -35,12 +40,13 @@ impl From<NotAdded> for ServiceError {
 }
 
 impl Service {
-    /// Adds a mesh in any format as a template of that organ.
+    /// Adds a mesh in any format as a template of that organ, for `by`.
     ///
     /// # Errors
     /// If the mesh or the name cannot be used, the tenant has no room for it, or the storage fails.
     pub async fn add_template(
         &self,
+        by: &Agent,
         source: TemplateSource<'_>,
         organ: &str,
         mesh: Bytes,
@@ -53,16 +59,28 @@ impl Service {
         let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
         let output = self.decoding.run(memory, make).await??;
         let room = self.product_room(Resource::Template, quota);
-        let added = self.items().add_template(source, organ, output, room);
-        Ok(added.await?)
+        let (items, organ) = (self.items().clone(), organ.to_owned());
+        let (tenant, name) = (source.tenant.clone(), source.name.to_owned());
+        let (volume, library) = (source.volume.map(str::to_owned), source.library);
+        let add = async move {
+            let source = TemplateSource {
+                tenant: &tenant,
+                name: &name,
+                volume: volume.as_deref(),
+                library,
+            };
+            items.add_template(source, &organ, output, room).await
+        };
+        Ok(by.change(add, added_by).await?)
     }
 
-    /// Adds a reader's profile.
+    /// Adds a reader's profile, for `by`.
     ///
     /// # Errors
     /// As [`Service::add_template`].
     pub async fn add_reader(
         &self,
+        by: &Agent,
         tenant: &Tenant,
         name: &str,
         profile: Bytes,
@@ -74,16 +92,17 @@ impl Service {
         // At most 1 MiB of text, parsed to at most 5001 entries, and written again.
         let output = self.decoding.run(LITTLE_MEMORY, check).await??;
         let room = self.product_room(Resource::Reader, quota);
-        let made = (tenant, Resource::Reader);
-        Ok(self.items().add_named(made, name, output, room).await?)
+        self.add_named(by, (tenant, Resource::Reader), name, output, room)
+            .await
     }
 
-    /// Adds normal limits.
+    /// Adds normal limits, for `by`.
     ///
     /// # Errors
     /// As [`Service::add_template`].
     pub async fn add_normals(
         &self,
+        by: &Agent,
         tenant: &Tenant,
         name: &str,
         limits: Bytes,
@@ -95,8 +114,24 @@ impl Service {
         let check = move |_: &Monitor<'_>| reader.normals(&limits);
         let output = self.decoding.run(memory, check).await??;
         let room = self.product_room(Resource::Normals, quota);
-        let made = (tenant, Resource::Normals);
-        Ok(self.items().add_named(made, name, output, room).await?)
+        self.add_named(by, (tenant, Resource::Normals), name, output, room)
+            .await
+    }
+
+    async fn add_named(
+        &self,
+        by: &Agent,
+        (tenant, made): (&Tenant, Resource),
+        name: &str,
+        output: WorkOutput,
+        room: ProductRoom,
+    ) -> Result<Added, ServiceError> {
+        let (items, tenant, name) = (self.items().clone(), tenant.clone(), name.to_owned());
+        let add = async move {
+            let added = items.add_named((&tenant, made), &name, output, room);
+            added.await
+        };
+        Ok(by.change(add, added_by).await?)
     }
 
     /// Refuses another template, reader or set of normal limits where the tenant has as many as it may have, before it is sent.

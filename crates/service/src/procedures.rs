@@ -8,6 +8,7 @@
 //!
 //! Each step is written down before the next one begins and is found again after a restart.
 
+use crate::access::{Activity, Agent};
 use crate::archive::{ExchangeHost, ObjectDelivery};
 use crate::error::ServiceError;
 use crate::filing::UnattendedJob;
@@ -87,6 +88,17 @@ fn procedure<'a>(service: &'a Service, item: &Workitem) -> Option<&'a Procedure>
     all.find(|procedure| procedure.is_asked_by(item))
 }
 
+/// The agent of an item's procedure: its number in the settings.
+fn agent(service: &Service, item: &Workitem) -> Agent {
+    let mut all = service.settings.procedures.0.iter();
+    let place = all.position(|procedure| procedure.is_asked_by(item));
+    let name = place.map_or_else(
+        || "procedure".to_owned(),
+        |place| format!("procedure:{}", place + 1),
+    );
+    service.agent(&item.tenant, name)
+}
+
 async fn follow_all(service: &Service) -> Result<(), StoreError> {
     let mut after = 0;
     loop {
@@ -114,7 +126,8 @@ async fn follow(service: &Service, mut item: Workitem) -> Result<(), StoreError>
         return give_up(service, item, "The job was deleted.").await;
     };
     if item.is_to_be_cancelled() && !job.state.is_final() {
-        if let Interrupted::Cancelled(_) = service.queue().interrupt(&id).await? {
+        let by = agent(service, &item);
+        if let Interrupted::Cancelled(_) = service.interrupt_job(&by, &id).await? {
             return give_up(service, item, "The job was cancelled.").await;
         }
         return Ok(());
@@ -124,11 +137,9 @@ async fn follow(service: &Service, mut item: Workitem) -> Result<(), StoreError>
             let tenths = (job.progress.clamp(0.0, 1.0) * 100.0) as u8 / PROGRESS_STEP_PERCENT;
             let percent = tenths * PROGRESS_STEP_PERCENT;
             if item.progress_percent() != Some(percent) {
-                change(service, &mut item, |item, now| {
-                    item.note_progress(percent, now);
-                    Ok(())
-                })
-                .await?;
+                let now = service.queue().now();
+                item.note_progress(percent, (now, &dicom_time(now)));
+                service.worklist.change_workitem(&item).await?;
             }
             Ok(())
         }
@@ -192,6 +203,7 @@ async fn file_by(
 ) -> Result<String, ServiceError> {
     let transaction = item.transaction.clone().unwrap_or_default();
     let job = UnattendedJob {
+        by: agent(service, item),
         ordered_by: "procedure",
         tenant: &procedure.tenant,
         kind: &procedure.kind,
@@ -279,7 +291,13 @@ async fn change(
 ) -> Result<bool, StoreError> {
     let now = service.queue().now();
     match how(item, (now, &dicom_time(now))) {
-        Ok(()) => service.worklist.change_workitem(item).await,
+        Ok(()) => {
+            let (worklist, item) = (service.worklist.clone(), item.clone());
+            let (by, uid) = (agent(service, &item), item.uid.clone());
+            let change = async move { worklist.change_workitem(&item).await };
+            let done = move |changed: &bool| changed.then_some((Activity::Update, uid));
+            by.change(change, done).await
+        }
         Err(refusal) => {
             tracing::warn!(workitem = item.sequence, %refusal, "a work item could not be changed");
             Ok(false)

@@ -29,7 +29,10 @@ impl VolumeMaker for Service {
             upload.write(pieces.map_err(ServiceError::internal)).await?;
         }
         let tags = Tags::default();
-        let stored = self.store_volume(&group.origin.tenant, upload, &tags);
+        let origin = &group.origin;
+        let by = self.agent(&origin.tenant, format!("intake:{}", origin.sender));
+        let by = by.at(&origin.address);
+        let stored = self.store_volume(&by, &origin.tenant, upload, &tags);
         // Decoding is shared out between the senders.
         let stored = match group.origin.address.parse() {
             Ok(address) => ClientAddress::of_peer(address).scope(stored).await?,
@@ -45,7 +48,10 @@ impl VolumeMaker for Service {
         volume: &str,
         key: String,
     ) -> Result<Option<String>, MakeError> {
+        let rules = &self.settings.rules.0;
+        let number = rules.iter().position(|known| known == rule).unwrap_or(0) + 1;
         let mut job = UnattendedJob {
+            by: self.agent(&group.origin.tenant, format!("rule:{number}")),
             ordered_by: "rule",
             tenant: &group.origin.tenant,
             kind: &rule.kind,

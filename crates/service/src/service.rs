@@ -13,7 +13,7 @@
 //! | perform work items | [`crate::procedures`] |
 //! | count what tenants may store and queue | [`crate::quotas`] |
 
-use crate::access::{AccessStore, Recorder};
+use crate::access::{AccessStore, Agent, Recorder};
 use crate::archive::ArchiveDesk;
 use crate::config::Settings;
 use crate::decoding::Decoding;
@@ -23,7 +23,7 @@ use crate::items::{Items, RetentionAges};
 use crate::jobs::Queue;
 use crate::memory::MemoryBudget;
 use crate::quotas::Quotas;
-use crate::records::{Clock, FigureStore, Ownership, Resource, Timestamp};
+use crate::records::{Clock, FigureStore, Ownership, Resource, Tenant, Timestamp};
 use crate::telemetry::{Metrics, Readiness, Spans};
 use crate::work::Engine;
 use crate::worklist::Worklist;
@@ -99,6 +99,12 @@ impl Service {
     /// The time now.
     pub fn now(&self) -> Timestamp {
         self.queue.now()
+    }
+
+    /// The agent of that name, for acts of no caller.
+    pub fn agent(&self, tenant: &Tenant, name: impl Into<String>) -> Agent {
+        let (recorder, clock) = (self.recorder.clone(), self.clock().clone());
+        Agent::new(recorder, clock, tenant.clone(), name)
     }
 
     /// When an item of that kind will be erased; `None` if it is kept.

@@ -8,6 +8,7 @@
 //! Guaranteed: what arrives counts against the tenant's quota as it comes. Not guaranteed: that a refused upload has
 //! not been written to the disk; its files are deleted.
 
+use crate::access::{Activity, Agent, Done};
 use crate::error::ServiceError;
 use crate::items::Pin;
 use crate::memory::{HeldMemory, MemoryBudget};
@@ -312,26 +313,28 @@ impl VolumeUpload {
 }
 
 impl Service {
-    /// Checks and stores the volume of an upload. One that is stored already is not checked again; its age
+    /// Checks and stores the volume of an upload for `by`. One that is stored already is not checked again; its age
     /// counts from now.
     ///
     /// # Errors
     /// If the files are no usable volume, the tenant's quota has no room for them, or the storage fails.
     pub async fn store_volume(
         &self,
+        by: &Agent,
         tenant: &Tenant,
         upload: VolumeUpload,
         tags: &Tags,
     ) -> Result<Stored, ServiceError> {
         let counting = upload.counting.clone();
         counting.settle().await?;
-        let stored = self.store_counted(tenant, upload, tags).await?;
+        let stored = self.store_counted(by, tenant, upload, tags).await?;
         counting.stored();
         Ok(stored)
     }
 
     async fn store_counted(
         &self,
+        by: &Agent,
         tenant: &Tenant,
         mut upload: VolumeUpload,
         tags: &Tags,
@@ -341,8 +344,16 @@ impl Service {
         let pin = items.pin(&id).await?;
         if let Some(stored) = items.intact_volume(&id).await? {
             let scan = self.scan_to_note(tenant, &id, &stored).await?;
-            let renewed = items.renew_volume(tenant, &id, tags, scan.as_ref());
-            if let Some((volume, new)) = renewed.await? {
+            let renewed = {
+                let (items, tenant, tags) = (items.clone(), tenant.clone(), tags.clone());
+                let id = id.clone();
+                async move {
+                    let renewed = items.renew_volume(&tenant, &id, &tags, scan.as_ref());
+                    renewed.await
+                }
+            };
+            let done = |renewed: &Option<_>| renewed.as_ref().map(stored_by);
+            if let Some((volume, new)) = by.change(renewed, done).await? {
                 return Ok(Stored { volume, new, pin });
             }
         }
@@ -372,10 +383,20 @@ impl Service {
             facts: facts.to_json(),
             id,
         };
-        let added = items.add_volume(volume, staged, tenant, tags, scan);
+        let (items, tenant, tags) = (items.clone(), tenant.clone(), tags.clone());
+        let add = async move {
+            let added = items.add_volume(volume, staged, &tenant, &tags, scan);
+            added.await
+        };
+        let added = by.change(add, |added| Some(stored_by(added)));
         let (volume, new) = added.await?;
         Ok(Stored { volume, new, pin })
     }
+}
+
+/// The act of storing a volume, which is new for the tenant or not.
+fn stored_by((volume, new): &(Owned<StoredVolume>, bool)) -> Done {
+    (Activity::of_added(*new), volume.item.id.clone())
 }
 
 /// An upload of no file.

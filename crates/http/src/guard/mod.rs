@@ -11,8 +11,9 @@
 //! 4. The scope must include what method and path need: 403 if not.
 //! 5. From here on, its memory is charged to its client ([`super::memory`]). Handlers that add something reserve it
 //!    under the tenant's quotas ([`super::quota`]).
-//! 6. After the handler, [`trail`] writes what was done to the audit trail. An act that changed
-//!    something is answered when its event is on disk.
+//! 6. What changes something is recorded where that is done, by the caller's agent ([`Caller::by`]); after the handler,
+//!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event is on
+//!    disk.
 //!
 //! `Authorization` decides alone; a caller's address or a forwarded header never does.
 
@@ -22,7 +23,7 @@ pub mod state;
 
 mod trail;
 
-pub use trail::{Agent, AlreadyRecorded};
+pub use trail::AlreadyRecorded;
 
 use super::app::App;
 use super::caller::Caller;
@@ -128,9 +129,7 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
         None => admit(&app, &identity, &address, &mut request).await,
     };
     let mut response = match answer {
-        Ok(()) => {
-            let act = trail::Act::of(&request, &identity, address);
-            request.extensions.insert(act.agent());
+        Ok(act) => {
             let ledger = Ledger::new(&app.service.memory);
             let answer = next.run(Request::from_parts(request, body));
             let response = ledger.clone().scope(answer).await;
@@ -174,9 +173,15 @@ async fn identify(app: &App, request: &Parts, address: &str) -> Answer<Identity>
 }
 
 /// Refuses what the caller may not do, and tells the handlers who it is.
-async fn admit(app: &App, identity: &Identity, address: &str, request: &mut Parts) -> Answer<()> {
+async fn admit(
+    app: &App,
+    identity: &Identity,
+    address: &str,
+    request: &mut Parts,
+) -> Answer<trail::Act> {
     let quota = identity.limits(app.service.quotas.general);
-    let caller = Caller::of(identity, quota);
+    let act = trail::Act::of(app, request, identity, address.to_owned());
+    let caller = Caller::of(identity, quota, act.agent());
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
     }
@@ -187,7 +192,7 @@ async fn admit(app: &App, identity: &Identity, address: &str, request: &mut Part
         return Err(problem);
     }
     request.extensions.insert(caller);
-    Ok(())
+    Ok(act)
 }
 
 /// Counts a request for its caller and for the keys that have made the caller's key. Returns what is left where the

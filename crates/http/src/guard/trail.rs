@@ -1,6 +1,7 @@
 //! From requests to rows of the audit trail.
 //!
-//! Recorded are: acts that changed something, reads of contents and of lists under `/v1`, refused
+//! Changes are recorded where they are made ([`Agent::change`]), so that a request which is dropped or refused afterwards
+//! leaves its rows; what a handler changes otherwise is recorded here, after its answer is known. Recorded are: acts that changed something, reads of contents and of lists under `/v1`, refused
 //! credentials, and requests beyond a caller's scope. Not recorded are reads of jobs, which clients
 //! repeat while they wait, and requests that were refused for another reason or found nothing.
 //!
@@ -15,8 +16,8 @@ use axum::http::{Method, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use tower_http::request_id::RequestId;
 use ventriform::export::dicom::is_uid;
-use ventriform_service::access::{Activity, AuditEvent, Identity, Outcome, Refusal};
-use ventriform_service::records::{ErasureAgent, Tenant, Timestamp};
+use ventriform_service::access::{Activity, Agent, AuditEvent, Identity, Outcome, Refusal};
+use ventriform_service::records::Tenant;
 
 /// Longest id that is recorded; others are no ids of this service.
 const LONGEST_ID: usize = 80;
@@ -26,57 +27,36 @@ const LONGEST_ID: usize = 80;
 #[derive(Debug, Clone, Copy)]
 pub struct AlreadyRecorded;
 
-/// Who sends a request, for events that a handler records itself.
-#[derive(Debug, Clone)]
-pub struct Agent(AuditEvent);
-
-impl Agent {
-    /// Who it is, for an erasure, whose event is recorded together with its receipt.
-    pub fn of_erasure(&self) -> ErasureAgent {
-        ErasureAgent {
-            name: self.0.agent.clone(),
-            key: self.0.key.clone(),
-            address: self.0.address.clone(),
-            request: self.0.request.clone(),
-        }
-    }
-
-    /// The act of the agent at that time.
-    pub fn event(&self, activity: Activity, now: Timestamp) -> AuditEvent {
-        AuditEvent {
-            activity,
-            recorded: now,
-            ..self.0.clone()
-        }
-    }
-}
-
 /// A request that may have to be recorded.
 pub struct Act {
     method: Method,
     route: String,
     object: Option<String>,
     event: AuditEvent,
+    agent: Agent,
 }
 
 impl Act {
     /// The act of this request.
-    pub fn of(request: &Parts, identity: &Identity, address: String) -> Self {
+    pub fn of(app: &App, request: &Parts, identity: &Identity, address: String) -> Self {
         let route = request.extensions.get::<MatchedPath>();
+        let event = event(request, identity, address, Activity::Read);
+        let (recorder, clock) = (app.service.recorder.clone(), app.service.clock().clone());
         Self {
+            agent: Agent::of(recorder, clock, event.clone()),
             method: request.method.clone(),
             route: route.map_or_else(String::new, |route| route.as_str().to_owned()),
             object: item_of(request.uri.path()),
-            event: event(request, identity, address, Activity::Read),
+            event,
         }
     }
 
     /// Who sends the request.
     pub fn agent(&self) -> Agent {
-        Agent(self.event.clone())
+        self.agent.clone()
     }
 
-    /// Records what was done, and returns the answer; instead of it 503 if an act that changed
+    /// Records what was done and is not recorded yet, and returns the answer; instead of it 503 if an act that changed
     /// something could not be recorded.
     pub async fn record(mut self, app: &App, response: Response) -> Response {
         let status = response.status();
@@ -88,6 +68,12 @@ impl Act {
             return response;
         }
         let done = status.is_success() || status == StatusCode::NOT_MODIFIED;
+        if done && self.agent.lacks_rows() {
+            return not_recorded().into_response();
+        }
+        if self.agent.has_acted() {
+            return response;
+        }
         if !done || response.extensions().get::<AlreadyRecorded>().is_some() {
             return response;
         }

@@ -71,7 +71,7 @@ pub async fn file_upload(
         key,
         webhook,
         trace_parent: observe::trace_parent(&request),
-        ..JobOrder::new(tenant.clone(), caller.quota)
+        ..JobOrder::new(caller.by.clone(), tenant.clone(), caller.quota)
     };
     let mut parameters = work.parameters_from_text(&stated.parameters)?;
     // A repeated request gets its job, whatever has become of the queue and of what it names.
@@ -93,8 +93,8 @@ pub async fn file_upload(
     // Pinned until the job is filed: from then on the job keeps them.
     let mut pins = Vec::new();
     for (name, files) in upload.others {
-        let stored = service.store_volume(tenant, files, &order.tags).await;
-        let stored = stored.map_err(|error| error.at(name))?;
+        let stored = service.store_volume(&caller.by, tenant, files, &order.tags);
+        let stored = stored.await.map_err(|error| error.at(name))?;
         pairs.push((name.to_owned(), stored.volume.id.clone()));
         pins.push(stored.pin);
     }
@@ -102,7 +102,7 @@ pub async fn file_upload(
         parameters = work.parameters_from_text(&pairs)?;
     }
     let stored = service
-        .store_volume(tenant, upload.volume, &order.tags)
+        .store_volume(&caller.by, tenant, upload.volume, &order.tags)
         .await?;
     pins.push(stored.pin);
     let volume = Some(stored.volume.item.id);

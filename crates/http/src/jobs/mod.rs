@@ -98,7 +98,7 @@ pub fn order_of(
         priority: priority::of_object(object)?,
         key: idempotency::key(headers)?,
         trace_parent,
-        ..JobOrder::new(caller.tenant.clone(), caller.quota)
+        ..JobOrder::new(caller.by.clone(), caller.tenant.clone(), caller.quota)
     })
 }
 
@@ -257,7 +257,7 @@ pub async fn update_job(
             .map_ok(|job| job.tags)
             .boxed()
     };
-    tags::change(&app, &caller.tenant, &id, request, tags_of).await?;
+    tags::change(&app, &caller, &id, request, tags_of).await?;
     let job = find(&app, &caller.tenant, &id).await?;
     Ok(Json(describe(&app, job).await?))
 }
@@ -304,7 +304,7 @@ pub async fn delete_job(
         )
         .fix("DELETE it without `erase` to cancel it, wait for its end, then erase it."));
     }
-    let (status, job) = match app.service.queue().interrupt(&id).await? {
+    let (status, job) = match app.service.interrupt_job(&caller.by, &id).await? {
         Interrupted::Cancelled(job) => (StatusCode::OK, job),
         Interrupted::Asked(job) => (StatusCode::ACCEPTED, job),
         Interrupted::Unknown => {
@@ -312,7 +312,7 @@ pub async fn delete_job(
         }
         Interrupted::Finished(job) if job.cancel_requested && !erase => (StatusCode::OK, job),
         Interrupted::Finished(_) => {
-            return match app.service.queue().delete_job(&id).await? {
+            return match app.service.delete_job(&caller.by, &id).await? {
                 Deleted::Done => Ok(StatusCode::NO_CONTENT.into_response()),
                 _ => {
                     Err(missing(app.service.items().catalogue(), tenant, Resource::Job, &id).await)

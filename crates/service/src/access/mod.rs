@@ -20,7 +20,7 @@
 //! |---|---|
 //! | `scope`, `key`, `quota` | what callers may do; keys; limits |
 //! | `gate`, `oidc`, `identity` | from `Authorization` to a caller; tokens of an issuer |
-//! | `audit` | events, the chain, its check, its writer |
+//! | `audit` | events, who acts, the chain, its check, its writer |
 //! | `storage` | the trait that a database implements |
 
 mod audit;
@@ -33,8 +33,8 @@ mod scope;
 mod storage;
 
 pub use audit::{
-    Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, AuditReport, BrokenLink,
-    NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
+    Activity, Agent, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, AuditReport,
+    BrokenLink, Done, NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
 };
 pub use gate::{FRESH_FOR, Gate, MOST_MAKERS, Refusal};
 pub use identity::{Identity, Makers};

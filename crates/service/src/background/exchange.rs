@@ -1,6 +1,6 @@
 //! The exchange with archives: series are fetched and stored as uploads are, objects of results are made and delivered.
 
-use crate::access::{Activity, AuditEvent, Outcome};
+use crate::access::{Activity, Outcome};
 use crate::archive::{
     ArchiveObject, Deliverer, DuePull, DueSend, Exchange, ExchangeEnd, ExchangeHost,
     ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
@@ -93,7 +93,9 @@ impl ExchangeHost for Service {
             written.map_err(trouble)?;
             upload.join_repeated().await.map_err(trouble)?;
         }
-        let stored = self.store_volume(tenant, upload, &Tags::default()).await;
+        let (by, tags) = (self.agent(tenant, AUDIT_AGENT), Tags::default());
+        let stored = self.store_volume(&by, tenant, upload, &tags);
+        let stored = stored.await;
         let stored = stored.map_err(trouble)?;
         Ok(StoredSeries {
             volume: stored.volume.item.id,
@@ -169,7 +171,7 @@ impl ExchangeHost for Service {
 }
 
 impl Service {
-    /// Notes in the audit trail what left or entered the service without a request. Attempts that
+    /// Writes to the audit trail what left or entered the service without a request. Attempts that
     /// will be repeated are not noted.
     async fn recorded(&self, tenant: &Tenant, activity: Activity, object: &str, end: ExchangeEnd) {
         let outcome = match end {
@@ -177,12 +179,9 @@ impl Service {
             ExchangeEnd::Done | ExchangeEnd::Present => Outcome::Success,
             ExchangeEnd::GivenUp => Outcome::Refused,
         };
-        let now = self.queue.now();
-        let event = AuditEvent {
-            outcome,
-            ..AuditEvent::new(now, activity, tenant.clone(), AUDIT_AGENT.into()).on(object)
-        };
-        self.recorder.note(event).await;
+        let by = self.agent(tenant, AUDIT_AGENT);
+        // One that cannot be written now is written later.
+        let _ = by.record(activity, outcome, object.to_owned()).await;
     }
 }
 

@@ -15,7 +15,7 @@ use super::senders::AeTitle;
 use super::service::{Place, Service};
 use super::session::Session;
 use super::wire::{Wire, WireError};
-use crate::access::{Activity, AuditEvent, Outcome};
+use crate::access::{Activity, Agent, AuditEvent, Outcome};
 use crate::records::Tenant;
 use dicom_ul::pdu::{
     AbortRQServiceProviderReason as AbortReason, AbortRQSource, AssociationRJ, AssociationRJResult,
@@ -228,6 +228,13 @@ where
             length.max(SHORTEST_REQUEST_BYTES) - VALUE_HEADER
         }),
         session: service.sessions.begin(),
+        by: Agent::new(
+            service.recorder.clone(),
+            service.clock.clone(),
+            origin.tenant.clone(),
+            origin.sender.clone(),
+        )
+        .at(&origin.address),
         origin,
         command: (0, Vec::new()),
         message: None,
@@ -261,6 +268,8 @@ struct Association<'a, S> {
     /// Bytes of one value that is sent.
     portion: usize,
     session: Session,
+    /// The sender, in the audit trail.
+    by: Agent,
     origin: Origin,
     /// The part of a command that has come, and its context.
     command: (u8, Vec<u8>),
@@ -446,16 +455,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + Send> Association<'_, S> {
             study: None,
         };
         let receiver = &self.service.receiver;
-        let stored = receiver
-            .store(object, stated, &self.origin, &mut self.session)
-            .await;
-        let (group, _) = stored.map_err(|refused| refused.error)?;
-        let now = self.service.clock.now();
-        let tenant = self.origin.tenant.clone();
-        let sender = self.origin.sender.clone();
-        let mut event = AuditEvent::new(now, Activity::Create, tenant, sender).on(group);
-        event.address = Some(self.origin.address.clone());
-        self.service.recorder.note(event).await;
+        let stored = receiver.store(&self.by, object, stated, &self.origin, &mut self.session);
+        stored.await.map_err(|refused| refused.error)?;
         Ok(())
     }
 

@@ -2,13 +2,15 @@
 //!
 //! 1. The bytes are written to a file as they come ([`Incoming::write`]).
 //! 2. The header is read and the content hashed, within the bounds of a [`HeaderTurns`].
-//! 3. The file is forced to the disk; then its row is committed.
+//! 3. The file is forced to the disk; then its row is committed; then that of the audit trail. From here on it goes on if
+//!    the caller goes away.
 
 use super::observer::IntakeObserver;
 use super::record::{
     Added, IncomingFile, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, ReceivedFiles,
 };
-use super::session::Session;
+use super::session::{RecordedGroups, Session};
+use crate::access::{Activity, Agent};
 use crate::error::ServiceError;
 use crate::records::{BlobError, Clock, Fault, StoreError, StoreFault, hex, random_id};
 use async_trait::async_trait;
@@ -19,6 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use tokio::sync::oneshot;
+use tracing::Instrument;
 use ventriform::progress::{Monitor, Stage};
 use ventriform::volume::dicom::{DicomHeader, read_header};
 use ventriform::volume::{ReadLimits, VolumeError, VolumeFile};
@@ -263,13 +266,14 @@ impl Receiver {
         })
     }
 
-    /// Stores an object whose bytes have all been written. When this returns, it is on disk. Returns
-    /// its group, and its header.
+    /// Stores an object whose bytes have all been written, for `by`. When this returns, it is on disk, and so is the row of the
+    /// audit trail which says that the session brings objects of this group. Returns its group, and its header.
     ///
     /// # Errors
-    /// Why it was not stored; nothing is left of it.
+    /// Why it was not stored; nothing is left of it, unless the audit trail could not be written.
     pub async fn store(
         &self,
+        by: &Agent,
         incoming: Incoming,
         stated: Stated<'_>,
         origin: &Origin,
@@ -277,7 +281,7 @@ impl Receiver {
     ) -> Result<(String, DicomHeader), Refused> {
         let bytes = incoming.bytes;
         let stored = self
-            .store_uncounted(incoming, stated, origin, session)
+            .store_uncounted(by, incoming, stated, origin, session)
             .await;
         let outcome = stored
             .as_ref()
@@ -303,6 +307,7 @@ impl Receiver {
 
     async fn store_uncounted(
         &self,
+        by: &Agent,
         mut incoming: Incoming,
         stated: Stated<'_>,
         origin: &Origin,
@@ -323,7 +328,19 @@ impl Receiver {
         let header = examined.header.clone();
         let kept = match stated.contradiction(&header) {
             Some(what) => Err(ReceiveError::Mismatch(what)),
-            None => self.keep(incoming, examined, origin).await,
+            None => {
+                let keeping = Keeping {
+                    store: self.store.clone(),
+                    files: self.files.clone(),
+                    clock: self.clock.clone(),
+                    room: self.settings.room,
+                    by: by.clone(),
+                    recorded: session.recorded(),
+                };
+                let kept = keeping.keep(incoming, examined, origin.clone());
+                let kept = tokio::spawn(kept.in_current_span()).await;
+                kept.unwrap_or_else(|error| Err(ReceiveError::Storage(error.to_string())))
+            }
         };
         match kept {
             Ok(group) => {
@@ -336,18 +353,48 @@ impl Receiver {
             }),
         }
     }
+}
 
-    /// Forces an object to the disk and commits its row. Returns its group.
+/// The last step of an object.
+struct Keeping {
+    store: Arc<dyn IntakeStore>,
+    files: Arc<dyn ReceivedFiles>,
+    clock: Arc<dyn Clock>,
+    room: IntakeRoom,
+    by: Agent,
+    recorded: RecordedGroups,
+}
+
+impl Keeping {
+    /// Forces an object to the disk, commits its row, and records that. Returns its group.
     async fn keep(
+        self,
+        incoming: Incoming,
+        examined: Examined,
+        origin: Origin,
+    ) -> Result<String, ReceiveError> {
+        let group = self.store(incoming, examined, origin).await?;
+        // The first object of a group waits for its row; further ones of the session are counted each second.
+        if self.recorded.contains(&group) {
+            self.by.note(Activity::Create, group.clone()).await;
+            return Ok(group);
+        }
+        let recorded = self.by.did(Activity::Create, group.clone()).await;
+        recorded.map_err(|error| ReceiveError::Storage(error.to_string()))?;
+        self.recorded.insert(&group);
+        Ok(group)
+    }
+
+    async fn store(
         &self,
         incoming: Incoming,
         examined: Examined,
-        origin: &Origin,
+        origin: Origin,
     ) -> Result<String, ReceiveError> {
         let name = format!("{}.dcm", random_id("obj_"));
         incoming.file.keep(&name).await?;
         let object = NewObject {
-            origin: origin.clone(),
+            origin,
             header: examined.header,
             data_sha256: examined.data_sha256,
             file_sha256: examined.file_sha256,
@@ -355,7 +402,7 @@ impl Receiver {
             bytes: incoming.bytes,
         };
         let now = self.clock.now();
-        let added = self.store.add(&object, self.settings.room, now).await;
+        let added = self.store.add(&object, self.room, now).await;
         let (group, useless) = match added {
             Ok(Added::New(group, obsolete)) => (Ok(group), obsolete),
             Ok(Added::Known(group)) => (Ok(group), Some(name)),

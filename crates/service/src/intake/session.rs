@@ -58,6 +58,7 @@ impl Sessions {
         Session {
             sessions: self.clone(),
             groups: BTreeSet::new(),
+            recorded: RecordedGroups::default(),
             released: false,
         }
     }
@@ -151,10 +152,37 @@ impl Sessions {
 pub struct Session {
     sessions: Arc<Sessions>,
     groups: BTreeSet<String>,
+    recorded: RecordedGroups,
     released: bool,
 }
 
+/// The groups of a session of which the audit trail has a row that names them.
+#[derive(Clone, Default)]
+pub(super) struct RecordedGroups(Arc<Mutex<BTreeSet<String>>>);
+
+impl RecordedGroups {
+    fn groups(&self) -> MutexGuard<'_, BTreeSet<String>> {
+        // A panic cannot leave the set half changed: each change is a single call.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether there is a row of that group.
+    pub(super) fn contains(&self, group: &str) -> bool {
+        self.groups().contains(group)
+    }
+
+    /// There is a row of that group.
+    pub(super) fn insert(&self, group: &str) {
+        self.groups().insert(group.to_owned());
+    }
+}
+
 impl Session {
+    /// Those of its groups that the audit trail names.
+    pub(super) fn recorded(&self) -> RecordedGroups {
+        self.recorded.clone()
+    }
+
     /// It has brought an object of `group`; `whole` if that is all of it.
     pub fn brought(&mut self, group: &str, whole: bool) {
         let first = self.groups.insert(group.to_owned());

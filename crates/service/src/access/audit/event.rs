@@ -35,6 +35,13 @@ pub enum Activity {
     AuditGap,
 }
 
+impl Activity {
+    /// The act of adding something: an update if it was there.
+    pub fn of_added(new: bool) -> Self {
+        if new { Self::Create } else { Self::Update }
+    }
+}
+
 /// Its outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

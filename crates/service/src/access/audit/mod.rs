@@ -8,11 +8,13 @@
 //! Not guaranteed: somebody who can write to the database file can write the whole chain anew.
 //! Against that, keep the newest hash in another place; `ventriform audit verify` prints it.
 
+mod agent;
 mod chain;
 mod event;
 mod fhir;
 mod recorder;
 
+pub use agent::{Agent, Done};
 pub use chain::{AuditReport, BrokenLink, NO_HASH, chain_hash, verify};
 pub use event::{Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, Outcome};
 pub use fhir::fhir;
