@@ -431,6 +431,36 @@ async fn a_fetch_during_which_the_service_ended_counts() {
     assert_eq!(fake.transfers().len(), 1);
 }
 
+/// As with fetches.
+#[tokio::test]
+async fn a_delivery_during_which_the_service_ended_counts() {
+    let once = |settings: &mut Settings| {
+        settings.archive_attempts = 1;
+        settings.shutdown_grace = "50ms".parse().unwrap();
+    };
+    let (app, fake) = real(once).await;
+    fake.fail_storing(&[Fault::Silence]);
+    let job = sending(&app, &["mesh.dcm"], "pacs").await;
+    let path = text(&job["links"]["self"]);
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while app.json(&path).await["deliveries"][0]["attempts"] != 1 {
+        assert!(Instant::now() < deadline, "{}", app.json(&path).await);
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    let data = app.stop().await;
+    fake.recover();
+    let app = TestApp::on(data, engine(), |settings| {
+        set(settings, &fake);
+        once(settings);
+    })
+    .await;
+    let job = sent(&app, &job, "dead").await;
+    assert_eq!(job["deliveries"][0]["attempts"], 1);
+    let why = text(&job["deliveries"][0]["last_error"]);
+    assert!(why.contains("was not written down"), "{why}");
+    assert_eq!(fake.stored().1, 0);
+}
+
 #[tokio::test]
 async fn a_listed_service_is_used_without_credentials() {
     let fake = FakeArchive::start(&[b"VOLUME sphere"]).await;
@@ -616,10 +646,13 @@ async fn results_are_delivered_once_whatever_happens() {
     ] {
         assert!(metrics.contains(line), "{line}");
     }
-    // Noted events are written within a second.
-    tokio::time::sleep(Duration::from_millis(1500)).await;
-    let trail = app.json("/v1/audit?limit=100").await.to_string();
-    assert!(trail.contains("archive exchange"), "{trail}");
+    let trail = app
+        .json("/v1/audit?limit=100&agent=archive%20exchange")
+        .await;
+    let trail = trail.to_string();
+    for item in [&refused["id"], &refused["volume"]] {
+        assert!(trail.contains(&text(item)), "{item}: {trail}");
+    }
 }
 
 #[tokio::test]
@@ -852,6 +885,12 @@ async fn work_items_with_the_code_of_a_procedure_are_performed() {
     let progress = &item["00741002"]["Value"][0];
     assert_eq!(progress["00741004"]["Value"][0], "100");
     becomes(&app, &other, "SCHEDULED").await;
+    let jobs = app.json("/v1/jobs").await;
+    let trail = app.json("/v1/audit?agent=procedure:1").await.to_string();
+    let uid = path.rsplit('/').next().unwrap().to_owned();
+    for item in [uid, text(&jobs["jobs"][0]["id"])] {
+        assert!(trail.contains(&item), "{item}: {trail}");
+    }
 
     // What cannot be done is given up with the reason.
     fake.fail(&[Fault::Status(404)]);

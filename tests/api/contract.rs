@@ -1342,6 +1342,11 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     // An attempt that fails is repeated, one that is taken is not.
     let settle = |outcome, again_at| Settlement { outcome, again_at };
     let again = settle(AttemptOutcome::Rejected(500), Some(now() + 60_000));
+    assert_eq!(due[0].attempts, 0);
+    // It counts from its beginning.
+    on.a.begun(&due[0].id, now()).await.unwrap();
+    let begun = on.b.due("https://own.example:443", now(), 10);
+    assert_eq!(begun.await.unwrap()[0].attempts, 1);
     on.a.settle(&due[0].id, again, now()).await.unwrap();
     assert!(
         on.b.due("https://own.example:443", now(), 10)
@@ -1349,6 +1354,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
             .unwrap()
             .is_empty()
     );
+    on.a.begun(&due[0].id, now()).await.unwrap();
     on.a.settle(
         &due[0].id,
         settle(AttemptOutcome::Delivered(204), None),
@@ -1519,7 +1525,17 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
         error: None,
         again_at: None,
     };
+    on.a.send_begun(&due[0].id, now()).await.unwrap();
+    let begun = on.b.due_sends("pacs", now(), 10).await.unwrap();
+    let begun = begun.iter().find(|send| send.id == due[0].id).unwrap();
+    assert_eq!((due[0].attempts, begun.attempts), (0, 1));
     on.a.settle_send(&due[0].id, &stored, now()).await.unwrap();
+    let sends = &on.b.sends(&[&job.id]).await.unwrap()[&job.id];
+    let settled = sends.iter().find(|send| send.id == due[0].id).unwrap();
+    assert_eq!(
+        (settled.state, settled.attempts),
+        (DeliveryState::Delivered, 1)
+    );
     let backlog = on.b.archive_backlog().await.unwrap();
     assert_eq!(
         (backlog.pulls, backlog.sends.pending, backlog.sends.dead),

@@ -223,6 +223,32 @@ async fn deliveries_survive_a_restart_and_erased_jobs() {
     app.stop().await;
 }
 
+/// Otherwise an answer with which the process ends would be asked for again after every start.
+#[tokio::test]
+async fn an_attempt_during_which_the_service_ended_counts() {
+    let once = |settings: &mut Settings| {
+        local(settings);
+        settings.webhook_attempts = 1;
+        settings.webhook_timeout = "60s".parse().unwrap();
+        settings.shutdown_grace = "50ms".parse().unwrap();
+    };
+    let receiver = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}/", receiver.local_addr().unwrap());
+    let app = TestApp::with(once).await;
+    let job = file(&app, "sphere", json!({"url": url})).await;
+    // It takes the message and never answers.
+    let arrived = tokio::time::timeout(Duration::from_secs(30), receiver.accept()).await;
+    let (silent, _) = arrived.unwrap().unwrap();
+    let data = app.stop().await;
+    drop(silent);
+    let app = TestApp::on(data, fake_engine(), once).await;
+    let told = delivery_until(&app, &job, "dead").await;
+    assert_eq!(told["attempts"], 1);
+    assert_eq!(told["last_outcome"], "interrupted");
+    let again = tokio::time::timeout(Duration::from_millis(300), receiver.accept()).await;
+    assert!(again.is_err(), "it was sent again");
+}
+
 #[tokio::test]
 async fn ends_told_by_a_killed_service_are_told_by_the_next() {
     let data = tempfile::tempdir().unwrap();

@@ -239,7 +239,7 @@ pub struct DeliveryBody {
     last_status: Option<u16>,
     /// How it last ended: `delivered`, `gone` (410), `rejected` (another status), `timed-out`,
     /// `unreachable`, `refused` (by this service, for its address), `too-old`, `too-many`,
-    /// `endpoint-removed`.
+    /// `endpoint-removed`, `interrupted` (the service ended during the last attempt).
     last_outcome: Option<String>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Nothing is stored twice: an object has the same UID and bytes in every attempt, and the archive
 //! is asked whether it has the object before it is sent. An archive that cannot be asked recognises the
-//! UID itself.
+//! UID itself. An attempt is counted before it is made, so that one which ends the process is not repeated without end.
 
 use super::end::{ExchangeCounts, ExchangeEnd};
 use super::exchange::{Exchange, means};
@@ -71,6 +71,7 @@ impl Deliverer {
     fn settlement(
         &self,
         due: &DueSend,
+        attempts: u32,
         sent: Result<Stored, Trouble>,
     ) -> (SendSettlement, ExchangeEnd, AttemptEnd) {
         let done = |outcome, end| {
@@ -88,7 +89,6 @@ impl Deliverer {
             Err(trouble) => trouble,
         };
         let meaning = means(&trouble);
-        let attempts = due.attempts.saturating_add(1);
         let again_after = |asked| self.exchange.again_at(attempts, due.since, asked);
         let again_at = match &trouble {
             Trouble::Passing { asked, .. } => again_after(*asked),
@@ -136,19 +136,33 @@ impl Errands for Deliverer {
     }
 
     async fn attempt(&self, due: DueSend) -> AttemptEnd {
-        let sent = self.exchange.in_time(self.send(&due)).await;
-        let (settlement, end, meaning) = self.settlement(&due, sent);
+        let exchange = &self.exchange;
+        let mut attempts = due.attempts;
+        let sent = if attempts >= exchange.settings.retries.attempts {
+            // The process ended during the last one.
+            Err(Trouble::passing(
+                "How the last attempt ended was not written down.",
+            ))
+        } else {
+            let now = exchange.clock().now();
+            if let Err(error) = exchange.store.send_begun(&due.id, now).await {
+                tracing::error!(delivery = %due.id, %error, "a delivery was not written down");
+                return AttemptEnd::NotWritten;
+            }
+            attempts += 1;
+            exchange.in_time(self.send(&due)).await
+        };
+        let (settlement, end, meaning) = self.settlement(&due, attempts, sent);
         if let Some(error) = &settlement.error {
             tracing::info!(delivery = %due.id, job = %due.job, error, "an object was not delivered");
         }
         self.counts.add(end);
+        // What has left is in the audit trail, also if the process ends before the delivery is settled.
+        self.exchange.host.delivered(&due, end).await;
         let now = self.exchange.clock().now();
         let written = self.exchange.store.settle_send(&due.id, &settlement, now);
         match written.await {
-            Ok(()) => {
-                self.exchange.host.delivered(&due, end).await;
-                meaning
-            }
+            Ok(()) => meaning,
             Err(error) => {
                 tracing::error!(delivery = %due.id, %error, "a delivery was not written down");
                 AttemptEnd::NotWritten

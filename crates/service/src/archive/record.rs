@@ -169,7 +169,10 @@ pub trait ArchiveStore: Send + Sync + 'static {
         limit: usize,
     ) -> StoreResult<Vec<DueSend>>;
 
-    /// Writes down how an attempt to deliver ended.
+    /// Counts an attempt to deliver before it is made, so that one with which the process ends counts too.
+    async fn send_begun(&self, id: &str, now: Timestamp) -> StoreResult<()>;
+
+    /// Writes down how an attempt to deliver ended, which has been counted.
     async fn settle_send(
         &self,
         id: &str,

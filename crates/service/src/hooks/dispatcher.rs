@@ -124,11 +124,18 @@ impl Dispatcher {
             }
             secrets => secrets,
         };
-        let now = self.clock.now();
-        let (outcome, asked) = self.sender.attempt(delivery, secrets, now).await;
+        let mut attempts = delivery.attempts;
+        let (outcome, asked) = if attempts >= self.settings.retries.attempts {
+            // The process ended during the last one.
+            (AttemptOutcome::Interrupted, None)
+        } else {
+            let now = self.clock.now();
+            self.store.begun(&delivery.id, now).await?;
+            attempts += 1;
+            self.sender.attempt(delivery, secrets, now).await
+        };
         self.counts.attempts[outcome.index()].fetch_add(1, Ordering::Relaxed);
         let now = self.clock.now();
-        let attempts = delivery.attempts.saturating_add(1);
         let again_at = match outcome {
             AttemptOutcome::Delivered(_) | AttemptOutcome::Gone => None,
             _ => {

@@ -17,17 +17,20 @@ pub enum AttemptOutcome {
     Unreachable,
     /// The guard did not let it pass.
     Refused,
+    /// The process ended during it.
+    Interrupted,
 }
 
 impl AttemptOutcome {
     /// The names of all outcomes.
-    pub const OUTCOME_NAMES: [&'static str; 6] = [
+    pub const OUTCOME_NAMES: [&'static str; 7] = [
         "delivered",
         "gone",
         "rejected",
         "timed-out",
         "unreachable",
         "refused",
+        "interrupted",
     ];
 
     /// Its place among [`AttemptOutcome::OUTCOME_NAMES`].
@@ -39,6 +42,7 @@ impl AttemptOutcome {
             AttemptOutcome::TimedOut => 3,
             AttemptOutcome::Unreachable => 4,
             AttemptOutcome::Refused => 5,
+            AttemptOutcome::Interrupted => 6,
         }
     }
 

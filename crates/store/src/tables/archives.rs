@@ -228,6 +228,10 @@ impl ArchiveStore for SqlStore {
         })
     }
 
+    async fn send_begun(&self, id: &str, now: Timestamp) -> StoreResult<()> {
+        self.errand_begun(Errands::Sends, id, now).await
+    }
+
     async fn settle_send(
         &self,
         id: &str,
@@ -237,8 +241,8 @@ impl ArchiveStore for SqlStore {
         let ended = (settled.state != DeliveryState::Pending).then_some(now);
         let mut transaction = self.writer.begin().await?;
         query(
-            "UPDATE sends SET state = $1, attempts = attempts + 1, last_attempt_at = $2,
-                    last_outcome = $3, last_error = $4, ended_at = $5,
+            "UPDATE sends SET state = $1, last_attempt_at = $2, last_outcome = $3,
+                    last_error = $4, ended_at = $5,
                     next_attempt_at = coalesce($6, next_attempt_at)
              WHERE id = $7 AND state = 'pending'",
         )

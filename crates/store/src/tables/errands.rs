@@ -74,6 +74,25 @@ impl SqlStore {
         })
     }
 
+    /// Counts an attempt that is about to be made.
+    pub(super) async fn errand_begun(
+        &self,
+        errands: Errands,
+        id: &str,
+        now: Timestamp,
+    ) -> StoreResult<()> {
+        let table = errands.table();
+        query(format!(
+            "UPDATE {table} SET attempts = attempts + 1, last_attempt_at = $1
+             WHERE id = $2 AND state = 'pending' RETURNING id",
+        ))
+        .bind(now)
+        .bind(id)
+        .write_optional(&self.writer)
+        .await?;
+        Ok(())
+    }
+
     /// Lets an ended errand of a job wait again, unless what it would deliver was erased. Returns its row as
     /// it is then, or nothing if the job has no such errand.
     pub(super) async fn run_again(

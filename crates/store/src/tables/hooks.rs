@@ -46,6 +46,10 @@ impl DeliveryStore for SqlStore {
         rows::all(rows, due_delivery)
     }
 
+    async fn begun(&self, id: &str, now: Timestamp) -> StoreResult<()> {
+        self.errand_begun(Errands::Deliveries, id, now).await
+    }
+
     async fn settle(&self, id: &str, settled: Settlement, now: Timestamp) -> StoreResult<()> {
         let state = match (settled.outcome, settled.again_at) {
             (AttemptOutcome::Delivered(_), _) => DeliveryState::Delivered,
@@ -55,8 +59,8 @@ impl DeliveryStore for SqlStore {
         let ended = (state != DeliveryState::Pending).then_some(now);
         let mut transaction = self.writer.begin().await?;
         query(
-            "UPDATE deliveries SET state = $1, attempts = attempts + 1, last_attempt_at = $2,
-                    last_status = $3, last_outcome = $4, ended_at = $5,
+            "UPDATE deliveries SET state = $1, last_attempt_at = $2, last_status = $3,
+                    last_outcome = $4, ended_at = $5,
                     next_attempt_at = coalesce($6, next_attempt_at)
              WHERE id = $7 AND state = 'pending'",
         )
