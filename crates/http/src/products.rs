@@ -491,7 +491,7 @@ async fn send_part(
         .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
     let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
-    match app.service.decoding.run(memory, make).await?? {
+    match app.service.decoding.run_on(size, memory, make).await?? {
         Some(file) => files::send_derived(product, file, headers).await,
         None => Err(Problem::new(
             StatusCode::NOT_FOUND,
@@ -604,12 +604,12 @@ async fn send_object(
         None
     };
     let memory = dicom::object_memory(UploadFacts::of(&result.source.volume)?.shape);
-    let limits = app.service.engine.limits;
+    let (bytes, limits) = (result.bytes(), app.service.engine.limits);
     let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
     let made = app
         .service
         .decoding
-        .run(memory, make)
+        .run_on(bytes, memory, make)
         .await?
         .map_err(|failure| {
             let unknown = failure.code == "identity-needed" || failure.code == "identity-differs";
@@ -716,7 +716,8 @@ async fn send_named(
                 .await?;
             let scan = asker.sees(app, product).await?;
             let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
-            let page = app.service.decoding.run(LITTLE_MEMORY, draw).await??;
+            let page = app.service.decoding.run_on(size, LITTLE_MEMORY, draw);
+            let page = page.await??;
             files::send_page(product, page, headers).await
         }
         None => {

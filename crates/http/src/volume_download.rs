@@ -87,7 +87,9 @@ async fn is_bare(app: &App, volume: &StoredVolume, file: &FileRecord) -> Answer<
     };
     let reader = app.service.engine.reader.clone();
     let look = move |monitor: &Monitor<'_>| reader.is_bare(&local, monitor);
-    Ok(app.service.decoding.run(LITTLE_MEMORY, look).await??)
+    let decoding = &app.service.decoding;
+    let looked = decoding.run_on(file.bytes, LITTLE_MEMORY, look);
+    Ok(looked.await??)
 }
 
 async fn send(

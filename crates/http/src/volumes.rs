@@ -378,7 +378,8 @@ pub async fn preview_volume(
     let reader = app.service.engine.reader.clone();
     let memory = preview_memory(UploadFacts::of(&volume)?.shape);
     let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
-    let preview = app.service.decoding.run(memory, draw).await?;
+    let decoding = &app.service.decoding;
+    let preview = decoding.run_on(volume.bytes, memory, draw).await?;
     let png = preview.map_err(Problem::internal)?;
     let headers = [
         (header::CONTENT_TYPE, "image/png"),

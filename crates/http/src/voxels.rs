@@ -116,7 +116,8 @@ pub async fn download_voxels(
         Some(choice) => reader.mask(&files, choice, monitor),
         None => reader.voxels(&files, frame, monitor),
     };
-    let bytes = app.service.decoding.run(memory, read).await??;
+    let decoding = &app.service.decoding;
+    let bytes = decoding.run_on(volume.bytes, memory, read).await??;
     let headers = [
         (header::CONTENT_TYPE, "application/gzip"),
         (header::ETAG, etag.as_str()),

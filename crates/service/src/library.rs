@@ -54,10 +54,11 @@ impl Service {
         quota: Quota,
         _counting: &Counting,
     ) -> Result<Added, ServiceError> {
-        let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * mesh.len() as u64;
+        let bytes = mesh.len() as u64;
+        let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * bytes;
         let (reader, shows) = (self.engine.reader.clone(), organ.to_owned());
         let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
-        let output = self.decoding.run(memory, make).await??;
+        let output = self.decoding.run_on(bytes, memory, make).await??;
         let room = self.product_room(Resource::Template, quota);
         let (items, organ) = (self.items().clone(), organ.to_owned());
         let (tenant, name) = (source.tenant.clone(), source.name.to_owned());
@@ -88,9 +89,10 @@ impl Service {
         _counting: &Counting,
     ) -> Result<Added, ServiceError> {
         let reader = self.engine.reader.clone();
+        let bytes = profile.len() as u64;
         let check = move |_: &Monitor<'_>| reader.profile(&profile);
         // At most 1 MiB of text, parsed to at most 5001 entries, and written again.
-        let output = self.decoding.run(LITTLE_MEMORY, check).await??;
+        let output = self.decoding.run_on(bytes, LITTLE_MEMORY, check).await??;
         let room = self.product_room(Resource::Reader, quota);
         self.add_named(by, (tenant, Resource::Reader), name, output, room)
             .await
@@ -109,10 +111,11 @@ impl Service {
         quota: Quota,
         _counting: &Counting,
     ) -> Result<Added, ServiceError> {
-        let memory = LITTLE_MEMORY + LIMITS_MEMORY_PER_BYTE * limits.len() as u64;
+        let bytes = limits.len() as u64;
+        let memory = LITTLE_MEMORY + LIMITS_MEMORY_PER_BYTE * bytes;
         let reader = self.engine.reader.clone();
         let check = move |_: &Monitor<'_>| reader.normals(&limits);
-        let output = self.decoding.run(memory, check).await??;
+        let output = self.decoding.run_on(bytes, memory, check).await??;
         let room = self.product_room(Resource::Normals, quota);
         self.add_named(by, (tenant, Resource::Normals), name, output, room)
             .await

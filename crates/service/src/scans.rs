@@ -38,6 +38,7 @@ impl Service {
         volume: &str,
         files: &[FileRecord],
     ) -> Result<Option<ScanFields>, ServiceError> {
+        let bytes = files.iter().map(|file| file.bytes).sum();
         let files = self.items().volume_files(volume, files).await?;
         let files = files.ok_or_else(|| {
             let which = format!("a file of {volume} is missing");
@@ -45,7 +46,8 @@ impl Service {
         })?;
         let reader = self.engine.reader.clone();
         let scan = move |monitor: &Monitor<'_>| reader.scan(&files, monitor);
-        let found = self.decoding.run(INSPECTION_MEMORY, scan).await?;
+        let found = self.decoding.run_on(bytes, INSPECTION_MEMORY, scan);
+        let found = found.await?;
         // The volume was read when it was uploaded. A program that reads less of it now leaves it
         // without identity.
         Ok(found.unwrap_or_default())

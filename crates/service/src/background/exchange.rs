@@ -144,10 +144,13 @@ impl ExchangeHost for Service {
             .await?;
         let result = result.ok_or_else(|| gone("The result or its volume was erased."))?;
         let shape = UploadFacts::of(&result.source.volume)?.shape;
+        let bytes = result.bytes();
         let limits = self.engine.limits;
         let make = move |_: &Monitor<'_>| dicom::object(&result, object, None, &limits);
-        let made = self.decoding.run(dicom::object_memory(shape), make).await;
-        let made = made?.map_err(Trouble::Final)?;
+        let made = self
+            .decoding
+            .run_on(bytes, dicom::object_memory(shape), make);
+        let made = made.await?.map_err(Trouble::Final)?;
         let made = made.ok_or_else(|| gone("The result has no such object."))?;
         ArchiveObject::of(made.bytes).ok_or_else(|| {
             Trouble::lasting(

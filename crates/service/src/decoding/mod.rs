@@ -98,8 +98,8 @@ impl Decoding {
         }
     }
 
-    /// Runs `work`, which needs at most `memory` bytes, on a blocking thread when it is its turn.
-    /// Dropping the future cancels the work.
+    /// Runs `work`, which reads no file and needs at most `memory` bytes, on a blocking thread when it is its turn.
+    /// Dropping the future cancels the work. Its memory gives it no time: a small file may need much.
     ///
     /// # Errors
     /// `busy` if too much waits, `decoding-time` if the work takes too long, `internal` if it panics.
@@ -108,7 +108,7 @@ impl Decoding {
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        self.run_on(memory, memory, work).await
+        self.run_on(0, memory, work).await
     }
 
     /// As [`Decoding::run`], for work on files of `bytes` bytes as they are stored.
@@ -617,6 +617,34 @@ mod tests {
         drop(release);
         until(|| decoding.admission.queue().free == 2 << 20).await;
         assert_eq!(most.1.load(Ordering::SeqCst), 2);
+    }
+
+    /// A small file that is costly to decode states much memory.
+    #[tokio::test(flavor = "multi_thread")]
+    async fn time_is_given_for_the_bytes_of_a_file_and_not_for_memory() {
+        let settings = Settings {
+            decoding_memory: "1GiB".parse().unwrap(),
+            decoding_time: "100ms".parse().unwrap(),
+            decoding_rate: "1MiB".parse().unwrap(),
+            ..Settings::default()
+        };
+        let decoding = Decoding::new(&settings, Metrics::new().requests.decoding_waits);
+        let compute = |monitor: &Monitor<'_>| {
+            let end = Instant::now() + Duration::from_secs(20);
+            while monitor.report(Stage::Read, 0.0).is_ok() && Instant::now() < end {
+                std::hint::spin_loop();
+            }
+        };
+        for (bytes, memory, least) in [(0, 512 << 20, 0), (1, 512 << 20, 0), (1 << 20, 1, 1000)] {
+            let begun = Instant::now();
+            let ended = decoding.run_on(bytes, memory, compute).await;
+            assert_eq!(ended.unwrap_err().failure.code, "decoding-time");
+            let took = begun.elapsed();
+            assert!(took >= Duration::from_millis(least), "{bytes}: {took:?}");
+            assert!(took < Duration::from_secs(15), "{bytes}: {took:?}");
+        }
+        let ended = decoding.run(512 << 20, compute).await;
+        assert_eq!(ended.unwrap_err().failure.code, "decoding-time");
     }
 
     #[tokio::test(flavor = "multi_thread")]

@@ -66,6 +66,14 @@ pub struct StoredResult {
     pub rest: Option<StoredSource>,
 }
 
+impl StoredResult {
+    /// Bytes of the volumes of which it was made, as they are stored.
+    pub fn bytes(&self) -> u64 {
+        let rest = self.rest.as_ref().map_or(0, |rest| rest.volume.bytes);
+        self.source.volume.bytes.saturating_add(rest)
+    }
+}
+
 /// A volume that a result was made of.
 #[derive(Debug, Clone)]
 pub struct StoredSource {
