@@ -15,7 +15,7 @@ use ventriform_service::access::{
 };
 use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
 use ventriform_service::hooks::{
-    AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent,
+    AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent, Lane,
     Settlement, SigningSecret,
 };
 use ventriform_service::intake::{
@@ -155,6 +155,13 @@ fn other() -> Tenant {
     "other".parse().unwrap()
 }
 
+fn lane(tenant: &Tenant, destination: &str) -> Lane {
+    Lane {
+        destination: destination.into(),
+        tenant: tenant.clone(),
+    }
+}
+
 fn stored_volume(id: &str, bytes: u64) -> StoredVolume {
     StoredVolume {
         id: id.into(),
@@ -266,6 +273,7 @@ contracts!(
     keys_are_kept,
     ends_of_jobs_are_told,
     series_are_fetched_and_results_sent,
+    errands_are_found_by_tenant_and_destination,
     received_objects_become_volumes,
     work_items_change_once,
     figures_are_counted,
@@ -1314,12 +1322,13 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     assert_eq!(told.len(), 4);
     assert!(told.contains(&(Some("whk_1"), HookEvent::Started)));
     assert!(told.contains(&(None, HookEvent::Failed)));
-    let places = on.b.destinations().await.unwrap();
-    let names: Vec<_> = places.iter().map(|place| place.0.as_str()).collect();
-    assert_eq!(
-        names,
-        ["https://own.example:443", "https://ward.example:443"]
+    let (at_own, at_ward) = (
+        lane(&tenant(), "https://own.example:443"),
+        lane(&tenant(), "https://ward.example:443"),
     );
+    let lanes = on.b.delivery_lanes().await.unwrap();
+    let lanes: Vec<_> = lanes.into_iter().map(|(lane, _)| lane).collect();
+    assert_eq!(lanes, [at_own.clone(), at_ward.clone()]);
     let tenants = on.a.signing_secret(&tenant(), &secret).await.unwrap();
     assert_eq!(
         on.b.signing_secret(&tenant(), &SigningSecret::random())
@@ -1330,10 +1339,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     on.a.replace_secret(&tenant(), &SigningSecret::random(), i64::MAX)
         .await
         .unwrap();
-    let due =
-        on.b.due("https://own.example:443", now(), 10)
-            .await
-            .unwrap();
+    let due = on.b.due_deliveries(&at_own, now(), 10).await.unwrap();
     assert_eq!(due.len(), 1);
     assert_eq!(
         (due[0].secrets.len(), due[0].cause.as_deref()),
@@ -1349,7 +1355,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     assert_eq!(begun.await.unwrap()[0].attempts, 1);
     on.a.settle(&due[0].id, again, now()).await.unwrap();
     assert!(
-        on.b.due("https://own.example:443", now(), 10)
+        on.b.due_deliveries(&at_own, now(), 10)
             .await
             .unwrap()
             .is_empty()
@@ -1378,10 +1384,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
         (DeliveryState::Pending, 0)
     );
     // 410 ends the endpoint, and what it was to be told.
-    let due =
-        on.b.due("https://ward.example:443", now(), 10)
-            .await
-            .unwrap();
+    let due = on.b.due_deliveries(&at_ward, now(), 10).await.unwrap();
     let first = due.iter().find(|d| d.event == HookEvent::Started).unwrap();
     on.a.settle(&first.id, settle(AttemptOutcome::Gone, None), now())
         .await
@@ -1454,19 +1457,20 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     };
     let (job, lost) = (on.file(&sourced).await, on.file(&sourced).await);
     assert!(on.claim().await.is_none(), "they have no volume yet");
-    assert_eq!(on.b.pull_destinations().await.unwrap()[0].0, "pacs");
-    let due = on.b.due_pulls("pacs", now(), 10).await.unwrap();
+    let pacs = lane(&tenant(), "pacs");
+    assert_eq!(on.b.pull_lanes().await.unwrap()[0].0, pacs);
+    let due = on.b.due_pulls(&pacs, now(), 10).await.unwrap();
     assert_eq!(due.len(), 2);
     assert_eq!((&due[0].source, due[0].attempts), (&source, 0));
     // An attempt counts from its beginning.
     on.a.pull_begun(&job.id, now()).await.unwrap();
-    let due = on.b.due_pulls("pacs", now(), 10).await.unwrap();
+    let due = on.b.due_pulls(&pacs, now(), 10).await.unwrap();
     let begun = due.iter().find(|due| due.job == job.id).unwrap();
     assert_eq!(begun.attempts, 1);
     on.a.pull_failed(&job.id, "away", now() + 60_000, now())
         .await
         .unwrap();
-    assert_eq!(on.b.due_pulls("pacs", now(), 10).await.unwrap().len(), 1);
+    assert_eq!(on.b.due_pulls(&pacs, now(), 10).await.unwrap().len(), 1);
     let given_up =
         on.a.pull_given_up(&lost.id, &failure("no-series"), now())
             .await
@@ -1517,8 +1521,8 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     let sends = &on.a.sends(&[&job.id]).await.unwrap()[&job.id];
     let names: Vec<_> = sends.iter().map(|send| send.name.as_str()).collect();
     assert_eq!(names, ["mesh.dcm", "report.dcm"]);
-    assert_eq!(on.b.send_destinations().await.unwrap()[0].0, "pacs");
-    let due = on.b.due_sends("pacs", now(), 10).await.unwrap();
+    assert_eq!(on.b.send_lanes().await.unwrap()[0].0, pacs);
+    let due = on.b.due_sends(&pacs, now(), 10).await.unwrap();
     let stored = SendSettlement {
         state: DeliveryState::Delivered,
         outcome: "stored",
@@ -1576,6 +1580,85 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
         "",
         "the UIDs go with the volume"
     );
+}
+
+/// However much a tenant has due at a destination, what another has due there is found: fetches, deliveries of
+/// objects, and webhooks.
+async fn errands_are_found_by_tenant_and_destination(on: &Stores) {
+    const MANY: usize = 30;
+    let (busy, calm): (Tenant, Tenant) = ("busy".parse().unwrap(), "calm".parse().unwrap());
+    let sourced = |tenant: &Tenant, archive: &str| NewJob {
+        tenant: tenant.clone(),
+        kind: "model".into(),
+        source: Some(SeriesSource {
+            archive: Some(archive.into()),
+            dicomweb: None,
+            study: "1.2".into(),
+            series: "1.2.3".into(),
+        }),
+        send: Some(SendOrder {
+            names: vec!["mesh.dcm".into()],
+            to: archive.into(),
+        }),
+        webhook: Some(JobWebhook {
+            url: "https://shared.example/".into(),
+            destination: "https://shared.example:443".into(),
+            events: vec!["succeeded".into()],
+            secret: None,
+        }),
+        ..NewJob::default()
+    };
+    for _ in 0..MANY {
+        on.file(&sourced(&busy, "pacs")).await;
+    }
+    on.file(&sourced(&busy, "archive")).await;
+    on.file(&sourced(&calm, "pacs")).await;
+    let expected = |destinations: &[(&str, &Tenant)]| -> Vec<Lane> {
+        let lanes = destinations.iter();
+        lanes.map(|(name, tenant)| lane(tenant, name)).collect()
+    };
+    let names = |lanes: Vec<(Lane, Timestamp)>| -> Vec<Lane> {
+        assert!(lanes.iter().all(|(_, due_at)| *due_at <= now()));
+        lanes.into_iter().map(|(lane, _)| lane).collect()
+    };
+    let at_archives = expected(&[("archive", &busy), ("pacs", &busy), ("pacs", &calm)]);
+    assert_eq!(names(on.b.pull_lanes().await.unwrap()), at_archives);
+    let mut supplied = Vec::new();
+    for (lane, count) in at_archives.iter().zip([1, 3, 1]) {
+        let due = on.b.due_pulls(lane, now(), 3).await.unwrap();
+        assert!(due.iter().all(|due| due.tenant == lane.tenant));
+        assert_eq!(due.len(), count);
+        supplied.extend(on.b.due_pulls(lane, now(), MANY).await.unwrap());
+    }
+    assert_eq!(supplied.len(), MANY + 2);
+    // All succeed, so each has an object to deliver and a webhook to send.
+    for due in supplied {
+        let volume = on.volume(&due.tenant).await;
+        on.a.pulled(&due.job, &volume, now())
+            .await
+            .unwrap()
+            .unwrap();
+        let (job, lease) = on.claim().await.unwrap();
+        let result = model(job.volume.as_deref().unwrap());
+        on.b.finish(&lease, &succeeded(&result), now())
+            .await
+            .unwrap()
+            .unwrap();
+    }
+    assert!(on.b.pull_lanes().await.unwrap().is_empty());
+    assert_eq!(names(on.b.send_lanes().await.unwrap()), at_archives);
+    let of_calm = on.b.due_sends(&at_archives[2], now(), 3).await.unwrap();
+    assert_eq!((of_calm.len(), &of_calm[0].tenant), (1, &calm));
+    let of_busy = on.b.due_sends(&at_archives[1], now(), 3).await.unwrap();
+    assert_eq!((of_busy.len(), &of_busy[0].tenant), (3, &busy));
+    let shared = "https://shared.example:443";
+    let at_receiver = expected(&[(shared, &busy), (shared, &calm)]);
+    assert_eq!(names(on.b.delivery_lanes().await.unwrap()), at_receiver);
+    for (lane, count) in [(&at_receiver[0], 3), (&at_receiver[1], 1)] {
+        let due = on.b.due_deliveries(lane, now(), 3).await.unwrap();
+        assert_eq!(due.len(), count);
+        assert!(due.iter().all(|due| due.tenant == lane.tenant));
+    }
 }
 
 async fn received_objects_become_volumes(on: &Stores) {

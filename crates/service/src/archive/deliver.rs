@@ -9,7 +9,7 @@ use super::exchange::{Exchange, means};
 use super::trouble::Trouble;
 use super::web::Stored;
 use super::{DueSend, SendSettlement, dimse};
-use crate::hooks::{AttemptEnd, DeliveryState, Errands, Rounds};
+use crate::hooks::{AttemptEnd, DeliveryState, Errands, Lane, Rounds};
 use crate::records::{Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
@@ -117,18 +117,13 @@ impl Deliverer {
 impl Errands for Deliverer {
     type Due = DueSend;
 
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.exchange.store.send_destinations().await
+    async fn lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.exchange.store.send_lanes().await
     }
 
-    async fn due(
-        &self,
-        destination: &str,
-        now: Timestamp,
-        limit: usize,
-    ) -> StoreResult<Vec<DueSend>> {
+    async fn due(&self, lane: &Lane, now: Timestamp, limit: usize) -> StoreResult<Vec<DueSend>> {
         let store = &self.exchange.store;
-        store.due_sends(destination, now, limit).await
+        store.due_sends(lane, now, limit).await
     }
 
     fn id(due: &DueSend) -> &str {

@@ -7,7 +7,7 @@ use super::parts::PartLimits;
 use super::trouble::Trouble;
 use super::web::DicomWeb;
 use super::{DuePull, HeldSeries, SeriesKey};
-use crate::hooks::{AttemptEnd, Errands, Rounds};
+use crate::hooks::{AttemptEnd, Errands, Lane, Rounds};
 use crate::records::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
 use async_trait::async_trait;
 use std::sync::Arc;
@@ -162,18 +162,13 @@ fn unavailable(attempts: u32, what: &str) -> Failure {
 impl Errands for Puller {
     type Due = DuePull;
 
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.exchange.store.pull_destinations().await
+    async fn lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.exchange.store.pull_lanes().await
     }
 
-    async fn due(
-        &self,
-        destination: &str,
-        now: Timestamp,
-        limit: usize,
-    ) -> StoreResult<Vec<DuePull>> {
+    async fn due(&self, lane: &Lane, now: Timestamp, limit: usize) -> StoreResult<Vec<DuePull>> {
         let store = &self.exchange.store;
-        store.due_pulls(destination, now, limit).await
+        store.due_pulls(lane, now, limit).await
     }
 
     fn id(due: &DuePull) -> &str {

@@ -1,6 +1,6 @@
 //! Fetches and deliveries, and the trait that a database implements.
 
-use crate::hooks::{Backlog, DeliveryState};
+use crate::hooks::{Backlog, DeliveryState, Lane};
 use crate::records::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
@@ -115,13 +115,13 @@ pub struct SendSettlement {
 /// The tables of archives. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait ArchiveStore: Send + Sync + 'static {
-    /// The archives from which is to be fetched, each with the time when the first is due.
-    async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+    /// The lanes that have pending fetches, each with the time when the first is due.
+    async fn pull_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>>;
 
-    /// The fetches from an archive that are due, the longest due first.
+    /// The fetches of a lane that are due, the longest due first.
     async fn due_pulls(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DuePull>>;
@@ -158,13 +158,13 @@ pub trait ArchiveStore: Send + Sync + 'static {
     /// Notes the volume as which a series is held, if the tenant has that volume.
     async fn note_series(&self, key: SeriesKey<'_>, held: &HeldSeries) -> StoreResult<()>;
 
-    /// The archives to which is to be delivered, each with the time when the first is due.
-    async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+    /// The lanes that have pending deliveries, each with the time when the first is due.
+    async fn send_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>>;
 
-    /// The deliveries to an archive that are due, the longest due first.
+    /// The deliveries of a lane that are due, the longest due first.
     async fn due_sends(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueSend>>;

@@ -3,7 +3,7 @@
 use super::rounds::random_share;
 use super::schedule::milliseconds;
 use super::{
-    AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lanes,
+    AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lane, Lanes,
     RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
 };
 use crate::records::{Clock, Job, JobState, StoreResult, Timestamp};
@@ -171,17 +171,17 @@ impl Dispatcher {
 impl Errands for Dispatcher {
     type Due = DueDelivery;
 
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.store.destinations().await
+    async fn lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.store.delivery_lanes().await
     }
 
     async fn due(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueDelivery>> {
-        self.store.due(destination, now, limit).await
+        self.store.due_deliveries(lane, now, limit).await
     }
 
     fn id(due: &DueDelivery) -> &str {

@@ -7,14 +7,15 @@
 //! 1. [`UrlGuard::check`] refuses URLs through which a client could reach what only this machine can
 //!    reach.
 //! 2. The database writes a [`Delivery`] in the transaction that changes the job's state.
-//! 3. [`Dispatcher`] sends what is due, a few at a time and fairly among destinations ([`Lanes`]),
+//! 3. [`Dispatcher`] sends what is due, a few at a time and fairly among tenants and destinations ([`Lanes`]),
 //!    each time through the guard, and signs it ([`SigningSecret`]).
 //! 4. What fails is tried again later and later ([`RetrySchedule`]), until a receiver takes it, its
 //!    time is over, or the receiver answers 410.
 //!
 //! Guaranteed: each end of a job is told at least once, across restarts and crashes, or is shown as
 //! dead; the id and the content of a delivery are the same in every attempt; no request goes to
-//! an address that was not checked; a receiver that hangs delays no other receiver. Bodies hold
+//! an address that was not checked; a receiver that hangs delays no other receiver, and no
+//! tenant another one. Bodies hold
 //! ids and states, and nothing from a file or from a client's request.
 //!
 //! Not guaranteed: that a delivery arrives only once, or in order. Receivers tell repetitions by
@@ -47,7 +48,7 @@ pub use desk::Hooks;
 pub use dispatcher::{DeliveryCounts, Dispatcher, HookSettings};
 pub use event::HookEvent;
 pub use guard::{AllowList, CheckedUrl, Pin, PinnedNames, UrlGuard, UrlRefusal};
-pub use lanes::Lanes;
+pub use lanes::{Lane, Lanes};
 pub use message::message_body;
 pub use outcome::AttemptOutcome;
 pub use record::{

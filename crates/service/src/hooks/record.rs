@@ -1,6 +1,6 @@
 //! Deliveries and endpoints, and the trait that a database implements.
 
-use super::{AttemptOutcome, HookEvent, SigningSecret};
+use super::{AttemptOutcome, HookEvent, Lane, SigningSecret};
 use crate::records::{StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
@@ -133,7 +133,7 @@ pub struct DeliveryLimits {
     pub pending_since: Timestamp,
     /// Deliveries that ended before this are deleted.
     pub ended_since: Timestamp,
-    /// Most pending deliveries of one destination; the oldest beyond that are given up.
+    /// Most pending deliveries of one lane; the oldest beyond that are given up.
     pub backlog: u32,
 }
 
@@ -151,13 +151,13 @@ pub struct Backlog {
 /// The tables of webhooks. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait DeliveryStore: Send + Sync + 'static {
-    /// The destinations that have pending deliveries, each with the time when the first is due.
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+    /// The lanes that have pending deliveries, each with the time when the first is due.
+    async fn delivery_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>>;
 
-    /// The deliveries of a destination that are due, the longest due first.
-    async fn due(
+    /// The deliveries of a lane that are due, the longest due first.
+    async fn due_deliveries(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueDelivery>>;

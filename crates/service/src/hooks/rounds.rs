@@ -3,8 +3,8 @@
 //! The table is the queue, so nothing is lost with the process: what was on the way when it ended
 //! is done again. In memory there are only the errands on the way, whose number is limited.
 
-use super::Lanes;
 use super::schedule::milliseconds;
+use super::{Lane, Lanes};
 use crate::records::{Clock, Job, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
@@ -27,16 +27,11 @@ pub trait Errands: Send + Sync + 'static {
     /// A row whose time has come.
     type Due: Send + 'static;
 
-    /// The destinations that have pending rows, each with the time when the first is due.
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>>;
+    /// The lanes that have pending rows, each with the time when the first is due.
+    async fn lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>>;
 
-    /// The rows of a destination that are due, the longest due first.
-    async fn due(
-        &self,
-        destination: &str,
-        now: Timestamp,
-        limit: usize,
-    ) -> StoreResult<Vec<Self::Due>>;
+    /// The rows of a lane that are due, the longest due first.
+    async fn due(&self, lane: &Lane, now: Timestamp, limit: usize) -> StoreResult<Vec<Self::Due>>;
 
     /// The id of a row.
     fn id(due: &Self::Due) -> &str;
@@ -51,7 +46,7 @@ pub trait Errands: Send + Sync + 'static {
     fn concerns(&self, job: &Job) -> bool;
 }
 
-/// Consequences of an attempt for others to the same destination.
+/// Consequences of an attempt for others in the same lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttemptEnd {
     /// The destination works.
@@ -76,7 +71,7 @@ pub struct Rounds<E> {
 
 /// An attempt that has ended.
 struct Ended {
-    destination: String,
+    lane: Lane,
     id: String,
     end: AttemptEnd,
 }
@@ -130,34 +125,30 @@ impl<E: Errands> Rounds<E> {
 
     /// Starts the attempts that are due and have a place. Returns when to look again.
     async fn start_due(&mut self, on_the_way: &mut JoinSet<Ended>) -> StoreResult<Duration> {
-        let pending = self.errands.destinations().await?;
-        self.lanes.keep(&pending);
+        let pending = self.errands.lanes().await?;
         let now = self.clock.now();
+        self.lanes.begin_round(&pending, now);
         let mut next = now.saturating_add(milliseconds(IDLE_WAIT));
-        for (destination, due_at) in self.lanes.in_turn(pending) {
-            let room = self.lanes.room(&destination, now);
+        for (lane, due_at) in self.lanes.in_turn(pending) {
+            let room = self.lanes.room(&lane, now);
             if due_at > now || room == 0 {
-                let rest = self.lanes.rests_until(&destination);
+                let rest = self.lanes.rests_until(&lane);
                 let when = due_at.max(rest);
                 if when > now {
                     next = next.min(when);
                 }
                 continue;
             }
-            let limit = room + self.lanes.busy(&destination);
+            let limit = room + self.lanes.busy(&lane);
             let mut started = 0;
-            for due in self.errands.due(&destination, now, limit).await? {
+            for due in self.errands.due(&lane, now, limit).await? {
                 let id = E::id(&due).to_owned();
-                if started < room && self.lanes.enter(&destination, &id) {
+                if started < room && self.lanes.enter(&lane, &id) {
                     started += 1;
-                    let (errands, destination) = (self.errands.clone(), destination.clone());
+                    let (errands, lane) = (self.errands.clone(), lane.clone());
                     on_the_way.spawn(async move {
                         let end = errands.attempt(due).await;
-                        Ended {
-                            destination,
-                            id,
-                            end,
-                        }
+                        Ended { lane, id, end }
                     });
                 }
             }
@@ -173,7 +164,7 @@ impl<E: Errands> Rounds<E> {
             AttemptEnd::NotWritten => Some(Some(IDLE_WAIT)),
         };
         let now = self.clock.now();
-        self.lanes.leave(&ended.destination, &ended.id, now, failed);
+        self.lanes.leave(&ended.lane, &ended.id, now, failed);
     }
 }
 

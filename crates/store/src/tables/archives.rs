@@ -11,29 +11,31 @@ use ventriform_service::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
-use ventriform_service::hooks::DeliveryState;
+use ventriform_service::hooks::{DeliveryState, Lane};
 use ventriform_service::records::{Failure, Job, StoreResult, Tenant, Timestamp};
 
 #[async_trait]
 impl ArchiveStore for SqlStore {
-    async fn pull_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.due_destinations(Errands::Pulls).await
+    async fn pull_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.lanes_of(Errands::Pulls).await
     }
 
     async fn due_pulls(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DuePull>> {
         let rows = query(
-            "SELECT p.*, j.tenant, j.source FROM pulls AS p JOIN jobs AS j ON j.id = p.job
+            "SELECT p.*, j.source FROM pulls AS p JOIN jobs AS j ON j.id = p.job
              WHERE p.state = 'pending' AND p.destination = $1 AND p.next_attempt_at <= $2
+                 AND p.tenant = $4
              ORDER BY p.next_attempt_at, p.job LIMIT $3",
         )
-        .bind(destination)
+        .bind(&lane.destination)
         .bind(now)
         .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .bind(lane.tenant.as_str())
         .fetch_all(&self.readers)
         .await?;
         rows::all(rows, |row| {
@@ -194,24 +196,26 @@ impl ArchiveStore for SqlStore {
         Ok(())
     }
 
-    async fn send_destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.due_destinations(Errands::Sends).await
+    async fn send_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.lanes_of(Errands::Sends).await
     }
 
     async fn due_sends(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueSend>> {
         let rows = query(
             "SELECT * FROM sends
              WHERE state = 'pending' AND destination = $1 AND next_attempt_at <= $2
+                 AND tenant = $4
              ORDER BY next_attempt_at, sequence LIMIT $3",
         )
-        .bind(destination)
+        .bind(&lane.destination)
         .bind(now)
         .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .bind(lane.tenant.as_str())
         .fetch_all(&self.readers)
         .await?;
         rows::all(rows, |row| {

@@ -5,7 +5,7 @@
 use super::rows;
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
-use ventriform_service::hooks::{Backlog, DeliveryState};
+use ventriform_service::hooks::{Backlog, DeliveryState, Lane};
 use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// A table of errands.
@@ -30,28 +30,44 @@ impl Errands {
 }
 
 impl SqlStore {
-    /// The destinations of waiting errands, each with the time when its first one is due.
-    pub(super) async fn due_destinations(
-        &self,
-        errands: Errands,
-    ) -> StoreResult<Vec<(String, Timestamp)>> {
+    /// The lanes of waiting errands, each with the time when its first one is due.
+    pub(super) async fn lanes_of(&self, errands: Errands) -> StoreResult<Vec<(Lane, Timestamp)>> {
         let table = errands.table();
-        // Jumps through the index from destination to destination.
+        // Jumps through the index from destination to destination, and at each from tenant to tenant.
         let rows = query(format!(
-            "WITH RECURSIVE found (name) AS (
+            "WITH RECURSIVE place (name) AS (
                  SELECT min(destination) FROM {table} WHERE state = 'pending'
                  UNION ALL
-                 SELECT (SELECT min(destination) FROM {table}
-                         WHERE state = 'pending' AND destination > found.name)
-                 FROM found WHERE found.name IS NOT NULL)
-             SELECT found.name, (SELECT min(next_attempt_at) FROM {table}
-                           WHERE state = 'pending' AND destination = found.name)
-             FROM found WHERE found.name IS NOT NULL",
+                 SELECT (SELECT min(e.destination) FROM {table} AS e
+                         WHERE e.state = 'pending' AND e.destination > place.name)
+                 FROM place WHERE place.name IS NOT NULL),
+             found (destination, tenant) AS (
+                 SELECT place.name, (SELECT min(e.tenant) FROM {table} AS e
+                                     WHERE e.state = 'pending' AND e.destination = place.name)
+                 FROM place WHERE place.name IS NOT NULL
+                 UNION ALL
+                 SELECT found.destination, (SELECT min(e.tenant) FROM {table} AS e
+                                            WHERE e.state = 'pending'
+                                                AND e.destination = found.destination
+                                                AND e.tenant > found.tenant)
+                 FROM found WHERE found.tenant IS NOT NULL)
+             SELECT found.destination, found.tenant,
+                    (SELECT min(e.next_attempt_at) FROM {table} AS e
+                     WHERE e.state = 'pending' AND e.destination = found.destination
+                         AND e.tenant = found.tenant)
+             FROM found WHERE found.tenant IS NOT NULL
+             ORDER BY found.destination, found.tenant",
         ))
         .fetch_all(&self.readers)
         .await?;
         rows.iter()
-            .map(|row| Ok((row.try_get(0)?, row.try_get(1)?)))
+            .map(|row| {
+                let lane = Lane {
+                    destination: row.try_get(0)?,
+                    tenant: rows::tenant(row)?,
+                };
+                Ok((lane, row.try_get(2)?))
+            })
             .collect()
     }
 

@@ -8,7 +8,7 @@ use crate::query::{DbRow, query};
 use async_trait::async_trait;
 use ventriform_service::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
-    HookEndpoint, HookEvent, Settlement, SigningSecret,
+    HookEndpoint, HookEvent, Lane, Settlement, SigningSecret,
 };
 use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
@@ -19,13 +19,13 @@ const ENDPOINT_REMOVED: &str = "endpoint-removed";
 
 #[async_trait]
 impl DeliveryStore for SqlStore {
-    async fn destinations(&self) -> StoreResult<Vec<(String, Timestamp)>> {
-        self.due_destinations(Errands::Deliveries).await
+    async fn delivery_lanes(&self) -> StoreResult<Vec<(Lane, Timestamp)>> {
+        self.lanes_of(Errands::Deliveries).await
     }
 
-    async fn due(
+    async fn due_deliveries(
         &self,
-        destination: &str,
+        lane: &Lane,
         now: Timestamp,
         limit: usize,
     ) -> StoreResult<Vec<DueDelivery>> {
@@ -36,11 +36,13 @@ impl DeliveryStore for SqlStore {
              LEFT JOIN webhook_endpoints AS e ON e.id = d.endpoint
              LEFT JOIN webhook_secrets AS s ON s.tenant = d.tenant
              WHERE d.state = 'pending' AND d.destination = $1 AND d.next_attempt_at <= $2
+                 AND d.tenant = $4
              ORDER BY d.next_attempt_at LIMIT $3",
         )
-        .bind(destination)
+        .bind(&lane.destination)
         .bind(now)
         .bind(i64::try_from(limit).unwrap_or(i64::MAX))
+        .bind(lane.tenant.as_str())
         .fetch_all(&self.readers)
         .await?;
         rows::all(rows, due_delivery)
