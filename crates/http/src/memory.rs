@@ -40,7 +40,7 @@ mod tests {
 
     #[tokio::test]
     async fn an_answer_holds_its_memory_until_it_is_gone() {
-        let ledger = Ledger::new(&MemoryBudget::new(1 << 20));
+        let ledger = Ledger::new(&MemoryBudget::new(1 << 20), None);
         let answer = ledger.clone().scope(async {
             charge(300_000).await.unwrap();
             Response::new(Body::from(vec![0; 200_000]))

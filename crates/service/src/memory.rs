@@ -1,4 +1,4 @@
-//! The memory that requests hold, shared out between clients.
+//! The memory that requests hold, shared out between tenants, and between the clients of each.
 //!
 //! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`MEMORY_WAIT`], or the error `busy`.
 //!
@@ -6,17 +6,18 @@
 //! that is gathered, what is made of it, the rows of a page, the answer until it is read. What is decoded has a
 //! budget of its own ([`super::decoding`]).
 //!
-//! **Shares.** Of the budget (setting `request_memory`), a client gets no more than it leaves free. So one client
-//! alone has at most half of it, two have a third each, and there is always something left for a client
-//! that holds little. (The rule is that of dynamic thresholds for shared buffers: A. K. Choudhury and
-//! E. L. Hahne, IEEE/ACM Transactions on Networking 6, 1998.)
+//! **Shares.** Of the budget (setting `request_memory`), a tenant gets no more than twice what it leaves free, and of that
+//! a client (an address) no more than it leaves to the tenant's other clients. So one tenant alone has at most two thirds of
+//! the budget and one client of it a third, and there is always something left for a tenant that holds little, and for a client of
+//! it, whatever their addresses. An anonymous caller gets no more than it leaves free: one alone has at most half. (The rule is that of dynamic
+//! thresholds for shared buffers: A. K. Choudhury and E. L. Hahne, IEEE/ACM Transactions on Networking 6, 1998.)
 //!
 //! A request charges by [`charge`], which notes what it holds in a [`Ledger`] of the request. When the handler
 //! has ended, the ledger goes with the body of the answer, and ends with it.
 
 use crate::client::ClientAddress;
 use crate::error::{Refusal, ServiceError};
-use crate::records::{Failure, Fault};
+use crate::records::{Failure, Fault, Tenant};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -42,13 +43,68 @@ struct Shared {
 #[derive(Default)]
 struct Used {
     total: u64,
+    by_group: BTreeMap<Group, GroupUse>,
+}
+
+/// What a group of clients holds.
+#[derive(Default)]
+struct GroupUse {
+    total: u64,
     by_client: BTreeMap<ClientAddress, u64>,
+}
+
+/// Clients that have a share together.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Group {
+    /// An anonymous caller, or work that belongs to no request.
+    Address(ClientAddress),
+    /// The callers of a tenant.
+    Tenant(Tenant),
+}
+
+impl Group {
+    /// Limit on what the group holds and what its client leaves to the group's other clients, together, where other
+    /// groups leave so much. Who is alone in a group leaves as much to other groups.
+    fn limit(&self, left_by_others: u64) -> u64 {
+        match self {
+            Self::Address(_) => left_by_others,
+            Self::Tenant(_) => left_by_others - left_by_others.div_ceil(3),
+        }
+    }
+
+    /// The most that one piece of memory may be.
+    fn largest_share(&self, limit: u64) -> u64 {
+        self.limit(limit) / 2
+    }
+}
+
+/// Whoever holds memory.
+#[derive(Debug, Clone)]
+struct Holder {
+    group: Group,
+    client: ClientAddress,
+}
+
+impl Holder {
+    fn new(tenant: Option<&Tenant>) -> Self {
+        let client = ClientAddress::current();
+        Self {
+            group: tenant.map_or(Group::Address(client), |t| Group::Tenant(t.clone())),
+            client,
+        }
+    }
+
+    /// The one that the current request is answered for.
+    fn current() -> Self {
+        let of_request = LEDGER.try_with(|ledger| ledger.holder.clone());
+        of_request.unwrap_or_else(|_| Self::new(None))
+    }
 }
 
 /// Memory that a client holds until this is dropped.
 pub struct HeldMemory {
     budget: MemoryBudget,
-    client: ClientAddress,
+    holder: Holder,
     bytes: u64,
 }
 
@@ -62,11 +118,15 @@ impl MemoryBudget {
         }))
     }
 
-    /// Nothing yet, for the client of the current request.
+    /// Nothing yet, for the caller of the current request.
     pub fn hold(&self) -> HeldMemory {
+        self.hold_for(Holder::current())
+    }
+
+    fn hold_for(&self, holder: Holder) -> HeldMemory {
         HeldMemory {
             budget: self.clone(),
-            client: ClientAddress::current(),
+            holder,
             bytes: 0,
         }
     }
@@ -76,30 +136,46 @@ impl MemoryBudget {
         self.0.used.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes `bytes` for a client if it leaves `share` times as much free as it then has.
-    fn take(&self, client: ClientAddress, bytes: u64, share: u64) -> bool {
+    /// Takes `bytes` for a holder if it leaves `share` times as much to the others of its group as it then has, and its group enough
+    /// to other groups.
+    fn take(&self, holder: &Holder, bytes: u64, share: u64) -> bool {
+        if bytes == 0 {
+            return true;
+        }
         let mut used = self.used();
-        let free = self.0.limit.saturating_sub(used.total);
-        let own = used.by_client.get(&client).copied().unwrap_or(0);
-        let all = own.saturating_add(bytes);
-        if all.saturating_mul(share) > free.saturating_sub(bytes) {
+        let of_group = used.by_group.get(&holder.group);
+        let together = of_group.map_or(0, |group| group.total);
+        let own = of_group.and_then(|group| group.by_client.get(&holder.client));
+        let own = own.copied().unwrap_or(0).saturating_add(bytes);
+        let others = used.total.saturating_sub(together);
+        let limit = (holder.group).limit(self.0.limit.saturating_sub(others));
+        let together = together.saturating_add(bytes);
+        if own.saturating_mul(share).saturating_add(together) > limit {
             return false;
         }
         used.total += bytes;
-        used.by_client.insert(client, all);
+        let of_group = used.by_group.entry(holder.group.clone()).or_default();
+        of_group.total = together;
+        of_group.by_client.insert(holder.client, own);
         true
     }
 
-    fn give_back(&self, client: ClientAddress, bytes: u64) {
+    fn give_back(&self, holder: &Holder, bytes: u64) {
         if bytes == 0 {
             return;
         }
         let mut used = self.used();
         used.total = used.total.saturating_sub(bytes);
-        if let Some(own) = used.by_client.get_mut(&client) {
-            *own = own.saturating_sub(bytes);
-            if *own == 0 {
-                used.by_client.remove(&client);
+        if let Some(group) = used.by_group.get_mut(&holder.group) {
+            group.total = group.total.saturating_sub(bytes);
+            if let Some(own) = group.by_client.get_mut(&holder.client) {
+                *own = own.saturating_sub(bytes);
+                if *own == 0 {
+                    group.by_client.remove(&holder.client);
+                }
+            }
+            if group.by_client.is_empty() {
+                used.by_group.remove(&holder.group);
             }
         }
         drop(used);
@@ -111,7 +187,8 @@ impl HeldMemory {
     /// Holds `bytes` more, if the client's share has them now.
     pub fn try_grow(&mut self, bytes: u64) -> bool {
         // What is larger than any share takes the largest one.
-        let bytes = bytes.min((self.budget.0.limit / 2).saturating_sub(self.bytes));
+        let largest = self.holder.group.largest_share(self.budget.0.limit);
+        let bytes = bytes.min(largest.saturating_sub(self.bytes));
         self.take(bytes, 1)
     }
 
@@ -121,7 +198,7 @@ impl HeldMemory {
     }
 
     fn take(&mut self, bytes: u64, share: u64) -> bool {
-        let taken = self.budget.take(self.client, bytes, share);
+        let taken = self.budget.take(&self.holder, bytes, share);
         if taken {
             self.bytes += bytes;
         }
@@ -153,7 +230,7 @@ impl HeldMemory {
     fn shrink(&mut self, bytes: u64) {
         let surplus = self.bytes.saturating_sub(bytes);
         self.bytes -= surplus;
-        self.budget.give_back(self.client, surplus);
+        self.budget.give_back(&self.holder, surplus);
     }
 
     /// Bytes that are held.
@@ -164,7 +241,7 @@ impl HeldMemory {
 
 impl Drop for HeldMemory {
     fn drop(&mut self) {
-        self.budget.give_back(self.client, self.bytes);
+        self.budget.give_back(&self.holder, self.bytes);
     }
 }
 
@@ -172,7 +249,7 @@ fn busy() -> ServiceError {
     let failure = Failure::new(
         Fault::Service,
         "busy",
-        "The requests of this client hold as much memory as one client may.",
+        "The requests of this client, or of its tenant, hold as much memory as they may.",
     );
     let advice = "Send fewer requests at the same time, and read their answers.";
     ServiceError::new(Refusal::Unavailable, failure.fix(advice)).after(BUSY_RETRY)
@@ -180,16 +257,24 @@ fn busy() -> ServiceError {
 
 /// The memory that a request holds.
 #[derive(Clone)]
-pub struct Ledger(Arc<tokio::sync::Mutex<HeldMemory>>);
+pub struct Ledger {
+    holder: Holder,
+    held: Arc<tokio::sync::Mutex<HeldMemory>>,
+}
 
 tokio::task_local! {
     static REQUEST_LEDGER: Ledger;
 }
 
 impl Ledger {
-    /// An empty ledger for the current request.
-    pub fn new(budget: &MemoryBudget) -> Self {
-        Self(Arc::new(tokio::sync::Mutex::new(budget.hold())))
+    /// An empty ledger for the current request, which is a tenant's or an anonymous caller's.
+    pub fn new(budget: &MemoryBudget, tenant: Option<&Tenant>) -> Self {
+        let holder = Holder::new(tenant);
+        let held = budget.hold_for(holder.clone());
+        Self {
+            holder,
+            held: Arc::new(tokio::sync::Mutex::new(held)),
+        }
     }
 
     /// Runs the answering of the request.
@@ -202,14 +287,14 @@ impl Ledger {
     /// # Errors
     /// `busy` if there is no memory for it.
     pub async fn settle(&self, bytes: u64) -> Result<(), ServiceError> {
-        let held = &mut *self.0.lock().await;
+        let held = &mut *self.held.lock().await;
         held.shrink(bytes);
         held.grow(bytes - held.bytes.min(bytes)).await
     }
 
     /// Bytes that the request holds.
     pub async fn bytes(&self) -> u64 {
-        self.0.lock().await.bytes
+        self.held.lock().await.bytes
     }
 }
 
@@ -220,7 +305,7 @@ impl Ledger {
 /// `busy` if the client's share has not as much within two seconds.
 pub async fn charge(bytes: u64) -> Result<(), ServiceError> {
     match REQUEST_LEDGER.try_with(Ledger::clone) {
-        Ok(ledger) => ledger.0.lock().await.grow(bytes).await,
+        Ok(ledger) => ledger.held.lock().await.grow(bytes).await,
         Err(_) => Ok(()),
     }
 }
@@ -234,15 +319,27 @@ mod tests {
         ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]))
     }
 
-    /// Takes as much as it can for a client, in pieces.
-    fn greedy(budget: &MemoryBudget, n: u8) -> Vec<HeldMemory> {
+    /// An anonymous caller.
+    fn anonymous(n: u8) -> Holder {
+        Holder {
+            group: Group::Address(client(n)),
+            client: client(n),
+        }
+    }
+
+    /// A caller of a tenant.
+    fn caller(tenant: &str, n: u8) -> Holder {
+        Holder {
+            group: Group::Tenant(tenant.parse().unwrap()),
+            client: client(n),
+        }
+    }
+
+    /// Takes as much as it can for a holder, in pieces.
+    fn greedy(budget: &MemoryBudget, holder: &Holder) -> Vec<HeldMemory> {
         let mut all = Vec::new();
         loop {
-            let mut held = HeldMemory {
-                budget: budget.clone(),
-                client: client(n),
-                bytes: 0,
-            };
+            let mut held = budget.hold_for(holder.clone());
             if !held.try_grow(10) {
                 return all;
             }
@@ -250,18 +347,22 @@ mod tests {
         }
     }
 
+    fn bytes(held: &[HeldMemory]) -> u64 {
+        held.iter().map(HeldMemory::bytes).sum()
+    }
+
     #[test]
     fn however_many_are_greedy_another_client_gets_something() {
         let budget = MemoryBudget::new(100_000);
         let mut greedy_ones = Vec::new();
         for n in 1..20_u8 {
-            let own = greedy(&budget, n);
-            let got: u64 = own.iter().map(HeldMemory::bytes).sum();
+            let own = greedy(&budget, &anonymous(n));
+            let got = bytes(&own);
             assert!(got > 0, "client {n} got nothing");
             if n == 1 {
                 assert!((49_000..=50_000).contains(&got), "{got}");
             }
-            assert!(greedy(&budget, n).is_empty());
+            assert!(greedy(&budget, &anonymous(n)).is_empty());
             if n < 8 {
                 greedy_ones.push(own);
             }
@@ -270,13 +371,68 @@ mod tests {
         drop(greedy_ones);
         assert_eq!(budget.used().total, 0);
         // What is only faster with memory leaves some of the share to what needs it.
-        let mut fast = greedy(&budget, 1);
+        let mut fast = greedy(&budget, &anonymous(1));
         fast.truncate(1);
         while fast[0].try_extend(10) {}
         assert!((33_000..=33_400).contains(&fast[0].bytes()));
         assert!(fast[0].try_grow(10_000));
         drop(fast);
-        assert!(budget.used().by_client.is_empty());
+        assert!(budget.used().by_group.is_empty());
+    }
+
+    #[test]
+    fn tenants_behind_one_address_have_shares_of_their_own() {
+        let budget = MemoryBudget::new(90_000);
+        let first = greedy(&budget, &caller("a", 1));
+        assert!((29_000..=30_000).contains(&bytes(&first)), "a third");
+        // Of the 60,000 that are left, 40,000 are for the second tenant, half of them for one client.
+        let second = greedy(&budget, &caller("b", 1));
+        assert!((19_000..=20_500).contains(&bytes(&second)));
+        drop((first, second));
+        assert!(budget.used().by_group.is_empty());
+    }
+
+    #[test]
+    fn a_tenant_gets_no_more_by_many_addresses() {
+        let budget = MemoryBudget::new(90_000);
+        let many: Vec<_> = (0..100).map(|n| greedy(&budget, &caller("a", n))).collect();
+        let got: u64 = many.iter().map(|held| bytes(held)).sum();
+        assert!((59_000..=60_000).contains(&got), "two thirds: {got}");
+        assert!(
+            many[..8].iter().all(|held| !held.is_empty()),
+            "each client has some"
+        );
+        let calm = greedy(&budget, &caller("b", 1));
+        assert!((9_000..=10_500).contains(&bytes(&calm)));
+        assert!(!greedy(&budget, &anonymous(1)).is_empty());
+        drop((many, calm));
+        assert_eq!(budget.used().total, 0);
+    }
+
+    #[tokio::test]
+    async fn a_request_holds_for_its_tenant() {
+        let budget = MemoryBudget::new(90_000);
+        let tenant = Tenant::default();
+        let ledger = Ledger::new(&budget, Some(&tenant));
+        let held = ledger.clone().scope(async {
+            charge(10_000).await.unwrap();
+            let mut held = budget.hold();
+            assert!(held.try_grow(5_000));
+            held
+        });
+        let held = held.await;
+        let total = || {
+            let used = budget.used();
+            let group = used.by_group.get(&Group::Tenant(Tenant::default()));
+            group.map_or(0, |group| group.total)
+        };
+        assert_eq!(total(), 15_000);
+        drop((held, ledger));
+        assert_eq!(total(), 0);
+        // More than any share is the whole share.
+        let ledger = Ledger::new(&budget, Some(&tenant));
+        ledger.clone().scope(charge(1 << 30)).await.unwrap();
+        assert_eq!(total(), 30_000);
     }
 
     #[tokio::test]
@@ -306,7 +462,7 @@ mod tests {
     #[tokio::test]
     async fn a_ledger_holds_what_it_is_settled_to_until_it_is_dropped() {
         let budget = MemoryBudget::new(1 << 20);
-        let ledger = Ledger::new(&budget);
+        let ledger = Ledger::new(&budget, None);
         let charged = ledger.clone().scope(charge(300_000));
         charged.await.unwrap();
         assert_eq!(ledger.bytes().await, 300_000);

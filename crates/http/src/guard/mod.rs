@@ -9,7 +9,7 @@
 //! 3. The caller's requests are counted, also as those of the keys that have made its key: 429 beyond the quota. Every answer carries `RateLimit` and
 //!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
 //! 4. The scope must include what method and path need: 403 if not.
-//! 5. From here on, its memory is charged to its client ([`super::memory`]). Handlers that add something reserve it
+//! 5. From here on, its memory is charged to its tenant and client ([`super::memory`]). Handlers that add something reserve it
 //!    under the tenant's quotas ([`super::quota`]).
 //! 6. What changes something is recorded where that is done, by the caller's agent ([`Caller::by`]); after the handler,
 //!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event is on
@@ -130,7 +130,9 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
     };
     let mut response = match answer {
         Ok(act) => {
-            let ledger = Ledger::new(&app.service.memory);
+            // Anonymous callers have only their address.
+            let tenant = identity.account.as_ref().map(|_| &identity.tenant);
+            let ledger = Ledger::new(&app.service.memory, tenant);
             let answer = next.run(Request::from_parts(request, body));
             let response = ledger.clone().scope(answer).await;
             match answered(&ledger, response).await {
