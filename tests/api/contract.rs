@@ -22,12 +22,12 @@ use ventriform_service::intake::{
     Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
 };
 use ventriform_service::records::{
-    AddedProduct, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased, ErasureAgent,
-    ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed, Idempotency,
-    Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState, JobStore,
-    JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product, ProductFile,
-    ProductRoom, Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource, StoreFault,
-    StoredVolume, SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
+    AddedProduct, Bounded, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased,
+    ErasureAgent, ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed,
+    Idempotency, Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState,
+    JobStore, JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product,
+    ProductFile, ProductRoom, Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource,
+    StoreFault, StoredVolume, SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
@@ -267,6 +267,7 @@ contracts!(
     old_things_expire,
     lists_find_by_tags_and_scans,
     a_page_is_planned_by_the_bytes_of_its_rows,
+    a_row_is_read_within_its_bytes,
     identities_are_kept_and_erased,
     items_are_shared_by_tenants,
     the_audit_trail_is_one_chain,
@@ -829,8 +830,10 @@ async fn erasures_leave_receipts(on: &Stores) {
         assert!(on.b.was_erased(id).await.unwrap());
     }
     assert_eq!(
-        on.b.receipt(&tenant(), &receipt.id).await.unwrap().as_ref(),
-        Some(&*receipt)
+        on.b.receipt_within(&tenant(), &receipt.id, u64::MAX)
+            .await
+            .unwrap(),
+        Bounded::Read((*receipt).clone())
     );
     let listed = on.b.receipts(&tenant(), Some(&volume), ALL).await.unwrap();
     assert_eq!(listed.items, [*receipt]);
@@ -951,6 +954,91 @@ async fn a_page_is_planned_by_the_bytes_of_its_rows(on: &Stores) {
     })
     .await;
     assert!(on.b.plan_jobs(&jobs, ALL).await.unwrap().bytes > 2048);
+}
+
+/// One row of each kind whose size a client chooses: told to be larger, read as soon as there is room for all of it, and
+/// seen by its tenant alone.
+async fn a_row_is_read_within_its_bytes(on: &Stores) {
+    const TEXT: usize = 50_000;
+    const LEAST: u64 = TEXT as u64;
+    /// The bytes that a row is told to have by a reader with room for fewer.
+    fn size<T: std::fmt::Debug>(read: Bounded<T>) -> u64 {
+        match read {
+            Bounded::Larger(bytes) => bytes,
+            other => panic!("{other:?}"),
+        }
+    }
+    fn is_read<T>(read: Bounded<T>) -> bool {
+        matches!(read, Bounded::Read(_))
+    }
+    let long = "\u{e4}".repeat(TEXT / 2);
+    let (store, own, other) = (&on.b, tenant(), other());
+    // A volume by what was found in its file.
+    let id = random_id(Resource::Volume.prefix());
+    let mut volume = stored_volume(&id, 1_000);
+    volume.facts = json!({"found": long});
+    let added = on.a.add_volume(&volume, &own, &Tags::default(), None);
+    assert!(added.await.unwrap());
+    let bytes = size(store.volume_within(&own, &id, LEAST).await.unwrap());
+    assert!((LEAST..LEAST + 1_000).contains(&bytes), "{bytes}");
+    assert_eq!(
+        size(store.volume_within(&own, &id, bytes - 1).await.unwrap()),
+        bytes
+    );
+    assert!(is_read(
+        store.volume_within(&own, &id, bytes).await.unwrap()
+    ));
+    let missing = store.volume_within(&other, &id, bytes).await.unwrap();
+    assert!(matches!(missing, Bounded::Missing));
+    // A product by its parameters.
+    let mut product = model(&id);
+    product.parameters = object(json!({"cases": long}));
+    on.a.add_product(&product, &own, None, ROOM).await.unwrap();
+    let bytes = size(
+        store
+            .product_within(&own, &product.id, LEAST)
+            .await
+            .unwrap(),
+    );
+    assert!((LEAST..LEAST + 1_000).contains(&bytes), "{bytes}");
+    let read = store.product_within(&own, &product.id, bytes);
+    assert!(is_read(read.await.unwrap()));
+    let missing = store.product_within(&other, &product.id, bytes);
+    assert!(matches!(missing.await.unwrap(), Bounded::Missing));
+    // A job by its parameters.
+    let job = on
+        .file(&NewJob {
+            parameters: object(json!({"cases": "x".repeat(TEXT)})),
+            ..new_job(&id)
+        })
+        .await;
+    let bytes = size(store.job_within(&job.id, LEAST).await.unwrap());
+    assert!((LEAST..LEAST + 3_000).contains(&bytes), "{bytes}");
+    assert!(is_read(store.job_within(&job.id, bytes).await.unwrap()));
+    let missing = store.job_within("job_0", bytes).await.unwrap();
+    assert!(matches!(missing, Bounded::Missing));
+    // A work item.
+    on.a.add_workitem(&workitem("1.7.2", &long), 10)
+        .await
+        .unwrap();
+    let bytes = size(store.workitem_within(&own, "1.7.2", LEAST).await.unwrap());
+    assert!((LEAST..LEAST + 1_000).contains(&bytes), "{bytes}");
+    let read = store.workitem_within(&own, "1.7.2", bytes);
+    assert!(is_read(read.await.unwrap()));
+    let missing = store.workitem_within(&other, "1.7.2", bytes);
+    assert!(matches!(missing.await.unwrap(), Bounded::Missing));
+    // A receipt.
+    on.a.interrupt(&job.id, now()).await.unwrap();
+    let expected = [id.clone(), product.id.clone()];
+    let erased = on.a.erase(&erasure(&id, true), &expected, now());
+    let Erased::Done(receipt) = erased.await.unwrap() else {
+        panic!("the volume is in use");
+    };
+    let bytes = size(store.receipt_within(&own, &receipt.id, 10).await.unwrap());
+    let read = store.receipt_within(&own, &receipt.id, bytes);
+    assert_eq!(read.await.unwrap(), Bounded::Read(*receipt.clone()));
+    let missing = store.receipt_within(&other, &receipt.id, bytes);
+    assert!(matches!(missing.await.unwrap(), Bounded::Missing));
 }
 
 async fn lists_find_by_tags_and_scans(on: &Stores) {

@@ -543,6 +543,55 @@ async fn one_client_that_holds_memory_keeps_no_other_waiting() {
 }
 
 #[tokio::test]
+async fn one_large_row_is_charged_before_it_is_read() {
+    let app = behind_proxy(|settings| settings.request_memory = "4MiB".parse().unwrap()).await;
+    for (uid, size) in [("1.2.1", 60_000), ("1.2.2", 100)] {
+        let set = json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
+                          "00741204": {"vr": "LT", "Value": ["x".repeat(size)]}}]);
+        let created = app
+            .post(&format!("/dicom-web/workitems?workitem={uid}"))
+            .json(&set)
+            .send();
+        assert_eq!(created.await.unwrap().status(), 201);
+    }
+    let half = || {
+        // Begins a body of JSON and leaves the rest.
+        let begin = futures::stream::iter([Ok::<_, std::io::Error>(vec![b' '; 100_000])]);
+        let body = begin.chain(futures::stream::pending());
+        let sent = app
+            .post("/v1/templates?name=t&organ=generic")
+            .header(FORWARDED, "192.0.2.1")
+            .header("content-type", "application/json")
+            .body(reqwest::Body::wrap_stream(body))
+            .send();
+        tokio::spawn(sent)
+    };
+    let greedy: Vec<_> = (0..12).map(|_| half()).collect();
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    let item = async |client: &str, uid: &str| {
+        let item = app
+            .get(&format!("/dicom-web/workitems/{uid}"))
+            .header(FORWARDED, client);
+        item.send().await.unwrap()
+    };
+    assert_eq!(
+        item("192.0.2.1", "1.2.2").await.status(),
+        200,
+        "a small one"
+    );
+    problem(item("192.0.2.1", "1.2.1").await, 503, "busy").await;
+    // Another client has its share.
+    assert_eq!(item("192.0.2.2", "1.2.1").await.status(), 200);
+    for sent in &greedy {
+        sent.abort();
+    }
+    // What was charged is given back, however often it is read.
+    for _ in 0..20 {
+        assert_eq!(item("192.0.2.3", "1.2.1").await.status(), 200);
+    }
+}
+
+#[tokio::test]
 async fn work_items_are_bounded_one_by_one_and_in_pages() {
     let app = TestApp::start().await;
     let create = |n: usize, size: usize| {

@@ -7,6 +7,7 @@
 use super::app::App;
 use super::caller::Caller;
 use super::erasures::{self, CascadeQuery, ReceiptBody};
+use super::memory::read_row;
 use super::openapi::{
     CachedHeaders, Documented, EraseProblems, ErasureHeader, ListProblems, LookupProblems,
     UnchangedAnswer,
@@ -35,7 +36,7 @@ use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
-    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, StoreError, Tenant,
+    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Resource, StoreError, Tenant,
 };
 
 /// One kind of stored thing.
@@ -61,12 +62,13 @@ pub trait Collection: 'static {
     /// If the row holds something that cannot be read.
     fn body(app: &App, scope: Scope, row: Owned<Self::Row>) -> Result<Self::Body, StoreError>;
 
-    /// The tenant's row of that id.
+    /// The tenant's row of that id, if it has no more than so many bytes.
     fn row(
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> impl Future<Output = Result<Option<Owned<Self::Row>>, StoreError>> + Send;
+        bytes: u64,
+    ) -> impl Future<Output = Result<Bounded<Owned<Self::Row>>, StoreError>> + Send;
 
     /// A page of the tenant's rows, newest first.
     fn rows(
@@ -137,11 +139,11 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
     ]
 }
 
-/// The tenant's row of that id, or the 404 or 410 that says why there is none.
+/// The tenant's row of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Owned<C::Row>> {
     let catalogue = app.service.items().catalogue();
     let found = if Resource::of(id) == Some(C::RESOURCE_KIND) {
-        C::row(catalogue, tenant, id).await?
+        read_row(|bytes| C::row(catalogue, tenant, id, bytes)).await?
     } else {
         None
     };

@@ -250,7 +250,7 @@ async fn scan_of(
     };
     match Resource::of(id) {
         Some(Resource::Segmentation | Resource::Beat) => {
-            let product = app.service.items().catalogue().product(tenant, id).await?;
+            let product = products::stored(app, tenant, id).await?;
             let fit = product.map(|product| (product.item.volume, product.item.parameters));
             match fit {
                 Some((Some(volume), parameters)) => Ok(NamedScan {

@@ -4,6 +4,7 @@ use super::app::App;
 use super::caller::Caller;
 use super::guard::AlreadyRecorded;
 use super::links::{path_of, rfc3339};
+use super::memory::read_row;
 use super::openapi::{ListProblems, LookupProblems};
 use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
 use super::problem::not_found::{missing, no_receipt};
@@ -266,13 +267,8 @@ pub async fn get_erasure(
     _: NoQuery,
     headers: HeaderMap,
 ) -> Answer {
-    match app
-        .service
-        .items()
-        .catalogue()
-        .receipt(&caller.tenant, &id)
-        .await?
-    {
+    let catalogue = app.service.items().catalogue();
+    match read_row(|bytes| catalogue.receipt_within(&caller.tenant, &id, bytes)).await? {
         Some(receipt) => validators::json(&headers, &ReceiptBody::from(receipt)),
         None => Err(no_receipt(&id)),
     }

@@ -6,7 +6,7 @@ use super::held_body::HeldBody;
 use super::problem::Answer;
 use axum::body::{Body, HttpBody};
 use axum::response::Response;
-pub use ventriform_service::memory::{Ledger, charge};
+pub use ventriform_service::memory::{Ledger, MEMORY_PER_ROW_BYTE, charge, end_rows, read_row};
 
 /// Bytes of an answer that are not charged: the system's buffers hold as many.
 const SMALL_ANSWER_BYTES: u64 = 16 << 10;
@@ -18,9 +18,10 @@ const SMALL_ANSWER_BYTES: u64 = 16 << 10;
 /// 503 if there is no memory for it.
 pub async fn answered(ledger: &Ledger, response: Response) -> Answer<Response> {
     // What was needed to make an answer that is in memory as a whole is no longer needed.
-    if let Some(size) = response.body().size_hint().exact() {
-        let charged = if size <= SMALL_ANSWER_BYTES { 0 } else { size };
-        ledger.settle(charged).await?;
+    match response.body().size_hint().exact() {
+        Some(size) if size <= SMALL_ANSWER_BYTES => ledger.settle(0).await?,
+        Some(size) => ledger.settle(size).await?,
+        None => ledger.end_rows().await,
     }
     if ledger.bytes().await == 0 {
         return Ok(response);

@@ -1,6 +1,6 @@
 //! `limit` and `cursor` of lists.
 
-use super::memory::charge;
+use super::memory::{MEMORY_PER_ROW_BYTE, charge};
 use super::problem::Answer;
 use super::query::parsed;
 use serde::{Deserialize, Deserializer};
@@ -15,10 +15,6 @@ const MAX_PAGE_ITEMS: u32 = 100;
 /// Memory for one entry of a page: its row, what is made of it, and its JSON. Labels of 16 KiB are the largest part, unless a
 /// page is [charged by its bytes](charged_by_bytes).
 const ENTRY_MEMORY: u64 = 64 << 10;
-
-/// Memory for a stored byte of a page: the row, its JSON parsed (a job of 1000 cases takes nine times as much as its text), and the
-/// JSON of the answer.
-const MEMORY_PER_BYTE: u64 = 12;
 
 /// The page of a list that is asked for.
 #[derive(Deserialize, IntoParams)]
@@ -55,7 +51,7 @@ impl PageQuery {
 /// 503 if there is no memory for it.
 pub async fn charged_by_bytes(asked: ListRequest, plan: PagePlan) -> Answer<ListRequest> {
     let charged = ENTRY_MEMORY * u64::from(asked.limit);
-    charge((MEMORY_PER_BYTE * plan.bytes).saturating_sub(charged)).await?;
+    charge((MEMORY_PER_ROW_BYTE * plan.bytes).saturating_sub(charged)).await?;
     Ok(plan.page)
 }
 

@@ -8,7 +8,7 @@ use super::caller::Caller;
 use super::collection::{Collection, find};
 use super::files;
 use super::links::path_of;
-use super::memory::charge;
+use super::memory::{charge, read_row};
 use super::negotiate;
 use super::openapi::{
     ConditionalHeaders, DicomProblems, Documented, DownloadAnswers, LookupProblems, MeshAnswer,
@@ -41,7 +41,8 @@ use ventriform::progress::Monitor;
 use ventriform_service::access::Scope;
 use ventriform_service::decoding::LITTLE_MEMORY;
 use ventriform_service::records::{
-    Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError, Tenant,
+    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError,
+    Tenant,
 };
 use ventriform_service::work::dicom::{self, ResultObject};
 use ventriform_service::work::{UploadFacts, part};
@@ -97,8 +98,9 @@ impl<P: ProductCollection> Collection for P {
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Owned<Product>>, StoreError> {
-        catalogue.product(tenant, id).await
+        bytes: u64,
+    ) -> Result<Bounded<Owned<Product>>, StoreError> {
+        catalogue.product_within(tenant, id, bytes).await
     }
 
     fn body(app: &App, _: Scope, product: Owned<Product>) -> Result<P::Body, StoreError> {
@@ -369,10 +371,16 @@ pub fn choose<'a>(headers: &HeaderMap, offers: &'a [Offer]) -> Answer<&'a Offer>
     Ok(&offers[negotiate::require_offer(headers, &types)?])
 }
 
+/// The tenant's product of that id, for which the request is charged.
+pub async fn stored(app: &App, tenant: &Tenant, id: &str) -> Answer<Option<Owned<Product>>> {
+    let catalogue = app.service.items().catalogue();
+    Ok(read_row(|bytes| catalogue.product_within(tenant, id, bytes)).await?)
+}
+
 /// The tenant's product of that id, or the 404 or 410 that says why there is none.
 pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
     let catalogue = app.service.items().catalogue();
-    match catalogue.product(tenant, id).await? {
+    match stored(app, tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
             let resource = Resource::of(id).unwrap_or(Resource::Model);

@@ -6,7 +6,7 @@ use super::collection::find;
 use super::links::{added, path_of, rfc3339};
 use super::openapi::{self, LookupProblems, UploadProblems};
 use super::problem::{Answer, Problem, ProblemBody};
-use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
+use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody, stored};
 use super::query::{NoQuery, Query};
 use super::quota::reserve_item;
 use super::request::{PathSegments, bytes_of, merge_patch, unknown};
@@ -263,9 +263,8 @@ async fn given_mesh(
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.
 async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let catalogue = app.service.items().catalogue();
     let product = match Resource::of(id) {
-        Some(Resource::Model | Resource::Segmentation) => catalogue.product(tenant, id).await?,
+        Some(Resource::Model | Resource::Segmentation) => stored(app, tenant, id).await?,
         _ => None,
     };
     let Some(product) = product else {

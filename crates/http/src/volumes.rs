@@ -25,8 +25,8 @@ use ventriform::progress::Monitor;
 use ventriform::volume::GateFacts;
 use ventriform_service::access::Scope;
 use ventriform_service::records::{
-    BlobError, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest, LocalFile,
-    Owned, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
+    BlobError, Bounded, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest,
+    LocalFile, Owned, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
 };
 use ventriform_service::work::{UploadFacts, preview_memory};
 
@@ -46,8 +46,9 @@ impl Collection for Volumes {
         catalogue: &dyn Catalogue,
         tenant: &Tenant,
         id: &str,
-    ) -> Result<Option<Owned<StoredVolume>>, StoreError> {
-        catalogue.volume(tenant, id).await
+        bytes: u64,
+    ) -> Result<Bounded<Owned<StoredVolume>>, StoreError> {
+        catalogue.volume_within(tenant, id, bytes).await
     }
 
     fn body(

@@ -7,7 +7,7 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::memory::charge;
+use super::memory::{charge, end_rows, read_row};
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
 use super::query::{NoQuery, QueryReader};
@@ -450,6 +450,8 @@ async fn change(
         if caller.by.change(change, recorded).await? {
             return Ok(done);
         }
+        // It is read anew.
+        end_rows(0).await;
     }
     Err(Problem::new(
         StatusCode::SERVICE_UNAVAILABLE,
@@ -466,7 +468,8 @@ fn text_of(attributes: &DataSetJson) -> Answer<String> {
 }
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
-    let item = app.service.worklist.workitem(&caller.tenant, uid).await?;
+    let worklist = &app.service.worklist;
+    let item = read_row(|bytes| worklist.workitem_within(&caller.tenant, uid, bytes)).await?;
     item.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,

@@ -13,11 +13,12 @@
 //! thresholds for shared buffers: A. K. Choudhury and E. L. Hahne, IEEE/ACM Transactions on Networking 6, 1998.)
 //!
 //! A request charges by [`charge`], which notes what it holds in a [`Ledger`] of the request. When the handler
-//! has ended, the ledger goes with the body of the answer, and ends with it.
+//! has ended, the ledger goes with the body of the answer, and ends with it. Single rows are read by [`read_row`]; what
+//! is charged for them ends with the handler.
 
 use crate::client::ClientAddress;
 use crate::error::{Refusal, ServiceError};
-use crate::records::{Failure, Fault, Tenant};
+use crate::records::{Bounded, Failure, Fault, StoreResult, Tenant};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -26,6 +27,13 @@ use tokio::time::{Instant, timeout_at};
 
 /// Longest time for which a request waits for memory.
 const MEMORY_WAIT: Duration = Duration::from_secs(2);
+
+/// Memory for a stored byte of a row: the row, its JSON parsed (a job of 1000 cases takes nine times as much as its text), and the
+/// JSON of the answer.
+pub const MEMORY_PER_ROW_BYTE: u64 = 12;
+
+/// Stored bytes of a single row that are not charged.
+const UNCHARGED_ROW_BYTES: u64 = 8 << 10;
 
 /// Pause before a request is sent again that found no memory.
 const BUSY_RETRY: Duration = Duration::from_secs(1);
@@ -96,7 +104,7 @@ impl Holder {
 
     /// The one that the current request is answered for.
     fn current() -> Self {
-        let of_request = LEDGER.try_with(|ledger| ledger.holder.clone());
+        let of_request = REQUEST_LEDGER.try_with(|ledger| ledger.holder.clone());
         of_request.unwrap_or_else(|_| Self::new(None))
     }
 }
@@ -259,7 +267,28 @@ fn busy() -> ServiceError {
 #[derive(Clone)]
 pub struct Ledger {
     holder: Holder,
-    held: Arc<tokio::sync::Mutex<HeldMemory>>,
+    charges: Arc<tokio::sync::Mutex<Charges>>,
+}
+
+struct Charges {
+    held: HeldMemory,
+    /// The part of it that is for rows that the handler has read.
+    for_rows: u64,
+}
+
+impl Charges {
+    async fn grow_for_row(&mut self, bytes: u64) -> Result<(), ServiceError> {
+        let before = self.held.bytes;
+        self.held.grow(bytes).await?;
+        self.for_rows += self.held.bytes - before;
+        Ok(())
+    }
+
+    /// Gives back what is held for rows but `kept` bytes, which are held for good.
+    fn end_rows(&mut self, kept: u64) {
+        let ended = std::mem::take(&mut self.for_rows).saturating_sub(kept);
+        self.held.shrink(self.held.bytes - ended);
+    }
 }
 
 tokio::task_local! {
@@ -273,7 +302,7 @@ impl Ledger {
         let held = budget.hold_for(holder.clone());
         Self {
             holder,
-            held: Arc::new(tokio::sync::Mutex::new(held)),
+            charges: Arc::new(tokio::sync::Mutex::new(Charges { held, for_rows: 0 })),
         }
     }
 
@@ -287,14 +316,21 @@ impl Ledger {
     /// # Errors
     /// `busy` if there is no memory for it.
     pub async fn settle(&self, bytes: u64) -> Result<(), ServiceError> {
-        let held = &mut *self.held.lock().await;
-        held.shrink(bytes);
-        held.grow(bytes - held.bytes.min(bytes)).await
+        let charges = &mut *self.charges.lock().await;
+        charges.for_rows = 0;
+        charges.held.shrink(bytes);
+        let held = charges.held.bytes;
+        charges.held.grow(bytes - held.min(bytes)).await
+    }
+
+    /// Gives back what was charged for rows: the handler has ended.
+    pub async fn end_rows(&self) {
+        self.charges.lock().await.end_rows(0);
     }
 
     /// Bytes that the request holds.
     pub async fn bytes(&self) -> u64 {
-        self.held.lock().await.bytes
+        self.charges.lock().await.held.bytes
     }
 }
 
@@ -305,8 +341,48 @@ impl Ledger {
 /// `busy` if the client's share has not as much within two seconds.
 pub async fn charge(bytes: u64) -> Result<(), ServiceError> {
     match REQUEST_LEDGER.try_with(Ledger::clone) {
-        Ok(ledger) => ledger.held.lock().await.grow(bytes).await,
+        Ok(ledger) => ledger.charges.lock().await.held.grow(bytes).await,
         Err(_) => Ok(()),
+    }
+}
+
+/// A row whose size a client chose, for which the current request is charged before it is read if it is large: `read` is
+/// given the most bytes that the row may have.
+///
+/// # Errors
+/// Those of `read`, and `busy` as of [`charge`].
+pub async fn read_row<T, F>(read: impl Fn(u64) -> F) -> Result<Option<T>, ServiceError>
+where
+    F: Future<Output = StoreResult<Bounded<T>>>,
+{
+    let (mut limit, mut charged) = (UNCHARGED_ROW_BYTES, 0);
+    loop {
+        match read(limit).await? {
+            Bounded::Read(row) => return Ok(Some(row)),
+            Bounded::Missing => return Ok(None),
+            // It may have grown in between.
+            Bounded::Larger(bytes) => {
+                charge_row(MEMORY_PER_ROW_BYTE * bytes.saturating_sub(charged)).await?;
+                (limit, charged) = (limit.max(bytes), charged.max(bytes));
+            }
+        }
+    }
+}
+
+async fn charge_row(bytes: u64) -> Result<(), ServiceError> {
+    match REQUEST_LEDGER.try_with(Ledger::clone) {
+        Ok(ledger) => ledger.charges.lock().await.grow_for_row(bytes).await,
+        Err(_) => Ok(()),
+    }
+}
+
+/// Gives back what the current request was charged for rows that it holds no more, but what `copies` of them take, which it
+/// holds until its answer has been read.
+pub async fn end_rows(copies: u64) {
+    if let Ok(ledger) = REQUEST_LEDGER.try_with(Ledger::clone) {
+        let mut charges = ledger.charges.lock().await;
+        let kept = charges.for_rows / MEMORY_PER_ROW_BYTE * copies;
+        charges.end_rows(kept);
     }
 }
 
@@ -457,6 +533,67 @@ mod tests {
         drop(second);
         large.grow(10_000).await.unwrap();
         assert_eq!(large.bytes(), 500);
+    }
+
+    #[tokio::test]
+    async fn a_large_row_is_charged_before_it_is_read_and_until_the_handler_ends() {
+        const ROW_BYTES: u64 = 100_000;
+        let budget = MemoryBudget::new(10 << 20);
+        let tenant = Tenant::default();
+        let total = || budget.used().total;
+        let read = |bytes: u64| {
+            let held = total();
+            async move {
+                Ok(if bytes < ROW_BYTES {
+                    Bounded::Larger(ROW_BYTES)
+                } else {
+                    Bounded::Read(held)
+                })
+            }
+        };
+        let ledger = Ledger::new(&budget, Some(&tenant));
+        let row = ledger.clone().scope(async {
+            charge(500).await.unwrap();
+            read_row(read).await.unwrap()
+        });
+        let charged = 500 + MEMORY_PER_ROW_BYTE * ROW_BYTES;
+        assert_eq!((row.await, total()), (Some(charged), charged));
+        ledger.end_rows().await;
+        assert_eq!(total(), 500);
+        // What is held on, of rows that are read one after the other.
+        let rows = ledger.clone().scope(async {
+            for _ in 0..10 {
+                read_row(read).await.unwrap();
+                end_rows(0).await;
+                assert_eq!(total(), 500);
+            }
+            read_row(read).await.unwrap();
+            end_rows(2).await;
+        });
+        rows.await;
+        ledger.end_rows().await;
+        assert_eq!(total(), 500 + 2 * ROW_BYTES);
+        // Small ones and those that there are not are not charged, nor work of no request.
+        let small = async |_| Ok(Bounded::Read(()));
+        let missing = async |_| Ok(Bounded::<()>::Missing);
+        let none = ledger.clone().scope(async {
+            assert_eq!(read_row(small).await.unwrap(), Some(()));
+            assert_eq!(read_row(missing).await.unwrap(), None);
+        });
+        none.await;
+        assert_eq!(total(), 500 + 2 * ROW_BYTES);
+        drop(ledger);
+        assert_eq!(read_row(read).await.unwrap(), Some(0));
+        // More at the same time than the share of one client has is refused.
+        let many: Vec<_> = (0..3)
+            .map(|_| Ledger::new(&budget, Some(&tenant)))
+            .collect();
+        let mut refused = 0;
+        for ledger in &many {
+            let row = ledger.clone().scope(read_row(read)).await;
+            refused += usize::from(row.is_err());
+        }
+        assert_eq!(refused, 1, "a third of 10 MiB has two rows");
     }
 
     #[tokio::test]

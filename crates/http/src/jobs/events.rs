@@ -8,6 +8,7 @@
 use super::{describe, find};
 use crate::app::App;
 use crate::caller::Caller;
+use crate::memory::end_rows;
 use crate::openapi::{self, LookupProblems};
 use crate::problem::{Answer, Problem, ProblemBody};
 use crate::public_base::PublicBase;
@@ -56,6 +57,8 @@ pub async fn follow_job(
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
     let place = app.streams.enter()?;
+    // The stream holds the job, or what tells of it, as long as its client reads nothing.
+    end_rows(2).await;
     Ok(stream(app, job, seen, changes, place))
 }
 

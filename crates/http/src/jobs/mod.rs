@@ -13,6 +13,7 @@ pub use priority::PriorityQuery;
 use super::app::App;
 use super::caller::Caller;
 use super::idempotency;
+use super::memory::read_row;
 use super::observe;
 use super::openapi::{self, FileProblems, ListProblems, LookupProblems};
 use super::pagination::{PageQuery, charged_by_bytes, next_cursor};
@@ -323,9 +324,10 @@ pub async fn delete_job(
     Ok((status, Json(describe(&app, job).await?)).into_response())
 }
 
-/// The tenant's job of that id, or the 404 or 410 that says why there is none.
+/// The tenant's job of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find(app: &App, tenant: &Tenant, id: &str) -> Answer<Job> {
-    let job = app.service.queue().table().job(id).await?;
+    let table = app.service.queue().table();
+    let job = read_row(|bytes| table.job_within(id, bytes)).await?;
     match job.filter(|job| job.tenant == *tenant) {
         Some(job) => Ok(job),
         None => Err(missing(app.service.items().catalogue(), tenant, Resource::Job, id).await),

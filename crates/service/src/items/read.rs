@@ -1,6 +1,8 @@
 //! Reading items: records with local copies of their files, every file verified.
 
 use super::{Items, StoredItem, StoredResult, StoredSource};
+use crate::error::ServiceError;
+use crate::memory::read_row;
 use crate::records::{
     BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, Resource,
     StoreError, StoreFault, Tenant,
@@ -121,14 +123,15 @@ impl Items {
     /// no volume.
     ///
     /// # Errors
-    /// If the storage fails.
+    /// If the storage fails, and `busy` if the request has no memory for the rows.
     pub async fn result(
         &self,
         tenant: &Tenant,
         id: &str,
         wanted: impl FnOnce(&Product) -> Vec<String> + Send,
-    ) -> Result<Option<StoredResult>, StoreError> {
-        let Some(product) = self.catalogue.product(tenant, id).await? else {
+    ) -> Result<Option<StoredResult>, ServiceError> {
+        let product = read_row(|bytes| self.catalogue.product_within(tenant, id, bytes));
+        let Some(product) = product.await? else {
             return Ok(None);
         };
         let Some(source) = self.source(tenant, product.volume.as_deref()).await? else {
@@ -159,11 +162,12 @@ impl Items {
         &self,
         tenant: &Tenant,
         id: Option<&str>,
-    ) -> Result<Option<StoredSource>, StoreError> {
+    ) -> Result<Option<StoredSource>, ServiceError> {
         let Some(id) = id else {
             return Ok(None);
         };
-        let Some(volume) = self.catalogue.volume(tenant, id).await? else {
+        let volume = read_row(|bytes| self.catalogue.volume_within(tenant, id, bytes));
+        let Some(volume) = volume.await? else {
             return Ok(None);
         };
         let files = self.volume_files(id, &volume.files).await?;

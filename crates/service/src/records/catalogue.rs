@@ -3,8 +3,8 @@
 //! Every method that takes a [`Tenant`] sees what this tenant has and nothing else.
 
 use super::{
-    Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest, Owned,
-    PagePlan, Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
+    Bounded, Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest,
+    Owned, PagePlan, Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
 use super::{Resource, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -75,6 +75,14 @@ pub trait Catalogue: Custody + Scans {
     /// The volume with that id.
     async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>>;
 
+    /// The volume with that id, if its row and what the tenant has of it have no more than so many bytes.
+    async fn volume_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Owned<StoredVolume>>>;
+
     /// The memory that such a page of items of one kind takes, so that it can be charged before it is read.
     async fn plan_items(
         &self,
@@ -112,6 +120,14 @@ pub trait Catalogue: Custody + Scans {
 
     /// The product with that id.
     async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<Product>>>;
+
+    /// The product with that id, likewise.
+    async fn product_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Owned<Product>>>;
 
     /// Products of one kind, newest first.
     async fn products(
@@ -159,8 +175,13 @@ pub trait Catalogue: Custody + Scans {
     /// When the item or job with that id was erased; `None` if the tenant never had it.
     async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>>;
 
-    /// The receipt with that id.
-    async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>>;
+    /// The receipt with that id, if it has no more than so many bytes.
+    async fn receipt_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Receipt>>;
 
     /// Receipts, newest first: all, or those of one item.
     async fn receipts(

@@ -1,7 +1,7 @@
 //! The interface to the jobs table.
 
 use super::{
-    Deleted, ListPage, ListRequest, PagePlan, Product, ScanFilter, StoreResult, TagFilter,
+    Bounded, Deleted, ListPage, ListRequest, PagePlan, Product, ScanFilter, StoreResult, TagFilter,
 };
 use super::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -107,6 +107,9 @@ pub trait JobStore: Send + Sync + 'static {
 
     /// The job with that id.
     async fn job(&self, id: &str) -> StoreResult<Option<Job>>;
+
+    /// The job with that id, if its record has no more than so many bytes.
+    async fn job_within(&self, id: &str, bytes: u64) -> StoreResult<Bounded<Job>>;
 
     /// The memory that such a page of jobs takes, so that it can be charged before it is read.
     async fn plan_jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<PagePlan>;

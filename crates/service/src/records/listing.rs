@@ -18,6 +18,17 @@ pub struct PagePlan {
     pub bytes: u64,
 }
 
+/// A row that is read only if it has no more stored bytes than its reader has memory for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Bounded<T> {
+    /// The row.
+    Read(T),
+    /// It has this many stored bytes.
+    Larger(u64),
+    /// There is no such row.
+    Missing,
+}
+
 /// Stored bytes after which a page ends: ten jobs of a thousand cases, five volumes of two thousand files, or a hundred rows of
 /// 20 KiB. Only a page of one row may have more.
 pub const PAGE_BYTES: u64 = 2 << 20;

@@ -56,7 +56,7 @@ pub use job::{Filed, Idempotency, Job, JobState, JobWebhook, NewJob, SendOrder, 
 pub use job_store::{
     Claimant, DeathLimit, Interrupted, JobFilter, JobOutcome, JobStore, Lease, QueueLoad,
 };
-pub use listing::{ListPage, ListRequest, PAGE_BYTES, PagePlan};
+pub use listing::{Bounded, ListPage, ListRequest, PAGE_BYTES, PagePlan};
 pub use ownership::{ItemFilter, LegalHold, Owned, Ownership, TagFilter, Tags};
 pub use peers::{News, NewsFeed, Peers};
 pub use priority::Priority;

@@ -1,7 +1,7 @@
 //! The interface to the table of work items.
 
 use super::{Workitem, WorkitemState};
-use crate::records::{StoreResult, Tenant, Timestamp};
+use crate::records::{Bounded, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Bytes of work items that are read at a time.
@@ -26,6 +26,14 @@ pub trait Worklist: Send + Sync + 'static {
 
     /// A tenant's item of that UID.
     async fn workitem(&self, tenant: &Tenant, uid: &str) -> StoreResult<Option<Workitem>>;
+
+    /// A tenant's item of that UID, if its attributes have no more than so many bytes.
+    async fn workitem_within(
+        &self,
+        tenant: &Tenant,
+        uid: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Workitem>>;
 
     /// Stores a changed item, unless another change came between: the stored revision is no longer
     /// that of `item`. Returns whether it was stored.

@@ -6,12 +6,12 @@ use super::pages::{push_page, push_tags};
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::scans::{note_upload, push_scan};
 use crate::database::{SqlStore, Transaction};
-use crate::query::{QueryBuilder, query};
+use crate::query::{Query, QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::records::{
-    AddedProduct, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage,
-    ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource, ScanFields, StoreResult,
-    StoredVolume, Tags, Tenant, Timestamp,
+    AddedProduct, Bounded, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
+    ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource, ScanFields,
+    StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 
 /// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
@@ -63,6 +63,11 @@ impl Select {
         }
     }
 
+    /// The bytes of a row that are of any size.
+    fn bytes(&self) -> String {
+        format!("CAST({} + {HELD_SIZE} AS BIGINT)", self.size)
+    }
+
     fn query(&self, columns: Columns) -> QueryBuilder {
         let Self { table, volume, .. } = self;
         let columns = match columns {
@@ -73,9 +78,7 @@ impl Select {
                      AS source_holds",
                 self.columns
             ),
-            Columns::Size => {
-                format!("h.sequence, CAST({} + {HELD_SIZE} AS BIGINT)", self.size)
-            }
+            Columns::Size => format!("h.sequence, {} AS bytes", self.bytes()),
         };
         QueryBuilder::new(format!(
             "SELECT {columns} FROM holdings AS h JOIN {table}
@@ -134,11 +137,22 @@ impl Catalogue for SqlStore {
     }
 
     async fn volume(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<StoredVolume>>> {
-        let row = one(&HELD_VOLUME, tenant, id)
+        let row = one(&HELD_VOLUME, Columns::All, tenant, id)
             .build()
             .fetch_optional(&self.readers)
             .await?;
         row.map(|row| rows::held(row, rows::volume)).transpose()
+    }
+
+    async fn volume_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Owned<StoredVolume>>> {
+        let record = |row| rows::held(row, rows::volume);
+        let (within, size) = one_within(&HELD_VOLUME, tenant, id, bytes);
+        rows::bounded(self, within, size, record).await
     }
 
     async fn plan_items(
@@ -201,11 +215,22 @@ impl Catalogue for SqlStore {
     }
 
     async fn product(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Owned<Product>>> {
-        let row = one(&HELD_PRODUCT, tenant, id)
+        let row = one(&HELD_PRODUCT, Columns::All, tenant, id)
             .build()
             .fetch_optional(&self.readers)
             .await?;
         row.map(|row| rows::held(row, rows::product)).transpose()
+    }
+
+    async fn product_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Owned<Product>>> {
+        let record = |row| rows::held(row, rows::product);
+        let (within, size) = one_within(&HELD_PRODUCT, tenant, id, bytes);
+        rows::bounded(self, within, size, record).await
     }
 
     async fn products(
@@ -311,13 +336,21 @@ impl Catalogue for SqlStore {
         row.map(|row| row.try_get(0)).transpose()
     }
 
-    async fn receipt(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Receipt>> {
-        let row = query("SELECT sequence, receipt FROM erasures WHERE tenant = $1 AND id = $2")
-            .bind(tenant.as_str())
-            .bind(id)
-            .fetch_optional(&self.readers)
-            .await?;
-        row.map(|row| Ok(rows::receipt(row)?.0)).transpose()
+    async fn receipt_within(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Receipt>> {
+        let one = |columns: &str, bounded: &str| {
+            let text =
+                format!("SELECT {columns} FROM erasures WHERE tenant = $1 AND id = $2{bounded}");
+            query(text).bind(tenant.as_str()).bind(id)
+        };
+        let within = one("sequence, receipt", " AND octet_length(receipt) <= $3");
+        let size = one("CAST(octet_length(receipt) AS BIGINT) AS bytes", "");
+        let within = within.bind(rows::bytes_bound(bytes));
+        rows::bounded(self, within, size, |row| Ok(rows::receipt(row)?.0)).await
     }
 
     async fn receipts(
@@ -365,14 +398,25 @@ impl Catalogue for SqlStore {
     }
 }
 
-/// The row of one item that a tenant has.
-fn one(select: &Select, tenant: &Tenant, id: &str) -> QueryBuilder {
-    let mut query = select.query(Columns::All);
+/// An item that a tenant has.
+fn one(select: &Select, columns: Columns, tenant: &Tenant, id: &str) -> QueryBuilder {
+    let mut query = select.query(columns);
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
     query.push(" AND h.id = ").push_bind(id.to_owned());
     query
+}
+
+/// The same if it has no more than so many bytes, and its bytes.
+fn one_within(select: &Select, tenant: &Tenant, id: &str, bytes: u64) -> (Query, Query) {
+    let mut within = one(select, Columns::All, tenant, id);
+    within.push(" AND ").push(&select.bytes()).push(" <= ");
+    within.push_bind(rows::bytes_bound(bytes));
+    (
+        within.build(),
+        one(select, Columns::Size, tenant, id).build(),
+    )
 }
 
 /// A page of the items of one kind that a tenant has.

@@ -29,9 +29,9 @@ use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
 use ventriform_service::records::{
-    Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter, JobOutcome,
-    JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan, Priority, Product,
-    QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
+    Bounded, Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter,
+    JobOutcome, JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan, Priority,
+    Product, QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
 };
 
 /// Number of last succeeded jobs whose durations are averaged.
@@ -209,6 +209,14 @@ impl JobStore for SqlStore {
             .fetch_optional(&self.readers)
             .await?;
         row.map(rows::job).transpose()
+    }
+
+    async fn job_within(&self, id: &str, bytes: u64) -> StoreResult<Bounded<Job>> {
+        let within = query("SELECT * FROM jobs WHERE id = $1 AND bytes <= $2")
+            .bind(id)
+            .bind(rows::bytes_bound(bytes));
+        let size = query("SELECT bytes FROM jobs WHERE id = $1").bind(id);
+        rows::bounded(self, within, size, rows::job).await
     }
 
     async fn plan_jobs(&self, filter: &JobFilter, page: ListRequest) -> StoreResult<PagePlan> {

@@ -1,12 +1,13 @@
 //! From rows of the database to the records of `jobs`, and JSON columns both ways.
 
-use crate::query::DbRow;
+use crate::database::SqlStore;
+use crate::query::{DbRow, Query};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ventriform_service::records::{
-    Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority, Product,
-    Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags, Tenant,
-    Timestamp,
+    Bounded, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority,
+    Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags,
+    Tenant, Timestamp,
 };
 
 pub(super) fn job(row: DbRow) -> StoreResult<Job> {
@@ -137,6 +138,27 @@ fn tags(row: &DbRow) -> StoreResult<Tags> {
     Ok(Tags {
         external_id: row.try_get("external_id")?,
         labels: json(row, "labels")?,
+    })
+}
+
+/// A number of bytes as a value of a statement.
+pub(super) fn bytes_bound(bytes: u64) -> i64 {
+    i64::try_from(bytes).unwrap_or(i64::MAX)
+}
+
+/// The row of one statement, or else its bytes by another, of which they are the column `bytes`.
+pub(super) async fn bounded<T>(
+    store: &SqlStore,
+    within: Query,
+    size: Query,
+    record: impl Fn(DbRow) -> StoreResult<T>,
+) -> StoreResult<Bounded<T>> {
+    if let Some(row) = within.fetch_optional(&store.readers).await? {
+        return record(row).map(Bounded::Read);
+    }
+    Ok(match size.fetch_optional(&store.readers).await? {
+        Some(row) => Bounded::Larger(unsigned(row.try_get("bytes")?)),
+        None => Bounded::Missing,
     })
 }
 

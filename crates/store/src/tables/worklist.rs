@@ -4,7 +4,7 @@ use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::records::{StoreError, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{Bounded, StoreError, StoreResult, Tenant, Timestamp};
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
@@ -43,6 +43,21 @@ impl Worklist for SqlStore {
             .fetch_optional(&self.readers)
             .await?;
         row.map(item_of).transpose()
+    }
+
+    async fn workitem_within(
+        &self,
+        tenant: &Tenant,
+        uid: &str,
+        bytes: u64,
+    ) -> StoreResult<Bounded<Workitem>> {
+        let one = |columns: &str, bounded: &str| {
+            let text =
+                format!("SELECT {columns} FROM workitems WHERE tenant = $1 AND uid = $2{bounded}");
+            query(text).bind(tenant.as_str()).bind(uid)
+        };
+        let within = one("*", " AND bytes <= $3").bind(rows::bytes_bound(bytes));
+        rows::bounded(self, within, one("bytes", ""), item_of).await
     }
 
     async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
