@@ -977,7 +977,8 @@ async fn a_row_is_read_within_its_bytes(on: &Stores) {
     let id = random_id(Resource::Volume.prefix());
     let mut volume = stored_volume(&id, 1_000);
     volume.facts = json!({"found": long});
-    let added = on.a.add_volume(&volume, &own, &Tags::default(), None);
+    let untagged = Tags::default();
+    let added = on.a.add_volume(&volume, &own, &untagged, None);
     assert!(added.await.unwrap());
     let bytes = size(store.volume_within(&own, &id, LEAST).await.unwrap());
     assert!((LEAST..LEAST + 1_000).contains(&bytes), "{bytes}");
@@ -993,7 +994,9 @@ async fn a_row_is_read_within_its_bytes(on: &Stores) {
     // A product by its parameters.
     let mut product = model(&id);
     product.parameters = object(json!({"cases": long}));
-    on.a.add_product(&product, &own, None, ROOM).await.unwrap();
+    on.a.add_product(&product, &own, None, AMPLE_ROOM)
+        .await
+        .unwrap();
     let bytes = size(
         store
             .product_within(&own, &product.id, LEAST)
@@ -1030,7 +1033,8 @@ async fn a_row_is_read_within_its_bytes(on: &Stores) {
     // A receipt.
     on.a.interrupt(&job.id, now()).await.unwrap();
     let expected = [id.clone(), product.id.clone()];
-    let erased = on.a.erase(&erasure(&id, true), &expected, now());
+    let cascading = erasure(&id, true);
+    let erased = on.a.erase(&cascading, &expected, now());
     let Erased::Done(receipt) = erased.await.unwrap() else {
         panic!("the volume is in use");
     };
@@ -1439,7 +1443,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     assert_eq!(due[0].attempts, 0);
     // It counts from its beginning.
     on.a.begun(&due[0].id, now()).await.unwrap();
-    let begun = on.b.due("https://own.example:443", now(), 10);
+    let begun = on.b.due_deliveries(&at_own, now(), 10);
     assert_eq!(begun.await.unwrap()[0].attempts, 1);
     on.a.settle(&due[0].id, again, now()).await.unwrap();
     assert!(
@@ -1618,7 +1622,7 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
         again_at: None,
     };
     on.a.send_begun(&due[0].id, now()).await.unwrap();
-    let begun = on.b.due_sends("pacs", now(), 10).await.unwrap();
+    let begun = on.b.due_sends(&pacs, now(), 10).await.unwrap();
     let begun = begun.iter().find(|send| send.id == due[0].id).unwrap();
     assert_eq!((due[0].attempts, begun.attempts), (0, 1));
     on.a.settle_send(&due[0].id, &stored, now()).await.unwrap();

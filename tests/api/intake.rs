@@ -181,13 +181,13 @@ async fn a_request_that_breaks_off_leaves_a_row_for_what_it_has_stored() {
     let address = app.url.trim_start_matches("http://").parse().unwrap();
     let mut stream = connect(address);
     let head = format!(
-        "POST /dicom-web/studies HTTP/1.1\r\nHost: {address}\r\nContent-Type: {RELATED}\r\n\
+        "POST /dicom-web/studies HTTP/1.1\r\nHost: {address}\r\nContent-Type: {RELATED_TYPE}\r\n\
          Content-Length: {}\r\n\r\n",
         body.len() + 1000
     );
     stream.write_all(head.as_bytes()).unwrap();
     stream.write_all(&body).unwrap();
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + EVENT_PATIENCE;
     while intake(&app).await.is_empty() {
         assert!(Instant::now() < deadline, "nothing is stored");
         tokio::time::sleep(Duration::from_millis(10)).await;

@@ -560,7 +560,7 @@ async fn one_large_row_is_charged_before_it_is_read() {
         let body = begin.chain(futures::stream::pending());
         let sent = app
             .post("/v1/templates?name=t&organ=generic")
-            .header(FORWARDED, "192.0.2.1")
+            .header(FORWARDED_HEADER, "192.0.2.1")
             .header("content-type", "application/json")
             .body(reqwest::Body::wrap_stream(body))
             .send();
@@ -571,7 +571,7 @@ async fn one_large_row_is_charged_before_it_is_read() {
     let item = async |client: &str, uid: &str| {
         let item = app
             .get(&format!("/dicom-web/workitems/{uid}"))
-            .header(FORWARDED, client);
+            .header(FORWARDED_HEADER, client);
         item.send().await.unwrap()
     };
     assert_eq!(

@@ -25,6 +25,7 @@ use ventriform_service::access::Activity;
 use ventriform_service::config::Size;
 use ventriform_service::error::ServiceError;
 use ventriform_service::items::{TemplateSource, check_name};
+use ventriform_service::library::GivenMesh;
 use ventriform_service::records::{Resource, Tenant};
 use ventriform_service::work::TEMPLATE_BYTES;
 
@@ -171,22 +172,19 @@ pub async fn create_template(
         .require_product_room(tenant, Resource::Template)
         .await?;
     let body = bytes_of(request, &MESH_TYPES).await?;
-    let (mesh, volume) = given_mesh(&app, tenant, model, body).await?;
+    let (bytes, volume) = given_mesh(&app, tenant, model, body).await?;
+    let mesh = GivenMesh {
+        organ: organ.as_str().to_owned(),
+        bytes,
+        stated,
+    };
     let source = TemplateSource {
         tenant,
         name,
         volume: volume.as_deref(),
         library: query.library,
     };
-    let added_template = service.add_template(
-        &caller.by,
-        source,
-        organ.as_str(),
-        mesh,
-        stated,
-        caller.quota,
-        &counting,
-    );
+    let added_template = service.add_template(&caller.by, source, mesh, caller.quota, &counting);
     let (template, new) = added_template.await?;
     let body = TemplateBody::from(Presented::of(&app, template));
     Ok(added(new, &body.id, &body))

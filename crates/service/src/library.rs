@@ -23,6 +23,16 @@ const LIMITS_MEMORY_PER_BYTE: u64 = 26;
 /// A product with its owner's record, and whether it is new.
 pub type Added = (Owned<Product>, bool);
 
+/// A mesh that is given to become a template.
+pub struct GivenMesh {
+    /// The organ that it shows.
+    pub organ: String,
+    /// Its file.
+    pub bytes: Bytes,
+    /// What is stated of it where the file does not say it.
+    pub stated: MeshStatement,
+}
+
 /// The act of adding a product.
 fn added_by((product, new): &Added) -> Option<Done> {
     Some((Activity::of_added(*new), product.item.id.clone()))
@@ -40,7 +50,7 @@ impl From<NotAdded> for ServiceError {
 }
 
 impl Service {
-    /// Adds a mesh in any format as a template of that organ, for `by`.
+    /// Adds a mesh in any format as a template of its organ, for `by`.
     ///
     /// # Errors
     /// If the mesh or the name cannot be used, the tenant has no room for it, or the storage fails.
@@ -48,19 +58,17 @@ impl Service {
         &self,
         by: &Agent,
         source: TemplateSource<'_>,
-        organ: &str,
-        mesh: Bytes,
-        stated: MeshStatement,
+        mesh: GivenMesh,
         quota: Quota,
         _counting: &Counting,
     ) -> Result<Added, ServiceError> {
-        let bytes = mesh.len() as u64;
+        let bytes = mesh.bytes.len() as u64;
         let memory = LITTLE_MEMORY + MEMORY_PER_BYTE * bytes;
-        let (reader, shows) = (self.engine.reader.clone(), organ.to_owned());
-        let make = move |_: &Monitor<'_>| reader.template(&mesh, &shows, &stated);
+        let (reader, organ) = (self.engine.reader.clone(), mesh.organ.clone());
+        let make = move |_: &Monitor<'_>| reader.template(&mesh.bytes, &mesh.organ, &mesh.stated);
         let output = self.decoding.run_on(bytes, memory, make).await??;
         let room = self.product_room(Resource::Template, quota);
-        let (items, organ) = (self.items().clone(), organ.to_owned());
+        let items = self.items().clone();
         let (tenant, name) = (source.tenant.clone(), source.name.to_owned());
         let (volume, library) = (source.volume.map(str::to_owned), source.library);
         let add = async move {
