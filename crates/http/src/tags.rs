@@ -10,7 +10,6 @@ use super::memory::end_rows;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
 use axum::extract::Request;
-use axum::http::{StatusCode, header};
 use futures::future::BoxFuture;
 use serde::Deserialize;
 use serde_json::{Map, Value};
@@ -139,13 +138,7 @@ pub async fn change<'a>(
             return Ok(());
         }
     }
-    Err(Problem::new(
-        StatusCode::SERVICE_UNAVAILABLE,
-        "busy",
-        "Other requests change the tags all the time.",
-    )
-    .fix("Send the patch again.")
-    .header(header::RETRY_AFTER, "1"))
+    Err(Problem::contended("these tags"))
 }
 
 /// The tags after a JSON merge patch: what is `null` goes, what is absent stays.

@@ -65,9 +65,6 @@ const CHANGE_TRIES: u32 = 20;
 /// of many requests spread.
 const CHANGE_PAUSE: Duration = Duration::from_millis(2);
 
-/// Pause before a change is asked for again that all tries have failed, seconds.
-const CHANGE_RETRY_S: &str = "1";
-
 /// The query of a new work item.
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -453,13 +450,7 @@ async fn change(
         // It is read anew.
         end_rows(0).await;
     }
-    Err(Problem::new(
-        StatusCode::SERVICE_UNAVAILABLE,
-        "busy",
-        "Other requests change this work item at the same time, so it was not changed.",
-    )
-    .fix("Send the request again after the number of seconds in Retry-After.")
-    .header(header::RETRY_AFTER, CHANGE_RETRY_S))
+    Err(Problem::contended("this work item"))
 }
 
 /// An item's attributes as they are stored.

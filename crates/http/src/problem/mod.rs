@@ -30,6 +30,9 @@ use ventriform_service::error::ServiceError;
 /// The media type of problem objects.
 pub const MEDIA_TYPE: &str = "application/problem+json";
 
+/// Pause before a change is sent again that others came before, seconds.
+const CONTENDED_RETRY_S: &str = "1";
+
 const TYPE_PREFIX: &str = "urn:ventriform:problem:";
 
 /// Why a request was not fulfilled (RFC 9457).
@@ -100,6 +103,15 @@ impl Problem {
     /// 422: the value of `field` cannot be used.
     pub fn invalid_field(field: &str, detail: impl Into<String>) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-field", detail).at(field)
+    }
+
+    /// 503: other requests change the same thing all the time, so that it was not changed.
+    pub fn contended(what: &str) -> Self {
+        let detail =
+            format!("Other requests change {what} at the same time, so that was not changed.");
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "busy", detail)
+            .fix("Send the request again after the number of seconds in Retry-After.")
+            .header(header::RETRY_AFTER, CONTENDED_RETRY_S)
     }
 
     /// 500. The cause goes to the log only.
