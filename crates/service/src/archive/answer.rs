@@ -32,11 +32,20 @@ pub(super) enum Read {
 /// Longest text that is kept, bytes: a UID has no more (PS3.5, 9.1).
 pub(super) const TEXT_BYTES: usize = 64;
 
-/// The value at the end of that path in a JSON value.
+/// A value, and how far a path to it leads.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Found {
+    /// Number of steps of the path, from its beginning, that lead to a value.
+    pub steps: usize,
+    /// The value at its end.
+    pub value: Read,
+}
+
+/// The value at the end of that path in a JSON value, and how far the path leads.
 ///
 /// # Errors
 /// If it is no JSON.
-pub(super) fn read(json: &[u8], path: &[Step]) -> serde_json::Result<Read> {
+pub(super) fn find(json: &[u8], path: &[Step]) -> serde_json::Result<Found> {
     whole(json, At(path))
 }
 
@@ -62,40 +71,58 @@ fn whole<'de, S: DeserializeSeed<'de>>(json: &'de [u8], seed: S) -> serde_json::
 struct At<'p>(&'p [Step]);
 
 impl At<'_> {
-    /// The value of a text, number or the like: `value` where the path ends at it, else nothing.
-    fn scalar(self, value: Read) -> Read {
-        if self.0.is_empty() {
-            value
-        } else {
-            Read::Nothing
+    /// A text, number or the like: `value` where the path ends at it, else nothing.
+    fn scalar(self, value: Read) -> Found {
+        Found {
+            steps: 0,
+            value: if self.0.is_empty() {
+                value
+            } else {
+                Read::Nothing
+            },
+        }
+    }
+}
+
+impl Found {
+    const NOTHING: Self = Self {
+        steps: 0,
+        value: Read::Nothing,
+    };
+
+    /// The same, one step further from the beginning.
+    fn deeper(self) -> Self {
+        Self {
+            steps: self.steps + 1,
+            ..self
         }
     }
 }
 
 impl<'de> DeserializeSeed<'de> for At<'_> {
-    type Value = Read;
+    type Value = Found;
 
-    fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Read, D::Error> {
+    fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<Found, D::Error> {
         deserializer.deserialize_any(self)
     }
 }
 
 impl<'de> Visitor<'de> for At<'_> {
-    type Value = Read;
+    type Value = Found;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a JSON value")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Read, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Found, A::Error> {
         let Some((Step::Member(name), path)) = self.0.split_first() else {
             while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
             return Ok(self.scalar(Read::Other));
         };
-        let mut found = Read::Nothing;
+        let mut found = Found::NOTHING;
         while let Some(named) = map.next_key_seed(Named(name))? {
             if named {
-                found = map.next_value_seed(At(path))?;
+                found = map.next_value_seed(At(path))?.deeper();
             } else {
                 map.next_value::<IgnoredAny>()?;
             }
@@ -103,11 +130,11 @@ impl<'de> Visitor<'de> for At<'_> {
         Ok(found)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut array: A) -> Result<Read, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut array: A) -> Result<Found, A::Error> {
         let found = match self.0.split_first() {
             Some((Step::First, path)) => {
                 let first = array.next_element_seed(At(path))?;
-                first.unwrap_or(Read::Nothing)
+                first.map_or(Found::NOTHING, Found::deeper)
             }
             _ => self.scalar(Read::Other),
         };
@@ -115,30 +142,30 @@ impl<'de> Visitor<'de> for At<'_> {
         Ok(found)
     }
 
-    fn visit_str<E>(self, text: &str) -> Result<Read, E> {
+    fn visit_str<E>(self, text: &str) -> Result<Found, E> {
         if self.0.is_empty() && text.len() <= TEXT_BYTES {
-            return Ok(Read::Text(text.to_owned()));
+            return Ok(self.scalar(Read::Text(text.to_owned())));
         }
         Ok(self.scalar(Read::Other))
     }
 
-    fn visit_u64<E>(self, number: u64) -> Result<Read, E> {
+    fn visit_u64<E>(self, number: u64) -> Result<Found, E> {
         Ok(self.scalar(Read::Number(number)))
     }
 
-    fn visit_i64<E>(self, _: i64) -> Result<Read, E> {
+    fn visit_i64<E>(self, _: i64) -> Result<Found, E> {
         Ok(self.scalar(Read::Other))
     }
 
-    fn visit_f64<E>(self, _: f64) -> Result<Read, E> {
+    fn visit_f64<E>(self, _: f64) -> Result<Found, E> {
         Ok(self.scalar(Read::Other))
     }
 
-    fn visit_bool<E>(self, _: bool) -> Result<Read, E> {
+    fn visit_bool<E>(self, _: bool) -> Result<Found, E> {
         Ok(self.scalar(Read::Other))
     }
 
-    fn visit_unit<E>(self) -> Result<Read, E> {
+    fn visit_unit<E>(self) -> Result<Found, E> {
         Ok(self.scalar(Read::Other))
     }
 }
@@ -193,7 +220,7 @@ impl<'de> Visitor<'de> for Listed<'_> {
     fn visit_seq<A: SeqAccess<'de>>(self, mut array: A) -> Result<Vec<String>, A::Error> {
         let mut texts = Vec::new();
         while let Some(found) = array.next_element_seed(self.at)? {
-            let Read::Text(text) = found else {
+            let Read::Text(text) = found.value else {
                 return Err(A::Error::custom("an entry without the text"));
             };
             if texts.len() == self.most {

@@ -3,7 +3,7 @@
 //! Redirects are followed within the archive's own scheme, host and port only. For a URL without a
 //! configured archive, connections go to the addresses that the guard has checked.
 
-use super::answer::{Read, Step, listed, read};
+use super::answer::{Read, Step, find, listed};
 use super::parts::{PartLimits, SeriesParts};
 use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
@@ -340,40 +340,38 @@ fn uids(answer: &[u8], most: usize) -> Option<Vec<String>> {
 /// The outcome for the only object in an answer to STOW-RS (PS3.18, 10.5.3; Store Instances Response
 /// Module, PS3.18 annex I).
 fn judge(status: StatusCode, answer: &[u8]) -> Result<Stored, Trouble> {
-    let failed = [
+    /// To the reason why the first object failed. The first steps lead to that object.
+    const REASON: [Step; 6] = [
         Step::Member(FAILED_SOP_SEQUENCE),
         Step::Member("Value"),
         Step::First,
-    ];
-    let json = read(answer, &failed).ok();
-    if matches!(json, None | Some(Read::Nothing)) {
-        let said = match status {
-            StatusCode::OK => json.is_some() || answer.is_empty() || is_xml_without_failure(answer),
-            StatusCode::ACCEPTED => json.is_some(),
-            _ => false,
-        };
-        return if said {
-            Ok(Stored::Now)
-        } else {
-            Err(Trouble::passing(
-                "The archive did not say whether it has stored the object.",
-            ))
-        };
-    }
-    let [sequence, value, first] = failed;
-    let reason = [
-        sequence,
-        value,
-        first,
         Step::Member(FAILURE_REASON),
         Step::Member("Value"),
         Step::First,
     ];
-    let reason = match read(answer, &reason) {
-        Ok(Read::Number(reason)) => u16::try_from(reason).ok(),
-        _ => None,
-    };
-    store_failure(reason)
+    const STEPS_TO_FAILED: usize = 3;
+    let found = find(answer, &REASON).ok();
+    match found {
+        Some(found) if found.steps >= STEPS_TO_FAILED => store_failure(match found.value {
+            Read::Number(reason) => u16::try_from(reason).ok(),
+            _ => None,
+        }),
+        _ => {
+            let is_json = found.is_some();
+            let said = match status {
+                StatusCode::OK => is_json || answer.is_empty() || is_xml_without_failure(answer),
+                StatusCode::ACCEPTED => is_json,
+                _ => false,
+            };
+            if said {
+                Ok(Stored::Now)
+            } else {
+                Err(Trouble::passing(
+                    "The archive did not say whether it has stored the object.",
+                ))
+            }
+        }
+    }
 }
 
 /// Whether it is the Native DICOM Model (PS3.19 A.1) of a response that lists no failure.
