@@ -2220,11 +2220,42 @@ async fn everything_stored_counts_for_its_tenant(on: &Stores) {
     };
     let filed = on.file(&new_job(&volume)).await;
     let of_job = bytes(&tenant()).await - before - size;
+    let texts = on.b.text_bytes(&new_job(&volume)).unwrap();
+    assert_eq!(of_job, 2048 + texts);
     assert!((2048..2500).contains(&of_job), "{of_job}");
     let with_tags = on.file(&tagged).await;
     let added = bytes(&tenant()).await - before - size - of_job;
     assert_eq!(added, of_job + 207, "the text of the labels in UTF-8");
-    for job in [filed, with_tags] {
+    let all_texts = NewJob {
+        parameters: object(json!({"\u{e4}": [1, 2.5, "\u{1f9e1}"]})),
+        needs: [("expert".to_owned(), volume.clone())].into(),
+        tags: Tags {
+            external_id: Some("\u{e4}".into()),
+            ..tagged.tags.clone()
+        },
+        volume: None,
+        source: Some(SeriesSource {
+            archive: Some("pacs".into()),
+            dicomweb: None,
+            study: "1.2".into(),
+            series: "1.2.3".into(),
+        }),
+        send: Some(SendOrder {
+            names: vec!["mesh.dcm".into()],
+            to: "pacs".into(),
+        }),
+        webhook: Some(JobWebhook {
+            url: "https://own.example/\u{e4}".into(),
+            destination: "https://own.example:443".into(),
+            events: vec!["failed".into()],
+            secret: None,
+        }),
+        ..new_job(&volume)
+    };
+    let with_all = on.file(&all_texts).await;
+    let added = bytes(&tenant()).await - before - size - of_job - added;
+    assert_eq!(added, 2048 + on.b.text_bytes(&all_texts).unwrap());
+    for job in [filed, with_tags, with_all] {
         on.a.interrupt(&job.id, now()).await.unwrap();
         on.a.delete_job(&job.id, now()).await.unwrap();
     }

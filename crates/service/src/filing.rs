@@ -192,7 +192,8 @@ impl Service {
     /// Counts the texts of a job that is about to be filed. Those of one that is filed already, told by its
     /// idempotency key, add nothing.
     async fn count(&self, job: &NewJob, counting: &Counting) -> Result<(), ServiceError> {
-        let counted = counting.arrived(job.text_bytes()).await;
+        let bytes = self.queue.table().text_bytes(job)?;
+        let counted = counting.arrived(bytes).await;
         let key = job.idempotency.as_ref().map(|promise| &*promise.key);
         match counted {
             Err(_) if self.is_filed(&job.tenant, key).await? => Ok(()),

@@ -169,27 +169,6 @@ pub struct NewJob {
     pub storage_limit: Option<u64>,
 }
 
-impl NewJob {
-    /// Bytes of the texts that are stored with the job, beside its record: as the database counts them.
-    pub fn text_bytes(&self) -> u64 {
-        let bytes = [
-            stored_bytes(&self.parameters),
-            stored_bytes(&self.needs),
-            stored_bytes(&self.tags.labels),
-            self.tags.external_id.as_ref().map_or(0, String::len),
-            self.webhook.as_ref().map_or(0, stored_bytes),
-            self.source.as_ref().map_or(0, stored_bytes),
-            self.send.as_ref().map_or(0, stored_bytes),
-        ];
-        bytes.iter().map(|bytes| *bytes as u64).sum()
-    }
-}
-
-/// Bytes of a value as JSON.
-fn stored_bytes(value: &impl Serialize) -> usize {
-    serde_json::to_string(value).map_or(0, |text| text.len())
-}
-
 /// Where a job is told about, as it is stored with the job. `Debug` does not show it.
 #[derive(Clone, PartialEq, Eq, Serialize)]
 pub struct JobWebhook {

@@ -101,6 +101,9 @@ pub trait JobStore: Send + Sync + 'static {
     /// another needed item does not exist, or the idempotency key was used before.
     async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> StoreResult<Filed>;
 
+    /// Bytes of the texts that are stored with a job, beside its record: as the table counts them.
+    fn text_bytes(&self, job: &NewJob) -> StoreResult<u64>;
+
     /// Whether the queue has room for one more job of that tenant: fewer than `queue_limit` jobs wait, or the
     /// tenant has less than its equal share of them.
     async fn has_room(&self, tenant: &Tenant, queue_limit: usize) -> StoreResult<bool>;

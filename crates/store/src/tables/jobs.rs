@@ -134,6 +134,36 @@ pub(super) async fn renew_volumes(
     Ok(())
 }
 
+/// The JSON that is stored with a new job. The column `bytes` counts it, and the external id.
+struct JobTexts {
+    parameters: String,
+    needs: String,
+    labels: String,
+    webhook: Option<String>,
+    source: Option<String>,
+    send: Option<String>,
+}
+
+impl JobTexts {
+    fn of(job: &NewJob) -> StoreResult<Self> {
+        Ok(Self {
+            parameters: to_json(&job.parameters)?,
+            needs: to_json(&job.needs)?,
+            labels: to_json(&job.tags.labels)?,
+            webhook: job.webhook.as_ref().map(to_json).transpose()?,
+            source: job.source.as_ref().map(to_json).transpose()?,
+            send: job.send.as_ref().map(to_json).transpose()?,
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        let given = [&self.webhook, &self.source, &self.send];
+        let given = given.into_iter().flatten();
+        let all = given.chain([&self.parameters, &self.needs, &self.labels]);
+        all.map(String::len).sum()
+    }
+}
+
 #[async_trait]
 impl JobStore for SqlStore {
     async fn file(&self, job: &NewJob, queue_limit: usize, now: Timestamp) -> StoreResult<Filed> {
@@ -142,6 +172,7 @@ impl JobStore for SqlStore {
         }
         self.require_room()?;
         let id = random_id(Resource::Job.prefix());
+        let texts = JobTexts::of(job)?;
         let key = job.idempotency.as_ref();
         let mut transaction = self.writer.begin().await?;
         let inserted = query(format!(
@@ -162,19 +193,19 @@ impl JobStore for SqlStore {
         .bind(&id)
         .bind(&job.kind)
         .bind(job.volume.as_deref().unwrap_or_default())
-        .bind(to_json(&job.parameters)?)
+        .bind(&texts.parameters)
         .bind(now)
         .bind(key.map(|k| stored_key(&job.tenant, &k.key)))
         .bind(key.map(|k| &k.fingerprint))
         .bind(i64::try_from(queue_limit).unwrap_or(i64::MAX))
-        .bind(to_json(&job.needs)?)
+        .bind(&texts.needs)
         .bind(job.tenant.as_str())
         .bind(&job.tags.external_id)
-        .bind(to_json(&job.tags.labels)?)
-        .bind(job.webhook.as_ref().map(to_json).transpose()?)
+        .bind(&texts.labels)
+        .bind(&texts.webhook)
         .bind(&job.trace_parent)
-        .bind(job.source.as_ref().map(to_json).transpose()?)
-        .bind(job.send.as_ref().map(to_json).transpose()?)
+        .bind(&texts.source)
+        .bind(&texts.send)
         .bind(job.priority.rank())
         .bind(job.storage_limit.map(|limit| i64::try_from(limit).unwrap_or(i64::MAX)))
         .fetch_optional(&mut transaction)
@@ -191,6 +222,11 @@ impl JobStore for SqlStore {
             return Ok(earlier);
         }
         Ok(self.missing(job).await?.unwrap_or(Filed::QueueFull))
+    }
+
+    fn text_bytes(&self, job: &NewJob) -> StoreResult<u64> {
+        let external_id = job.tags.external_id.as_ref().map_or(0, String::len);
+        Ok((JobTexts::of(job)?.bytes() + external_id) as u64)
     }
 
     async fn has_room(&self, tenant: &Tenant, queue_limit: usize) -> StoreResult<bool> {
