@@ -318,7 +318,8 @@ settings! {
     /// kept until something is written; `0B` keeps none
     answer_memory: Size = "8MiB";
     /// Memory that bodies of requests and answers take together, shared out between tenants and between the
-    /// clients of each: one client alone has at most a third of it, an anonymous one half. Requests beyond that wait for two seconds, then they are answered with status 503
+    /// clients of each: one client alone has at most a third of it, an anonymous one half. Requests beyond
+    /// that wait for two seconds, then they are answered with status 503
     request_memory: Size = "128MiB";
     /// Threads for work that blocks (files, decoding); more of it waits for one. `auto` is 64. Each takes up to
     /// 2 MiB of memory
