@@ -8,6 +8,7 @@ processor time. Meanwhile another client, told apart by a trusted proxy's header
 uploads; it must be answered within two seconds (more where `--patience` says so, for slow programs), and the
 service must live and be what it was when the attack is over. Uses the standard library alone."""
 import argparse
+import http.server
 import json
 import os
 import random
@@ -21,8 +22,13 @@ import threading
 import time
 import urllib.error
 import urllib.request
+import zlib
 
 GIB = 1 << 30
+NM_CLASS, PET_CLASS = b"1.2.840.10008.5.1.4.1.1.20", b"1.2.840.10008.5.1.4.1.1.128"
+EXPLICIT, IMPLICIT, DEFLATED = b"1.2.840.10008.1.2.1", b"1.2.840.10008.1.2", b"1.2.840.10008.1.2.1.99"
+JSON = {"content-type": "application/json"}
+ATTACKER = {"X-Forwarded-For": "192.0.2.66"}
 HOST = b"Host: localhost\r\nX-Forwarded-For: 192.0.2.66\r\n"
 HONEST = {"X-Forwarded-For": "192.0.2.7"}
 
@@ -35,11 +41,11 @@ def free_port():
 
 class Service:
     def __init__(self, program, folder, *arguments):
-        self.port, self.folder = free_port(), folder
+        self.port, self.dicom_port, self.folder = free_port(), free_port(), folder
         self.url = f"http://127.0.0.1:{self.port}"
         self.log = open(folder + ".log", "wb")
         command = ["prlimit", f"--data={GIB}", "--cpu=60", "--nofile=16384", program, "serve", "--listen", f"127.0.0.1:{self.port}",
-                   "--data-dir", folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", *arguments]
+                   "--data-dir", folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", "--dicom-listen", f"127.0.0.1:{self.dicom_port}", *arguments]
         self.process = subprocess.Popen(command, stdout=self.log, stderr=subprocess.STDOUT)
         end = time.time() + 30
         while time.time() < end and self.process.poll() is None:
@@ -196,9 +202,6 @@ def few_threads(service):
     return f"{said}, {max(most)} threads, {before} before"
 
 
-FLAGS = {few_threads: ["--blocking-threads", str(BLOCKING_THREADS)]}
-
-
 def half_json(service):
     body = b"[" + b" " * 230_000
     paths = ["/v1/jobs", "/v1/keys", "/v1/templates?name=t", "/v1/readers", "/dicom-web/workitems", "/v1/webhooks"]
@@ -269,28 +272,35 @@ def wavelet_frame(side):
     return out + struct.pack(">HHHIBB", 0xFF90, 10, 0, 14 + len(packet), 0, 1) + b"\xff\x93" + bytes(packet) + b"\xff\xd9"
 
 
+def element(group, number, vr, value):
+    """An element of a data set in Explicit VR Little Endian."""
+    value += (b"\0" if vr in (b"UI", b"SQ", b"AT", b"US") else b" ") * (len(value) % 2)
+    length = struct.pack("<HI", 0, len(value)) if vr == b"SQ" else struct.pack("<H", len(value))
+    return struct.pack("<HH", group, number) + vr + length + value
+
+
+def file_start(syntax, sop_class=NM_CLASS, instance=b"1.2.3.4"):
+    """The beginning of a file in the form of PS3.10."""
+    meta = b"".join([element(2, 2, b"UI", sop_class), element(2, 3, b"UI", instance), element(2, 0x10, b"UI", syntax)])
+    return bytes(128) + b"DICM" + element(2, 0, b"UL", struct.pack("<I", len(meta))) + meta
+
+
 def dicom_image(syntax, side, frames, frame):
     """A Nuclear Medicine Image whose frames are all `frame`, of 16 bits."""
-    def element(group, number, vr, value):
-        value += (b"\0" if vr in (b"UI", b"SQ", b"AT", b"US") else b" ") * (len(value) % 2)
-        length = struct.pack("<HI", 0, len(value)) if vr == b"SQ" else struct.pack("<H", len(value))
-        return struct.pack("<HH", group, number) + vr + length + value
-
     def item(content):
         content += b"\0" * (len(content) % 2)
         return b"\xfe\xff\x00\xe0" + struct.pack("<I", len(content)) + content
 
     us = lambda *numbers: struct.pack(f"<{len(numbers)}H", *numbers)
     place = element(0x20, 0x32, b"DS", b"0\\0\\0") + element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0")
-    meta = b"".join([element(2, 2, b"UI", b"1.2.840.10008.5.1.4.1.1.20"), element(2, 3, b"UI", b"1.2.3.4"), element(2, 0x10, b"UI", syntax)])
-    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"), element(8, 0x16, b"UI", b"1.2.840.10008.5.1.4.1.1.20"),
+    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"), element(8, 0x16, b"UI", NM_CLASS),
             element(8, 0x18, b"UI", b"1.2.3.4"), element(8, 0x60, b"CS", b"NM"), element(0x18, 0x50, b"DS", b"4"), element(0x18, 0x88, b"DS", b"4"),
             element(0x28, 2, b"US", us(1)), element(0x28, 8, b"IS", str(frames).encode()), element(0x28, 9, b"AT", b"\x54\0\x80\0"),
             element(0x28, 0x10, b"US", us(side)), element(0x28, 0x11, b"US", us(side)), element(0x28, 0x30, b"DS", b"4\\4"),
             element(0x28, 0x100, b"US", us(16)), element(0x28, 0x101, b"US", us(16)), element(0x28, 0x102, b"US", us(15)),
             element(0x28, 0x103, b"US", us(0)), element(0x54, 0x22, b"SQ", item(place)), element(0x54, 0x80, b"US", us(*range(1, frames + 1)))]
     pixels = struct.pack("<HH", 0x7FE0, 0x10) + b"OB\0\0\xff\xff\xff\xff" + item(b"") + item(frame) * frames + b"\xfe\xff\xdd\xe0" + bytes(4)
-    return bytes(128) + b"DICM" + element(2, 0, b"UL", struct.pack("<I", len(meta))) + meta + b"".join(data) + pixels
+    return file_start(syntax) + b"".join(data) + pixels
 
 
 def wavelets(service, count=24, seconds=8):
@@ -326,7 +336,283 @@ def wavelet_voxels(service, count=40, seconds=8):
     return held(service, lambda number: requests[number % 2], count, seconds)
 
 
-ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, few_threads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads]
+def together(count, ask):
+    """The statuses of `count` requests that are sent at the same time."""
+    answers = []
+
+    def send(number):
+        try:
+            answers.append(ask(number)[0])
+        except OSError as error:
+            answers.append(type(error).__name__)
+
+    senders = [threading.Thread(target=send, args=(number,), daemon=True) for number in range(count)]
+    for sender in senders:
+        sender.start()
+    for sender in senders:
+        sender.join(60)
+    return {status: answers.count(status) for status in sorted(set(answers), key=str)}
+
+
+def little_objects(size, head):
+    """A JSON document whose text of `size` bytes takes much memory as a tree of values."""
+    return head + b",".join([b'{"":0}'] * ((size - len(head)) // 7)) + b"]}"
+
+
+def stored_scan(service, scan=None):
+    status, body = service.ask("POST", "/v1/volumes", scan or nifti(), {"content-type": "application/octet-stream"})
+    assert status in (200, 201), (status, body)
+    return json.loads(body)["id"]
+
+
+def cohort(volume, number, cases=1000):
+    """A job as large as a client can make it."""
+    case = {"volume": volume, "sex": "F", "protocol": "r" * 40, "tracer": "t" * 40, "attenuation_corrected": True, "healthy": True}
+    body = {"name": f"n{number}", "priority": "bulk", "cases": [dict(case, case=str(row)) for row in range(cases)]}
+    return json.dumps(body, separators=(",", ":")).encode()
+
+
+def hostile_archive(service, seconds=5):
+    """Fetches from an archive that answers each search with 16 MiB of `{"":0},`."""
+    answer = b"[" + b",".join([b'{"":0}'] * ((16 << 20) // 7)) + b"]"
+    asked = []
+
+    class Handler(http.server.BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_GET(self):
+            asked.append(self.path)
+            try:
+                self.send_response(200)
+                self.send_header("content-type", "application/dicom+json")
+                self.send_header("content-length", str(len(answer)))
+                self.end_headers()
+                self.wfile.write(answer)
+            except OSError:
+                self.close_connection = True
+
+        def log_message(self, *_):
+            pass
+
+    server = http.server.ThreadingHTTPServer(("0.0.0.0", 0), Handler)
+    server.daemon_threads = True
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    for number in range(8):
+        # Each is an archive of its own.
+        source = {"dicomweb": f"http://127.1.1.{number + 1}:{server.server_port}/dw", "study": "1.2.3", "series": f"1.2.3.{number + 1}"}
+        order = {"kind": "model", "source": source, "parameters": {"points": 67}}
+        status, body = service.ask("POST", "/v1/jobs", json.dumps(order).encode(), JSON)
+        assert status == 202, (status, body)
+    time.sleep(seconds)
+    server.shutdown()
+    assert asked, "the archive was not asked"
+    return f"{len(asked)} answers of {len(answer) >> 20} MiB"
+
+
+def huge_normals(service):
+    """Documents of normal limits, as large as they may be."""
+    body = little_objects(15 << 20, b'{"format":"ventriform-normals","groups":[')
+    said = together(4, lambda number: service.ask("POST", f"/v1/normals?name=n{number}", body, dict(JSON, **ATTACKER), 60))
+    return f"answers {said}"
+
+
+def profiles(service):
+    """Readers' profiles, as large as they may be."""
+    body = little_objects((1 << 20) - 100, b'{"format":"ventriform-reader","a":[')
+    said = together(64, lambda number: service.ask("POST", f"/v1/readers?name=r{number}", body, dict(JSON, **ATTACKER), 60))
+    return f"answers {said}"
+
+
+def large_jobs(service):
+    """Lists of jobs of a thousand cases each, asked for and not read."""
+    volume = stored_scan(service)
+    for number in range(60):
+        status, body = service.ask("POST", "/v1/normals", cohort(volume, number), JSON)
+        assert status == 202, (status, body[:300])
+    return held(service, lambda number: head("GET", f"/v1/jobs?limit={(100, 20)[number % 2]}"), 20, 4)
+
+
+def half_patches(service):
+    """Patches of the names of a large job, and of others', that do not come."""
+    volume = stored_scan(service)
+    status, body = service.ask("POST", "/v1/normals", cohort(volume, 0), JSON)
+    assert status == 202, (status, body[:300])
+    paths = [f"/v1/jobs/{json.loads(body)['id']}", f"/v1/volumes/{volume}"]
+    return held(service, lambda number: head("PATCH", paths[number % 2], 20, "application/json"), 900, 4)
+
+
+def pet_slice(number):
+    """One of many slices of a PET scan."""
+    us = lambda value: struct.pack("<H", value)
+    instance = f"1.2.9.{number + 1}".encode()
+    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY"), element(8, 0x16, b"UI", PET_CLASS), element(8, 0x18, b"UI", instance), element(8, 0x60, b"CS", b"PT"),
+            element(0x18, 0x50, b"DS", b"1"), element(0x20, 0xD, b"UI", b"1.2.9"), element(0x20, 0xE, b"UI", b"1.2.9.9"),
+            element(0x20, 0x13, b"IS", str(number + 1).encode()), element(0x20, 0x32, b"DS", f"0\\0\\{number}".encode()),
+            element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0"), element(0x20, 0x52, b"UI", b"1.2.9.2"), element(0x28, 2, b"US", us(1)),
+            element(0x28, 4, b"CS", b"MONOCHROME2"), element(0x28, 0x10, b"US", us(8)), element(0x28, 0x11, b"US", us(8)),
+            element(0x28, 0x30, b"DS", b"4\\4"), element(0x28, 0x100, b"US", us(16)), element(0x28, 0x101, b"US", us(16)),
+            element(0x28, 0x102, b"US", us(15)), element(0x28, 0x103, b"US", us(0)), element(0x28, 0x1052, b"DS", b"0"), element(0x28, 0x1053, b"DS", b"1"),
+            struct.pack("<HH2sHI", 0x7FE0, 0x10, b"OW", 0, 128) + struct.pack("<64H", *range(number, number + 64))]
+    return file_start(EXPLICIT, PET_CLASS, instance) + b"".join(data)
+
+
+def late_bodies(service, slices=1500):
+    """Bodies of identities and names of a volume of many slices, of which the last byte is missing."""
+    parts = []
+    for number in range(slices):
+        disposition = f'Content-Disposition: form-data; name="f"; filename="{number}.dcm"'.encode()
+        parts.append(b"--B\r\n" + disposition + b"\r\n\r\n" + pet_slice(number) + b"\r\n")
+    form = b"".join(parts) + b"--B--\r\n"
+    status, body = service.ask("POST", "/v1/volumes", form, {"content-type": "multipart/form-data; boundary=B"}, 60)
+    assert status == 201, (status, body[:300])
+    volume = json.loads(body)["id"]
+    bodies = [("PUT", f"/v1/volumes/{volume}/identity", b'{"patient_id":"1"}'), ("PATCH", f"/v1/volumes/{volume}", b'{"external_id":"e"}')]
+
+    def request(number):
+        method, path, whole = bodies[number % 2]
+        return head(method, path, len(whole), "application/json") + whole[:-1]
+
+    return held(service, request, 1500, 3)
+
+
+def work_item_changes(service):
+    """Changes of one large work item, a hundred at the same time."""
+    values = ",".join(['{"":0}'] * 30_000)
+    item = f'[{{"00741000":{{"vr":"CS","Value":["SCHEDULED"]}},"00741204":{{"vr":"IS","Value":[{values}]}}}}]'
+    status, body = service.ask("POST", "/dicom-web/workitems?workitem=1.2.3", item.encode(), JSON)
+    assert status == 201, (status, body)
+    claim = [{"00741000": {"vr": "CS", "Value": ["IN PROGRESS"]}, "00081195": {"vr": "UI", "Value": ["9.9"]}}]
+    status, body = service.ask("PUT", "/dicom-web/workitems/1.2.3/state", json.dumps(claim).encode(), JSON)
+    assert status == 200, (status, body)
+    requests = [("POST", "/dicom-web/workitems/1.2.3/cancelrequest", b"[{}]"),
+                ("POST", "/dicom-web/workitems/1.2.3", b'[{"00741202":{"vr":"LO","Value":["x"]},"00081195":{"vr":"UI","Value":["9.9"]}}]')]
+
+    def send(number):
+        method, path, body = requests[number % 2]
+        return service.ask(method, path, body, dict(JSON, **ATTACKER), 60)
+
+    said = together(100, send)
+    assert not {500, 502} & set(said), said
+    return f"answers {said}"
+
+
+def associations(service, count=500):
+    """Requests for associations as long as they may be, of presentation contexts without content, held open."""
+    def item(kind, content):
+        return bytes([kind, 0]) + struct.pack(">H", len(content)) + content
+
+    start = struct.pack(">H", 1) + bytes(2) + b"VENTRIFORM".ljust(16) + b"ATTACKER".ljust(16) + bytes(32)
+    start += item(0x10, b"1.2.840.10008.3.1.1.1")
+    start += item(0x20, bytes([1, 0, 0, 0]) + item(0x30, b"1.2.840.10008.1.1") + item(0x40, IMPLICIT))
+    end = item(0x50, item(0x51, struct.pack(">I", 16384)))
+    room = (512 << 10) - len(start) - len(end) - 100
+    little = item(0x20, bytes([3, 0, 0, 0]) + item(0x30, b"") + item(0x40, b""))
+    large = item(0x20, bytes([3, 0, 0, 0]) + item(0x30, b"1.2") + item(0x40, b"") * 16370)
+    requests = []
+    for context in (little, large):
+        content = start + context * (room // len(context)) + end
+        requests.append(bytes([1, 0]) + struct.pack(">I", len(content)) + content)
+    open_ones, broken = [], 0
+    for number in range(count):
+        s = socket.socket()
+        # As many machines.
+        s.bind((f"127.0.{number // 200}.{number % 200 + 2}", 0))
+        s.settimeout(5)
+        open_ones.append(s)
+        try:
+            s.connect(("127.0.0.1", service.dicom_port))
+            s.sendall(requests[number % 2])
+        except OSError:
+            broken += 1
+    time.sleep(3)
+    for s in open_ones:
+        s.close()
+    return f"{count} requests of {len(requests[0]) >> 10} KiB, {broken} broken"
+
+
+def header_bomb(size):
+    """A deflated image whose header has `size` bytes of empty items."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    start = element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION") + element(8, 0x16, b"UI", NM_CLASS) + element(8, 0x18, b"UI", b"1.2.3.4")
+    out = packer.compress(start + b"\x08\0\x40\x11SQ\0\0\xff\xff\xff\xff")
+    items = b"\xfe\xff\x00\xe0\0\0\0\0" * (1 << 17)
+    for _ in range(size // len(items)):
+        out += packer.compress(items)
+    out += packer.compress(b"\xfe\xff\xdd\xe0\0\0\0\0" + element(0x20, 0xD, b"UI", b"1.2.9") + element(0x20, 0xE, b"UI", b"1.2.9.1"))
+    return out + packer.flush()
+
+
+def header_bombs(service, seconds=4):
+    """Objects whose headers take long to read, by STOW-RS from clients that hang up, and by C-STORE."""
+    data_set = header_bomb(512 << 20)
+    whole = file_start(DEFLATED) + data_set
+    end, sent = time.time() + seconds, {"STOW-RS": 0, "C-STORE": 0}
+
+    def stow():
+        while time.time() < end:
+            try:
+                with service.connect() as s:
+                    s.sendall(head("POST", "/dicom-web/studies", len(whole), "application/dicom") + whole)
+                    sent["STOW-RS"] += 1
+                    time.sleep(0.3)
+            except OSError:
+                time.sleep(0.1)
+
+    def store():
+        while time.time() < end:
+            try:
+                c_store(service, data_set)
+                sent["C-STORE"] += 1
+            except OSError:
+                time.sleep(0.1)
+
+    senders = [threading.Thread(target=work, daemon=True) for work in [stow] * 6 + [store] * 2]
+    for sender in senders:
+        sender.start()
+    time.sleep(seconds)
+    assert all(sent.values()), sent
+    return f"{len(whole) >> 10} KiB that hold 512 MiB, sent {sent}"
+
+
+def c_store(service, data_set):
+    """Sends a deflated image by C-STORE and waits a second for the answer."""
+    def item(kind, content):
+        return bytes([kind, 0]) + struct.pack(">H", len(content)) + content
+
+    def pdu(kind, content):
+        return bytes([kind, 0]) + struct.pack(">I", len(content)) + content
+
+    def values(control, content):
+        return pdu(4, struct.pack(">I", len(content) + 2) + bytes([1, control]) + content)
+
+    def command(number, value):
+        value += b"\0" * (len(value) % 2)
+        return struct.pack("<HHI", 0, number, len(value)) + value
+
+    request = struct.pack(">H", 1) + bytes(2) + b"VENTRIFORM".ljust(16) + b"ATTACKER".ljust(16) + bytes(32) + item(0x10, b"1.2.840.10008.3.1.1.1")
+    request += item(0x20, bytes([1, 0, 0, 0]) + item(0x30, NM_CLASS) + item(0x40, DEFLATED)) + item(0x50, item(0x51, struct.pack(">I", 1 << 20)))
+    short = lambda number: struct.pack("<H", number)
+    elements = command(2, NM_CLASS) + command(0x100, short(1)) + command(0x110, short(1)) + command(0x700, short(0)) + command(0x800, short(0))
+    elements += command(0x1000, b"1.2.3.4")
+    with socket.create_connection(("127.0.0.1", service.dicom_port), 5) as s:
+        s.settimeout(5)
+        s.sendall(pdu(1, request))
+        if s.recv(1) != b"\2":
+            raise ConnectionError("the association was refused")
+        s.sendall(values(3, command(0, struct.pack("<I", len(elements))) + elements))
+        for place in range(0, len(data_set), 16000):
+            piece = data_set[place:place + 16000]
+            s.sendall(values(2 if place + 16000 >= len(data_set) else 0, piece))
+        time.sleep(1)
+
+
+# Settings of the service under an attack. Where a large job runs at the end, the service is not to wait for it.
+FLAGS = {few_threads: ["--blocking-threads", str(BLOCKING_THREADS)], hostile_archive: ["--dicomweb-allow", "127.0.0.0/8"],
+         large_jobs: ["--shutdown-grace", "1s"], half_patches: ["--shutdown-grace", "1s"]}
+
+
+ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, few_threads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads,
+           hostile_archive, huge_normals, profiles, large_jobs, half_patches, late_bodies, work_item_changes, associations, header_bombs]
 
 
 # Memory of the service: a third of the limit is left for attacks that come together.
@@ -334,6 +620,7 @@ MOST_MEBIBYTES = 640
 
 
 def attempt(attack, program, patience):
+    began = time.time()
     with tempfile.TemporaryDirectory() as folder:
         service = Service(program, folder + "/data", "--queue-limit", "1000", *FLAGS.get(attack, []))
         honest = Honest(service, nifti())
@@ -361,7 +648,8 @@ def attempt(attack, program, patience):
             wrong.append("an honest request took too long")
         service.stop()
         slowest = f"slowest of {honest.asked} honest requests {honest.slowest[0]:.2f} s ({honest.slowest[1]})"
-        print(f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {slowest} {'; '.join(wrong)}", flush=True)
+        took = time.time() - began
+        print(f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {took:.0f} s; {slowest} {'; '.join(wrong)}", flush=True)
         return not wrong
 
 
