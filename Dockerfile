@@ -7,6 +7,7 @@ COPY crates/ventriform/Cargo.toml crates/ventriform/
 COPY crates/service/Cargo.toml crates/service/
 COPY crates/store/Cargo.toml crates/store/
 COPY crates/http/Cargo.toml crates/http/
+COPY crates/http_client/Cargo.toml crates/http_client/
 COPY crates/python/Cargo.toml crates/python/
 COPY tools/Cargo.toml tools/
 # Not built, but Cargo.toml declares them and cargo looks for their files.

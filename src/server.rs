@@ -1,7 +1,9 @@
-//! The service as a whole: settings, then stores, then the HTTP service on them.
+//! The service as a whole: settings, then stores and the HTTP client, then the HTTP service on them.
 
 use std::net::TcpListener;
+use std::sync::Arc;
 use ventriform_http::{Running, ServeError};
+use ventriform_http_client::ReqwestFactory;
 use ventriform_service::config::Settings;
 use ventriform_service::work::Engine;
 use ventriform_store::{S3Location, Store, StoreSettings};
@@ -21,7 +23,7 @@ pub async fn start(
         let store = Store::open_with(&folder, stores).await;
         store.map(Store::into_stores)
     };
-    ventriform_http::start(settings, engine, listener, open).await
+    ventriform_http::start(settings, engine, listener, open, Arc::new(ReqwestFactory)).await
 }
 
 /// Where the files are, if not in the data folder.

@@ -13,6 +13,7 @@ const CRATE_USES: &[(&str, &[&str])] = &[
     ("crates/ventriform", &[]),
     ("crates/service", &["ventriform"]),
     ("crates/store", &["ventriform-service"]),
+    ("crates/http_client", &["ventriform-service"]),
     ("crates/http", &["ventriform", "ventriform-service"]),
     ("crates/python", &["ventriform", "ventriform-service"]),
     ("tools", &["ventriform"]),
@@ -21,6 +22,7 @@ const CRATE_USES: &[(&str, &[&str])] = &[
         &[
             "ventriform",
             "ventriform-http",
+            "ventriform-http-client",
             "ventriform-service",
             "ventriform-store",
         ],
@@ -30,13 +32,18 @@ const CRATE_USES: &[(&str, &[&str])] = &[
 /// The crates that one crate may not depend on, whatever it uses today, unless by a feature.
 const FORBIDDEN_CRATES: &[(&str, &[&str])] = &[
     ("crates/ventriform", SERVICE_CRATES),
-    (
-        "crates/service",
-        &["axum", "hyper", "utoipa", "sqlx", "object_store"],
-    ),
+    ("crates/service", INTERFACE_CRATES),
     ("crates/store", &["axum", "hyper", "utoipa"]),
-    ("crates/http", &["sqlx", "object_store"]),
+    (
+        "crates/http_client",
+        &["axum", "utoipa", "sqlx", "object_store"],
+    ),
+    ("crates/http", &["reqwest", "sqlx", "object_store"]),
 ];
+
+/// Crates that serve, send or store, each behind a trait of the service or above it: the service has none of them, by
+/// any of its dependencies either.
+const INTERFACE_CRATES: &[&str] = &["axum", "hyper", "reqwest", "utoipa", "sqlx", "object_store"];
 
 /// Each module of the library and the modules it uses, in reading order: a module uses only what
 /// stands above it.
@@ -292,13 +299,14 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     ("dicom_tags", &[]),
     ("client", &[]),
     ("pem", &[]),
+    ("http_client", &[]),
     ("items", &["records"]),
     ("jobs", &["records", "items"]),
-    ("access", &["records"]),
+    ("access", &["records", "http_client"]),
     ("reservations", &["records", "access"]),
     ("quotas", &["records", "error", "access", "reservations"]),
     ("memory", &["records", "error", "client"]),
-    ("hooks", &["records"]),
+    ("hooks", &["records", "http_client"]),
     (
         "archive",
         &[
@@ -306,6 +314,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
             "error",
             "dicom_tags",
             "pem",
+            "http_client",
             "items",
             "jobs",
             "hooks",
@@ -326,13 +335,22 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     ("decoding", &["records", "error", "client", "config"]),
     (
         "telemetry",
-        &["records", "jobs", "hooks", "archive", "intake", "config"],
+        &[
+            "records",
+            "http_client",
+            "jobs",
+            "hooks",
+            "archive",
+            "intake",
+            "config",
+        ],
     ),
     ("work", &["records", "items", "jobs"]),
     (
         "service",
         &[
             "records",
+            "http_client",
             "items",
             "jobs",
             "access",
@@ -401,6 +419,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
         "start",
         &[
             "records",
+            "http_client",
             "items",
             "jobs",
             "access",

@@ -13,6 +13,7 @@ use std::sync::Arc;
 use tokio::task::JoinHandle;
 use ventriform_service::access::{Gate, Issuer, IssuerError, IssuerSettings, Scope};
 use ventriform_service::config::{Role, Settings};
+use ventriform_service::http_client::ClientFactory;
 use ventriform_service::intake::{Listener, ScpSettings, TlsConfiguration};
 use ventriform_service::jobs::Queue;
 use ventriform_service::records::{StoreError, SystemClock};
@@ -86,7 +87,8 @@ pub struct Running {
     dicom_address: Option<SocketAddr>,
 }
 
-/// Starts the service on a bound listener. `stores` opens its stores, once the settings are known to be usable.
+/// Starts the service on a bound listener. `stores` opens its stores, once the settings are known to be usable;
+/// `http_clients` makes the clients of its requests to other programs.
 ///
 /// # Errors
 /// If the stores are in use or unusable, or the system refuses threads or sockets.
@@ -95,6 +97,7 @@ pub async fn start<E>(
     engine: Engine,
     listener: TcpListener,
     stores: impl Future<Output = Result<Stores, E>>,
+    http_clients: Arc<dyn ClientFactory>,
 ) -> Result<Running, ServeError>
 where
     E: Into<Box<dyn std::error::Error + Send + Sync>>,
@@ -106,7 +109,7 @@ where
     let dicom_tls = Tls::of_dicom(&settings)?;
     let stores = stores.await;
     let stores = stores.map_err(|error| ServeError::Store(error.into()))?;
-    let opened = open(settings, engine, stores).await?;
+    let opened = open(settings, engine, stores, http_clients).await?;
     let service = opened.service.clone();
     listener.set_nonblocking(true)?;
     let address = listener.local_addr()?;
@@ -273,14 +276,15 @@ async fn guard(service: &Service, address: SocketAddr) -> Result<Guard, ServeErr
     let loopback = address.ip().to_canonical().is_loopback();
     let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
     let issuer = text(&settings.oidc_issuer).map(|issuer| {
-        Issuer::new(IssuerSettings {
+        let tokens = IssuerSettings {
             issuer,
             audience: settings.oidc_audience.clone(),
             jwks: text(&settings.oidc_jwks),
             tenant_claim: text(&settings.oidc_tenant_claim),
             scope_claim: settings.oidc_scope_claim.clone(),
             leeway: settings.oidc_leeway.0,
-        })
+        };
+        Issuer::new(tokens, &*service.http_clients)
     });
     // Whoever can reach a loopback address can usually read the data folder too.
     let anonymous = if loopback {

@@ -5,7 +5,7 @@
 //! for each use case. Quotas and limits are checked inside; a [`error::ServiceError`] says whether trying again helps.
 //!
 //! It knows no HTTP interface and no database: the crate `ventriform-http` answers requests with it, `ventriform-store`
-//! implements the traits of [`records`].
+//! implements the traits of [`records`], `ventriform-http-client` those of [`http_client`].
 
 pub mod access;
 pub mod archive;
@@ -17,6 +17,7 @@ pub mod dicom_tags;
 pub mod error;
 pub mod filing;
 pub mod hooks;
+pub mod http_client;
 pub mod intake;
 pub mod items;
 pub mod jobs;

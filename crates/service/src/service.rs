@@ -18,6 +18,7 @@ use crate::archive::ArchiveDesk;
 use crate::config::Settings;
 use crate::decoding::Decoding;
 use crate::hooks::Hooks;
+use crate::http_client::ClientFactory;
 use crate::intake::Intake;
 use crate::items::{Items, RetentionAges};
 use crate::jobs::Queue;
@@ -68,6 +69,8 @@ pub struct Service {
     pub figures: Arc<dyn FigureStore>,
     /// Traces of requests.
     pub spans: Spans,
+    /// Makes the clients of requests to other programs.
+    pub http_clients: Arc<dyn ClientFactory>,
 }
 
 /// The ages at which the operator lets things be erased.

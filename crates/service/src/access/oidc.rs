@@ -14,14 +14,20 @@
 //! used as they are, for at most [`STALE_AFTER`], and read anew beside the requests.
 
 use super::{Identity, Makers, Quota, Scope};
+use crate::http_client::{
+    ClientFactory, ClientOptions, HttpClient, Redirects, bounded_body, request_uri,
+};
 use crate::records::{Tenant, content_id};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
+use bytes::Bytes;
+use http::Request;
 use jsonwebtoken::jwk::{AlgorithmParameters, EllipticCurve, Jwk};
 use jsonwebtoken::{Algorithm, DecodingKey, Header, Validation, decode, decode_header};
 use serde_json::{Map, Value};
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::{Duration, Instant};
+use url::Url;
 use ventriform::text::is_printable;
 
 /// How long a JWKS is used without reading it again.
@@ -74,7 +80,7 @@ pub struct Issuer(Arc<Known>);
 
 struct Known {
     settings: IssuerSettings,
-    client: reqwest::Client,
+    client: Arc<dyn HttpClient>,
     keys: RwLock<Option<Keys>>,
     /// When reading was last tried. Owned while reading, so that one request reads at a time.
     tried: tokio::sync::Mutex<Option<Instant>>,
@@ -93,19 +99,22 @@ struct TokenKey {
 }
 
 impl Issuer {
-    /// An issuer whose keys are read when the first token comes.
+    /// An issuer whose keys are read when the first token comes, by a client of that factory.
     ///
     /// # Errors
     /// If an address of the settings is neither https nor on this machine.
-    pub fn new(settings: IssuerSettings) -> Result<Self, IssuerError> {
+    pub fn new(settings: IssuerSettings, clients: &dyn ClientFactory) -> Result<Self, IssuerError> {
         let addresses = std::iter::once(&settings.issuer).chain(&settings.jwks);
         for address in addresses {
             check_address(address)?;
         }
-        let client = reqwest::Client::builder()
-            .timeout(ISSUER_TIMEOUT)
-            .redirect(reqwest::redirect::Policy::none())
-            .build()
+        let client = clients
+            .build(ClientOptions {
+                total_timeout: Some(ISSUER_TIMEOUT),
+                redirects: Redirects::Never,
+                environment_proxies: true,
+                ..ClientOptions::default()
+            })
             .map_err(|error| IssuerError::Unavailable(error.to_string()))?;
         Ok(Self(Arc::new(Known {
             settings,
@@ -276,16 +285,18 @@ impl Known {
     }
 
     async fn document(&self, address: &str) -> Result<Value, String> {
-        let told = |error: reqwest::Error| error.without_url().to_string();
-        let answer = self.client.get(address).send().await.map_err(told)?;
-        let mut answer = answer.error_for_status().map_err(told)?;
-        let mut body = Vec::new();
-        while let Some(piece) = answer.chunk().await.map_err(told)? {
-            if body.len() + piece.len() > ANSWER_BYTES {
-                return Err(format!("{address} is larger than {ANSWER_BYTES} bytes"));
-            }
-            body.extend_from_slice(&piece);
+        let uri = request_uri(address).map_err(|error| error.to_string())?;
+        let request = Request::get(uri).body(Bytes::new());
+        let request = request.map_err(|error| error.to_string())?;
+        let answer = self.client.send(request).await;
+        let answer = answer.map_err(|error| error.to_string())?;
+        let status = answer.status();
+        if status.is_client_error() || status.is_server_error() {
+            return Err(format!("{address} answered with status {status}"));
         }
+        let body = bounded_body(answer.into_body(), ANSWER_BYTES).await;
+        let body = body.map_err(|error| error.to_string())?;
+        let body = body.ok_or_else(|| format!("{address} is larger than {ANSWER_BYTES} bytes"))?;
         serde_json::from_slice(&body).map_err(|error| format!("{address}: {error}"))
     }
 }
@@ -394,7 +405,7 @@ fn why(error: &jsonwebtoken::errors::Error) -> IssuerError {
 /// Addresses of an issuer are https, so that nobody on the way can put in keys of his own; plain
 /// http only on this machine.
 fn check_address(address: &str) -> Result<(), IssuerError> {
-    let url = reqwest::Url::parse(address).ok();
+    let url = Url::parse(address).ok();
     let usable = url.is_some_and(|url| {
         let host = url.host_str().unwrap_or_default();
         let here = host == "localhost"
@@ -416,7 +427,9 @@ fn check_address(address: &str) -> Result<(), IssuerError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::http_client::fake::FakeClient;
     use serde_json::json;
+    use std::sync::atomic::Ordering;
 
     #[test]
     fn scopes_are_read_from_texts_and_lists() {
@@ -508,16 +521,15 @@ mod tests {
             "c6BfI7noOPqvhJ1phCnvWh6IeYI2w9QOYEUipUTI8np6LbgGY9Fs98rqVt5AXLIhWkWywlVmtVrBp0igcN_IoypGlU",
             "PQGe77Rw"
         );
-        let _ = rustls::crypto::ring::default_provider().install_default();
-        let issuer = Issuer::new(IssuerSettings {
+        let settings = IssuerSettings {
             issuer: "https://joe.example".into(),
             audience: "ventriform".into(),
             jwks: None,
             tenant_claim: None,
             scope_claim: "scope".into(),
             leeway: Duration::ZERO,
-        })
-        .unwrap();
+        };
+        let issuer = Issuer::new(settings, &FakeClient::default()).unwrap();
         *issuer.0.keys.write().unwrap() = Some(Keys {
             keys: Arc::new(vec![TokenKey::read(&jwk).unwrap()]),
             read: Instant::now(),
@@ -543,20 +555,18 @@ mod tests {
         }
     }
 
-    /// An issuer at an address that accepts connections and never answers, with keys read that long ago.
-    async fn slow_issuer(age: Duration) -> (Issuer, tokio::net::TcpListener, String) {
-        let _ = rustls::crypto::ring::default_provider().install_default();
-        let silent = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let url = format!("http://{}", silent.local_addr().unwrap());
-        let issuer = Issuer::new(IssuerSettings {
-            issuer: url.clone(),
+    /// An issuer that is asked by that client, with keys read that long ago, and a token of it.
+    fn slow_issuer(age: Duration, client: &FakeClient) -> (Issuer, String) {
+        let url = "https://id.example";
+        let settings = IssuerSettings {
+            issuer: url.into(),
             audience: "ventriform".into(),
             jwks: Some(format!("{url}/keys")),
             tenant_claim: None,
             scope_claim: "scope".into(),
             leeway: Duration::from_secs(60),
-        })
-        .unwrap();
+        };
+        let issuer = Issuer::new(settings, client).unwrap();
         let pair = rcgen::KeyPair::generate_for(&rcgen::PKCS_ECDSA_P256_SHA256).unwrap();
         let point = pair.public_key_raw();
         let base64 = |bytes: &[u8]| URL_SAFE_NO_PAD.encode(bytes);
@@ -577,28 +587,30 @@ mod tests {
         header.kid = Some("a".into());
         let secret = jsonwebtoken::EncodingKey::from_ec_der(pair.serialized_der());
         let token = jsonwebtoken::encode(&header, &claims, &secret).unwrap();
-        (issuer, silent, token)
+        (issuer, token)
     }
 
     #[tokio::test]
     async fn stale_keys_are_used_at_once_and_renewed_beside_the_requests() {
-        let (issuer, silent, token) = slow_issuer(2 * REFRESH_AFTER).await;
+        let client = FakeClient::default();
+        let (issuer, token) = slow_issuer(2 * REFRESH_AFTER, &client);
         let begun = Instant::now();
         for _ in 0..20 {
             assert_eq!(issuer.subject(&token).await.unwrap().name, "me");
         }
         assert!(begun.elapsed() < ISSUER_TIMEOUT, "{:?}", begun.elapsed());
-        // One of them made the service ask.
-        let asked = tokio::time::timeout(ISSUER_TIMEOUT, silent.accept()).await;
-        asked.unwrap().unwrap();
-        let again = tokio::time::timeout(Duration::from_millis(200), silent.accept()).await;
-        assert!(again.is_err(), "asked twice");
+        // One of them made the service ask, and no other did.
+        tokio::time::sleep(Duration::from_millis(200)).await;
+        assert_eq!(client.requests.load(Ordering::SeqCst), 1);
     }
 
     #[tokio::test]
     async fn keys_that_are_too_old_are_not_used() {
-        let (issuer, silent, token) = slow_issuer(STALE_AFTER).await;
-        drop(silent);
+        let client = FakeClient {
+            unreachable: true,
+            ..FakeClient::default()
+        };
+        let (issuer, token) = slow_issuer(STALE_AFTER, &client);
         let refused = issuer.subject(&token).await.unwrap_err();
         assert!(matches!(refused, IssuerError::Unavailable(_)), "{refused}");
     }

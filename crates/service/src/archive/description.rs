@@ -1,9 +1,9 @@
 //! An archive as the operator describes it.
 
 use crate::records::Tenant;
-use reqwest::Url;
 use std::fmt;
 use std::path::PathBuf;
+use url::Url;
 
 /// Longest name of an archive.
 const NAME_LENGTH: usize = 64;

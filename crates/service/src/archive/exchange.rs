@@ -4,6 +4,7 @@ use super::trouble::Trouble;
 use super::web::WebClients;
 use super::{Archive, ArchiveStore, Archives, ExchangeHost};
 use crate::hooks::{AttemptEnd, Lanes, RetrySchedule, UrlGuard, random_share};
+use crate::http_client::ClientFactory;
 use crate::jobs::Queue;
 use crate::records::{Clock, Tenant, Timestamp};
 use std::sync::Arc;
@@ -43,6 +44,7 @@ impl Exchange {
         store: Arc<dyn ArchiveStore>,
         host: Arc<dyn ExchangeHost>,
         queue: Arc<Queue>,
+        clients: Arc<dyn ClientFactory>,
         guard: UrlGuard,
         settings: ExchangeSettings,
     ) -> Self {
@@ -50,7 +52,7 @@ impl Exchange {
             store,
             host,
             queue,
-            web: WebClients::new(guard, settings.timeout, settings.parts),
+            web: WebClients::new(clients, guard, settings.timeout, settings.parts),
             settings,
         }
     }

@@ -4,8 +4,8 @@
 use super::pieces::{EndlessHeader, Unparsed};
 use super::related::RelatedType;
 use super::trouble::{Trouble, odd_answer};
+use crate::http_client::ByteStream;
 use crate::records::Fault;
-use futures::stream::BoxStream;
 use futures::{Stream, StreamExt};
 use multer::{Constraints, Multipart, SizeLimit};
 use std::pin::Pin;
@@ -35,7 +35,7 @@ impl SeriesParts {
     /// If it is no `multipart/related` with a boundary.
     pub(super) fn new(
         content_type: &str,
-        body: BoxStream<'static, reqwest::Result<bytes::Bytes>>,
+        body: ByteStream,
         limits: PartLimits,
     ) -> Result<Self, Trouble> {
         let related = RelatedType::parse(content_type);

@@ -9,14 +9,21 @@ use super::trouble::{Trouble, odd_answer};
 use super::{Archive, Credentials};
 use crate::dicom_tags::{FAILED_SOP_SEQUENCE, FAILURE_REASON, SOP_INSTANCE_UID};
 use crate::hooks::{Pin, PinnedNames, UrlGuard, retry_after};
+use crate::http_client::{
+    ByteStream, ClientError, ClientFactory, ClientOptions, HttpClient, Redirects, SendError,
+    USER_AGENT, bounded_body, build_client, request_uri,
+};
 use crate::records::{Failure, Fault, Timestamp};
-use futures::StreamExt;
-use reqwest::header::{ACCEPT, CONTENT_TYPE, HeaderMap};
-use reqwest::redirect::{Attempt, Policy};
-use reqwest::{Certificate, Client, ClientBuilder, Response, StatusCode};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use bytes::Bytes;
+use http::header::{
+    ACCEPT, AUTHORIZATION, CONTENT_LENGTH, CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue,
+    InvalidHeaderValue,
+};
+use http::{Method, Request, Response, StatusCode};
 use std::collections::BTreeMap;
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Most bytes of a search's answer for each object that a series may have. PS3.18 (10.6.3.3) has some 40 attributes in an
@@ -34,11 +41,15 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most redirects within an archive.
 const MAX_REDIRECTS: usize = 3;
 
+/// Time for which an unused connection is kept.
+const IDLE_TIMEOUT: Duration = Duration::from_secs(10);
+
 const DICOM_JSON: &str = "application/dicom+json";
 const PART_BOUNDARY: &str = "ventriform-dicom-object";
 
 /// Connects to DICOMweb services.
 pub struct WebClients {
+    factory: Arc<dyn ClientFactory>,
     /// Which services may be used beside the configured archives.
     guard: UrlGuard,
     names: PinnedNames,
@@ -47,12 +58,12 @@ pub struct WebClients {
     objects: usize,
     /// Made for the first use: reading the system's certificates takes time and memory. By the
     /// name of the archive; the empty name is for URLs without one.
-    clients: Mutex<BTreeMap<String, Client>>,
+    clients: Mutex<BTreeMap<String, Arc<dyn HttpClient>>>,
 }
 
 /// One DICOMweb service.
 pub struct DicomWeb {
-    client: Client,
+    client: Arc<dyn HttpClient>,
     base: String,
     credentials: Credentials,
     now: Timestamp,
@@ -72,9 +83,15 @@ pub enum Stored {
 }
 
 impl WebClients {
-    /// Clients that allow pauses of that length in answers, and so many objects in a series.
-    pub fn new(guard: UrlGuard, timeout: Duration, objects: usize) -> Self {
+    /// Clients of that factory that allow pauses of that length in answers, and so many objects in a series.
+    pub fn new(
+        factory: Arc<dyn ClientFactory>,
+        guard: UrlGuard,
+        timeout: Duration,
+        objects: usize,
+    ) -> Self {
         Self {
+            factory,
             guard,
             names: PinnedNames::default(),
             timeout,
@@ -94,19 +111,14 @@ impl WebClients {
         let client = match self.known(&archive.name) {
             Some(client) => client,
             None => {
-                let mut builder = self.builder().redirect(Policy::custom(within_origin));
+                let mut options = self.options();
+                options.redirects = Redirects::WithinOrigin(MAX_REDIRECTS);
                 if let Some(path) = &archive.ca_file {
-                    let unusable = |error: String| {
-                        tracing::error!(archive = %archive.name, error, "ca_file is unusable");
-                        Trouble::passing("The file `ca_file` of the archive cannot be used.")
-                    };
                     let pem = tokio::fs::read(path).await;
-                    let pem = pem.map_err(|error| unusable(error.to_string()))?;
-                    let authorities = Certificate::from_pem_bundle(&pem);
-                    builder = builder
-                        .tls_certs_merge(authorities.map_err(|error| unusable(error.to_string()))?);
+                    let pem = pem.map_err(|error| unusable_authorities(&archive.name, &error))?;
+                    options.authorities = Some(pem);
                 }
-                self.made(&archive.name, builder).await?
+                self.made(&archive.name, options).await?
             }
         };
         Ok(DicomWeb {
@@ -136,9 +148,9 @@ impl WebClients {
         let client = match self.known("") {
             Some(client) => client,
             None => {
-                let builder = self.builder().redirect(Policy::none());
-                self.made("", builder.dns_resolver(self.names.clone()))
-                    .await?
+                let mut options = self.options();
+                options.resolver = Some(Arc::new(self.names.clone()));
+                self.made("", options).await?
             }
         };
         Ok(DicomWeb {
@@ -151,43 +163,46 @@ impl WebClients {
         })
     }
 
-    fn builder(&self) -> ClientBuilder {
-        Client::builder()
-            .no_proxy()
-            .referer(false)
-            .pool_idle_timeout(Duration::from_secs(10))
-            .connect_timeout(CONNECT_TIMEOUT.min(self.timeout))
-            .read_timeout(self.timeout)
-            .user_agent(concat!("ventriform/", env!("CARGO_PKG_VERSION")))
+    /// The rules for all archives.
+    fn options(&self) -> ClientOptions {
+        ClientOptions {
+            redirects: Redirects::Never,
+            idle_timeout: IDLE_TIMEOUT,
+            connect_timeout: Some(CONNECT_TIMEOUT.min(self.timeout)),
+            read_timeout: Some(self.timeout),
+            user_agent: Some(USER_AGENT),
+            ..ClientOptions::default()
+        }
     }
 
-    fn known(&self, name: &str) -> Option<Client> {
+    fn known(&self, name: &str) -> Option<Arc<dyn HttpClient>> {
         let clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
         clients.get(name).cloned()
     }
 
-    async fn made(&self, name: &str, builder: ClientBuilder) -> Result<Client, Trouble> {
-        let built = tokio::task::spawn_blocking(|| builder.build()).await;
-        let failed = |error: String| {
-            tracing::error!(error, "archives cannot be reached");
-            Trouble::passing("The connection to the archive could not be set up.")
-        };
-        let client = built.map_err(|e| failed(e.to_string()))?;
-        let client = client.map_err(|e| failed(e.to_string()))?;
+    async fn made(
+        &self,
+        name: &str,
+        options: ClientOptions,
+    ) -> Result<Arc<dyn HttpClient>, Trouble> {
+        let built = build_client(self.factory.clone(), options).await;
+        let client = built.map_err(|error| match error {
+            ClientError::Authorities(_) => unusable_authorities(name, &error),
+            ClientError::Client(_) => {
+                tracing::error!(%error, "archives cannot be reached");
+                Trouble::passing("The connection to the archive could not be set up.")
+            }
+        })?;
         let mut clients = self.clients.lock().unwrap_or_else(PoisonError::into_inner);
         clients.insert(name.to_owned(), client.clone());
         Ok(client)
     }
 }
 
-/// Follows redirects to the same scheme, host and port.
-fn within_origin(attempt: Attempt<'_>) -> reqwest::redirect::Action {
-    let known = attempt.previous().first().map(reqwest::Url::origin);
-    if known == Some(attempt.url().origin()) && attempt.previous().len() <= MAX_REDIRECTS {
-        attempt.follow()
-    } else {
-        attempt.stop()
-    }
+fn unusable_authorities(archive: &str, error: &dyn std::error::Error) -> Trouble {
+    let error = error.to_string();
+    tracing::error!(archive, error, "ca_file is unusable");
+    Trouble::passing("The file `ca_file` of the archive cannot be used.")
 }
 
 impl DicomWeb {
@@ -222,8 +237,8 @@ impl DicomWeb {
 
     /// The SOP Instance UIDs that a search finds.
     async fn search(&self, path: &str) -> Result<Option<Vec<String>>, Trouble> {
-        let request = self.client.get(format!("{}/{path}", self.base));
-        let answer = self.send(request.header(ACCEPT, DICOM_JSON)).await?;
+        let headers = [(ACCEPT, DICOM_JSON)];
+        let answer = self.send(Method::GET, path, &headers, Bytes::new()).await?;
         match answer.status() {
             StatusCode::NO_CONTENT => return Ok(Some(Vec::new())),
             StatusCode::OK => {}
@@ -249,10 +264,13 @@ impl DicomWeb {
         series: &str,
         limits: PartLimits,
     ) -> Result<SeriesParts, Trouble> {
-        let url = format!("{}/studies/{study}/series/{series}", self.base);
-        let accept = "multipart/related; type=\"application/dicom\"; transfer-syntax=*";
+        let path = format!("studies/{study}/series/{series}");
+        let headers = [(
+            ACCEPT,
+            "multipart/related; type=\"application/dicom\"; transfer-syntax=*",
+        )];
         let answer = self
-            .send(self.client.get(url).header(ACCEPT, accept))
+            .send(Method::GET, &path, &headers, Bytes::new())
             .await?;
         let status = answer.status();
         if status != StatusCode::OK {
@@ -269,10 +287,8 @@ impl DicomWeb {
                 status => refused(status, answer.headers(), self.now),
             });
         }
-        if answer
-            .content_length()
-            .is_some_and(|length| length > limits.bytes)
-        {
+        let length = text(answer.headers(), CONTENT_LENGTH.as_str()).parse::<u64>();
+        if length.is_ok_and(|length| length > limits.bytes) {
             return Err(Trouble::lasting(
                 Fault::TooLarge,
                 "too-large",
@@ -281,7 +297,7 @@ impl DicomWeb {
             ));
         }
         let content_type = text(answer.headers(), CONTENT_TYPE.as_str()).to_owned();
-        SeriesParts::new(&content_type, answer.bytes_stream().boxed(), limits)
+        SeriesParts::new(&content_type, answer.into_body(), limits)
     }
 
     /// Stores an object.
@@ -294,13 +310,10 @@ impl DicomWeb {
         let body = [head.as_bytes(), object, tail.as_bytes()].concat();
         let content_type =
             format!("multipart/related; type=\"application/dicom\"; boundary={PART_BOUNDARY}");
-        let request = self
-            .client
-            .post(format!("{}/studies", self.base))
-            .header(CONTENT_TYPE, content_type)
-            .header(ACCEPT, DICOM_JSON)
-            .body(body);
-        let answer = self.send(request).await?;
+        let headers = [(CONTENT_TYPE, content_type.as_str()), (ACCEPT, DICOM_JSON)];
+        let answer = self
+            .send(Method::POST, "studies", &headers, Bytes::from(body))
+            .await?;
         let status = answer.status();
         if !matches!(status.as_u16(), 200 | 202 | 409) {
             return Err(refused(status, answer.headers(), self.now));
@@ -309,22 +322,51 @@ impl DicomWeb {
         judge(status, &bytes)
     }
 
-    async fn send(&self, request: reqwest::RequestBuilder) -> Result<Response, Trouble> {
-        let request = match &self.credentials {
-            Credentials::None => request,
-            Credentials::Basic { username, password } => {
-                request.basic_auth(username, Some(password))
+    /// Sends a request for a path below its base, with its credentials.
+    async fn send(
+        &self,
+        method: Method,
+        path: &str,
+        headers: &[(HeaderName, &str)],
+        body: Bytes,
+    ) -> Result<Response<ByteStream>, Trouble> {
+        let sent = async {
+            let uri = request_uri(&format!("{}/{path}", self.base))?;
+            let unusable = |error: http::Error| SendError::Request(error.to_string());
+            let mut request = Request::builder().method(method).uri(uri);
+            for (name, value) in headers {
+                request = request.header(name, *value);
             }
-            Credentials::Bearer(token) => request.bearer_auth(token),
+            if let Some(value) = authorization(&self.credentials) {
+                request = request.header(AUTHORIZATION, value.map_err(|e| unusable(e.into()))?);
+            }
+            self.client
+                .send(request.body(body).map_err(unusable)?)
+                .await
         };
-        request.send().await.map_err(|error| {
-            Trouble::passing(if error.is_timeout() {
-                "The archive did not answer in time."
-            } else {
-                "The archive could not be reached, or broke the connection off."
+        sent.await.map_err(|error| {
+            Trouble::passing(match error {
+                SendError::Timeout => "The archive did not answer in time.",
+                _ => "The archive could not be reached, or broke the connection off.",
             })
         })
     }
+}
+
+/// The value of `Authorization` (RFC 7617, RFC 6750), which logs must not show.
+fn authorization(credentials: &Credentials) -> Option<Result<HeaderValue, InvalidHeaderValue>> {
+    let value = match credentials {
+        Credentials::None => return None,
+        Credentials::Basic { username, password } => {
+            let pair = STANDARD.encode(format!("{username}:{password}"));
+            format!("Basic {pair}")
+        }
+        Credentials::Bearer(token) => format!("Bearer {token}"),
+    };
+    Some(HeaderValue::try_from(value).map(|mut value| {
+        value.set_sensitive(true);
+        value
+    }))
 }
 
 /// The SOP Instance UIDs in an answer to QIDO-RS; `None` if it is no list of objects that have one, or of more than `most`.
@@ -453,25 +495,11 @@ fn refused(status: StatusCode, headers: &HeaderMap, now: Timestamp) -> Trouble {
 }
 
 /// The body of an answer, if it has no more than `most` bytes.
-async fn limited(mut answer: Response, most: usize) -> Result<Vec<u8>, Trouble> {
-    let mut bytes = Vec::new();
-    loop {
-        match answer.chunk().await {
-            Ok(Some(piece)) if bytes.len() + piece.len() <= most => {
-                bytes.extend_from_slice(&piece);
-            }
-            Ok(Some(_)) => {
-                let what = format!("The archive's answer has more than {most} bytes.");
-                return Err(odd_answer(what));
-            }
-            Ok(None) => return Ok(bytes),
-            Err(_) => {
-                return Err(Trouble::passing(
-                    "The connection to the archive broke off in its answer.",
-                ));
-            }
-        }
-    }
+async fn limited(answer: Response<ByteStream>, most: usize) -> Result<Vec<u8>, Trouble> {
+    let read = bounded_body(answer.into_body(), most).await;
+    let read = read
+        .map_err(|_| Trouble::passing("The connection to the archive broke off in its answer."))?;
+    read.ok_or_else(|| odd_answer(format!("The archive's answer has more than {most} bytes.")))
 }
 
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
@@ -483,6 +511,27 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> &'a str {
 mod tests {
     use super::super::answer::TEXT_BYTES;
     use super::*;
+
+    /// The example of RFC 7617, section 2, and that of RFC 6750, section 2.1.
+    #[test]
+    fn credentials_are_sent_as_the_standards_say_and_logged_by_nobody() {
+        let basic = Credentials::Basic {
+            username: "Aladdin".into(),
+            password: "open sesame".into(),
+        };
+        let bearer = Credentials::Bearer("mF_9.B5f-4.1JqM".into());
+        for (credentials, sent) in [
+            (basic, "Basic QWxhZGRpbjpvcGVuIHNlc2FtZQ=="),
+            (bearer, "Bearer mF_9.B5f-4.1JqM"),
+        ] {
+            let value = authorization(&credentials).unwrap().unwrap();
+            assert_eq!(value, sent);
+            assert_eq!(format!("{value:?}"), "Sensitive");
+        }
+        assert!(authorization(&Credentials::None).is_none());
+        let broken = Credentials::Bearer("two\nlines".into());
+        assert!(authorization(&broken).unwrap().is_err());
+    }
 
     #[test]
     fn each_object_of_a_stow_answer_is_judged_by_itself() {

@@ -29,6 +29,7 @@ pub async fn run(service: Arc<Service>, end: CancellationToken) {
         service.archives.store.clone(),
         service.clone(),
         service.queue.clone(),
+        service.http_clients.clone(),
         service.archives.guard.clone(),
         ExchangeSettings {
             archives: settings.archives.clone(),

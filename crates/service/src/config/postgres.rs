@@ -1,9 +1,9 @@
 //! Where a database on a server is: the URL, and the limits of its connections.
 
-use reqwest::Url;
 use std::fmt::{self, Debug, Display, Formatter};
 use std::str::FromStr;
 use std::time::Duration;
+use url::Url;
 
 /// The address of a server, and the means of reaching it.
 #[derive(Debug, Clone, PartialEq)]

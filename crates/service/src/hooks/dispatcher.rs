@@ -6,6 +6,7 @@ use super::{
     AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lane, Lanes,
     RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
 };
+use crate::http_client::ClientFactory;
 use crate::records::{Clock, Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
 use std::sync::Arc;
@@ -71,13 +72,19 @@ impl Dispatcher {
     pub fn new(
         store: Arc<dyn DeliveryStore>,
         clock: Arc<dyn Clock>,
+        clients: Arc<dyn ClientFactory>,
         guard: UrlGuard,
         settings: HookSettings,
     ) -> Self {
         Self {
             store,
             clock,
-            sender: Sender::new(guard, settings.attempt_limit, settings.base_path.clone()),
+            sender: Sender::new(
+                clients,
+                guard,
+                settings.attempt_limit,
+                settings.base_path.clone(),
+            ),
             settings,
             counts: DeliveryCounts::default(),
             woken: Arc::default(),

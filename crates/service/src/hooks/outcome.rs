@@ -1,6 +1,6 @@
 //! The outcomes of attempts to deliver.
 
-use reqwest::StatusCode;
+use http::StatusCode;
 
 /// The outcome of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,10 +2,15 @@
 
 use super::guard::PinnedNames;
 use super::{AttemptOutcome, DueDelivery, SigningSecret, UrlGuard, message_body, signature_header};
+use crate::http_client::{
+    ClientFactory, ClientOptions, HttpClient, Redirects, USER_AGENT, build_client, request_uri,
+};
 use crate::records::Timestamp;
-use reqwest::header::{CONTENT_TYPE, HeaderMap, RETRY_AFTER};
-use reqwest::redirect::Policy;
-use reqwest::{Client, StatusCode};
+use bytes::Bytes;
+use futures::StreamExt;
+use http::header::{CONTENT_TYPE, HeaderMap, RETRY_AFTER};
+use http::{Request, StatusCode};
+use std::sync::Arc;
 use std::time::Duration;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc2822;
@@ -22,7 +27,8 @@ pub struct Sender {
     guard: UrlGuard,
     names: PinnedNames,
     /// Made for the first delivery: reading the system's certificates takes time and memory.
-    client: OnceCell<Client>,
+    client: OnceCell<Arc<dyn HttpClient>>,
+    clients: Arc<dyn ClientFactory>,
     limit: Duration,
     base_path: String,
 }
@@ -30,8 +36,14 @@ pub struct Sender {
 impl Sender {
     /// A sender that lets pass what the guard does, and gives each attempt that much time. Paths in
     /// messages begin with `base_path`.
-    pub fn new(guard: UrlGuard, limit: Duration, base_path: String) -> Self {
+    pub fn new(
+        clients: Arc<dyn ClientFactory>,
+        guard: UrlGuard,
+        limit: Duration,
+        base_path: String,
+    ) -> Self {
         Self {
+            clients,
             guard,
             names: PinnedNames::default(),
             client: OnceCell::new(),
@@ -68,8 +80,10 @@ impl Sender {
         let _pin = self.names.pin(&checked);
         let body = message_body(delivery, &self.base_path);
         let seconds = now / 1000;
-        let sent = client
-            .post(checked.url.clone())
+        let Ok(uri) = request_uri(checked.url.as_str()) else {
+            return (AttemptOutcome::Unreachable, None);
+        };
+        let request = Request::post(uri)
             .header(CONTENT_TYPE, "application/json")
             .header("webhook-id", &delivery.id)
             .header("webhook-timestamp", seconds)
@@ -77,16 +91,18 @@ impl Sender {
                 "webhook-signature",
                 signature_header(secrets, &delivery.id, seconds, &body),
             )
-            .body(body)
-            .send()
-            .await;
-        let Ok(mut answer) = sent else {
+            .body(Bytes::from(body));
+        let Ok(request) = request else {
+            return (AttemptOutcome::Unreachable, None);
+        };
+        let Ok(answer) = client.send(request).await else {
             return (AttemptOutcome::Unreachable, None);
         };
         let asked = retry_after(answer.headers(), now);
         let status = answer.status();
+        let mut body = answer.into_body();
         let mut read = 0;
-        while let Ok(Some(piece)) = answer.chunk().await {
+        while let Some(Ok(piece)) = body.next().await {
             read += piece.len();
             if read >= ANSWER_BYTES {
                 break;
@@ -101,21 +117,20 @@ impl Sender {
 
     /// The client: it follows no redirects, uses no proxy, keeps no connections, and resolves no
     /// names.
-    async fn client(&self) -> Option<&Client> {
-        let made = self.client.get_or_try_init(|| async {
-            let builder = Client::builder()
-                .dns_resolver(self.names.clone())
-                .redirect(Policy::none())
-                .no_proxy()
-                .referer(false)
-                .pool_max_idle_per_host(0)
-                .connect_timeout(self.limit)
-                .user_agent(concat!("ventriform/", env!("CARGO_PKG_VERSION")));
-            let built = tokio::task::spawn_blocking(|| builder.build()).await;
-            built.map_err(|e| e.to_string())?.map_err(|e| e.to_string())
-        });
+    async fn client(&self) -> Option<&Arc<dyn HttpClient>> {
+        let options = ClientOptions {
+            redirects: Redirects::Never,
+            idle_timeout: Duration::ZERO,
+            connect_timeout: Some(self.limit),
+            resolver: Some(Arc::new(self.names.clone())),
+            user_agent: Some(USER_AGENT),
+            ..ClientOptions::default()
+        };
+        let made = self
+            .client
+            .get_or_try_init(|| build_client(self.clients.clone(), options));
         made.await
-            .inspect_err(|error: &String| tracing::error!(error, "webhooks cannot be sent"))
+            .inspect_err(|error| tracing::error!(%error, "webhooks cannot be sent"))
             .ok()
     }
 }

@@ -1,6 +1,6 @@
 //! Starting a service on its stores, and ending it.
 //!
-//! 1. [`open`] makes the [`Service`] from settings, engine and stores, returns the jobs of a process that died to the
+//! 1. [`open`] makes the [`Service`] from settings, engine, stores and the factory of HTTP clients, returns the jobs of a process that died to the
 //!    queue, and checks the rules of the settings. Nothing runs yet.
 //! 2. [`RunningService::start`] starts workers and background tasks.
 //! 3. [`RunningService::stop`] ends them in order; unfinished jobs go back to the queue.
@@ -15,6 +15,7 @@ use crate::background::{self, UPKEEP_EVERY, Upkeep};
 use crate::config::Settings;
 use crate::decoding::Decoding;
 use crate::hooks::{Dispatcher, HookSettings, Hooks, RetrySchedule, UrlGuard};
+use crate::http_client::ClientFactory;
 use crate::intake::{Intake, Receiver, Sessions};
 use crate::items::{Items, RetentionAges};
 use crate::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
@@ -64,6 +65,7 @@ pub async fn open(
     settings: Settings,
     engine: Engine,
     stores: Stores,
+    http_clients: Arc<dyn ClientFactory>,
 ) -> Result<OpenedService, OpenError> {
     let queue = queue(&settings, &stores);
     queue.heartbeat().await?;
@@ -71,7 +73,7 @@ pub async fn open(
     let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
     queue.recover_after_crash(limit).await?;
     let metrics = Metrics::new();
-    let spans = Spans::new(settings.otlp_endpoint.0.as_deref())?;
+    let spans = Spans::new(settings.otlp_endpoint.0.as_deref(), &*http_clients)?;
     queue.observe(Arc::new(JobWatch::new(metrics.jobs.clone(), spans.clone())));
     let decoding = Arc::new(Decoding::new(
         &settings,
@@ -90,7 +92,7 @@ pub async fn open(
         closing: CancellationToken::new(),
         decoding: decoding.clone(),
         memory: MemoryBudget::new(settings.request_memory.0),
-        hooks: hooks(&settings, &stores, &queue),
+        hooks: hooks(&settings, &stores, &queue, http_clients.clone()),
         archives: ArchiveDesk::new(
             stores.archives.clone(),
             UrlGuard::of_listed(settings.dicomweb_allow.clone()),
@@ -100,6 +102,7 @@ pub async fn open(
         readiness: Readiness::default(),
         figures: stores.figures.clone(),
         spans,
+        http_clients,
         settings,
         queue,
     };
@@ -234,7 +237,12 @@ fn receiving(
     }
 }
 
-fn hooks(settings: &Settings, stores: &Stores, queue: &Queue) -> Hooks {
+fn hooks(
+    settings: &Settings,
+    stores: &Stores,
+    queue: &Queue,
+    http_clients: Arc<dyn ClientFactory>,
+) -> Hooks {
     let guard = UrlGuard::new(settings.webhook_allow.clone());
     let sending = HookSettings {
         retries: RetrySchedule {
@@ -252,6 +260,7 @@ fn hooks(settings: &Settings, stores: &Stores, queue: &Queue) -> Hooks {
     let dispatcher = Dispatcher::new(
         stores.deliveries.clone(),
         queue.clock().clone(),
+        http_clients,
         guard.clone(),
         sending,
     );

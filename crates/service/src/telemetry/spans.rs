@@ -11,26 +11,33 @@
 //! Without an endpoint nothing is made. With one, spans wait in a queue of limited length for a
 //! thread that sends them; what does not fit, or cannot be sent, is dropped.
 
+use crate::http_client::{ClientFactory, ClientOptions, HttpClient, Redirects, SendError};
 use crate::records::{Job, Timestamp};
 use async_trait::async_trait;
 use bytes::Bytes;
+use futures::StreamExt;
 use opentelemetry::trace::{
     Span, SpanContext, SpanId, SpanKind, Status, TraceContextExt, TraceFlags, TraceId, TraceState,
     Tracer, TracerProvider,
 };
 use opentelemetry::{Context, KeyValue};
-use opentelemetry_http::{HttpClient, HttpError, Request, Response};
+use opentelemetry_http::{HttpError, Request, Response};
 use opentelemetry_otlp::{Protocol, SpanExporter, WithExportConfig, WithHttpConfig};
 use opentelemetry_sdk::Resource;
 use opentelemetry_sdk::trace::{SdkTracer, SdkTracerProvider};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::runtime::Handle;
+use url::Url;
 
 /// Longest time to send a batch of spans, and to send the last ones on shutdown.
 const SEND_LIMIT: Duration = Duration::from_secs(5);
 
 /// Largest answer of a collector that is read, bytes.
 const ANSWER_BYTES: usize = 64 << 10;
+
+/// Most redirects of a collector.
+const MAX_REDIRECTS: usize = 10;
 
 /// The path of traces below a collector's address (OTLP over HTTP).
 const TRACES_PATH: &str = "/v1/traces";
@@ -50,12 +57,12 @@ pub struct OtlpError {
 }
 
 impl Spans {
-    /// Sends spans to the collector at this address; makes none without one. To be called within
-    /// the runtime that sends them.
+    /// Sends spans to the collector at this address, by a client of that factory; makes none without one. To be
+    /// called within the runtime that sends them.
     ///
     /// # Errors
     /// If the address is not a URL.
-    pub fn new(endpoint: Option<&str>) -> Result<Self, OtlpError> {
+    pub fn new(endpoint: Option<&str>, clients: &dyn ClientFactory) -> Result<Self, OtlpError> {
         let Some(endpoint) = endpoint else {
             return Ok(Self(None));
         };
@@ -63,15 +70,19 @@ impl Spans {
             endpoint: endpoint.to_owned(),
             reason,
         };
-        let url = reqwest::Url::parse(endpoint).map_err(|e| unusable(e.to_string()))?;
+        let url = Url::parse(endpoint).map_err(|e| unusable(e.to_string()))?;
         if !matches!(url.scheme(), "http" | "https") {
             return Err(unusable(
                 "it begins with neither http:// nor https://".into(),
             ));
         }
-        let client = reqwest::Client::builder()
-            .timeout(SEND_LIMIT)
-            .build()
+        let client = clients
+            .build(ClientOptions {
+                total_timeout: Some(SEND_LIMIT),
+                redirects: Redirects::Anywhere(MAX_REDIRECTS),
+                environment_proxies: true,
+                ..ClientOptions::default()
+            })
             .map_err(|e| unusable(e.to_string()))?;
         let exporter = SpanExporter::builder()
             .with_http()
@@ -248,30 +259,28 @@ fn time_of(at: Timestamp) -> SystemTime {
     UNIX_EPOCH + Duration::from_millis(u64::try_from(at).unwrap_or(0))
 }
 
-/// Sends batches with this program's HTTP client. The exporter calls it from a thread of its own,
+/// Sends batches with the service's HTTP client. The exporter calls it from a thread of its own,
 /// so the request is made on the runtime.
 #[derive(Debug)]
 struct CollectorClient {
-    client: reqwest::Client,
+    client: Arc<dyn HttpClient>,
     runtime: Handle,
 }
 
 #[async_trait]
-impl HttpClient for CollectorClient {
+impl opentelemetry_http::HttpClient for CollectorClient {
     async fn send_bytes(&self, request: Request<Bytes>) -> Result<Response<Bytes>, HttpError> {
-        let request = reqwest::Request::try_from(request)?;
         let client = self.client.clone();
         let sent = self.runtime.spawn(async move {
-            let mut answer = client.execute(request).await?;
-            let status = answer.status();
+            let (head, mut pieces) = client.send(request).await?.into_parts();
             let mut body = Vec::new();
-            while let Some(piece) = answer.chunk().await? {
-                body.extend_from_slice(&piece);
+            while let Some(piece) = pieces.next().await {
+                body.extend_from_slice(&piece?);
                 if body.len() > ANSWER_BYTES {
                     break;
                 }
             }
-            Ok::<_, reqwest::Error>((status, body))
+            Ok::<_, SendError>((head.status, body))
         });
         let (status, body) = sent.await??;
         let answer = Response::builder().status(status);
