@@ -616,6 +616,68 @@ fn a_crate_depends_on_the_crates_below_it_alone() {
     }
 }
 
+/// The crates of a lock file by name, each with the names of those it depends on. Versions are left out: all versions of
+/// a crate count as one.
+fn locked_crates(lock: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let mut crates: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut current = String::new();
+    for line in lock.lines() {
+        if let Some(name) = line.strip_prefix("name = ") {
+            current = name.trim_matches('"').to_owned();
+            crates.entry(current.clone()).or_default();
+        } else if let Some(named) = line.strip_prefix(" \"") {
+            // `name`, or `name version` where there are several.
+            let name = named.split([' ', '"']).next().unwrap_or_default();
+            let uses = crates.entry(current.clone()).or_default();
+            uses.insert(name.to_owned());
+        }
+    }
+    crates
+}
+
+/// All crates that the crate in `folder` is built with: those of its manifest, those of the manifests of our crates among
+/// these, those that the others have in the lock file, and so on. That is at least what `cargo tree --edges normal` names,
+/// but for optional dependencies of ours: a lock file has the dependencies of every platform, and of the features that
+/// any crate of the workspace asks for.
+fn all_dependencies(folder: &str) -> BTreeSet<String> {
+    let lock = fs::read_to_string(root().join("Cargo.lock")).expect("a lock file");
+    let mut crates = locked_crates(&lock);
+    for (folder, _) in CRATE_USES {
+        crates.insert(package_name(folder), dependencies(folder));
+    }
+    let mut found = BTreeSet::new();
+    let mut next: Vec<String> = dependencies(folder).into_iter().collect();
+    while let Some(name) = next.pop() {
+        let uses = crates.get(&name);
+        let uses = uses.unwrap_or_else(|| panic!("{name} is not in the lock file"));
+        if found.insert(name) {
+            next.extend(uses.iter().cloned());
+        }
+    }
+    found
+}
+
+/// The name of the package in `folder`.
+fn package_name(folder: &str) -> String {
+    let manifest = fs::read_to_string(root().join(folder).join("Cargo.toml")).expect("a manifest");
+    let package = manifest.split("[package]\n").nth(1).expect("a package");
+    let mut lines = package.lines();
+    let name = lines.find_map(|line| line.strip_prefix("name = "));
+    name.expect("a name").trim_matches('"').to_owned()
+}
+
+#[test]
+fn the_service_is_built_without_what_serves_sends_and_stores() {
+    let found = all_dependencies("crates/service");
+    for name in INTERFACE_CRATES {
+        assert!(!found.contains(*name), "the service is built with {name}");
+    }
+    // The lock file names what the others are built with.
+    let sending = all_dependencies("crates/http_client");
+    assert!(sending.contains("reqwest") && sending.contains("hyper"));
+    assert!(all_dependencies("crates/store").contains("sqlx"));
+}
+
 #[test]
 fn the_library_knows_no_clock_and_no_environment() {
     let mut violations = Vec::new();
