@@ -580,6 +580,11 @@ async fn a_cohort_becomes_limits_and_two_scans_a_scored_comparison() {
             for said in figures.iter().map(String::as_str).chain(named) {
                 assert!(contains(&object, said), "{said}");
             }
+            // It names the limits behind the scores.
+            let limits = &report["stress"]["perfusion"]["normals"];
+            for said in ["sha256", "people", "program_version"] {
+                assert!(contains(&object, &text(&limits[said])), "{said}");
+            }
         }
         let hidden = service.get(&format!("{link}?deidentify=true")).send().await;
         let hidden = hidden.unwrap().bytes().await.unwrap();

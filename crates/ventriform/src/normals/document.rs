@@ -240,6 +240,12 @@ fn flat<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Map<String, Value>
     deserializer.deserialize_map(Flat)
 }
 
+/// Whether the name of a protocol has the word `role`, `stress` or `rest`, in it.
+pub(crate) fn names_protocol(protocol: &str, role: &str) -> bool {
+    let mut words = protocol.split(|c: char| !c.is_alphanumeric());
+    words.any(|word| word.eq_ignore_ascii_case(role))
+}
+
 impl NormalLimits {
     /// Limits of these groups with the SHA-256 of their content.
     pub fn new(
@@ -335,21 +341,17 @@ impl NormalLimits {
     /// The protocol for scans at `stress` or `rest`: the only one whose name has that word in it, or the word itself where
     /// all names have that of the other kind of scan, so that no group suits. `None` if names do not tell.
     pub fn protocol_of(&self, role: &str) -> Option<String> {
-        let names = |protocol: &str, role: &str| {
-            let mut words = protocol.split(|c: char| !c.is_alphanumeric());
-            words.any(|word| word.eq_ignore_ascii_case(role))
-        };
         let protocols: BTreeSet<&str> = (self.groups.iter())
             .map(|group| group.protocol.as_str())
             .collect();
         let own: Vec<&str> = (protocols.iter().copied())
-            .filter(|protocol| names(protocol, role))
+            .filter(|protocol| names_protocol(protocol, role))
             .collect();
         let other = if role == "stress" { "rest" } else { "stress" };
         match own[..] {
             [only] => Some(only.to_owned()),
             [] => (protocols.iter())
-                .all(|protocol| names(protocol, other))
+                .all(|protocol| names_protocol(protocol, other))
                 .then(|| role.to_owned()),
             _ => None,
         }

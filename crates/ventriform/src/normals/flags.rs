@@ -3,6 +3,9 @@
 use super::sizes::FEW_CASES;
 use std::fmt;
 
+/// The stable name of [`NormalsFlag::KindNotStated`].
+pub(crate) const KIND_NOT_STATED: &str = "normals_kind_not_stated";
+
 /// A reason to look closer at a comparison with normal limits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NormalsFlag {
@@ -49,7 +52,7 @@ impl NormalsFlag {
             Self::Simulated => "normals_simulated",
             Self::FewCases { .. } => "normals_few_cases",
             Self::MixedSex => "normals_mixed_sex",
-            Self::KindNotStated { .. } => "normals_kind_not_stated",
+            Self::KindNotStated { .. } => KIND_NOT_STATED,
             Self::OtherParameters { .. } => "normals_other_parameters",
             Self::OtherVersion { .. } => "normals_other_version",
             Self::MaskedBase { .. } => "normals_base_masked",

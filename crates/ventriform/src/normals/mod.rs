@@ -39,11 +39,13 @@ mod sizes;
 mod tests;
 
 pub use build::{GroupKind, HealthyScan, group_of, limits_of};
+pub(crate) use document::names_protocol;
 pub use document::{
     ExcludedCase, GlobalLimit, LeftOut, LimitMap, MOST_NORMALS_BYTES, NormalCase, NormalGroup,
     NormalLimits, Specificity,
 };
 pub use error::NormalsError;
+pub(crate) use flags::KIND_NOT_STATED;
 pub use flags::NormalsFlag;
 pub use kind::{GroupSex, ScanKind, Sex, yes_or_no};
 pub use matching::{MATCHED_Z, Matched, matched};

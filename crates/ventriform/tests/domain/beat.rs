@@ -11,10 +11,11 @@ use dicom_object::{DefaultDicomObject, FileMetaTableBuilder, InMemDicomObject, f
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::ThreadPoolBuilder;
+use serde_json::json;
 use ventriform::beat::BeatFlag;
 use ventriform::beat::phase::behind;
 use ventriform::export::Format;
-use ventriform::export::dicom::Moment;
+use ventriform::export::dicom::{DicomBeat, Moment, Structure};
 use ventriform::gated::{GatedError, GatedHeart, GatedOrder, beat_figures, from_files};
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
@@ -1080,6 +1081,46 @@ fn a_beat_is_written_as_dicom() {
     assert_eq!(of("59092-7"), thickening);
     let motion: Vec<f64> = segments.iter().map(|s| s.motion_mm).collect();
     assert_eq!(of("60797005"), motion);
+}
+
+/// The structured report of a beat beside normal limits has their figures and names the limits.
+#[test]
+fn a_beat_beside_normal_limits_is_written_as_dicom() {
+    let heart = from_nuclear();
+    let made = Moment {
+        date: "20260101".into(),
+        time: "120000".into(),
+    };
+    let scans = heart.scans(heart.reading.provenance().unwrap(), &made);
+    let of = |report: &BeatReport| -> Vec<u8> {
+        let text = serde_json::to_string(report).unwrap();
+        let structure = Structure::of("left_ventricle");
+        let beat = DicomBeat::new(structure, &scans, report, &text);
+        beat.measurements().unwrap()
+    };
+    let mut report = heart.report();
+    let sha256 = "ab".repeat(32);
+    let normals = json!({"sha256": sha256, "simulated": true, "people": "simulated, not patients", "sex": "M",
+        "protocol": "rest", "tracer": "Tc-99m", "attenuation_corrected": false, "cases": 15});
+    let segment = json!({"segment": 10, "name": "x", "z": -3.0, "score": 2, "extent_percent": 50.0,
+        "deficit_percent": 20.0, "compared_percent": 100.0});
+    let perfusion = json!({"normals": normals, "note": "TPD-like", "z_limit": 2.5, "deficit_percent": 6.0,
+        "extent_percent": 11.0, "severity": 3.0, "summed_score": 2, "summed_percent": 3.0, "segments": [segment],
+        "territories": [], "figures": [], "flags": []});
+    let without = of(&report);
+    report.perfusion = Some(serde_json::from_value(perfusion).unwrap());
+    let with = of(&report);
+    let has = |bytes: &[u8], text: &str| bytes.windows(text.len()).any(|w| w == text.as_bytes());
+    for said in [
+        "427751006",
+        "DEFICIT",
+        "SRS",
+        "SCORE",
+        "simulated, not patients",
+        &sha256,
+    ] {
+        assert!(has(&with, said) && !has(&without, said), "{said}");
+    }
 }
 
 /// Calls `visit` with the data set and every item in it.

@@ -6,11 +6,12 @@
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
-//! segments, unless the gates are no beat. A figure that the report lacks is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
+//! segments, unless the gates are no beat, and those beside normal limits ([`normals`](super::normals)). A figure that the report lacks is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
 use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
+use super::normals;
 use super::structured_report::{
     self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, WALL_SEGMENTS, concept, figure,
     finding_site, group, measured, text, tracking, within,
@@ -206,6 +207,10 @@ impl<'a> DicomBeat<'a> {
             }
             groups.push(group("1501", content));
         }
+        let perfusion = self.report.perfusion.iter();
+        groups.extend(
+            perfusion.flat_map(|perfusion| normals::groups(perfusion, self.structure, uids)),
+        );
         groups
     }
 

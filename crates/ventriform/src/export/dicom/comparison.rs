@@ -7,10 +7,14 @@
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one of
 //! each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17 segments
-//! in each state, and one of each segment's change. A figure that the report lacks is left out: without normal limits there are no scores.
+//! in each state, and one of each segment's change. The group of a scan names the limits that its scores stand beside
+//! ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
 
 use super::codes::{Code, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
+use super::normals::{
+    DEFECT_EXTENT, DEFICIT_SCORE, REST_SCORE, SCORE_UNIT, SEGMENT_SCORE, STRESS_SCORE, limits_used, patient_state,
+};
 use super::structured_report::{
     self as sr, Figure, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group,
     measured, text, tracking,
@@ -179,16 +183,14 @@ impl<'a> DicomComparison<'a> {
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
         let mut groups = vec![group("1501", content)];
         for (scan, own, summed) in [
-            (WhichScan::Stress, &report.stress, STRESS_SCORE),
-            (WhichScan::Rest, &report.rest, REST_SCORE),
+            (WhichScan::Stress, &report.stress, STRESS_FIGURES),
+            (WhichScan::Rest, &report.rest, REST_FIGURES),
         ] {
             let name = format!("{label} at {scan}");
             let mut content = self.beginning(&name, Some(scan), site);
             content.extend(measured(own, SCAN_FIGURES));
             content.extend(measured(report, summed));
-            if let Some(perfusion) = &own.perfusion {
-                content.push(text("CONTAINS", dcm("121106", "Comment"), &perfusion.note));
-            }
+            content.extend(own.perfusion.iter().flat_map(limits_used));
             groups.push(group("1501", content));
         }
         for territory in &report.territories {
@@ -225,29 +227,17 @@ impl<'a> DicomComparison<'a> {
         let mut content = tracking(name, &self.uids.uid(name));
         let finding = dcm("121071", "Finding");
         content.push(concept("CONTAINS", finding, self.structure.kind));
-        content.extend(state.map(|scan| {
-            let state = match scan {
-                WhichScan::Stress => sct("432655005", "Cardiac Stress State"),
-                WhichScan::Rest => sct("128975004", "Resting State"),
-            };
-            concept("HAS CONCEPT MOD", dcm("109054", "Patient State"), state)
-        }));
+        content.extend(state.map(patient_state));
         content.push(finding_site(site));
         content
     }
 }
 
 const NO_UNITS: Code = ucum("1", "no units");
-const SCORE_UNIT: Code = ucum("{score}", "score");
-const DEFECT_EXTENT: Code = sct(
-    "427751006",
-    "Extent of cardiac perfusion defect (observable entity)",
-);
 const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 const VOLUME: Code = sct("118565006", "Volume");
 const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
 const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");
-const SEGMENT_SCORE: Code = own("SCORE", "Perfusion score, 0 normal to 4 absent");
 
 /// Measurements of both scans together.
 const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
@@ -273,30 +263,14 @@ const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
     ),
 ];
 
-const STRESS_SCORE: &[Figure<ComparisonReport>] = &[
-    figure(
-        |r| r.sss.map(f64::from),
-        loinc("82648-7", "Summed stress score"),
-        SCORE_UNIT,
-    ),
-    figure(
-        |r| r.beat.as_ref()?.stress_ef_percent,
-        EJECTION_FRACTION,
-        PERCENT,
-    ),
+const STRESS_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(|r| r.sss.map(f64::from), STRESS_SCORE, SCORE_UNIT),
+    figure(|r| r.beat.as_ref()?.stress_ef_percent, EJECTION_FRACTION, PERCENT),
 ];
 
-const REST_SCORE: &[Figure<ComparisonReport>] = &[
-    figure(
-        |r| r.srs.map(f64::from),
-        own("SRS", "Summed rest score"),
-        SCORE_UNIT,
-    ),
-    figure(
-        |r| r.beat.as_ref()?.rest_ef_percent,
-        EJECTION_FRACTION,
-        PERCENT,
-    ),
+const REST_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(|r| r.srs.map(f64::from), REST_SCORE, SCORE_UNIT),
+    figure(|r| r.beat.as_ref()?.rest_ef_percent, EJECTION_FRACTION, PERCENT),
 ];
 
 const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");
@@ -319,7 +293,7 @@ const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
     ),
     figure(
         |s| Some(s.perfusion.as_ref()?.deficit_percent),
-        own("DEFICIT", "Deficit score against normal limits"),
+        DEFICIT_SCORE,
         PERCENT,
     ),
 ];

@@ -7,10 +7,12 @@
 //! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
 //! measured, not at the figure. The volumes of the anatomical
-//! wall and cavity have the ends of the interval that holds the true one. A figure that the report lacks is left out.
+//! wall and cavity have the ends of the interval that holds the true one. A scan beside normal limits has the groups of
+//! [`normals`](super::normals) too. A figure that the report lacks is left out.
 
 use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
+use super::normals::{self, DEFECT_EXTENT};
 use super::structured_report::{
     self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, SeriesReference,
     WALL_SEGMENTS, concept, figure, finding_site, group, image, mean, measured, text, tracking,
@@ -24,10 +26,6 @@ use dicom_dictionary_std::{tags, uids};
 const VOLUME: Code = sct("118565006", "Volume");
 const WALL_MASS: Code = sct("118538004", "Mass");
 const WALL_THICKNESS: Code = dcm("122445", "Wall Thickness");
-const DEFECT_EXTENT: Code = sct(
-    "427751006",
-    "Extent of cardiac perfusion defect (observable entity)",
-);
 const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
 
 const NO_UNITS: Code = ucum("1", "no units");
@@ -187,6 +185,12 @@ fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
         content.extend(figures);
         groups.push(group("1501", content));
     }
+    let perfusion = (results.figures).and_then(|report| report.perfusion.as_ref());
+    groups.extend(
+        perfusion
+            .into_iter()
+            .flat_map(|perfusion| normals::groups(perfusion, results.structure, &results.uids)),
+    );
     groups
 }
 

@@ -7,7 +7,7 @@
 //! 2. [`SourceScan::deidentified`] takes the identity away, on request.
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
-//!    `measurements`, `capture`).
+//!    `measurements` with `normals`, `capture`).
 //! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest and
 //!    stress: a report and pictures.
 //!
@@ -29,6 +29,7 @@ mod codes;
 mod comparison;
 mod data_set;
 mod measurements;
+mod normals;
 mod segmentation;
 mod source;
 mod stl;

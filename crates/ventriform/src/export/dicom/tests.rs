@@ -7,10 +7,12 @@ use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::voxelise;
 use crate::mesh::shapes;
+use crate::normals::{GroupSex, NormalsFlag, NormalsUsed};
 use crate::polar::{PolarSegment, PolarSummary};
 use crate::report::segmentation_report::tests::first_report;
 use crate::report::{
-    RaisedFlag, SegmentationReport, Thickness, Thicknesses, VolumeIntervalsReport, WallVolumes,
+    PerfusionReport, RaisedFlag, SegmentScore, SegmentationReport, TerritoryScore, Thickness,
+    Thicknesses, VolumeIntervalsReport, WallVolumes,
 };
 use crate::volume::Provenance;
 use dicom_core::Tag;
@@ -447,6 +449,138 @@ fn the_report_repeats_the_figures() {
         .collect();
     let mask = text(&scene.read(DicomObject::Mask), tags::SOP_INSTANCE_UID);
     assert_eq!(named, ["1.2.3.4.5.6", &mask]);
+}
+
+/// A wall beside limits of this protocol.
+fn perfusion(protocol: &str) -> PerfusionReport {
+    let segment = |segment: usize| SegmentScore {
+        segment,
+        name: "x".into(),
+        z: (segment > 1).then_some(-(segment as f64)),
+        score: (segment > 1).then_some(2),
+        extent_percent: 30.0 + segment as f64,
+        deficit_percent: 20.0,
+        compared_percent: 90.0,
+    };
+    let territory = |name: &str| TerritoryScore {
+        name: name.into(),
+        extent_percent: 41.5,
+        deficit_percent: 7.5,
+        summed_score: 9,
+    };
+    PerfusionReport {
+        normals: NormalsUsed {
+            sha256: "5eba".repeat(16),
+            program_version: Some("0.0.9".into()),
+            simulated: true,
+            people: "simulated, not patients".into(),
+            sex: GroupSex::F,
+            protocol: protocol.into(),
+            tracer: "Tc-99m".into(),
+            attenuation_corrected: false,
+            cases: 31,
+        },
+        note: "TPD-like".into(),
+        z_limit: 2.5,
+        deficit_percent: 6.25,
+        extent_percent: 18.75,
+        severity: Some(3.5),
+        summed_score: 32,
+        summed_percent: 47.0,
+        segments: (1..=17).map(segment).collect(),
+        territories: ["LAD", "LCX", "RCA"].map(territory).into(),
+        figures: Vec::new(),
+        flags: vec![RaisedFlag {
+            code: "normals_simulated".into(),
+            reason: "for tests only".into(),
+        }],
+    }
+}
+
+/// Every text of the content below `set`, codes' values and meanings included.
+fn texts(set: &InMemDicomObject) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    walk(set, &mut |_, value| {
+        found.insert(value.trim_end_matches(['\0', ' ']).to_owned());
+    });
+    found
+}
+
+#[test]
+fn a_scan_beside_normal_limits_has_their_figures_and_names_them() {
+    let mut scene = straight();
+    let mut before = Vec::new();
+    figures(&scene.read(DicomObject::Measurements), &mut before, "");
+    for (protocol, summed, state) in [
+        ("stress, one day", "Summed stress score", Some("432655005")),
+        ("rest", "Summed rest score", Some("128975004")),
+        ("one day", "Summed score", None),
+    ] {
+        scene.report.perfusion = Some(perfusion(protocol));
+        let set = scene.read(DicomObject::Measurements);
+        let mut found = Vec::new();
+        figures(&set, &mut found, "");
+        let has = |concept: &str, site: &str, number: f64| {
+            let entry = (concept.to_owned(), site.to_owned(), number);
+            assert!(found.contains(&entry), "{entry:?} in {found:?}");
+        };
+        let extent = "Extent of cardiac perfusion defect (observable entity)";
+        // That below a share of the maximum stays.
+        has(extent, "Left ventricle", 12.5);
+        has(extent, "Left ventricle", 18.75);
+        has(
+            "Deficit score against normal limits",
+            "Left ventricle",
+            6.25,
+        );
+        has(
+            "Mean |z| of the wall below the normal limit",
+            "Left ventricle",
+            3.5,
+        );
+        has(summed, "Left ventricle", 32.0);
+        // Of a territory.
+        has(extent, "Left ventricle", 41.5);
+        has("Summed score", "Left ventricle", 9.0);
+        let segment = "left ventricle mid inferior segment";
+        has("Perfusion score, 0 normal to 4 absent", segment, 2.0);
+        has("Mean z, negative below the normal mean", segment, -10.0);
+        has(extent, segment, 40.0);
+        // A segment that nothing was compared in has no figures.
+        let basal = |(_, site, number): &&(String, String, f64)| {
+            site == "left ventricle basal anterior segment" && *number == 31.0
+        };
+        assert_eq!(found.iter().find(basal), None);
+        assert_eq!(found.len(), before.len() + 4 + 3 * 3 + 16 * 4);
+        let texts = texts(&set);
+        let group = format!(
+            "sex F, protocol {protocol}, tracer Tc-99m, attenuation corrected no, 31 cases"
+        );
+        let hash = "5eba".repeat(16);
+        for said in [
+            group.as_str(),
+            hash.as_str(),
+            "simulated, not patients",
+            "ventriform 0.0.9",
+            "TPD-like",
+            "for tests only",
+            "NORMAL-LIMITS",
+        ] {
+            assert!(texts.contains(said), "{said}");
+        }
+        for known in ["432655005", "128975004"] {
+            assert_eq!(texts.contains(known), state == Some(known), "{protocol}");
+        }
+    }
+    // Whether a scan of unknown protocol is at stress, limits of stress do not tell.
+    let mut unknown = perfusion("stress");
+    let kind = NormalsFlag::KindNotStated {
+        fields: vec!["sex", "protocol"],
+    };
+    unknown.flags.push(RaisedFlag::new(kind.code(), &kind));
+    scene.report.perfusion = Some(unknown);
+    let texts = texts(&scene.read(DicomObject::Measurements));
+    assert!(!texts.contains("432655005") && !texts.contains("82648-7"));
 }
 
 /// Method ("" without one), site and volume, ml, of every group that has volumes, which may be one only: readers of
