@@ -162,6 +162,7 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
         </details>
       )}
       {report.beat && <details open><summary>The beat</summary><BeatTable report={report} /></details>}
+      {(report.no_beat ?? []).length > 0 && <p class="quiet">{report.beat ? "No ejection fractions" : "No beats"} were compared: {(report.no_beat ?? []).map(({ reason }) => reason).join("; ")}.</p>}
       {report.territories.length > 0 && <details><summary>Territories</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Territories"><TerritoryTable report={report} /></div></details>}
       <details><summary>Segments</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Segments"><SegmentChanges report={report} /></div></details>
       <details><summary>How both were matched</summary><MatchTable report={report} /></details>

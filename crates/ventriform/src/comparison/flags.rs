@@ -1,9 +1,12 @@
 //! Reasons to look closer at a comparison.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// One of the two scans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "lowercase")]
 pub enum WhichScan {
     /// That at stress.
     Stress,

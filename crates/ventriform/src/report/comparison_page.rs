@@ -183,7 +183,22 @@ fn figures(report: &ComparisonReport) -> Markup {
         @if report.sss.is_none() {
             p.hint { "No scores and no z: the scans were compared with no normal limits." }
         }
+        @if !report.no_beat.is_empty() {
+            p.hint { (not_compared(report)) }
+        }
     }
+}
+
+/// Why nothing of the beat, or no ejection fraction, stands here.
+fn not_compared(report: &ComparisonReport) -> String {
+    let lacking = match report.beat {
+        None => "No beats",
+        Some(_) => "No ejection fractions",
+    };
+    let reasons: Vec<&str> = (report.no_beat.iter())
+        .map(|no_beat| no_beat.reason.as_str())
+        .collect();
+    format!("{lacking} were compared: {}.", reasons.join("; "))
 }
 
 fn slices(page: &ComparisonPage) -> Markup {
@@ -371,7 +386,7 @@ fn scans(report: &ComparisonReport) -> Markup {
 /// Everything else, by its name in the report, without long lists.
 fn particulars(report: &ComparisonReport) -> Markup {
     let mut comparison = object(report);
-    for told in ["parameters", "stress", "rest", "flags", "beat"] {
+    for told in ["parameters", "stress", "rest", "flags", "beat", "no_beat"] {
         comparison.remove(told);
     }
     document::particulars(&[

@@ -8,7 +8,8 @@ use super::json_number::round;
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::Resolution;
-use crate::comparison::PartFigures;
+use crate::comparison::{PartFigures, WhichScan};
+use crate::grid::gates::GATES;
 use crate::polar::PolarSummary;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -49,6 +50,10 @@ pub struct ComparisonReport {
     pub territories: Vec<ComparedTerritoryReport>,
     /// What changed of the beat; `null` unless both scans are gated.
     pub beat: Option<BeatChange>,
+    /// Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one entry for each scan
+    /// that is a reason. Empty where they were.
+    #[serde(default)]
+    pub no_beat: Vec<NoBeat>,
     /// The scan at stress.
     pub stress: ComparedScan,
     /// The scan at rest.
@@ -127,6 +132,67 @@ pub struct BeatChange {
     pub rest_esv_ml: f64,
 }
 
+/// A scan of which no beat could be compared.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct NoBeat {
+    /// The scan.
+    pub scan: WhichScan,
+    /// Why.
+    pub code: NoBeatCode,
+    /// The same in words.
+    pub reason: String,
+}
+
+/// Why there is no beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum NoBeatCode {
+    /// The scan is one volume, or volumes that nobody says are gates.
+    NotGated,
+    /// It has fewer gates than a beat is fitted to.
+    FewGates,
+    /// It has more.
+    ManyGates,
+    /// The gates show no beat: there is no ejection fraction.
+    NoContraction,
+}
+
+impl NoBeat {
+    /// Of a scan whose files hold no gates, or `gates` of them that no beat is fitted to.
+    pub fn of_files(scan: WhichScan, gates: Option<usize>) -> Self {
+        let [least, most] = [GATES.start(), GATES.end()];
+        let (code, reason) = match gates {
+            None => (
+                NoBeatCode::NotGated,
+                format!("the scan at {scan} is not gated"),
+            ),
+            Some(gates) => {
+                let code = if gates < *least {
+                    NoBeatCode::FewGates
+                } else {
+                    NoBeatCode::ManyGates
+                };
+                let reason = format!(
+                    "the scan at {scan} has {gates} gates, and a beat is fitted to {least} to {most}"
+                );
+                (code, reason)
+            }
+        };
+        Self { scan, code, reason }
+    }
+
+    /// Of a scan whose gates show no beat.
+    pub fn of_gates(scan: WhichScan) -> Self {
+        Self {
+            scan,
+            code: NoBeatCode::NoContraction,
+            reason: format!("the gates at {scan} show no beat"),
+        }
+    }
+}
+
 /// One of both scans.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
@@ -172,6 +238,36 @@ impl UptakeChange {
             difference_points: figures.difference_points.map(round),
             reversible_percent: round(figures.reversible_percent),
             fixed_percent: round(figures.fixed_percent),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_for_no_beat_says_which_scan_and_why() {
+        let of = NoBeat::of_files;
+        for (no_beat, code, said) in [
+            (
+                of(WhichScan::Rest, None),
+                "not_gated",
+                "at rest is not gated",
+            ),
+            (of(WhichScan::Stress, Some(4)), "few_gates", "has 4 gates"),
+            (of(WhichScan::Stress, Some(48)), "many_gates", "6 to 32"),
+            (
+                NoBeat::of_gates(WhichScan::Stress),
+                "no_contraction",
+                "at stress show no beat",
+            ),
+        ] {
+            assert!(no_beat.reason.contains(said), "{no_beat:?}");
+            let written = serde_json::to_value(&no_beat).unwrap();
+            assert_eq!(written["code"], code);
+            assert_eq!(written["scan"], no_beat.scan.as_str());
+            assert_eq!(serde_json::from_value::<NoBeat>(written).unwrap(), no_beat);
         }
     }
 }

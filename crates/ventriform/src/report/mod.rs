@@ -50,7 +50,7 @@ pub use closeness::{Closeness, MeasuredSurface};
 pub use comparison_page::{ComparisonPage, comparison_page};
 pub use comparison_report::{
     BeatChange, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
-    UptakeChange,
+    NoBeat, NoBeatCode, UptakeChange,
 };
 pub use distance_pictures::vertex_colours;
 pub use fit_report::{

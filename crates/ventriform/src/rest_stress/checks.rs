@@ -2,12 +2,16 @@
 
 use super::error::ComparisonError;
 use super::hearts::ComparedHeart;
+use super::order::ComparisonOrder;
 use crate::comparison::Change;
 use crate::comparison::MOST_MUSCLE_QUOTIENT;
 use crate::comparison::{ComparisonFlag, Reason, WhichScan};
 use crate::gated::GatedHeart;
 use crate::normals::Perfusion;
-use crate::volume::Provenance;
+use crate::progress::Monitor;
+use crate::volume::{
+    Provenance, ReadLimits, ReadOptions, VolumeFile, hold_same_voxels, provenance,
+};
 
 /// Difference of resolution from which scans are not comparable, mm: a cavity looks smaller by some
 /// per cent for every millimetre of blur.
@@ -17,25 +21,53 @@ const LARGE_REVERSIBLE_PERCENT: f64 = 10.0;
 /// Share of the wall that sets the scale below which it is uncertain, per cent.
 const FEW_MATCHED_PERCENT: f64 = 40.0;
 
-/// Refuses one scan given twice, and scans of two patients unless the caller says that they are one.
+/// Refuses, before anything is fitted, one scan given twice, and scans of two patients unless the caller says that they
+/// are one.
 pub(super) fn refuse(
-    stress: &ComparedHeart,
-    rest: &ComparedHeart,
-    same_patient: bool,
+    order: &ComparisonOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
 ) -> Result<(), ComparisonError> {
-    if let (Some(a), Some(b)) = (stress.provenance(), rest.provenance()) {
+    let scans = [
+        (WhichScan::Stress, order.stress),
+        (WhichScan::Rest, order.rest),
+    ];
+    // Of gates the headers of the first.
+    let options = ReadOptions { frame: Some(0) };
+    let header = |(scan, files): (WhichScan, &[VolumeFile])| {
+        provenance(files, &options, limits, monitor)
+            .map_err(|error| ComparisonError::of_gated(scan, error.into()))
+    };
+    if let (Some(a), Some(b)) = (header(scans[0])?, header(scans[1])?) {
         if a.sop_instance_uid.is_some() && a.sop_instance_uid == b.sop_instance_uid {
             return Err(ComparisonError::SameScan("they have one SOP Instance UID"));
         }
-        let differ = other_patient(a, b);
-        if !differ.is_empty() && !same_patient {
+        let differ = other_patient(&a, &b);
+        if !differ.is_empty() && !order.parameters.choice.same_patient {
             return Err(ComparisonError::OtherPatient(differ));
         }
     }
-    if stress.has_voxels_of(rest) {
-        return Err(ComparisonError::SameScan("they have the same voxels"));
+    let quiet = monitor.without_observer();
+    match hold_same_voxels([order.stress, order.rest], limits, &quiet) {
+        Ok(true) => Err(same_voxels()),
+        // The fit that reads a file with an error says whose it is.
+        Ok(false) | Err(_) => Ok(monitor.check()?),
     }
-    Ok(())
+}
+
+/// Refuses fits to the same voxels: the sum of one scan's gates beside those gates.
+pub(super) fn refuse_fits(
+    stress: &ComparedHeart,
+    rest: &ComparedHeart,
+) -> Result<(), ComparisonError> {
+    match stress.has_voxels_of(rest) {
+        true => Err(same_voxels()),
+        false => Ok(()),
+    }
+}
+
+fn same_voxels() -> ComparisonError {
+    ComparisonError::SameScan("they have the same voxels")
 }
 
 /// The fields by which the headers name two patients. The name decides only where no number does: it changes by

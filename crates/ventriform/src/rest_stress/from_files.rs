@@ -11,7 +11,7 @@ use crate::normals::ScanKind;
 use crate::parameters::{BeatChoice, FitParameters};
 use crate::progress::Monitor;
 use crate::segmentation::{self, RankedTemplate, SegmentationOrder};
-use crate::volume::{ReadLimits, VolumeFile, hold_gates};
+use crate::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
 
 /// Compares the scans of `order`. Both are fitted as beats if both are gated, as images otherwise.
 ///
@@ -31,13 +31,15 @@ pub fn from_files(
         hold_gates(files, choice.gated, limits, monitor)
             .map_err(|error| ComparisonError::of_gated(scan, error.into()))
     };
-    let gated = is_gated(scans[0])? && is_gated(scans[1])?;
+    checks::refuse(order, limits, monitor)?;
+    let gates = [is_gated(scans[0])?, is_gated(scans[1])?];
+    let gated = gates == [HeldGates::Beat; 2];
     let fit = |kept: Option<&str>, which: usize| {
         let monitor = monitor.part(which, scans.len());
         fitted(order, scans[which], (gated, kept), limits, &monitor)
     };
     let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
-    checks::refuse(&stress, &rest, order.parameters.choice.same_patient)?;
+    checks::refuse_fits(&stress, &rest)?;
     if let Some(common) = common_template(&stress, &rest) {
         let again = |heart: ComparedHeart, which: usize| {
             if heart.template() == common {
@@ -58,6 +60,7 @@ pub fn from_files(
         flags: checks::flags(&stress, &rest, &change),
         stress,
         rest,
+        gates,
         change,
         parameters: order.parameters.fit.clone(),
         choice: order.parameters.choice.clone(),

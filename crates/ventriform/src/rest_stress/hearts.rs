@@ -10,7 +10,7 @@ use crate::parameters::{ComparisonChoice, FitParameters};
 use crate::polar::PolarMap;
 use crate::progress::{Cancelled, Monitor};
 use crate::segmentation::{Segmentation, SegmentedVolume};
-use crate::volume::{Provenance, Volume, VolumeFacts};
+use crate::volume::{HeldGates, Provenance, Volume, VolumeFacts};
 
 /// A heart of a comparison.
 #[derive(Debug)]
@@ -155,6 +155,8 @@ pub struct ComparedHearts {
     pub stress: ComparedHeart,
     /// At rest.
     pub rest: ComparedHeart,
+    /// What the files at stress and those at rest hold of a beat.
+    pub gates: [HeldGates; 2],
     /// The change of the wall's uptake.
     pub change: Change,
     /// Reasons to look closer.

@@ -1,15 +1,15 @@
 //! Rest and stress of one patient from beginning to end: two scans in, the comparison's report and files out.
 //!
 //! 1. [`ComparisonOrder`]: the files of both scans, the models, normal limits, and the parameters.
-//! 2. [`from_files`](mod@from_files) fits both hearts by one model: that of the built-in hearts in which both
+//! 2. One scan given twice, by its instance or its voxels, and scans of two patients are refused.
+//! 3. [`from_files`](mod@from_files) fits both hearts by one model: that of the built-in hearts in which both
 //!    together have the greatest confidence, so both polar maps have the same places. Both are beats if both scans
 //!    are gated.
-//! 3. The scans are checked: one scan given twice and scans of two patients are refused; what makes figures doubtful
-//!    is a [`ComparisonFlag`](crate::comparison::ComparisonFlag) with its numbers.
-//! 4. The maps are compared ([`crate::comparison`]). With normal limits, each scan is scored by the group of its own
+//! 4. What makes figures doubtful is a [`ComparisonFlag`](crate::comparison::ComparisonFlag) with its numbers.
+//! 5. The maps are compared ([`crate::comparison`]). With normal limits, each scan is scored by the group of its own
 //!    protocol, and the summed difference score adds up what segments score more at stress. The ratio of the cavities
 //!    (transient ischaemic dilation, TID) is that of the anatomical walls in the images of all gates.
-//! 5. [`ComparedHearts::report`] is the report; [`ComparedHearts::files`] are the files written.
+//! 6. [`ComparedHearts::report`] is the report; [`ComparedHearts::files`] are the files written.
 
 mod checks;
 mod error;

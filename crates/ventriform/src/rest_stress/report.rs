@@ -1,16 +1,16 @@
 //! The report of a comparison.
 
 use super::hearts::{ComparedHeart, ComparedHearts};
-use crate::comparison::REVERSIBLE_POINTS;
+use crate::comparison::{REVERSIBLE_POINTS, WhichScan};
 use crate::normals::{Perfusion, summed_percent};
 use crate::numeric::decimals::round;
 use crate::polar::{PolarMap, PolarSummary};
 use crate::report::{
     BeatChange, BeatReport, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport,
-    ComparisonReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
-    UptakeChange,
+    ComparisonReport, FileFacts, LongAxis, NoBeat, PerfusionReport, Posture, RaisedFlag,
+    Resolution, UptakeChange,
 };
-use crate::volume::Provenance;
+use crate::volume::{HeldGates, Provenance};
 use serde_json::{Map, Value};
 
 fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
@@ -43,6 +43,26 @@ fn scan_report(heart: &ComparedHeart) -> ComparedScan {
         input: FileFacts::of(facts),
         warnings: facts.warnings.clone(),
     }
+}
+
+/// Why no beats were compared, or no ejection fractions.
+fn no_beat(hearts: &ComparedHearts) -> Vec<NoBeat> {
+    let scans = [
+        (WhichScan::Stress, &hearts.stress),
+        (WhichScan::Rest, &hearts.rest),
+    ];
+    let reasons = scans.into_iter().zip(hearts.gates);
+    let reasons = reasons.filter_map(|((scan, heart), held)| match held {
+        HeldGates::NotGated => Some(NoBeat::of_files(scan, None)),
+        HeldGates::OtherNumber { gates } => Some(NoBeat::of_files(scan, Some(gates))),
+        HeldGates::Beat => {
+            let still = heart
+                .beat()
+                .is_some_and(|own| own.beat.ef_percent.is_none());
+            still.then(|| NoBeat::of_gates(scan))
+        }
+    });
+    reasons.collect()
 }
 
 /// The report of `hearts`.
@@ -115,6 +135,7 @@ pub(super) fn of(hearts: &ComparedHearts, parameters: Map<String, Value>) -> Com
             stress_esv_ml: stress.esv_ml,
             rest_esv_ml: rest.esv_ml,
         }),
+        no_beat: no_beat(hearts),
         stress: scan_report(&hearts.stress),
         rest: scan_report(&hearts.rest),
         flags: (hearts.flags.iter())

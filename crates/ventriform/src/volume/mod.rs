@@ -88,8 +88,8 @@ pub use phantom::{Phantom, PhantomParameters, phantom};
 pub use preview::{preview, preview_png};
 pub use provenance::Provenance;
 pub use read::{
-    hold_gates, inspect, labels_are_rounded, preview_files, provenance, read, read_gates,
-    read_segment, segments, surface, voxels_of_label,
+    HeldGates, hold_gates, hold_same_voxels, inspect, labels_are_rounded, preview_files,
+    provenance, read, read_gates, read_segment, segments, surface, voxels_of_label,
 };
 pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;

@@ -114,8 +114,22 @@ pub fn read_gates(
     GatedReading::of(readings, &timings)
 }
 
-/// Whether `files` hold as many gates of a heart beat as a beat can be fitted to, by the header or because `gated` says
-/// that their volumes are gates. Nothing is decoded.
+/// What files hold of a heart beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeldGates {
+    /// As many gates as a beat can be fitted to.
+    Beat,
+    /// Gates, but too few or too many of them.
+    OtherNumber {
+        /// Gates of an R-R interval.
+        gates: usize,
+    },
+    /// One volume, or volumes that nobody says are gates.
+    NotGated,
+}
+
+/// Whether `files` hold gates of a heart beat that a beat can be fitted to, by the header or because `gated` says that
+/// their volumes are gates. Nothing is decoded.
 ///
 /// # Errors
 /// [`VolumeError`].
@@ -124,12 +138,49 @@ pub fn hold_gates(
     gated: bool,
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<bool, VolumeError> {
+) -> Result<HeldGates, VolumeError> {
     let opened = open(files, limits, monitor)?;
     let header = opened.file.header();
     let stated = opened.file.gate_timings().into_iter().next();
     let each = stated.unwrap_or_default().gates_of_interval(header.frames);
-    Ok(GATE_COUNTS.contains(&each) && (header.gated || gated))
+    if header.frames == 1 || !(header.gated || gated) {
+        return Ok(HeldGates::NotGated);
+    }
+    Ok(if GATE_COUNTS.contains(&each) {
+        HeldGates::Beat
+    } else {
+        HeldGates::OtherNumber { gates: each }
+    })
+}
+
+/// Whether both lists of files hold the same volumes voxel by voxel, whatever their formats and names. Nothing is
+/// decoded after the first volume that differs, and one volume of each is held in memory.
+///
+/// # Errors
+/// [`VolumeError`].
+pub fn hold_same_voxels(
+    files: [&[VolumeFile]; 2],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<bool, VolumeError> {
+    let [mut one, mut other] = [
+        open(files[0], limits, monitor)?.file,
+        open(files[1], limits, monitor)?.file,
+    ];
+    let [size, other_size] = [&one, &other].map(|file| {
+        let header = file.header();
+        (header.shape, header.frames)
+    });
+    if size != other_size {
+        return Ok(false);
+    }
+    for frame in 0..size.1 {
+        let voxels = one.decode_frame(frame, monitor)?.voxels;
+        if voxels != other.decode_frame(frame, monitor)?.voxels {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Gates that have together more voxels than a volume may.

@@ -3,10 +3,14 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::comparison::REVERSIBLE_POINTS;
+use std::collections::BTreeSet;
+use std::sync::Mutex;
+
+use ventriform::comparison::{REVERSIBLE_POINTS, WhichScan};
 use ventriform::geometry::Vec3;
 use ventriform::parameters::ComparisonParameters;
-use ventriform::progress::Monitor;
+use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::report::NoBeatCode;
 use ventriform::rest_stress::{ComparedHearts, ComparisonError, ComparisonOrder, from_files};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
@@ -150,11 +154,44 @@ fn a_correction_is_of_its_own_scan() {
     }
 }
 
+/// Notes the stages that work reports.
+#[derive(Default)]
+struct Stages(Mutex<BTreeSet<Stage>>);
+
+impl Observer for Stages {
+    fn progress(&self, stage: Stage, _: f64) {
+        self.0.lock().unwrap().insert(stage);
+    }
+}
+
+/// Before anything is fitted, also where the files' formats and names differ.
 #[test]
-fn one_scan_twice_is_refused() {
+fn one_scan_twice_is_refused_at_once() {
     let rest = scan(2, 0.0);
-    let refused = compared(&rest, &rest).unwrap_err();
-    assert!(matches!(refused, ComparisonError::SameScan(_)), "{refused}");
+    let packed = nifti::write(&rest, StoredType::Float32, true).unwrap();
+    for other in [
+        file(&rest),
+        vec![VolumeFile::in_memory("other.nii.gz", packed)],
+        vec![VolumeFile::of_arrays("array", vec![rest.clone()])],
+    ] {
+        let stages = Stages::default();
+        let order = ComparisonOrder {
+            stress: &other,
+            rest: &file(&rest),
+            auto: true,
+            models: Vec::new(),
+            normals: None,
+            parameters: &ComparisonParameters::default(),
+        };
+        let monitor = Monitor::new(&stages, CancelToken::new());
+        let refused = from_files(&order, &ReadLimits::default(), &monitor).unwrap_err();
+        assert!(matches!(refused, ComparisonError::SameScan(_)), "{refused}");
+        let stages = stages.0.into_inner().unwrap();
+        assert!(
+            stages.iter().all(|stage| *stage == Stage::Read),
+            "{stages:?}"
+        );
+    }
 }
 
 #[test]
@@ -164,6 +201,13 @@ fn files_that_name_no_patient_are_flagged() {
     let codes: Vec<&str> = report.flags.iter().map(|flag| flag.code.as_str()).collect();
     assert_eq!(codes, ["origin_not_stated"]);
     assert_eq!((report.sss, report.sds), (None, None));
+    // Neither is gated, so there is no beat, and the report says so.
+    assert_eq!(report.beat, None);
+    let why: Vec<_> = (report.no_beat.iter())
+        .map(|no_beat| (no_beat.scan, no_beat.code))
+        .collect();
+    let not_gated = |scan| (scan, NoBeatCode::NotGated);
+    assert_eq!(why, [WhichScan::Stress, WhichScan::Rest].map(not_gated));
     let text = serde_json::to_string(&report).unwrap();
     let read: ventriform::report::ComparisonReport = serde_json::from_str(&text).unwrap();
     assert_eq!(read, report);

@@ -26,7 +26,7 @@ use crate::normals::{
 use crate::parameters::{BeatChoice, NormalsParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
 use crate::segmentation::{self, Segmentation, SegmentationOrder, heart_figures};
-use crate::volume::{ReadLimits, VolumeFile, hold_gates};
+use crate::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -280,7 +280,8 @@ fn fitted(
     monitor: &Monitor,
 ) -> Result<(Segmentation, Vec<HeartFigure>), String> {
     let (parameters, limits) = (&options.parameters.fit, &options.limits);
-    if hold_gates(files, false, limits, monitor).map_err(|error| error.to_string())? {
+    let held = hold_gates(files, false, limits, monitor).map_err(|error| error.to_string())?;
+    if held == HeldGates::Beat {
         let order = GatedOrder {
             gates: files,
             auto: true,
