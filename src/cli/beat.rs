@@ -32,8 +32,8 @@ mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes 
 (wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {
-    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in the order of the numbers in their
-    /// names (gate2 before gate10) or else as given
+    /// The gates: a 4-D NIfTI file, a gated DICOM file, or one file for each gate, in the order that DICOM headers state,
+    /// or else of the numbers in their names (gate2 before gate10), or as given
     #[arg(value_name = "IN", required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// Folder to write to (created if missing)

@@ -1,6 +1,6 @@
 //! `/v1/beats`: with the fake computation, and with the real one in the real program.
 
-use crate::dicom::{JANE, nm, nm_of};
+use crate::dicom::{JANE, nm, nm_numbered, nm_of};
 use crate::gated::{beating, nifti_of};
 use crate::helpers::{Service, TestApp, heart, problem, text, volume as words};
 use reqwest::header::{ACCEPT, LOCATION};
@@ -389,6 +389,38 @@ fn form_of(files: Vec<(String, Vec<u8>)>) -> Form {
     files.into_iter().fold(Form::new(), |form, (name, bytes)| {
         form.part("file", Part::bytes(bytes).file_name(name))
     })
+}
+
+#[tokio::test]
+async fn dicom_images_of_one_gate_each_become_one_gated_volume() {
+    let data = tempfile::tempdir().unwrap();
+    let service = Service::start(data.path(), &[]).await;
+    let upload = async |order: [usize; 8]| -> Value {
+        // Names in the order of the form, which means nothing.
+        let named = order.into_iter().enumerate();
+        let form = form_of(
+            named
+                .map(|(n, gate)| {
+                    let image = nm_numbered(&JANE, &[&beating()[gate]], Some(gate + 1));
+                    (format!("{n}.dcm"), image)
+                })
+                .collect(),
+        );
+        let answer = service.post("/v1/volumes").multipart(form).send().await;
+        answer.unwrap().json().await.unwrap()
+    };
+    let stored = upload([7, 2, 5, 0, 1, 6, 3, 4]).await;
+    assert_eq!(stored["frames"], 8, "{stored}");
+    assert_eq!(stored["gates"]["number"], 8);
+    let again = upload([0, 1, 2, 3, 4, 5, 6, 7]).await;
+    assert_eq!(again["id"], stored["id"], "headers decide, not the form");
+    // The smallest cavity is that of the fourth gate.
+    let order = json!({"volume": stored["id"]});
+    let request = service.post("/v1/beats").header("prefer", "wait=60");
+    let answer = request.json(&order).send().await.unwrap();
+    assert_eq!(answer.status(), 200);
+    let beat: Value = answer.json().await.unwrap();
+    assert_eq!(beat["end_systole_gate"], 4, "{beat}");
 }
 
 #[tokio::test]

@@ -2405,7 +2405,7 @@ fn object_of(tenant: &Tenant, instance: &str, data: &str) -> NewObject {
             sop_instance: instance.into(),
             study: "1.2".into(),
             series: "1.2.3".into(),
-            is_slice: true,
+            is_part: true,
             modality: Some("NM".into()),
             image_type: vec!["ORIGINAL".into()],
             study_description: None,

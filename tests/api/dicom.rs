@@ -86,6 +86,11 @@ pub fn nm(patient: &Patient, gates: usize) -> Vec<u8> {
 
 /// Gates on one grid (one is not gated) as a Nuclear Medicine Image.
 pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
+    nm_numbered(patient, volumes, None)
+}
+
+/// The same as the instance of that number of its series.
+pub fn nm_numbered(patient: &Patient, volumes: &[&Volume], number: Option<usize>) -> Vec<u8> {
     let (volume, gates) = (volumes[0], volumes.len());
     let [columns, rows, slices] = volume.shape;
     let matrix = volume.frame.matrix();
@@ -127,6 +132,10 @@ pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
         _ => ("RECON GATED TOMO", vec![0x54, 0x60, 0x54, 0x70, 0x54, 0x80]),
     };
     let below = |number: usize| format!("{}.{number}", patient.study).into_bytes();
+    let instance = match number {
+        None => below(3),
+        Some(number) => [below(3), format!(".{number}").into_bytes()].concat(),
+    };
     let mut elements = vec![
         element(
             0x08,
@@ -135,7 +144,7 @@ pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
             format!("ORIGINAL\\PRIMARY\\{kind}\\EMISSION").as_bytes(),
         ),
         element(0x08, 0x16, "UI", b"1.2.840.10008.5.1.4.1.1.20"),
-        element(0x08, 0x18, "UI", &below(3)),
+        element(0x08, 0x18, "UI", &instance),
         element(0x08, 0x20, "DA", b"20261101"),
         element(0x08, 0x22, "DA", b"20261102"),
         element(0x08, 0x30, "TM", b"101500"),
@@ -153,6 +162,9 @@ pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
         element(0x20, 0x0d, "UI", patient.study.as_bytes()),
         element(0x20, 0x0e, "UI", &below(2)),
         element(0x20, 0x10, "SH", b"S1"),
+        number.map_or_else(Vec::new, |number| {
+            element(0x20, 0x13, "IS", number.to_string().as_bytes())
+        }),
         element(0x20, 0x52, "UI", &below(4)),
         element(0x28, 0x02, "US", &short(1)),
         element(0x28, 0x08, "IS", frames.len().to_string().as_bytes()),

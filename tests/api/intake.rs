@@ -2,7 +2,7 @@
 
 use crate::dicom::{JANE, Patient, nm_of};
 use crate::helpers::{Service, TestApp, fake_engine, key, problem, rows_of, text};
-use crate::scu::{CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, slice};
+use crate::scu::{CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, one_gate, slice};
 use dicom_ul::pdu::{PDataValueType, Pdu};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -265,6 +265,30 @@ async fn slices_are_gathered_and_late_ones_are_added() {
     let volume = app.json(&text(&second["links"]["volume"])).await;
     assert_eq!(volume["shape"], json!([4, 4, 4]));
     kept(app.data.path(), 0).await;
+}
+
+/// In whatever order they come.
+#[tokio::test(flavor = "multi_thread")]
+async fn images_of_one_gate_each_are_gathered_to_one_gated_volume() {
+    let (app, address) = service(|_| {}).await;
+    let mut scu = Scu::open(address);
+    for gate in [3, 8, 1, 2, 7, 5, 6, 4] {
+        assert_eq!(scu.store(&one_gate("1.2.5", gate)), 0);
+    }
+    assert_eq!(intake(&app).await[0]["state"], "gathering");
+    scu.release();
+    let group = settled(&app, 1).await.remove(0);
+    assert_eq!(
+        (&group["state"], &group["objects"]),
+        (&json!("stored"), &json!(8))
+    );
+    let volume = app.json(&text(&group["links"]["volume"])).await;
+    assert_eq!(volume["shape"], json!([4, 4, 3]));
+    assert_eq!(volume["frames"], 8, "{volume}");
+    assert_eq!(volume["gates"]["number"], 8);
+    // Its numbers grow from gate to gate.
+    assert_eq!(volume["intensity"]["min"], 1.0);
+    assert_eq!(volume["intensity"]["max"], 55.0);
 }
 
 #[tokio::test(flavor = "multi_thread")]

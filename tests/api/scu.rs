@@ -122,6 +122,21 @@ pub fn nuclear(series: &str, instance: u16, image_type: &str) -> Object {
     }
 }
 
+/// A gate of eight as a gated Nuclear Medicine Image of its own, whose number only the Instance Number tells.
+pub fn one_gate(series: &str, gate: u16) -> Object {
+    let mut object = nuclear(series, gate, "RECON GATED TOMO");
+    let vectors = [0x0060, 0x0070, 0x0080].map(|element| Tag(0x0054, element));
+    let set = &mut object.set;
+    put(set, (0x0020, 0x0013), VR::IS, gate.to_string());
+    let pointer = PrimitiveValue::Tags(vectors.as_slice().into());
+    put(set, (0x0028, 0x0009), VR::AT, pointer);
+    for element in [0x0060, 0x0070] {
+        let ones = PrimitiveValue::U16(vec![1; 3].into());
+        put(set, (0x0054, element), VR::US, ones);
+    }
+    object
+}
+
 impl Object {
     /// The data set in that transfer syntax.
     pub fn data_set(&self, syntax: &str) -> Vec<u8> {

@@ -43,7 +43,7 @@ export function onStored(act: (volume: Volume) => void, together: (volumes: Volu
 /** The name of a NIfTI file of one gate: what is before and after its number. */
 const GATE_NAME = /^(.*(?:gate|bin|phase|frame|slot)[ _-]*)\d+(.*\.nii(?:\.gz)?)$/i;
 
-/** Files that make up one scan: a header with its image, the files of one DICOM series, and NIfTI files named as the gates of one study. */
+/** Files that make up one scan: a header with its image, the files of one DICOM series (a slice or a gate each), and NIfTI files named as the gates of one study. */
 export async function grouped(files: File[]): Promise<Group[]> {
   const groups = new Map<string, Group>();
   const add = (id: string, name: string, file: File) => {
@@ -65,7 +65,7 @@ export async function grouped(files: File[]): Promise<Group[]> {
       continue;
     }
     const series = await seriesOf(file);
-    if (series) add(`series ${series}`, folder.split("/").pop() || file.name, file);
+    if (series) add(`${series.frames > 1 ? "gates " : ""}series ${series.uid}`, folder.split("/").pop() || file.name, file);
     else add(`file ${folder}/${file.name}`, file.name, file);
   }
   const apart = ([id, group]: [string, Group]): Group[] => {
@@ -89,8 +89,8 @@ function folderOf(file: File): string {
   return pathOf(file).split("/").slice(0, -1).join("/");
 }
 
-/** The series of a DICOM file with one slice; null for other files. A file of many frames is a scan by itself. */
-async function seriesOf(file: File): Promise<string | null> {
+/** The series of a DICOM file, and its frames; null for other files. A file of many frames is a scan by itself, unless it has as many others beside it as a beat has gates. */
+async function seriesOf(file: File): Promise<{ uid: string; frames: number } | null> {
   if (/\.(nii|gz|zip)$/i.test(file.name) || file.size < 200) return null;
   const head = new Uint8Array(await file.slice(0, 16_384).arrayBuffer());
   if (String.fromCharCode(...head.subarray(128, 132)) !== "DICM") return null;
@@ -105,7 +105,8 @@ async function seriesOf(file: File): Promise<string | null> {
     return null;
   };
   const frames = Number(text(0x0028, 0x0008) ?? "1");
-  return frames > 1 ? null : text(0x0020, 0x000e);
+  const uid = text(0x0020, 0x000e);
+  return uid ? { uid, frames } : null;
 }
 
 let count = 0;

@@ -122,7 +122,7 @@ pub struct VolumeBody {
     intensity: IntensityBody,
     /// The voxel values in rising order if the volume looks like a label map.
     label_values: Option<Vec<i64>>,
-    /// The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 NIfTI files of one gate each,
+    /// The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 DICOM or NIfTI files of one gate each,
     /// or a 4-D NIfTI file whose header does not contradict.
     gates: Option<GateFacts>,
     /// Oddities of the file that do not prevent its use.
@@ -286,9 +286,9 @@ impl VolumeBody {
 /// Upload a volume
 ///
 /// The body is the file itself, or a form whose files make up one volume (a `.hdr`/`.img` pair, a
-/// DICOM series, or 6 to 32 NIfTI files of one gate each), or their parts as DICOMweb clients send them. The same bytes
-/// always get the same id. Files of gates are taken in the order of the numbers in their names, where the names are the
-/// same but for one number; otherwise in the order of the form.
+/// DICOM series, or 6 to 32 DICOM or NIfTI files of one gate each), or their parts as DICOMweb clients send them. The same bytes
+/// always get the same id. DICOM files of gates are taken in the order that their headers state, NIfTI files in that of the
+/// numbers in their names, where the names are the same but for one number; otherwise in the order of the form.
 #[utoipa::path(post, path = "/v1/volumes", tag = "volumes",
     request_body(content(
         (Vec<u8> = "application/octet-stream"),

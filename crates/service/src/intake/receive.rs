@@ -344,7 +344,7 @@ impl Receiver {
         };
         match kept {
             Ok(group) => {
-                session.brought(&group, !header.is_slice);
+                session.brought(&group, !header.is_part);
                 Ok((group, header))
             }
             Err(error) => Err(Refused {

@@ -855,7 +855,7 @@ fn volume_advice(error: &VolumeError) -> String {
             "Give the .hdr and the .img together, or a single .nii.".into()
         }
         VolumeError::NotOneVolume { .. } => {
-            "Give one file, a .hdr with its .img, the DICOM files of one series, or 6 to 32 NIfTI files of one gate each."
+            "Give one file, a .hdr with its .img, the DICOM files of one series (a slice or a gate each), or 6 to 32 NIfTI files of one gate each."
                 .into()
         }
         VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),

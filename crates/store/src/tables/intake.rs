@@ -386,7 +386,7 @@ async fn open_group(
     now: Timestamp,
 ) -> StoreResult<String> {
     let (header, origin) = (&object.header, &object.origin);
-    let instance = if header.is_slice {
+    let instance = if header.is_part {
         ""
     } else {
         header.sop_instance.as_str()

@@ -20,8 +20,8 @@ use crate::progress::Monitor;
 use std::cell::RefCell;
 
 /// Reads one volume from `files`: a single file, a `.hdr` file and its `.img` file in any order, the
-/// DICOM files of a series, or a zip archive of any of these; or 6 to 32 NIfTI files, which are the gates of a
-/// study. Of several files, those that are no volumes are left out.
+/// DICOM files of a series, or a zip archive of any of these; or 6 to 32 NIfTI files, or DICOM files of one gate each,
+/// which are the gates of a study. Of several files, those that are no volumes are left out.
 ///
 /// # Errors
 /// [`VolumeError`]; in particular [`VolumeError::FrameNeeded`] if the file holds several volumes
@@ -32,6 +32,16 @@ pub fn read(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
+    read_with_timings(files, options, limits, monitor).map(|(reading, _)| reading)
+}
+
+/// As [`read()`], with what the files say of the beats of gated volumes.
+fn read_with_timings(
+    files: &[VolumeFile],
+    options: &ReadOptions,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<(Reading, Vec<GateTiming>), VolumeError> {
     let mut opened = open(files, limits, monitor)?;
     let mut reading = open::read(&mut *opened.file, *options, monitor)?;
     reading.facts.warnings.extend(opened.notes);
@@ -39,11 +49,11 @@ pub fn read(
     if intensity.labels.is_some() && is_rounded(intensity, reading.facts.data_type) {
         reading.facts.intensity.labels = exact_labels(files, &reading, limits, monitor)?;
     }
-    Ok(reading)
+    Ok((reading, opened.file.gate_timings()))
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
-/// order of the numbers in their names ([`order_by_numbers`](super::order_by_numbers)), or else in the order given. Volumes whose header says
+/// order that DICOM headers state, or else of the numbers in their names ([`order_by_numbers`](super::order_by_numbers)), or else in the order given. Volumes whose header says
 /// that they are no gates are refused unless `gated` says that they are.
 ///
 /// # Errors
@@ -76,13 +86,8 @@ pub fn read_gates(
                 Err(opened.err().unwrap_or(error))
             }
             read => {
-                let stated = open(&sorted[..1], limits, monitor)?.file.gate_timings();
-                let timing = stated.into_iter().next().map(|timing| GateTiming {
-                    gates_per_interval: None,
-                    ..timing
-                });
-                let timings: Vec<GateTiming> = timing.into_iter().collect();
-                let mut gated = GatedReading::of(read?, &timings)?;
+                let (readings, timing) = read?;
+                let mut gated = GatedReading::of(readings, &[timing])?;
                 gated.facts.warnings.push(taken_for_gates(&order));
                 Ok(gated)
             }
@@ -193,24 +198,32 @@ fn too_many_voxels(file: &str, asked: u64, limits: &ReadLimits) -> VolumeError {
     }
 }
 
-/// Reads files that hold one gate each, as long as they have together no more voxels than a volume may.
+/// Reads files that hold one gate each, as long as they have together no more voxels than a volume may, with what the
+/// first says of the beats.
 fn one_by_one(
     files: &[VolumeFile],
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<Vec<Reading>, VolumeError> {
+) -> Result<(Vec<Reading>, GateTiming), VolumeError> {
     let (mut readings, mut voxels) = (Vec::with_capacity(files.len()), 0);
+    let mut of_first = None;
     for (index, file) in files.iter().enumerate() {
         let part = monitor.part(index, files.len());
         let own = std::slice::from_ref(file);
-        let reading = read(own, &ReadOptions::default(), limits, &part)?.usable()?;
+        let (reading, timings) = read_with_timings(own, &ReadOptions::default(), limits, &part)?;
+        let reading = reading.usable()?;
+        of_first.get_or_insert(timings.into_iter().next());
         voxels += reading.volume.voxels.len() as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(file.name(), voxels, limits));
         }
         readings.push(reading);
     }
-    Ok(readings)
+    let timing = GateTiming {
+        gates_per_interval: None,
+        ..of_first.flatten().unwrap_or_default()
+    };
+    Ok((readings, timing))
 }
 
 /// The exact labels of the volume that was read as `reading`; `None` if there are too many.

@@ -8,7 +8,8 @@ use super::attributes::{
     Attribute, Attributes, IMAGE_TYPE, MODALITY, SERIES_UID, SOP_CLASS, SOP_INSTANCE,
     STUDY_DESCRIPTION, STUDY_UID,
 };
-use super::{guarded, kind, scan, syntax};
+use super::kind::Kind;
+use super::{guarded, kind, scan, syntax, timing};
 use crate::progress::Monitor;
 use std::fmt;
 
@@ -30,8 +31,8 @@ pub struct DicomHeader {
     pub study: String,
     /// Series Instance UID (0020,000E).
     pub series: String,
-    /// Whether the object is one slice of its series, and not a volume of its own.
-    pub is_slice: bool,
+    /// Whether the object is one slice or one gate of its series, and not a volume of its own.
+    pub is_part: bool,
     /// Modality (0008,0060).
     pub modality: Option<String>,
     /// The values of Image Type (0008,0008).
@@ -68,8 +69,9 @@ pub fn read_header(
     let mut source = syntax.open(file, longest)?;
     let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
     let sop_class = uid(&a, SOP_CLASS)?;
+    let is_gate = Kind::of(&a).is_ok_and(|kind| timing::is_one_gate(&a, kind));
     Ok(DicomHeader {
-        is_slice: kind::is_slice_class(&sop_class),
+        is_part: kind::is_slice_class(&sop_class) || is_gate,
         sop_class,
         sop_instance: uid(&a, SOP_INSTANCE)?,
         study: uid(&a, STUDY_UID)?,

@@ -11,7 +11,7 @@
 //!    `company`: beside others it is left out.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
-//!    one place belong together. `segments`: labels.
+//!    one place belong together. `segments`: labels. `gate_series`: files of one gate each.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
 //! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text.
 //!
@@ -29,6 +29,7 @@ mod company;
 mod described;
 mod fragments;
 mod frames;
+mod gate_series;
 mod geometry;
 mod header;
 mod kind;
@@ -92,6 +93,8 @@ pub(super) struct DicomFile {
     provenance: Provenance,
     /// SOP Instance UID of each file of a series.
     instances: Vec<String>,
+    /// Whose scan each gate is, if each is a file of its own; empty otherwise.
+    gate_scans: Vec<Provenance>,
     warnings: Vec<String>,
 }
 
@@ -156,9 +159,12 @@ impl DicomFile {
     ) -> Result<Self, VolumeError> {
         let sorted = company::set_apart(files, limits, monitor)?;
         let mut opened = match &sorted.slices[..] {
-            [file] => Self::single(file, limits, monitor),
-            slices => Self::series(slices, limits, monitor),
-        }?;
+            [file] => Self::single(file, limits, monitor)?,
+            slices => match gate_series::open(slices, limits, monitor)? {
+                Some(gates) => gates,
+                None => Self::series(slices, limits, monitor)?,
+            },
+        };
         opened.warnings.extend(sorted.notes);
         Ok(opened)
     }
@@ -168,7 +174,17 @@ impl DicomFile {
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        let ScannedFile { scan, pixels } = ScannedFile::open(file, limits, monitor)?;
+        let scanned = ScannedFile::open(file, limits, monitor)?;
+        Self::of_scan(file, scanned, limits)
+    }
+
+    /// The volumes of one file.
+    fn of_scan(
+        file: &VolumeFile,
+        scanned: ScannedFile,
+        limits: &ReadLimits,
+    ) -> Result<Self, VolumeError> {
+        let ScannedFile { scan, pixels } = scanned;
         let a = &scan.attributes;
         let mut warnings = Provenance::warnings(a);
         let [columns, rows] = pixels.extent;
@@ -265,6 +281,7 @@ impl DicomFile {
             provenance: Provenance::of(a),
             parts: vec![pixels],
             instances: Vec::new(),
+            gate_scans: Vec::new(),
             warnings,
         })
     }
@@ -355,6 +372,7 @@ impl DicomFile {
             provenance: first.provenance,
             parts,
             instances,
+            gate_scans: Vec::new(),
             warnings,
         })
     }
@@ -782,7 +800,8 @@ impl OpenVolume for DicomFile {
     }
 
     fn provenance(&self, frame: usize) -> Option<Provenance> {
-        let mut provenance = self.provenance.clone();
+        let of_gate = self.gate_scans.get(frame);
+        let mut provenance = of_gate.unwrap_or(&self.provenance).clone();
         if let Content::Slices(stored) = &self.content {
             let mut slices: Vec<&StoredSlice> = stored
                 .iter()
@@ -795,7 +814,9 @@ impl OpenVolume for DicomFile {
                     .map(|slice| self.instances[slice.part].clone());
                 provenance.instance_uids = uids.collect();
                 provenance.sop_instance_uid = provenance.instance_uids.first().cloned();
-            } else if self.parts.len() == 1 && self.format != FileFormat::DicomSeries {
+            } else if (self.parts.len() == 1 || of_gate.is_some())
+                && self.format != FileFormat::DicomSeries
+            {
                 let frames = slices.iter().map(|slice| slice.frame as u32 + 1);
                 provenance.slice_frames = frames.collect();
             }

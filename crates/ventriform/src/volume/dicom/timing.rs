@@ -14,7 +14,9 @@ use super::attributes::{
     GATE_INTERVALS_REJECTED, GATE_LOW_RR, GATE_NOMINAL_INTERVAL, HEART_RATE, HIGH_RR_VALUE,
     INTERVALS_ACQUIRED, INTERVALS_REJECTED, LOW_RR_VALUE, MODALITY, NOMINAL_INTERVAL,
     OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
+    TRIGGER_TIME,
 };
+use super::kind::Kind;
 
 /// Milliseconds of a minute.
 const MINUTE_MS: f64 = 60_000.0;
@@ -86,6 +88,19 @@ pub(super) fn is_of_gates(a: &Attributes) -> bool {
         Some("GATED") => true,
         Some("DYNAMIC" | "STATIC" | "WHOLE BODY") => false,
         _ => a.shorts(TIME_SLOTS).first().is_some_and(|slots| *slots > 1),
+    }
+}
+
+/// Whether an image of one volume says that it is one gate of several: a gated Nuclear Medicine image whose frames are of one R-R
+/// interval and one time slot, or an image of a moment after the R wave.
+pub(super) fn is_one_gate(a: &Attributes, kind: Kind) -> bool {
+    let one = |vector| a.shorts(vector).iter().all(|number| *number == 1);
+    match kind {
+        Kind::Nuclear { gated: true } => one(RR_INTERVAL_VECTOR) && one(TIME_SLOT_VECTOR),
+        Kind::Nuclear { gated: false } | Kind::Enhanced => {
+            matches!(a.decimals::<1>(TRIGGER_TIME), Ok(Some(_)))
+        }
+        Kind::Slice | Kind::Segmentation => false,
     }
 }
 

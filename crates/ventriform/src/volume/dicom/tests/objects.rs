@@ -692,6 +692,113 @@ fn gated_pet_of_several_intervals_has_the_timing_of_the_one_with_the_most_counts
     assert_eq!(reading.timing.rr_ms, Some(1050.0));
 }
 
+/// Gate `n` as an image of its own, whose numbers begin with 100 n.
+fn one_gate(n: usize, series: &'static str) -> Elements {
+    let first = 100 * n as u16;
+    let mut elements = slices();
+    elements.extend([
+        ((0x08, 0x18), ("UI", written(format!("1.2.9.{n}")))),
+        ((0x20, 0x0d), ("UI", Text("1.2"))),
+        ((0x20, 0x0e), ("UI", Text(series))),
+        ((0x20, 0x11), ("IS", written(n + 1))),
+        ((0x20, 0x13), ("IS", written(n + 1))),
+        (
+            (0x7fe0, 0x10),
+            ("OW", Shorts((first..first + 24).collect())),
+        ),
+    ]);
+    elements
+}
+
+/// As they are, in any order, and in an archive: like one image of all gates.
+#[test]
+fn images_of_one_gate_each_are_read_as_one_gated_study() {
+    let limits = ReadLimits::default();
+    let quiet = Monitor::silent();
+    // Names that order them otherwise.
+    let mut images: Vec<Elements> = (0..8).map(|n| one_gate(n, "1.2.9")).collect();
+    images.reverse();
+    let loose = files(&images);
+    let named: Vec<String> = (0..8).map(|n| format!("S/{n}")).collect();
+    let packed: Vec<(&str, Vec<u8>)> = (named.iter().zip(&images))
+        .map(|(name, image)| (name.as_str(), Encoding::Explicit.file(image)))
+        .collect();
+    let packed = vec![archive(&packed, CompressionMethod::Deflated)];
+    for given in [&loose, &packed] {
+        let reading = crate::volume::read_gates(given, false, &limits, &quiet).unwrap();
+        assert_eq!(reading.gates.len(), 8);
+        for (n, gate) in reading.gates.iter().enumerate() {
+            // Slices lie backwards.
+            let alone = read_elements(&images[7 - n]).unwrap();
+            assert_eq!(gate.voxels, alone.volume.voxels);
+            let scan = &reading.scans[n];
+            assert_eq!(scan.sop_instance_uid, Some(format!("1.2.9.{n}")));
+            assert_eq!(scan.slice_frames.len(), 4);
+        }
+        let held = crate::volume::hold_gates(given, false, &limits, &quiet);
+        assert_eq!(held.unwrap(), crate::volume::HeldGates::Beat);
+        let facts = inspect_volume(given, &limits, &quiet).unwrap();
+        assert_eq!((facts.frames, facts.gates.is_some()), (8, true));
+        let told = facts.warnings.iter().any(|w| w.contains("Instance Number"));
+        assert!(told, "{:?}", facts.warnings);
+        let sum = read_files(given).unwrap().volume;
+        let gates = reading.gates.iter().map(|gate| gate.voxels[5]);
+        assert_eq!(sum.voxels[5], gates.sum::<f32>());
+    }
+    // What does not belong together is what it was: volumes of their own.
+    let apart = |change: fn(&mut Elements, usize)| {
+        let mut images: Vec<Elements> = (0..8).map(|n| one_gate(n, "1.2.9")).collect();
+        for (n, image) in images.iter_mut().enumerate() {
+            change(image, n);
+        }
+        read_files(&files(&images))
+    };
+    let changes: [fn(&mut Elements, usize); 4] = [
+        // Series each, that do not say that they are gates.
+        |image, n| drop(image.insert((0x20, 0x0e), ("UI", written(format!("1.2.9.{n}"))))),
+        |image, n| drop(image.insert((0x20, 0x0d), ("UI", written(format!("1.{n}"))))),
+        // No number orders them.
+        |image, n| {
+            image.insert((0x20, 0x11), ("IS", written(1)));
+            image.insert((0x20, 0x13), ("IS", written(1 + n / 2)));
+        },
+        |image, n| drop(image.insert((0x18, 0x88), ("DS", written(5 + n % 2)))),
+    ];
+    for (at, change) in changes.into_iter().enumerate() {
+        let refused = apart(change).unwrap_err();
+        let is_refused = matches!(refused, VolumeError::NotOneSeries { .. });
+        assert!(is_refused, "{at}: {refused}");
+    }
+    let few = read_files(&files(&images[..5])).unwrap_err();
+    assert!(matches!(few, VolumeError::NotOneSeries { .. }), "{few}");
+    // Gates by their own words need not be of one series.
+    let gated: fn(&mut Elements, usize) = |image, n| {
+        image.extend([
+            (
+                (0x08, 0x08),
+                ("CS", Text("ORIGINAL\\PRIMARY\\RECON GATED TOMO\\EMISSION")),
+            ),
+            ((0x20, 0x0e), ("UI", written(format!("1.2.9.{n}")))),
+            (
+                (0x28, 0x09),
+                ("AT", Shorts(vec![0x54, 0x60, 0x54, 0x70, 0x54, 0x80])),
+            ),
+            ((0x54, 0x60), ("US", Shorts(vec![1; 4]))),
+            ((0x54, 0x70), ("US", Shorts(vec![1; 4]))),
+        ]);
+    };
+    let reading = apart(gated).unwrap();
+    assert_eq!(reading.facts.frames, 8);
+    // Received one by one, such an object waits for the others of its series; a volume of its own does not.
+    let mut gate = one_gate(0, "1.2.9");
+    for is_part in [false, true] {
+        let file = VolumeFile::in_memory("gate", Encoding::Explicit.file(&gate));
+        let header = crate::volume::dicom::read_header(&file, &limits, &quiet).unwrap();
+        assert_eq!(header.is_part, is_part);
+        gated(&mut gate, 0);
+    }
+}
+
 /// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was made
 /// of single ones, their Trigger Time.
 #[test]
