@@ -86,8 +86,8 @@ fn of_pair(error: PairError) -> MakeError {
         PairError::NoRole => {
             let failure = Failure::new(Fault::Content, "rest-or-stress", error.to_string());
             MakeError::Never(failure.fix(
-                "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or compare the \
-                 volumes by POST /v1/comparisons.",
+                "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or `first`, the scan that is made \
+                 first on the same day with the lower dose; or compare the volumes by POST /v1/comparisons.",
             ))
         }
     }
@@ -114,10 +114,11 @@ impl Service {
             )
             .map_err(|reason| format!("rule {}: {reason}", number + 1))?;
             let is_pair = rule.kind == Resource::Comparison.noun();
-            if !is_pair && (rule.stress.is_some() || rule.rest.is_some()) {
+            let tells = rule.stress.is_some() || rule.rest.is_some() || rule.first.is_some();
+            if !is_pair && tells {
                 let number = number + 1;
                 return Err(format!(
-                    "rule {number}: `stress` and `rest` tell both scans of a comparison, and its kind is `{}`",
+                    "rule {number}: `stress`, `rest` and `first` tell both scans of a comparison, and its kind is `{}`",
                     rule.kind
                 ));
             }

@@ -4,6 +4,7 @@ use super::record::{IntakeGroup, Protocol};
 use super::senders::AeTitle;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use ventriform::comparison::WhichScan;
 
 /// A rule: what to match, and the job to start. What is absent matches anything.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,6 +30,10 @@ pub struct Rule {
     /// For comparisons: a part of the Series Description of scans at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<String>,
+    /// For comparisons: the scan that comes first, with the lower dose, where both are made on one day and neither headers nor
+    /// descriptions tell them apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first: Option<WhichScan>,
     /// The job's parameters.
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub parameters: Map<String, Value>,
