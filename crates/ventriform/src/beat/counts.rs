@@ -84,6 +84,11 @@ impl WallCounts {
         }
     }
 
+    /// The mean counts of every ray over the beat.
+    pub(super) fn means(&self) -> Vec<f64> {
+        self.coefficients.iter().map(|of| of[0]).collect()
+    }
+
     /// The counts of every ray at `turns` of the beat; not below 0.
     pub fn at(&self, turns: f64) -> Vec<f64> {
         let basis = harmonics(COUNT_HARMONICS, turns, 0.0);

@@ -4,6 +4,7 @@
 //! diastole and end systole are the extremes of the volume curve, from which the gates' width has been taken off; the
 //! gates nearest to them are named too. Segments are means over the area of their inner surface at end diastole.
 
+use super::beside;
 use super::counts::WallCounts;
 use super::fit::{BeatFit, Volumes};
 use super::flags::{self, BeatFlag, FlagFacts};
@@ -115,6 +116,7 @@ impl Beat {
             moving_share: phases.moving_share,
             phase_noise_degrees: fit.phase_noise_degrees,
             share_outside: fit.share_outside,
+            beside: beside::found(study, &fit, &counts, map),
             motions: (segments.iter())
                 .map(|segment| (segment.segment, segment.motion_mm))
                 .collect(),

@@ -1,5 +1,6 @@
 //! Reasons to look closer at a beat.
 
+use super::beside::ActivityBeside;
 use super::study::{COUNT_LOSS_FLAG_SHARE, COUNT_LOSS_LEFT_OUT_SHARE};
 
 /// Share of the orders of the gates that may be as smooth as theirs.
@@ -117,6 +118,16 @@ pub enum BeatFlag {
         /// Gates, from 1, and the share that each has too many.
         gains: Vec<(usize, f64)>,
     },
+    /// Activity beside the wall changes over the beat.
+    #[error(
+        "beside segment {}, {:.0} mm outside of the wall, is activity of up to {:.0} % of the wall's uptake that changes over the beat \
+         by {:.0} % of it: gut that moves may be taken for motion of the wall",
+        .0.segment,
+        .0.distance_mm,
+        100.0 * .0.greatest,
+        100.0 * .0.change
+    )]
+    ActivityBesideWall(ActivityBeside),
     /// Segments move outward.
     #[error(
         "segments move outward from end diastole to end systole: {}",
@@ -141,6 +152,7 @@ impl BeatFlag {
             Self::BeatsRejected { .. } => "beats_rejected",
             Self::MassNotMet { .. } => "mass_not_met",
             Self::CountGain { .. } => "count_gain",
+            Self::ActivityBesideWall(_) => "activity_beside_wall",
             Self::OutwardMotion { .. } => "outward_motion",
         }
     }
@@ -181,6 +193,8 @@ pub(super) struct FlagFacts<'a> {
     pub phase_noise_degrees: f64,
     /// Share of the voxels about the wall outside of the volume.
     pub share_outside: f64,
+    /// Activity beside the wall that changes over the beat.
+    pub beside: Option<ActivityBeside>,
     /// Segments and their motion inward, mm.
     pub motions: Vec<(usize, f64)>,
 }
@@ -224,6 +238,7 @@ pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
             },
         ),
         (outside > OUTSIDE_SHARE).then_some(BeatFlag::LeavesField { share: outside }),
+        facts.beside.map(BeatFlag::ActivityBesideWall),
         (!outward.is_empty()).then_some(BeatFlag::OutwardMotion { segments: outward }),
     ]
     .into_iter()

@@ -18,6 +18,7 @@
 //! volume of muscle; a millimetre moves the ejection fraction by about 1.5 points. Where the wall is dark, its motion
 //! is assumed to be small.
 
+mod beside;
 mod calibration;
 mod carried;
 pub mod counts;
@@ -37,6 +38,7 @@ pub mod phase;
 mod start;
 pub mod study;
 
+pub use beside::ActivityBeside;
 pub use counts::WallCounts;
 pub use error::BeatError;
 pub use figures::{Beat, Extreme, Rates, SegmentMotion};

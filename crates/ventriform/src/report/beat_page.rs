@@ -112,6 +112,10 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
             "phase_unreliable",
             "The wall moves enough, and more than noise, to have a phase",
         ),
+        (
+            "activity_beside_wall",
+            "No activity beside the wall changes over the beat",
+        ),
         ("outward_motion", "Every segment moves inward"),
     ]
     .map(|(code, text)| (!raised(code), text.to_owned()))

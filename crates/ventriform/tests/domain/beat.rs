@@ -168,6 +168,36 @@ fn codes(heart: &GatedHeart) -> Vec<String> {
         .collect()
 }
 
+/// Gut that lies beside the wall in half of the gates is told; the same gut in all of them does not move.
+#[test]
+fn activity_beside_the_wall_that_changes_is_flagged() {
+    let flagged = |heart: &GatedHeart| codes(heart).contains(&"activity_beside_wall".to_owned());
+    assert!(!flagged(whole()));
+    let moment = whole().beat.fit.moment(0.0);
+    // A place 14 mm outside of the middle of the wall.
+    let ray = moment.outer.len() / 2;
+    let way = (moment.outer[ray] - moment.inner[ray]).normalize();
+    let place = moment.outer[ray] + way * 14.0;
+    let hottest = (gates()[0].voxels.iter().copied()).fold(0.0, f32::max);
+    let with_gut = |is_there: fn(usize) -> bool| {
+        let gate = |(index, gate): (usize, &Volume)| {
+            let mut gate = gate.clone();
+            let [nx, ny, _] = gate.shape;
+            for n in (0..gate.voxels.len()).filter(|_| is_there(index)) {
+                let voxel = [n % nx, n / nx % ny, n / (nx * ny)].map(|i| i as f64);
+                let away = (gate.frame.to_patient(&Vec3::from(voxel)) - place).norm();
+                let blob = (-0.5 * ((away - 6.0).max(0.0) / 5.5).powi(2)).exp();
+                gate.voxels[n] += 1.2 * hottest * blob as f32;
+            }
+            gate
+        };
+        let gates: Vec<Volume> = gates().iter().enumerate().map(gate).collect();
+        beat_of(&gates, BeatChoice::default()).expect("a beat")
+    };
+    assert!(flagged(&with_gut(|gate| gate >= GATES / 2)));
+    assert!(!flagged(&with_gut(|_| true)));
+}
+
 #[test]
 fn volumes_and_ejection_fraction_are_those_of_the_heart() {
     let report = whole().report();
