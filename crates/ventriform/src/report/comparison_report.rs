@@ -9,7 +9,7 @@ use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::Resolution;
 use crate::comparison::{PartFigures, WhichScan};
-use crate::grid::gates::GATES;
+use crate::grid::gates::GATE_COUNTS;
 use crate::polar::PolarSummary;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -162,7 +162,7 @@ pub enum NoBeatCode {
 impl NoBeat {
     /// Of a scan whose files hold no gates, or `gates` of them that no beat is fitted to.
     pub fn of_files(scan: WhichScan, gates: Option<usize>) -> Self {
-        let [least, most] = [GATES.start(), GATES.end()];
+        let [least, most] = [GATE_COUNTS.start(), GATE_COUNTS.end()];
         let (code, reason) = match gates {
             None => (
                 NoBeatCode::NotGated,

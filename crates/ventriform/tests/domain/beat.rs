@@ -194,7 +194,7 @@ fn activity_beside_the_wall_that_changes_is_flagged() {
         let gates: Vec<Volume> = gates().iter().enumerate().map(gate).collect();
         beat_of(&gates, BeatChoice::default()).expect("a beat")
     };
-    assert!(flagged(&with_gut(|gate| gate >= GATES / 2)));
+    assert!(flagged(&with_gut(|gate| gate >= GATE_COUNT / 2)));
     assert!(!flagged(&with_gut(|_| true)));
 }
 

@@ -13,7 +13,8 @@
 use super::codes::{Code, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::normals::{
-    DEFECT_EXTENT, DEFICIT_SCORE, REST_SCORE, SCORE_UNIT, SEGMENT_SCORE, STRESS_SCORE, limits_used, patient_state,
+    DEFECT_EXTENT, DEFICIT_SCORE, REST_SCORE, SCORE_UNIT, SEGMENT_SCORE, STRESS_SCORE, limits_used,
+    patient_state,
 };
 use super::structured_report::{
     self as sr, Figure, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group,
@@ -265,12 +266,20 @@ const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
 
 const STRESS_FIGURES: &[Figure<ComparisonReport>] = &[
     figure(|r| r.sss.map(f64::from), STRESS_SCORE, SCORE_UNIT),
-    figure(|r| r.beat.as_ref()?.stress_ef_percent, EJECTION_FRACTION, PERCENT),
+    figure(
+        |r| r.beat.as_ref()?.stress_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
 ];
 
 const REST_FIGURES: &[Figure<ComparisonReport>] = &[
     figure(|r| r.srs.map(f64::from), REST_SCORE, SCORE_UNIT),
-    figure(|r| r.beat.as_ref()?.rest_ef_percent, EJECTION_FRACTION, PERCENT),
+    figure(
+        |r| r.beat.as_ref()?.rest_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
 ];
 
 const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");

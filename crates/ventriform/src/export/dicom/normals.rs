@@ -42,9 +42,11 @@ const WALL_FIGURES: &[Figure<PerfusionReport>] = &[
 ];
 
 /// The summed score of a scan at stress, of one at rest, and of one whose state is not known.
-const STRESS_FIGURES: &[Figure<PerfusionReport>] = &[figure(summed_score, STRESS_SCORE, SCORE_UNIT)];
+const STRESS_FIGURES: &[Figure<PerfusionReport>] =
+    &[figure(summed_score, STRESS_SCORE, SCORE_UNIT)];
 const REST_FIGURES: &[Figure<PerfusionReport>] = &[figure(summed_score, REST_SCORE, SCORE_UNIT)];
-const SUMMED_FIGURES: &[Figure<PerfusionReport>] = &[figure(summed_score, SUMMED_SCORE, SCORE_UNIT)];
+const SUMMED_FIGURES: &[Figure<PerfusionReport>] =
+    &[figure(summed_score, SUMMED_SCORE, SCORE_UNIT)];
 
 fn summed_score(perfusion: &PerfusionReport) -> Option<f64> {
     Some(f64::from(perfusion.summed_score))
@@ -53,7 +55,11 @@ fn summed_score(perfusion: &PerfusionReport) -> Option<f64> {
 const TERRITORY_FIGURES: &[Figure<TerritoryScore>] = &[
     figure(|t| Some(t.extent_percent), DEFECT_EXTENT, PERCENT),
     figure(|t| Some(t.deficit_percent), DEFICIT_SCORE, PERCENT),
-    figure(|t| Some(f64::from(t.summed_score)), SUMMED_SCORE, SCORE_UNIT),
+    figure(
+        |t| Some(f64::from(t.summed_score)),
+        SUMMED_SCORE,
+        SCORE_UNIT,
+    ),
 ];
 
 const SEGMENT_FIGURES: &[Figure<SegmentScore>] = &[

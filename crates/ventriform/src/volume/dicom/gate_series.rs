@@ -15,7 +15,7 @@ use super::attributes::{
 };
 use super::kind::Kind;
 use super::{Content, DicomFile, ScannedFile, StoredSlice, VolumeError, timing};
-use crate::grid::gates::{GATES, SAME_PLACE_MM};
+use crate::grid::gates::{GATE_COUNTS, SAME_PLACE_MM};
 use crate::progress::Monitor;
 use crate::volume::gate_timing::GateTiming;
 use crate::volume::limits::ReadLimits;
@@ -86,7 +86,7 @@ pub(super) fn open(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Option<DicomFile>, VolumeError> {
-    if !GATES.contains(&files.len()) {
+    if !GATE_COUNTS.contains(&files.len()) {
         return Ok(None);
     }
     let (mut places, mut gates) = (Vec::new(), Vec::new());
