@@ -582,6 +582,7 @@ fn dependencies(folder: &str) -> BTreeSet<String> {
                 && !line.contains("dev-")
                 && !line.contains("workspace");
         } else if inside
+            && !line.starts_with('#')
             && !line.contains("optional = true")
             && let Some((name, _)) = line.split_once(['.', ' ', '='])
         {
