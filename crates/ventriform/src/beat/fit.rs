@@ -6,12 +6,13 @@
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis, and turned so that the one with the
 //!    least energy about the wall is the first: the steps, which end before the value is at rest, are then the same
 //!    wherever in the cycle the study begins.
-//! 2. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
-//! 3. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
+//! 2. The motion has as many harmonics as the gates show ([`spectrum`](super::spectrum)).
+//! 3. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
+//! 4. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
 //!    stretch, activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which
 //!    the motion is a fifth too small after 60 steps, though the value has fallen by 95 per cent. It ends when EF is
 //!    at rest.
-//! 4. The summed image's resolution holds the blur by the motion. Once the motion is nearly found, its part is taken
+//! 5. The summed image's resolution holds the blur by the motion. Once the motion is nearly found, its part is taken
 //!    off.
 //!
 //! Guaranteed: the muscle of every column is the same at every moment; the same study gives the same figures on any
@@ -29,6 +30,7 @@ use super::moment::WallMoment;
 use super::noise;
 use super::objective::{Objective, Observed, Priors};
 use super::order::share_as_smooth;
+use super::spectrum::harmonics_shown;
 use super::start::StillWall;
 use super::study::GatedStudy;
 use crate::geometry::Vec3;
@@ -64,7 +66,7 @@ const CURVE_MOMENTS: usize = 48;
 pub struct BeatParameters {
     /// Weights of what is known of walls.
     pub priors: Priors,
-    /// Harmonics of the motion; `None`: 3, or 4 from 16 gates on.
+    /// Harmonics of the motion; `None`: those that stand out of the gates' noise: 2, 3, or 4 from 16 gates on.
     pub harmonics: Option<usize>,
     /// Most steps, 1..=2000. Default 400.
     pub max_steps: usize,
@@ -126,9 +128,7 @@ pub fn fit(
     monitor.report(Stage::Beat, 0.0)?;
     let coordinates = wall.coordinates();
     let count = study.gates.len();
-    let usual = if count < 16 { 3 } else { 4 };
-    let harmonic_count = parameters.harmonics.unwrap_or(usual);
-    let layout = Layout::new(&coordinates, harmonic_count, count);
+    let mut layout = Layout::new(&coordinates, 0, count);
     let still = StillWall::of(
         wall,
         &layout,
@@ -165,6 +165,8 @@ pub fn fit(
             }
         })
         .collect();
+    let shown = || harmonics_shown(&images, &weights);
+    layout.harmonics = parameters.harmonics.unwrap_or_else(shown);
     let first_gate = least_energy(&images, &weights);
     images.rotate_left(first_gate);
     let mut gate_weights: Vec<f64> = (study.counted().iter())
@@ -180,7 +182,7 @@ pub fn fit(
         images,
         gate_weights,
         weights,
-        bases: gate_harmonics(harmonic_count, count),
+        bases: gate_harmonics(layout.harmonics, count),
         rim: still.rim.clone(),
         dark: dark_nodes(&layout, &still, &relative),
     };
@@ -210,7 +212,7 @@ pub fn fit(
                 ..
             } = made;
             drop(curvature);
-            let still = vec![0.0; 2 * harmonic_count];
+            let still = vec![0.0; 2 * objective.layout.harmonics];
             let found_ml = volumes(&objective, &unknowns, &still).wall_ml;
             let mean = objective.mean_thickness(&unknowns) * muscle_ml / found_ml;
             let objective = objective.with_mean_thickness(mean, KNOWN_THICKNESS_SD_MM);

@@ -35,6 +35,7 @@ mod noise;
 mod objective;
 mod order;
 pub mod phase;
+mod spectrum;
 mod start;
 pub mod study;
 
