@@ -275,7 +275,7 @@ class ComparedTerritory(Document):
 class ComparisonReport(Document):
     """The report of a comparison of rest and stress."""
 
-    _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "rest": "ComparedScan", "segments": "ComparedSegment[]", "stress": "ComparedScan", "territories": "ComparedTerritory[]"}
+    _built: ClassVar[dict[str, str]] = {"beat": "BeatChange", "flags": "Flag[]", "no_beat": "NoBeat[]", "rest": "ComparedScan", "segments": "ComparedSegment[]", "stress": "ComparedScan", "territories": "ComparedTerritory[]"}
 
     beat: BeatChange | None = None
     """What changed of the beat; `null` unless both scans are gated."""
@@ -289,6 +289,9 @@ class ComparisonReport(Document):
     """Reasons to look closer."""
     matched_percent: float
     """Share of the wall by which stress was scaled."""
+    no_beat: list[NoBeat] | None = None
+    """Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one
+    entry for each scan that is a reason. Empty where they were."""
     parameters: dict[str, Any]
     """Every parameter, defaults written out."""
     rest: ComparedScan
@@ -1102,6 +1105,20 @@ class ModelReport(Document):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
+class NoBeat(Document):
+    """A scan of which no beat could be compared."""
+
+    _built: ClassVar[dict[str, str]] = {}
+
+    code: str
+    """Why."""
+    reason: str
+    """The same in words."""
+    scan: str
+    """The scan."""
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class NormalCase(Document):
     """A healthy person of a group."""
 
@@ -1177,6 +1194,8 @@ class NormalsUsed(Document):
     """Number of people."""
     people: str
     """What the people are."""
+    program_version: str | None = None
+    """Version of the program that built them; null in reports of versions that did not say."""
     protocol: str
     """The protocol."""
     sex: str
@@ -2032,8 +2051,8 @@ class StoredVolume(Document):
     frames: int
     """How many volumes of that shape the file holds; if several, the parameter `frame` chooses one."""
     gates: Gates | None = None
-    """The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 NIfTI files of one gate
-    each, or a 4-D NIfTI file whose header does not contradict."""
+    """The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 DICOM or NIfTI files of one
+    gate each, or a 4-D NIfTI file whose header does not contradict."""
     id: str
     """Derived from the SHA-256 of the content, so it is the same on every machine."""
     intensity: Intensity
@@ -2121,9 +2140,9 @@ register(
     ComparisonReport, CurvePoint, Distance, DistanceDirection, Evidence, ExcludedCase, FigureBeside, FileFacts, Fit,
     FitnessFormStages, FitnessForms, FitnessReport, FitnessScales, FitnessTermStages, FitnessTerms, FittedVolumes,
     Flag, GateReport, Gates, GlobalLimit, Histogram, Histograms, Intensity, IntensityFacts, Job, JobLinks,
-    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, NormalCase,
-    NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport, PolarMap,
-    PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
+    JobSource, LabelCount, LeftOut, LegalHold, LimitMap, Localisation, LongAxis, MeshFacts, ModelReport, NoBeat,
+    NormalCase, NormalGroup, LimitsDocument, NormalsUsed, ObjectDelivery, OptimiseReport, Perfusion, PhaseReport,
+    PolarMap, PolarSegment, PolarSummary, Posture, Problem, RatesReport, ReaderOffsets, RefusedTemplate, Resolution,
     RetileReport, Scaling, Scan, SegmentMotionReport, SegmentScore, SegmentationReport, Shape, Smoothness, Software,
     Specificity, Start, Summary, SurfaceNoise, SurfaceReport, Territory, TerritoryScore, Thickness, Thicknesses,
     TimingReport, Uncertainties, Uncertainty, Valence, StoredVolume, VolumeFile, VolumeIntervals, VolumeLinks,

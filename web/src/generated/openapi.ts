@@ -173,19 +173,11 @@ export interface components {
              */
             stress_esv_ml: number;
         };
-        /** @description A signing secret. */
-        WebhookSecret: {
-            /**
-             * Format: date-time
-             * @description Until when the secret before signs too (RFC 3339).
-             */
-            former_until: string;
-            /**
-             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
-             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
-             */
-            secret: string;
-        };
+        /**
+         * @description One of the two scans.
+         * @enum {string}
+         */
+        WhichScan: "stress" | "rest";
         /** @description Paths of one beat. */
         BeatLinks: {
             /** @description The volume curve. */
@@ -767,20 +759,18 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        WebhookRequest: {
-            /** @description What to tell; the three ends of a job unless given */
-            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+        /** @description A signing secret. */
+        WebhookSecret: {
             /**
-             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * Format: date-time
+             * @description Until when the secret before signs too (RFC 3339).
+             */
+            former_until: string;
+            /**
+             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
              * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
              */
-            secret?: string;
-            /**
-             * Format: uri
-             * @description Where to send deliveries: https, and a public host unless the operator allows it
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
+            secret: string;
         };
         ComparisonForm: {
             /**
@@ -1038,6 +1028,11 @@ export interface components {
              * @description Share of the wall by which stress was scaled.
              */
             matched_percent: number;
+            /**
+             * @description Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one entry for each scan
+             *     that is a reason. Empty where they were.
+             */
+            no_beat?: components["schemas"]["NoBeat"][];
             /** @description Every parameter, defaults written out. */
             parameters: {
                 [key: string]: unknown;
@@ -1210,7 +1205,7 @@ export interface components {
             /**
              * @description How it last ended: `delivered`, `gone` (410), `rejected` (another status), `timed-out`,
              *     `unreachable`, `refused` (by this service, for its address), `too-old`, `too-many`,
-             *     `endpoint-removed`.
+             *     `endpoint-removed`, `interrupted` (the service ended during the last attempt).
              */
             last_outcome?: string | null;
             /**
@@ -1623,10 +1618,20 @@ export interface components {
             /** @description Oddities of the file that do not prevent its use. */
             warnings: string[];
         };
-        /** @description The registered receivers. */
-        WebhookList: {
-            /** @description The oldest first. */
-            webhooks: components["schemas"]["Webhook"][];
+        WebhookRequest: {
+            /** @description What to tell; the three ends of a job unless given */
+            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+            /**
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret?: string;
+            /**
+             * Format: uri
+             * @description Where to send deliveries: https, and a public host unless the operator allows it
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
         };
         /** @description Figures of a fit, and the fitted model's pose. */
         Fit: {
@@ -2850,6 +2855,20 @@ export interface components {
              */
             stored_bytes?: number | null;
         };
+        /** @description A scan of which no beat could be compared. */
+        NoBeat: {
+            /** @description Why. */
+            code: components["schemas"]["NoBeatCode"];
+            /** @description The same in words. */
+            reason: string;
+            /** @description The scan. */
+            scan: components["schemas"]["WhichScan"];
+        };
+        /**
+         * @description Why there is no beat.
+         * @enum {string}
+         */
+        NoBeatCode: "not_gated" | "few_gates" | "many_gates" | "no_contraction";
         /** @description A healthy person of a group. */
         NormalCase: {
             /** @description The name in the table. */
@@ -2948,32 +2967,10 @@ export interface components {
             /** @description Their content. */
             summary: components["schemas"]["NormalsSummary"];
         };
-        /** @description A registered receiver. */
-        Webhook: {
-            /**
-             * Format: date-time
-             * @description When it was registered (RFC 3339).
-             */
-            created_at: string;
-            /** @description The events that it is told. */
-            events: string[];
-            /**
-             * Format: date-time
-             * @description Since when it answers 410 and is told nothing (RFC 3339).
-             */
-            gone_at?: string | null;
-            /**
-             * @description Its id.
-             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
-             */
-            id: string;
-            /** @description What signs its deliveries; shown only when it is registered. */
-            secret?: string | null;
-            /**
-             * @description Where it is.
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
+        /** @description The registered receivers. */
+        WebhookList: {
+            /** @description The oldest first. */
+            webhooks: components["schemas"]["Webhook"][];
         };
         /** @description The parameters of normal limits */
         NormalsFitParameters: {
@@ -3293,6 +3290,8 @@ export interface components {
             cases: number;
             /** @description What the people are. */
             people: string;
+            /** @description Version of the program that built them; null in reports of versions that did not say. */
+            program_version?: string | null;
             /** @description The protocol. */
             protocol: string;
             /** @description `M`, `F` or `mixed`. */
@@ -3724,18 +3723,32 @@ export interface components {
             /** @description The content of the profile. */
             summary: components["schemas"]["ReaderSummary"];
         };
-        /** @description Volumes of one wall, millilitres. */
-        WallVolumes: {
+        /** @description A registered receiver. */
+        Webhook: {
             /**
-             * Format: double
-             * @description Of the cavity.
+             * Format: date-time
+             * @description When it was registered (RFC 3339).
              */
-            cavity: number;
+            created_at: string;
+            /** @description The events that it is told. */
+            events: string[];
             /**
-             * Format: double
-             * @description Of the wall.
+             * Format: date-time
+             * @description Since when it answers 410 and is told nothing (RFC 3339).
              */
-            wall: number;
+            gone_at?: string | null;
+            /**
+             * @description Its id.
+             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description What signs its deliveries; shown only when it is registered. */
+            secret?: string | null;
+            /**
+             * @description Where it is.
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
         };
         /** @description Paths of one reader. */
         ReaderLinks: {
@@ -4227,11 +4240,19 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        /**
-         * @description A figure of the wall.
-         * @enum {string}
-         */
-        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
+        /** @description Volumes of one wall, millilitres. */
+        WallVolumes: {
+            /**
+             * Format: double
+             * @description Of the cavity.
+             */
+            cavity: number;
+            /**
+             * Format: double
+             * @description Of the wall.
+             */
+            wall: number;
+        };
         SegmentationForm: {
             /**
              * Format: binary
@@ -4960,13 +4981,11 @@ export interface components {
             /** @description Counts and main figures. */
             summary: components["schemas"]["TemplateSummary"];
         };
-        /** @description A page of volumes. */
-        VolumeList: {
-            /** @description `cursor` of the next page; absent on the last. */
-            next_cursor?: string | null;
-            /** @description The volumes, newest first. */
-            volumes: components["schemas"]["Volume"][];
-        };
+        /**
+         * @description A figure of the wall.
+         * @enum {string}
+         */
+        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
         /** @description Paths of one template. */
         TemplateLinks: {
             /** @description Its mesh, in the format that `Accept` asks for. */
@@ -5131,7 +5150,7 @@ export interface components {
         UploadForm: {
             /**
              * Format: binary
-             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series, or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form
+             * @description The volume; several files make up one: a .hdr/.img pair, a DICOM series (a slice or a gate in each file), or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form
              */
             file: string;
         };
@@ -5339,6 +5358,13 @@ export interface components {
             /** @description This volume. */
             self: string;
         };
+        /** @description A page of volumes. */
+        VolumeList: {
+            /** @description `cursor` of the next page; absent on the last. */
+            next_cursor?: string | null;
+            /** @description The volumes, newest first. */
+            volumes: components["schemas"]["Volume"][];
+        };
     };
     responses: never;
     parameters: never;
@@ -5352,7 +5378,7 @@ export type AuditEventName = components['schemas']['AuditEventName'];
 export type AuditPage = components['schemas']['AuditPage'];
 export type Beat = components['schemas']['Beat'];
 export type BeatChange = components['schemas']['BeatChange'];
-export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type WhichScan = components['schemas']['WhichScan'];
 export type BeatLinks = components['schemas']['BeatLinks'];
 export type BeatList = components['schemas']['BeatList'];
 export type BeatParameters = components['schemas']['BeatParameters'];
@@ -5366,7 +5392,7 @@ export type ComparedScan = components['schemas']['ComparedScan'];
 export type ComparedSegment = components['schemas']['ComparedSegment'];
 export type ComparedTerritory = components['schemas']['ComparedTerritory'];
 export type Comparison = components['schemas']['Comparison'];
-export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type WebhookSecret = components['schemas']['WebhookSecret'];
 export type ComparisonForm = components['schemas']['ComparisonForm'];
 export type ComparisonLinks = components['schemas']['ComparisonLinks'];
 export type ComparisonList = components['schemas']['ComparisonList'];
@@ -5390,7 +5416,7 @@ export type ExcludedCase = components['schemas']['ExcludedCase'];
 export type FigureBeside = components['schemas']['FigureBeside'];
 export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
-export type WebhookList = components['schemas']['WebhookList'];
+export type WebhookRequest = components['schemas']['WebhookRequest'];
 export type Fit = components['schemas']['Fit'];
 export type FitnessFormStages = components['schemas']['FitnessFormStages'];
 export type FitnessForms = components['schemas']['FitnessForms'];
@@ -5439,12 +5465,14 @@ export type ModelParameters = components['schemas']['ModelParameters'];
 export type ModelReport = components['schemas']['ModelReport'];
 export type ModelSummary = components['schemas']['ModelSummary'];
 export type NewKey = components['schemas']['NewKey'];
+export type NoBeat = components['schemas']['NoBeat'];
+export type NoBeatCode = components['schemas']['NoBeatCode'];
 export type NormalCase = components['schemas']['NormalCase'];
 export type NormalGroup = components['schemas']['NormalGroup'];
 export type NormalGroupSummary = components['schemas']['NormalGroupSummary'];
 export type NormalLimits = components['schemas']['NormalLimits'];
 export type Normals = components['schemas']['Normals'];
-export type Webhook = components['schemas']['Webhook'];
+export type WebhookList = components['schemas']['WebhookList'];
 export type NormalsFitParameters = components['schemas']['NormalsFitParameters'];
 export type NormalsLinks = components['schemas']['NormalsLinks'];
 export type NormalsList = components['schemas']['NormalsList'];
@@ -5467,7 +5495,7 @@ export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
 export type RatesReport = components['schemas']['RatesReport'];
 export type Reader = components['schemas']['Reader'];
-export type WallVolumes = components['schemas']['WallVolumes'];
+export type Webhook = components['schemas']['Webhook'];
 export type ReaderLinks = components['schemas']['ReaderLinks'];
 export type ReaderList = components['schemas']['ReaderList'];
 export type ReaderOffsets = components['schemas']['ReaderOffsets'];
@@ -5492,7 +5520,7 @@ export type Scope = components['schemas']['Scope'];
 export type SegmentMotionReport = components['schemas']['SegmentMotionReport'];
 export type SegmentScore = components['schemas']['SegmentScore'];
 export type Segmentation = components['schemas']['Segmentation'];
-export type WallFigure = components['schemas']['WallFigure'];
+export type WallVolumes = components['schemas']['WallVolumes'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
 export type SegmentationLinks = components['schemas']['SegmentationLinks'];
 export type SegmentationList = components['schemas']['SegmentationList'];
@@ -5513,7 +5541,7 @@ export type SurfaceNoise = components['schemas']['SurfaceNoise'];
 export type SurfaceReport = components['schemas']['SurfaceReport'];
 export type TagsPatch = components['schemas']['TagsPatch'];
 export type Template = components['schemas']['Template'];
-export type VolumeList = components['schemas']['VolumeList'];
+export type WallFigure = components['schemas']['WallFigure'];
 export type TemplateLinks = components['schemas']['TemplateLinks'];
 export type TemplateList = components['schemas']['TemplateList'];
 export type TemplatePatch = components['schemas']['TemplatePatch'];
@@ -5533,5 +5561,6 @@ export type VolumeFile = components['schemas']['VolumeFile'];
 export type VolumeIntervals = components['schemas']['VolumeIntervals'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
+export type VolumeList = components['schemas']['VolumeList'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;
