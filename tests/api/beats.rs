@@ -418,8 +418,9 @@ async fn dicom_images_of_one_gate_each_become_one_gated_volume() {
     let order = json!({"volume": stored["id"]});
     let request = service.post("/v1/beats").header("prefer", "wait=60");
     let answer = request.json(&order).send().await.unwrap();
-    assert_eq!(answer.status(), 200);
+    let status = answer.status();
     let beat: Value = answer.json().await.unwrap();
+    assert_eq!(status, 200, "{beat}");
     assert_eq!(beat["end_systole_gate"], 4, "{beat}");
 }
 

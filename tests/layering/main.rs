@@ -167,6 +167,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
             "grid",
             "volume",
             "polar",
+            "normals",
             "comparison",
             "report",
         ],
@@ -300,12 +301,12 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     ("client", &[]),
     ("pem", &[]),
     ("http_client", &[]),
-    ("items", &["records"]),
+    ("memory", &["records", "error", "client"]),
+    ("items", &["records", "error", "memory"]),
     ("jobs", &["records", "items"]),
     ("access", &["records", "http_client"]),
     ("reservations", &["records", "access"]),
     ("quotas", &["records", "error", "access", "reservations"]),
-    ("memory", &["records", "error", "client"]),
     ("hooks", &["records", "http_client"]),
     (
         "archive",
@@ -375,7 +376,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     (
         "uploads",
         &[
-            "records", "error", "items", "quotas", "memory", "work", "service",
+            "records", "error", "items", "access", "quotas", "memory", "work", "service",
         ],
     ),
     (
@@ -394,7 +395,8 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     (
         "procedures",
         &[
-            "records", "error", "hooks", "archive", "worklist", "service", "series", "filing",
+            "records", "error", "access", "hooks", "archive", "worklist", "service", "series",
+            "filing",
         ],
     ),
     (

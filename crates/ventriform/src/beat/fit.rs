@@ -6,7 +6,7 @@
 //! 1. The gates are resampled (cubic convolution) to a grid along the heart's axis, and turned so that the one with the
 //!    least energy about the wall is the first: the steps, which end before the value is at rest, are then the same
 //!    wherever in the cycle the study begins.
-//! 2. The motion has as many harmonics as the gates show ([`spectrum`](super::spectrum)).
+//! 2. The motion has two harmonics where the gates are noisy, else three or four ([`spectrum`](super::spectrum)).
 //! 3. The fit starts from the summed image's wall, which stands still, as thick as walls are in the mean.
 //! 4. [`lbfgs::minimise`] moves all unknowns at once: distance, motion, thickness, uptake, rim, the long axis's
 //!    stretch, activity beside the wall, the gates' factors. Its steps are those of the [`Curvature`], without which
@@ -30,7 +30,7 @@ use super::moment::WallMoment;
 use super::noise;
 use super::objective::{Objective, Observed, Priors};
 use super::order::share_as_smooth;
-use super::spectrum::harmonics_shown;
+use super::spectrum::usual_harmonics;
 use super::start::StillWall;
 use super::study::GatedStudy;
 use crate::geometry::Vec3;
@@ -66,7 +66,7 @@ const CURVE_MOMENTS: usize = 48;
 pub struct BeatParameters {
     /// Weights of what is known of walls.
     pub priors: Priors,
-    /// Harmonics of the motion; `None`: those that stand out of the gates' noise: 2, 3, or 4 from 16 gates on.
+    /// Harmonics of the motion; `None`: 3, 4 from 16 gates on, 2 where the gates are noisy or fewer than 8.
     pub harmonics: Option<usize>,
     /// Most steps, 1..=2000. Default 400.
     pub max_steps: usize,
@@ -165,8 +165,8 @@ pub fn fit(
             }
         })
         .collect();
-    let shown = || harmonics_shown(&images, &weights);
-    layout.harmonics = parameters.harmonics.unwrap_or_else(shown);
+    let usual = || usual_harmonics(&images, &weights);
+    layout.harmonics = parameters.harmonics.unwrap_or_else(usual);
     let first_gate = least_energy(&images, &weights);
     images.rotate_left(first_gate);
     let mut gate_weights: Vec<f64> = (study.counted().iter())
