@@ -415,12 +415,20 @@ async fn dicom_images_of_one_gate_each_become_one_gated_volume() {
     let again = upload([0, 1, 2, 3, 4, 5, 6, 7]).await;
     assert_eq!(again["id"], stored["id"], "headers decide, not the form");
     // The smallest cavity is that of the fourth gate.
-    let order = json!({"volume": stored["id"]});
-    let request = service.post("/v1/beats").header("prefer", "wait=60");
-    let answer = request.json(&order).send().await.unwrap();
-    let status = answer.status();
-    let beat: Value = answer.json().await.unwrap();
-    assert_eq!(status, 200, "{beat}");
+    let order = json!({"kind": "beat", "volume": stored["id"]});
+    let filed = service.post("/v1/jobs").json(&order).send().await.unwrap();
+    let job: Value = filed.json().await.unwrap();
+    let job = service.ended(&text(&job["id"])).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let report = format!("{}/report", text(&job["links"]["beat"]));
+    let beat: Value = service
+        .get(&report)
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
     assert_eq!(beat["end_systole_gate"], 4, "{beat}");
 }
 
