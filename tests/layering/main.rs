@@ -333,7 +333,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
         "config",
         &["records", "hooks", "archive", "intake", "worklist"],
     ),
-    ("decoding", &["records", "error", "client", "config"]),
+    ("decoding", &["records", "error", "memory", "config"]),
     (
         "telemetry",
         &[

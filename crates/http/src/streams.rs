@@ -1,24 +1,24 @@
-//! The limits on streams of events, which last as long as the job they follow: in all, and of one
-//! client.
+//! The limits on streams of events, which last as long as the job they follow: in all, and of one client of a tenant or one
+//! anonymous client.
 
-use super::client::ClientAddress;
 use super::problem::{Answer, Problem};
 use axum::http::{StatusCode, header};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use ventriform_service::config::Settings;
+use ventriform_service::memory::Requester;
 
 /// The open streams.
 pub struct EventStreams {
     limit: usize,
     of_one_client: usize,
-    open: Arc<Mutex<BTreeMap<ClientAddress, usize>>>,
+    open: Arc<Mutex<BTreeMap<Requester, usize>>>,
 }
 
 /// The place of an open stream, until this is dropped.
 pub struct StreamPlace {
-    client: ClientAddress,
-    open: Arc<Mutex<BTreeMap<ClientAddress, usize>>>,
+    requester: Requester,
+    open: Arc<Mutex<BTreeMap<Requester, usize>>>,
 }
 
 impl EventStreams {
@@ -36,12 +36,12 @@ impl EventStreams {
     /// # Errors
     /// 429 if there are too many streams.
     pub fn enter(&self) -> Answer<StreamPlace> {
-        let client = ClientAddress::current();
+        let requester = Requester::current();
         let mut open = lock(&self.open);
-        let own = open.get(&client).copied().unwrap_or(0);
-        // A client that has less than its equal share finds room also where others have taken all.
-        let clients = open.len() + usize::from(own == 0);
-        let full = open.values().sum::<usize>() >= self.limit && own * clients >= self.limit;
+        let own = open.get(&requester).copied().unwrap_or(0);
+        // One that has less than its equal share finds room also where others have taken all.
+        let requesters = open.len() + usize::from(own == 0);
+        let full = open.values().sum::<usize>() >= self.limit && own * requesters >= self.limit;
         if own >= self.of_one_client || full {
             return Err(Problem::new(
                 StatusCode::TOO_MANY_REQUESTS,
@@ -53,9 +53,9 @@ impl EventStreams {
                 "Close streams that are not needed, or ask for the job itself from time to time.",
             ));
         }
-        open.insert(client, own + 1);
+        open.insert(requester.clone(), own + 1);
         Ok(StreamPlace {
-            client,
+            requester,
             open: self.open.clone(),
         })
     }
@@ -64,18 +64,16 @@ impl EventStreams {
 impl Drop for StreamPlace {
     fn drop(&mut self) {
         let mut open = lock(&self.open);
-        if let Some(own) = open.get_mut(&self.client) {
+        if let Some(own) = open.get_mut(&self.requester) {
             *own -= 1;
             if *own == 0 {
-                open.remove(&self.client);
+                open.remove(&self.requester);
             }
         }
     }
 }
 
-fn lock(
-    open: &Mutex<BTreeMap<ClientAddress, usize>>,
-) -> MutexGuard<'_, BTreeMap<ClientAddress, usize>> {
+fn lock(open: &Mutex<BTreeMap<Requester, usize>>) -> MutexGuard<'_, BTreeMap<Requester, usize>> {
     // A panic cannot leave the counts half changed: each changes in one step.
     open.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -63,7 +63,7 @@ struct GroupUse {
 
 /// Clients that have a share together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-enum Group {
+pub enum Group {
     /// An anonymous caller, or work that belongs to no request.
     Address(ClientAddress),
     /// The callers of a tenant.
@@ -86,14 +86,14 @@ impl Group {
     }
 }
 
-/// Whoever holds memory.
-#[derive(Debug, Clone)]
-struct Holder {
+/// A client as one of its group: whoever asks for memory or for computing.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Requester {
     group: Group,
     client: ClientAddress,
 }
 
-impl Holder {
+impl Requester {
     fn new(tenant: Option<&Tenant>) -> Self {
         let client = ClientAddress::current();
         Self {
@@ -103,16 +103,44 @@ impl Holder {
     }
 
     /// The one that the current request is answered for.
-    fn current() -> Self {
+    pub fn current() -> Self {
         let of_request = REQUEST_LEDGER.try_with(|ledger| ledger.holder.clone());
         of_request.unwrap_or_else(|_| Self::new(None))
+    }
+
+    /// An anonymous client.
+    #[cfg(test)]
+    pub fn anonymous(client: ClientAddress) -> Self {
+        Self {
+            group: Group::Address(client),
+            client,
+        }
+    }
+
+    /// A client of a tenant.
+    #[cfg(test)]
+    pub fn of_tenant(tenant: Tenant, client: ClientAddress) -> Self {
+        Self {
+            group: Group::Tenant(tenant),
+            client,
+        }
+    }
+
+    /// Whom it shares with: its tenant, or for an anonymous one its address.
+    pub fn group(&self) -> &Group {
+        &self.group
+    }
+
+    /// Whether it is work of the service's own, which belongs to no request.
+    pub fn is_service(&self) -> bool {
+        self.group == Group::Address(ClientAddress::NONE)
     }
 }
 
 /// Memory that a client holds until this is dropped.
 pub struct HeldMemory {
     budget: MemoryBudget,
-    holder: Holder,
+    holder: Requester,
     bytes: u64,
 }
 
@@ -128,10 +156,10 @@ impl MemoryBudget {
 
     /// Nothing yet, for the caller of the current request.
     pub fn hold(&self) -> HeldMemory {
-        self.hold_for(Holder::current())
+        self.hold_for(Requester::current())
     }
 
-    fn hold_for(&self, holder: Holder) -> HeldMemory {
+    fn hold_for(&self, holder: Requester) -> HeldMemory {
         HeldMemory {
             budget: self.clone(),
             holder,
@@ -146,7 +174,7 @@ impl MemoryBudget {
 
     /// Takes `bytes` for a holder if it leaves `share` times as much to the others of its group as it then has, and its group enough
     /// to other groups.
-    fn take(&self, holder: &Holder, bytes: u64, share: u64) -> bool {
+    fn take(&self, holder: &Requester, bytes: u64, share: u64) -> bool {
         if bytes == 0 {
             return true;
         }
@@ -168,7 +196,7 @@ impl MemoryBudget {
         true
     }
 
-    fn give_back(&self, holder: &Holder, bytes: u64) {
+    fn give_back(&self, holder: &Requester, bytes: u64) {
         if bytes == 0 {
             return;
         }
@@ -266,7 +294,7 @@ fn busy() -> ServiceError {
 /// The memory that a request holds.
 #[derive(Clone)]
 pub struct Ledger {
-    holder: Holder,
+    holder: Requester,
     charges: Arc<tokio::sync::Mutex<Charges>>,
 }
 
@@ -298,7 +326,7 @@ tokio::task_local! {
 impl Ledger {
     /// An empty ledger for the current request, which is a tenant's or an anonymous caller's.
     pub fn new(budget: &MemoryBudget, tenant: Option<&Tenant>) -> Self {
-        let holder = Holder::new(tenant);
+        let holder = Requester::new(tenant);
         let held = budget.hold_for(holder.clone());
         Self {
             holder,
@@ -396,23 +424,23 @@ mod tests {
     }
 
     /// An anonymous caller.
-    fn anonymous(n: u8) -> Holder {
-        Holder {
+    fn anonymous(n: u8) -> Requester {
+        Requester {
             group: Group::Address(client(n)),
             client: client(n),
         }
     }
 
     /// A caller of a tenant.
-    fn caller(tenant: &str, n: u8) -> Holder {
-        Holder {
+    fn caller(tenant: &str, n: u8) -> Requester {
+        Requester {
             group: Group::Tenant(tenant.parse().unwrap()),
             client: client(n),
         }
     }
 
     /// Takes as much as it can for a holder, in pieces.
-    fn greedy(budget: &MemoryBudget, holder: &Holder) -> Vec<HeldMemory> {
+    fn greedy(budget: &MemoryBudget, holder: &Requester) -> Vec<HeldMemory> {
         let mut all = Vec::new();
         loop {
             let mut held = budget.hold_for(holder.clone());

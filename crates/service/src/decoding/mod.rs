@@ -4,12 +4,12 @@
 //! cost is bounded and shared out:
 //!
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
-//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted client by
-//!    client in turn, and one client holds at most half of the budget, so that one client's queue does
-//!    not delay another's work. The queue is bounded (setting `decoding_queue`); beyond that the answer
-//!    is `busy`, except for a client that has less than its equal share of the queue.
+//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted requester by
+//!    requester in turn, a client of a tenant or an anonymous client, and one holds at most half of the budget, so that one's
+//!    queue does not delay another's work, also where tenants share an address. The queue is bounded (setting
+//!    `decoding_queue`); beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
-//!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of clients that have
+//!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of tenants and clients that have
 //!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
 //!    one client for that of another. Work that has not reported for [`STALL_TIME`], and work whose client hung up,
 //!    loses its turn without being asked; it goes on beside the others until it reports, as one of at
@@ -26,9 +26,9 @@
 mod thread_clock;
 mod turns;
 
-use crate::client::ClientAddress;
 use crate::config::Settings;
 use crate::error::{Refusal, ServiceError};
+use crate::memory::Requester;
 use crate::records::{Failure, Fault};
 use prometheus::Histogram;
 use std::collections::{BTreeMap, VecDeque};
@@ -121,13 +121,13 @@ impl Decoding {
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let (asked, client) = (Instant::now(), ClientAddress::current());
-        let admitted = self.admission.enter(client, memory).await?;
-        let turn = self.turns.take(client).await;
+        let (asked, requester) = (Instant::now(), Requester::current());
+        let admitted = self.admission.enter(requester.clone(), memory).await?;
+        let turn = self.turns.take(requester.clone()).await;
         self.waits.observe(asked.elapsed().as_secs_f64());
         let extra = Duration::from_secs_f64(bytes as f64 / self.rate as f64);
         let task = Arc::new(Task {
-            client,
+            requester,
             turns: self.turns.clone(),
             overruns: self.overruns.clone(),
             cancel: CancelToken::new(),
@@ -171,7 +171,7 @@ impl Decoding {
 
 /// A piece of work that computes.
 struct Task {
-    client: ClientAddress,
+    requester: Requester,
     turns: Arc<Turns>,
     overruns: Arc<Semaphore>,
     cancel: CancelToken,
@@ -235,7 +235,7 @@ impl Task {
         let computed = state.computed();
         let new = computed.saturating_sub(state.counted);
         state.counted = computed;
-        self.turns.count(self.client, new);
+        self.turns.count(&self.requester, new);
     }
 
     fn stop(&self) {
@@ -321,7 +321,7 @@ impl Observer for TurnTaker {
             }
             task.count(&mut state);
             // It goes on where nobody goes before it.
-            if state.turn.is_some() && !task.turns.others_wait(task.client) {
+            if state.turn.is_some() && !task.turns.others_wait(&task.requester) {
                 state.before = state.computed();
                 state.since = state
                     .clock
@@ -333,7 +333,7 @@ impl Observer for TurnTaker {
         task.pause();
         let next = self.runtime.block_on(async {
             tokio::select! {
-                turn = task.turns.take(task.client) => turn,
+                turn = task.turns.take(task.requester.clone()) => turn,
                 () = task.stopped.cancelled() => None,
             }
         });
@@ -359,18 +359,18 @@ struct Admission {
 struct AdmissionQueue {
     /// Bytes of the budget that nobody holds.
     free: u64,
-    /// Most bytes that one client holds, unless it is one piece of work that needs more.
+    /// Most bytes that one requester holds, unless it is one piece of work that needs more.
     share: u64,
-    /// Bytes that each client holds; none is 0.
-    held: BTreeMap<ClientAddress, u64>,
+    /// Bytes that each requester holds; none is 0.
+    held: BTreeMap<Requester, u64>,
     /// The work that computes.
     running: Vec<Weak<Task>>,
     /// When work was last ended for others that wait.
     displaced: Option<Instant>,
-    /// Waiting work by client, in order of arrival; no list is empty.
-    waiting: BTreeMap<ClientAddress, VecDeque<Waiting>>,
-    /// The clients in `waiting`; the first is next.
-    order: VecDeque<ClientAddress>,
+    /// Waiting work by requester, in order of arrival; no list is empty.
+    waiting: BTreeMap<Requester, VecDeque<Waiting>>,
+    /// The requesters in `waiting`; the first is next.
+    order: VecDeque<Requester>,
 }
 
 struct Waiting {
@@ -381,7 +381,7 @@ struct Waiting {
 /// The memory that admitted work holds.
 struct Admitted {
     admission: Arc<Admission>,
-    client: ClientAddress,
+    requester: Requester,
     memory: u64,
 }
 
@@ -398,10 +398,10 @@ impl Drop for Admitted {
     fn drop(&mut self) {
         let mut queue = self.admission.queue();
         queue.free += self.memory;
-        if let Some(held) = queue.held.get_mut(&self.client) {
+        if let Some(held) = queue.held.get_mut(&self.requester) {
             *held -= self.memory;
             if *held == 0 {
-                queue.held.remove(&self.client);
+                queue.held.remove(&self.requester);
             }
         }
         drop(queue);
@@ -410,7 +410,7 @@ impl Drop for Admitted {
 }
 
 impl Admission {
-    fn take_next(&self) -> Option<(ClientAddress, Waiting)> {
+    fn take_next(&self) -> Option<(Requester, Waiting)> {
         self.queue().next()
     }
 
@@ -422,22 +422,22 @@ impl Admission {
     /// Waits for its turn to begin.
     async fn enter(
         self: &Arc<Self>,
-        client: ClientAddress,
+        requester: Requester,
         memory: u64,
     ) -> Result<Admitted, ServiceError> {
         let (admit, admitted) = oneshot::channel();
         {
             let mut queue = self.queue();
-            if !queue.has_room(client, self.longest) {
+            if !queue.has_room(&requester, self.longest) {
                 // Some of them may belong to clients that have gone.
                 queue.forget_gone();
-                if !queue.has_room(client, self.longest) {
+                if !queue.has_room(&requester, self.longest) {
                     return Err(busy());
                 }
             }
             // Work that needs more than the budget runs alone.
             let memory = memory.min(self.budget);
-            queue.add(client, Waiting { memory, admit });
+            queue.add(requester, Waiting { memory, admit });
         }
         self.advance();
         let mut admitted = std::pin::pin!(admitted);
@@ -474,10 +474,10 @@ impl Admission {
 
     /// Admits what fits.
     fn advance(self: &Arc<Self>) {
-        while let Some((client, next)) = self.take_next() {
+        while let Some((requester, next)) = self.take_next() {
             let admitted = Admitted {
                 admission: self.clone(),
-                client,
+                requester,
                 memory: next.memory,
             };
             // Without a receiver, `admitted` is dropped and the memory is free again.
@@ -487,61 +487,61 @@ impl Admission {
 }
 
 impl AdmissionQueue {
-    /// Whether a queue of `longest` has room for one more of this client. One that has less than its equal
+    /// Whether a queue of `longest` has room for one more of this requester. One that has less than its equal
     /// share has room also where others have filled the queue.
-    fn has_room(&self, client: ClientAddress, longest: usize) -> bool {
-        let own = self.waiting.get(&client).map_or(0, VecDeque::len);
-        let clients = self.waiting.len() + usize::from(own == 0);
+    fn has_room(&self, requester: &Requester, longest: usize) -> bool {
+        let own = self.waiting.get(requester).map_or(0, VecDeque::len);
+        let requesters = self.waiting.len() + usize::from(own == 0);
         let all: usize = self.waiting.values().map(VecDeque::len).sum();
-        all < longest || own * clients < longest
+        all < longest || own * requesters < longest
     }
 
-    fn add(&mut self, client: ClientAddress, work: Waiting) {
-        let list = self.waiting.entry(client).or_default();
-        if list.is_empty() {
-            self.order.push_back(client);
+    fn add(&mut self, requester: Requester, work: Waiting) {
+        if !self.waiting.contains_key(&requester) {
+            self.order.push_back(requester.clone());
         }
-        list.push_back(work);
+        self.waiting.entry(requester).or_default().push_back(work);
     }
 
     /// Takes the next piece of work if its memory is free. Nothing overtakes it, or large work
-    /// would wait for ever; only clients that hold their share are passed over.
-    fn next(&mut self) -> Option<(ClientAddress, Waiting)> {
+    /// would wait for ever; only requesters that hold their share are passed over.
+    fn next(&mut self) -> Option<(Requester, Waiting)> {
         self.forget_gone();
-        let fits = |client: &ClientAddress| {
-            let held = self.held.get(client).copied().unwrap_or(0);
-            let asked = self.waiting.get(client).and_then(VecDeque::front);
+        let fits = |requester: &Requester| {
+            let held = self.held.get(requester).copied().unwrap_or(0);
+            let asked = self.waiting.get(requester).and_then(VecDeque::front);
             let asked = asked.map_or(0, |work| work.memory);
-            held == 0 || *client == ClientAddress::NONE || held + asked <= self.share
+            held == 0 || requester.is_service() || held + asked <= self.share
         };
         let place = self.order.iter().position(fits)?;
-        let client = self.order[place];
-        let list = self.waiting.get_mut(&client)?;
+        let requester = self.order[place].clone();
+        let list = self.waiting.get_mut(&requester)?;
         if list.front()?.memory > self.free {
             return None;
         }
         let work = list.pop_front()?;
         self.free -= work.memory;
         if work.memory > 0 {
-            *self.held.entry(client).or_default() += work.memory;
+            *self.held.entry(requester.clone()).or_default() += work.memory;
         }
         self.order.remove(place);
         if list.is_empty() {
-            drop(self.waiting.remove(&client))
+            drop(self.waiting.remove(&requester));
         } else {
-            self.order.push_back(client)
+            self.order.push_back(requester.clone());
         }
-        Some((client, work))
+        Some((requester, work))
     }
 
-    /// Drops the work that no client waits for any more.
+    /// Drops the work that nobody waits for any more.
     fn forget_gone(&mut self) {
         self.waiting.retain(|_, list| {
             list.retain(|work| !work.admit.is_closed());
             !list.is_empty()
         });
         let waiting = &self.waiting;
-        self.order.retain(|client| waiting.contains_key(client));
+        self.order
+            .retain(|requester| waiting.contains_key(requester));
     }
 }
 
@@ -561,6 +561,7 @@ fn busy() -> ServiceError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::client::ClientAddress;
     use crate::telemetry::Metrics;
     use std::net::IpAddr;
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -577,8 +578,8 @@ mod tests {
         Arc::new(decoding)
     }
 
-    fn client(n: u8) -> ClientAddress {
-        ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]))
+    fn client(n: u8) -> Requester {
+        Requester::anonymous(ClientAddress::of_peer(IpAddr::from([10, 0, 0, n])))
     }
 
     async fn until(condition: impl Fn() -> bool) {

@@ -1,11 +1,12 @@
-//! Turns of clients at a few places.
+//! Turns of requesters at a few places.
 //!
-//! Whoever computes has a place. A free place goes to the waiting work of the client that has computed least
-//! lately; of one client, to what waits longest. So work of a client that asks for little waits for no more
-//! than the next free place, whatever others have begun. What a client has computed counts half after
+//! Whoever computes has a place. A free place goes to the waiting work of the tenant (or anonymous client) that has computed
+//! least lately; of one tenant, to its client that has; of one client, to what waits longest. So work of who asks for
+//! little waits for no more than the next free place, whatever others have begun. What was computed counts half after
 //! [`HALF_LIFE`], so that nobody waits for ever.
 
-use crate::client::ClientAddress;
+use crate::memory::{Group, Requester};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,7 +15,7 @@ use tokio::sync::oneshot;
 /// After which time of computing counts half.
 const HALF_LIFE: Duration = Duration::from_secs(10);
 
-/// Time of computing below which a client is forgotten, seconds.
+/// Time of computing below which a requester is forgotten, seconds.
 const NEGLIGIBLE_S: f64 = 1e-3;
 
 /// The places, and who waits for one.
@@ -27,12 +28,13 @@ pub struct Turn(Arc<Turns>);
 
 struct State {
     free: usize,
-    used: BTreeMap<ClientAddress, Used>,
+    used: BTreeMap<Requester, Used>,
+    used_by_groups: BTreeMap<Group, Used>,
     /// In the order of asking.
     waiting: Vec<Waiting>,
 }
 
-/// Time that a client has computed, seconds, as it counted at that moment.
+/// Time that somebody has computed, seconds, as it counted at that moment.
 #[derive(Clone, Copy)]
 struct Used {
     seconds: f64,
@@ -40,7 +42,7 @@ struct Used {
 }
 
 struct Waiting {
-    client: ClientAddress,
+    requester: Requester,
     give: oneshot::Sender<Turn>,
 }
 
@@ -58,35 +60,36 @@ impl Turns {
             state: Mutex::new(State {
                 free: places,
                 used: BTreeMap::new(),
+                used_by_groups: BTreeMap::new(),
                 waiting: Vec::new(),
             }),
         })
     }
 
     /// Waits for a place. Dropping the future gives up waiting.
-    pub async fn take(self: &Arc<Self>, client: ClientAddress) -> Option<Turn> {
+    pub async fn take(self: &Arc<Self>, requester: Requester) -> Option<Turn> {
         let (give, given) = oneshot::channel();
-        self.state().waiting.push(Waiting { client, give });
+        self.state().waiting.push(Waiting { requester, give });
         self.advance();
         given.await.ok()
     }
 
-    /// Counts time that a client has computed.
-    pub fn count(&self, client: ClientAddress, time: Duration) {
+    /// Counts time that a requester has computed.
+    pub fn count(&self, requester: &Requester, time: Duration) {
         let now = Instant::now();
         let mut state = self.state();
-        state.used.retain(|_, used| used.now(now) > NEGLIGIBLE_S);
-        let before = state.used.get(&client).map_or(0.0, |used| used.now(now));
-        let seconds = before + time.as_secs_f64();
-        state.used.insert(client, Used { seconds, at: now });
+        add(&mut state.used, requester, time, now);
+        add(&mut state.used_by_groups, requester.group(), time, now);
     }
 
-    /// Whether work waits that goes before further work of this client.
-    pub fn others_wait(&self, client: ClientAddress) -> bool {
+    /// Whether work waits that goes before further work of this requester.
+    pub fn others_wait(&self, requester: &Requester) -> bool {
         let now = Instant::now();
         let state = self.state();
-        let own = state.used_by(client, now);
-        let goes = |one: &Waiting| one.client == client || state.used_by(one.client, now) <= own;
+        let own = state.used_by(requester, now);
+        let goes = |one: &Waiting| {
+            one.requester == *requester || before(&state.used_by(&one.requester, now), &own).is_le()
+        };
         let mut waiting = state.waiting.iter().filter(|one| !one.give.is_closed());
         waiting.any(goes)
     }
@@ -107,10 +110,10 @@ impl Turns {
         if state.free == 0 {
             return None;
         }
-        let used = |one: &Waiting| state.used_by(one.client, now);
+        let used = |one: &Waiting| state.used_by(&one.requester, now);
         let all = state.waiting.iter().enumerate();
         // The first of several that are alike.
-        let (next, _) = all.min_by(|a, b| used(a.1).total_cmp(&used(b.1)))?;
+        let (next, _) = all.min_by(|a, b| before(&used(a.1), &used(b.1)))?;
         state.free -= 1;
         Some(state.waiting.remove(next))
     }
@@ -122,9 +125,25 @@ impl Turns {
 }
 
 impl State {
-    fn used_by(&self, client: ClientAddress, now: Instant) -> f64 {
-        self.used.get(&client).map_or(0.0, |used| used.now(now))
+    /// The time that a requester's group, and it itself, have computed.
+    fn used_by(&self, requester: &Requester, now: Instant) -> [f64; 2] {
+        let of = |used: Option<&Used>| used.map_or(0.0, |used| used.now(now));
+        let group = self.used_by_groups.get(requester.group());
+        [of(group), of(self.used.get(requester))]
     }
+}
+
+/// The order of two requesters by the times that [`State::used_by`] gives.
+fn before(a: &[f64; 2], b: &[f64; 2]) -> Ordering {
+    a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+}
+
+/// Adds time to what somebody has computed, and forgets who has computed nothing lately.
+fn add<K: Ord + Clone>(used: &mut BTreeMap<K, Used>, of: &K, time: Duration, now: Instant) {
+    used.retain(|_, used| used.now(now) > NEGLIGIBLE_S);
+    let before = used.get(of).map_or(0.0, |used| used.now(now));
+    let seconds = before + time.as_secs_f64();
+    used.insert(of.clone(), Used { seconds, at: now });
 }
 
 impl Drop for Turn {
@@ -145,18 +164,19 @@ impl Turns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::client::ClientAddress;
     use std::net::IpAddr;
 
-    fn client(n: u8) -> ClientAddress {
-        ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]))
+    fn client(n: u8) -> Requester {
+        Requester::anonymous(ClientAddress::of_peer(IpAddr::from([10, 0, 0, n])))
     }
 
     #[tokio::test]
     async fn who_has_computed_least_is_next() {
         let turns = Turns::new(1);
         let first = turns.take(client(1)).await;
-        turns.count(client(1), Duration::from_secs(3));
-        turns.count(client(2), Duration::from_secs(1));
+        turns.count(&client(1), Duration::from_secs(3));
+        turns.count(&client(2), Duration::from_secs(1));
         let order = Arc::new(Mutex::new(Vec::new()));
         let mut tasks = Vec::new();
         for (n, who) in [1, 1, 2, 2, 3].into_iter().enumerate() {
@@ -176,8 +196,8 @@ mod tests {
         tokio::task::yield_now().await;
         gone.abort();
         assert!(gone.await.is_err());
-        assert!(turns.others_wait(client(1)));
-        assert!(turns.others_wait(client(3)), "more of its own waits");
+        assert!(turns.others_wait(&client(1)));
+        assert!(turns.others_wait(&client(3)), "more of its own waits");
         drop(first);
         for task in tasks {
             task.await.unwrap();
@@ -187,19 +207,51 @@ mod tests {
             [(3, 4), (2, 2), (2, 3), (1, 0), (1, 1)]
         );
         assert_eq!(turns.free(), 1);
-        assert!(!turns.others_wait(client(1)));
+        assert!(!turns.others_wait(&client(1)));
+    }
+
+    /// Two tenants behind one address, one of them also at many others.
+    #[tokio::test]
+    async fn tenants_have_turns_whatever_their_addresses() {
+        let at = |tenant: &str, n: u8| {
+            let address = ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]));
+            Requester::of_tenant(tenant.parse().unwrap(), address)
+        };
+        let turns = Turns::new(1);
+        let first = turns.take(at("busy", 1)).await;
+        turns.count(&at("busy", 1), Duration::from_secs(3));
+        assert!(!turns.others_wait(&at("calm", 1)));
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let mut tasks = Vec::new();
+        for (tenant, n) in [("busy", 1), ("busy", 2), ("busy", 3), ("calm", 1)] {
+            let (turns, order) = (turns.clone(), order.clone());
+            tasks.push(tokio::spawn(async move {
+                let turn = turns.take(at(tenant, n)).await;
+                order.lock().unwrap().push((tenant, n));
+                drop(turn);
+            }));
+            tokio::task::yield_now().await;
+        }
+        drop(first);
+        for task in tasks {
+            task.await.unwrap();
+        }
+        assert_eq!(
+            *order.lock().unwrap(),
+            [("calm", 1), ("busy", 2), ("busy", 3), ("busy", 1)]
+        );
     }
 
     #[tokio::test]
     async fn who_has_computed_less_goes_on() {
         let turns = Turns::new(0);
-        turns.count(client(1), Duration::from_secs(3));
+        turns.count(&client(1), Duration::from_secs(3));
         let waiting = turns.take(client(1));
         let mut waiting = std::pin::pin!(waiting);
         assert!(futures::poll!(&mut waiting).is_pending());
-        assert!(!turns.others_wait(client(2)), "it has computed nothing");
-        turns.count(client(2), Duration::from_secs(4));
-        assert!(turns.others_wait(client(2)));
+        assert!(!turns.others_wait(&client(2)), "it has computed nothing");
+        turns.count(&client(2), Duration::from_secs(4));
+        assert!(turns.others_wait(&client(2)));
     }
 
     #[test]
