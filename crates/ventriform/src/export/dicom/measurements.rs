@@ -8,7 +8,7 @@
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
 //! measured, not at the figure. The volumes of the anatomical
 //! wall and cavity have the ends of the interval that holds the true one. A scan beside normal limits has the groups of
-//! [`normals`](super::normals) too. A figure that the report lacks is left out.
+//! [`normals`] too. A figure that the report lacks is left out.
 
 use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
 use super::data_set::{DataSet, reference};
