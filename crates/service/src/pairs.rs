@@ -122,9 +122,12 @@ impl Injection {
 fn seconds_of(time: &str) -> Option<f64> {
     let time = time.trim();
     let part = |at: usize| time.get(at..at + 2)?.parse::<u32>().ok();
-    let later = |at: usize, most: u32| match time.len() > at {
-        true => part(at).filter(|n| *n <= most),
-        false => Some(0),
+    let later = |at: usize, most: u32| {
+        if time.len() > at {
+            part(at).filter(|n| *n <= most)
+        } else {
+            Some(0)
+        }
     };
     let hours = part(0).filter(|hours| *hours < 24)?;
     let (minutes, seconds) = (later(2, 59)?, later(4, 60)?);
