@@ -328,10 +328,7 @@ async fn a_gated_study_becomes_a_beat_whatever_its_format() {
     let stored: Value = stored.json().await.unwrap();
     let order = json!({"kind": "beat", "volume": stored["id"],
         "parameters": {"gated": true, "axis": axis, "mass_g": 130}});
-    let filed = service.post("/v1/jobs").json(&order).send().await.unwrap();
-    let job: Value = filed.json().await.unwrap();
-    let job = service.ended(&text(&job["id"])).await;
-    assert_eq!(job["state"], "succeeded", "{job}");
+    let job = service.succeeded(&order).await;
     let refitted = json(&format!("{}/report", text(&job["links"]["beat"]))).await;
     assert_eq!(refitted["parameters"]["axis"], axis);
     // 130 g of muscle of 1.05 g/ml.
@@ -416,10 +413,7 @@ async fn dicom_images_of_one_gate_each_become_one_gated_volume() {
     assert_eq!(again["id"], stored["id"], "headers decide, not the form");
     // The smallest cavity is that of the fourth gate.
     let order = json!({"kind": "beat", "volume": stored["id"]});
-    let filed = service.post("/v1/jobs").json(&order).send().await.unwrap();
-    let job: Value = filed.json().await.unwrap();
-    let job = service.ended(&text(&job["id"])).await;
-    assert_eq!(job["state"], "succeeded", "{job}");
+    let job = service.succeeded(&order).await;
     let report = format!("{}/report", text(&job["links"]["beat"]));
     let beat: Value = service
         .get(&report)

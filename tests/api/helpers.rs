@@ -789,6 +789,15 @@ impl Service {
         assert!(sent.unwrap().success());
     }
 
+    /// Files a job and waits until it has succeeded; returns the job.
+    pub async fn succeeded(&self, order: &Value) -> Value {
+        let filed = self.post("/v1/jobs").json(order).send().await.unwrap();
+        let job: Value = filed.json().await.unwrap();
+        let job = self.ended(&text(&job["id"])).await;
+        assert_eq!(job["state"], "succeeded", "{job}");
+        job
+    }
+
     /// Waits until the job has ended; returns the job.
     pub async fn ended(&self, id: &str) -> Value {
         let deadline = Instant::now() + 3 * EVENT_PATIENCE;
