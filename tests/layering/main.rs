@@ -333,7 +333,11 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
         "config",
         &["records", "hooks", "archive", "intake", "worklist"],
     ),
-    ("decoding", &["records", "error", "memory", "config"]),
+    ("places", &["memory"]),
+    (
+        "decoding",
+        &["records", "error", "memory", "config", "places"],
+    ),
     (
         "telemetry",
         &[

@@ -25,6 +25,7 @@ pub mod library;
 pub mod memory;
 mod pairs;
 pub mod pem;
+pub mod places;
 mod procedures;
 pub mod quotas;
 pub mod records;

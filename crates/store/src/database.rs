@@ -14,17 +14,19 @@ use super::writer::{Write, WriteTransaction, Writer};
 use sqlx::postgres::PgPool;
 use sqlx::sqlite::SqlitePool;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::config::PostgresSettings;
+use ventriform_service::places::{Place, Places};
 use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
     /// To the file.
-    Sqlite(SqlitePool),
+    Sqlite(Shared<SqlitePool>),
     /// To the server.
-    Postgres(PgPool),
+    Postgres(Shared<PgPool>),
 }
 
 impl<'a> From<&'a Readers> for Target<'a> {
@@ -33,6 +35,38 @@ impl<'a> From<&'a Readers> for Target<'a> {
             Readers::Sqlite(pool) => Target::SqlitePool(pool),
             Readers::Postgres(pool) => Target::PgPool(pool),
         }
+    }
+}
+
+/// Connections whose use is shared out in turn between tenants and their clients.
+pub(super) struct Shared<P> {
+    /// The connections.
+    pub pool: P,
+    places: Arc<Places>,
+    /// Longest time for which a place is waited for.
+    wait: Duration,
+}
+
+impl<P> Shared<P> {
+    /// Connections of which at most `places` are used at the same time, and for one of which nobody waits longer than `wait`.
+    pub fn new(pool: P, places: usize, wait: Duration) -> Self {
+        Self {
+            pool,
+            places: Places::new(places),
+            wait,
+        }
+    }
+
+    /// Waits for its turn to use a connection.
+    ///
+    /// # Errors
+    /// If that is not within the set time.
+    pub async fn turn(&self) -> StoreResult<Place> {
+        let place = tokio::time::timeout(self.wait, self.places.take()).await;
+        place.map_err(|_| StoreError::Database {
+            cause: StoreFault::Busy,
+            message: "other reads take too long".into(),
+        })
     }
 }
 
@@ -264,8 +298,8 @@ impl SqlStore {
     /// Closes every connection; of a file, this moves the write-ahead log into the database.
     pub async fn close(&self) {
         match &self.readers {
-            Readers::Sqlite(pool) => pool.close().await,
-            Readers::Postgres(pool) => pool.close().await,
+            Readers::Sqlite(shared) => shared.pool.close().await,
+            Readers::Postgres(shared) => shared.pool.close().await,
         }
         if let Writing::Sqlite(writer) = &self.writer {
             writer.close().await;

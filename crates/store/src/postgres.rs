@@ -23,6 +23,7 @@
 //! fail with [`StoreFault::Away`] until it is back; a connection that was lost is noticed before it is used,
 //! and a read whose connection breaks is done again.
 
+use super::database::Shared;
 use super::faults;
 use super::query::jitter;
 use super::schema;
@@ -34,6 +35,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
+use ventriform_service::places::Place;
 use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// Pause between two attempts to reach the server at the start.
@@ -52,6 +54,8 @@ const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBou
 /// Advice about a user or a password that is not accepted.
 const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf (by auth_file, if a \
      pooler says so)";
+/// Transactions of this process that write or wait at the server for the lock: while one commits, the next one is there.
+const WRITE_CONNECTIONS: usize = 2;
 /// Oldest version of the server that is tested.
 const OLDEST_SERVER_VERSION: i32 = 150_000;
 
@@ -119,7 +123,7 @@ pub(super) async fn open(
     settings: &PostgresSettings,
     wait: Duration,
     run: &str,
-) -> Result<(PgWriter, PgPool), PostgresError> {
+) -> Result<(PgWriter, Shared<PgPool>), PostgresError> {
     let url = &settings.url;
     let refused = |error: sqlx::Error| refusal(url, &error);
     let options = options_of(url).map_err(refused)?;
@@ -147,8 +151,11 @@ pub(super) async fn open(
             Box::pin(async move { set_session(connection, &session).await })
         })
         .connect_lazy_with(options);
-    let writer = PgWriter { pool: pool.clone() };
-    Ok((writer, pool))
+    let writing = Shared::new(pool.clone(), WRITE_CONNECTIONS, wait);
+    // The rest is for single statements beside the lock.
+    let reading = settings.connections as usize / 4 * 3;
+    let readers = Shared::new(pool, reading.max(1), wait);
+    Ok((PgWriter { shared: writing }, readers))
 }
 
 /// Brings the tables to the current version. Newer ones are left as they are if they say that this version works on
@@ -456,21 +463,24 @@ fn migration_failure(url: &PostgresUrl, error: MigrateError) -> PostgresError {
 
 /// Connections that write.
 pub(super) struct PgWriter {
-    pool: PgPool,
+    shared: Shared<PgPool>,
 }
 
 impl PgWriter {
     /// A connection for single statements.
     pub async fn acquire(&self) -> StoreResult<PoolConnection<Postgres>> {
-        let connection = self.pool.acquire().await;
-        connection.map_err(|error| faults::of_pool(&self.pool, error))
+        let pool = &self.shared.pool;
+        let connection = pool.acquire().await;
+        connection.map_err(|error| faults::of_pool(pool, error))
     }
 
     /// Starts a transaction that holds the lock for writing.
     pub async fn begin(&self) -> StoreResult<PgTransaction> {
+        let turn = self.shared.turn().await?;
         let mut transaction = PgTransaction {
             connection: self.acquire().await?,
             ended: false,
+            _turn: turn,
         };
         sqlx::raw_sql(BEGIN_WRITING)
             .execute(&mut *transaction)
@@ -504,6 +514,7 @@ impl PgWriter {
 pub(super) struct PgTransaction {
     connection: PoolConnection<Postgres>,
     ended: bool,
+    _turn: Place,
 }
 
 impl PgTransaction {

@@ -6,6 +6,7 @@
 //! of the engine's own driver; `sqlx::Any`, which would do the same, guesses the types of computed
 //! columns and knows neither the settings nor the error codes of an engine.
 
+use super::database::Shared;
 use super::faults;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow};
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
@@ -80,12 +81,12 @@ where
 
 /// Where a statement runs.
 pub(super) enum Target<'a> {
-    /// A pool of SQLite's readers.
-    SqlitePool(&'a SqlitePool),
+    /// A pool of SQLite's readers, in turn.
+    SqlitePool(&'a Shared<SqlitePool>),
     /// A connection to SQLite.
     Sqlite(&'a mut SqliteConnection),
-    /// A pool of connections to PostgreSQL; for reading only, as it may be tried twice.
-    PgPool(&'a PgPool),
+    /// A pool of connections to PostgreSQL; in turn, and for reading only, as it may be tried twice.
+    PgPool(&'a Shared<PgPool>),
     /// A connection to PostgreSQL.
     Postgres(&'a mut PgConnection),
 }
@@ -162,19 +163,22 @@ impl Query {
     /// Runs it; returns all rows.
     pub async fn fetch_all(self, target: impl Into<Target<'_>> + Send) -> StoreResult<Vec<DbRow>> {
         Ok(match target.into() {
-            Target::SqlitePool(pool) => sqlite_rows(
-                self.sqlite()
-                    .fetch_all(pool)
-                    .await
-                    .map_err(faults::of_sqlite)?,
-            ),
+            Target::SqlitePool(shared) => {
+                let _turn = shared.turn().await?;
+                let rows = self.sqlite().fetch_all(&shared.pool).await;
+                sqlite_rows(rows.map_err(faults::of_sqlite)?)
+            }
             Target::Sqlite(connection) => sqlite_rows(
                 self.sqlite()
                     .fetch_all(connection)
                     .await
                     .map_err(faults::of_sqlite)?,
             ),
-            Target::PgPool(pool) => pg_rows(again(pool, self, |q| q.fetch_all(pool)).await?),
+            Target::PgPool(shared) => {
+                let _turn = shared.turn().await?;
+                let pool = &shared.pool;
+                pg_rows(again(pool, self, |q| q.fetch_all(pool)).await?)
+            }
             Target::Postgres(connection) => {
                 let rows = self.postgres().fetch_all(connection).await;
                 pg_rows(rows.map_err(faults::of_postgres)?)
@@ -198,12 +202,11 @@ impl Query {
         target: impl Into<Target<'_>> + Send,
     ) -> StoreResult<Option<DbRow>> {
         Ok(match target.into() {
-            Target::SqlitePool(pool) => self
-                .sqlite()
-                .fetch_optional(pool)
-                .await
-                .map_err(faults::of_sqlite)?
-                .map(DbRow::Sqlite),
+            Target::SqlitePool(shared) => {
+                let _turn = shared.turn().await?;
+                let row = self.sqlite().fetch_optional(&shared.pool).await;
+                row.map_err(faults::of_sqlite)?.map(DbRow::Sqlite)
+            }
             Target::Sqlite(connection) => {
                 let row = self
                     .sqlite()
@@ -212,9 +215,12 @@ impl Query {
                     .map_err(faults::of_sqlite)?;
                 row.map(DbRow::Sqlite)
             }
-            Target::PgPool(pool) => again(pool, self, |q| q.fetch_optional(pool))
-                .await?
-                .map(DbRow::Postgres),
+            Target::PgPool(shared) => {
+                let _turn = shared.turn().await?;
+                let pool = &shared.pool;
+                let row = again(pool, self, |q| q.fetch_optional(pool)).await?;
+                row.map(DbRow::Postgres)
+            }
             Target::Postgres(connection) => {
                 let row = self.postgres().fetch_optional(connection).await;
                 row.map_err(faults::of_postgres)?.map(DbRow::Postgres)
@@ -231,19 +237,20 @@ impl Query {
     /// Runs it; returns the number of rows that it changed.
     pub async fn execute(self, target: impl Into<Target<'_>> + Send) -> StoreResult<u64> {
         Ok(match target.into() {
-            Target::SqlitePool(pool) => self
-                .sqlite()
-                .execute(pool)
-                .await
-                .map_err(faults::of_sqlite)?
-                .rows_affected(),
+            Target::SqlitePool(shared) => {
+                let _turn = shared.turn().await?;
+                let done = self.sqlite().execute(&shared.pool).await;
+                done.map_err(faults::of_sqlite)?.rows_affected()
+            }
             Target::Sqlite(connection) => self
                 .sqlite()
                 .execute(connection)
                 .await
                 .map_err(faults::of_sqlite)?
                 .rows_affected(),
-            Target::PgPool(pool) => {
+            Target::PgPool(shared) => {
+                let _turn = shared.turn().await?;
+                let pool = &shared.pool;
                 let done = self.postgres().execute(pool).await;
                 let done = done.map_err(|error| faults::of_pool(pool, error))?;
                 done.rows_affected()

@@ -1,5 +1,6 @@
 //! The database file: one connection for writing, a few for reading.
 
+use super::database::Shared;
 use super::schema;
 use super::writer::Writer;
 use sqlx::sqlite::{
@@ -16,7 +17,10 @@ const READ_CONNECTIONS: u32 = 4;
 ///
 /// # Errors
 /// If the file cannot be used, or was migrated by a newer version of the program.
-pub(super) async fn open(path: &Path, wait: Duration) -> Result<(Writer, SqlitePool), sqlx::Error> {
+pub(super) async fn open(
+    path: &Path,
+    wait: Duration,
+) -> Result<(Writer, Shared<SqlitePool>), sqlx::Error> {
     let options = SqliteConnectOptions::new()
         .filename(path)
         .create_if_missing(true)
@@ -33,6 +37,8 @@ pub(super) async fn open(path: &Path, wait: Duration) -> Result<(Writer, SqliteP
         .connect_with(options.clone())
         .await?;
     schema::sqlite().run(&readers).await?;
+    let places = READ_CONNECTIONS as usize;
+    let readers = Shared::new(readers, places, wait);
     Ok((Writer::new(&options, wait), readers))
 }
 

@@ -1,7 +1,7 @@
 //! The one connection that writes, and how a failed write ends.
 //!
-//! SQLite allows one writer at a time, so writers wait for one connection in order instead of
-//! polling for the database's lock. Every write goes through [`Writer::begin`] and
+//! SQLite allows one writer at a time, so writers wait for one connection in turn, tenant by tenant and client by client
+//! ([`ventriform_service::places`]), instead of polling for the database's lock. Every write goes through [`Writer::begin`] and
 //! [`WriteTransaction::commit`]:
 //!
 //! 1. wait for the connection, and for other processes that hold the database's lock, for at most
@@ -25,10 +25,12 @@ use sqlx::query::Query;
 use sqlx::sqlite::{SqliteArguments, SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions, Row, Sqlite, SqliteConnection};
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::{Mutex, MutexGuard};
 use tokio::time::{Instant, sleep, timeout_at};
+use ventriform_service::places::{Place, Places};
 use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 
 /// How long SQLite itself waits for the database's lock before [`Writer::begin`] looks at the
@@ -41,6 +43,8 @@ const CONNECT_POLL: Duration = Duration::from_millis(10);
 /// The connection that writes.
 pub(super) struct Writer {
     options: SqliteConnectOptions,
+    /// Whoever waits for the connection has the one place first.
+    turn: Arc<Places>,
     /// `None` before the first write, and after one that failed.
     connection: Mutex<Option<SqliteConnection>>,
     wait: Duration,
@@ -58,6 +62,7 @@ impl Writer {
     pub fn new(options: &SqliteConnectOptions, wait: Duration) -> Self {
         Self {
             options: options.clone().busy_timeout(LOCK_POLL.min(wait)),
+            turn: Places::new(1),
             connection: Mutex::new(None),
             wait,
             suspect: AtomicBool::new(false),
@@ -74,9 +79,7 @@ impl Writer {
     /// Starts a transaction that holds the database's write lock.
     pub async fn begin(&self) -> StoreResult<WriteTransaction<'_>> {
         let deadline = Instant::now() + self.wait;
-        let mut place = timeout_at(deadline, self.connection.lock())
-            .await
-            .map_err(|_| busy("other writes take too long"))?;
+        let (turn, mut place) = self.connection_by(deadline).await?;
         loop {
             let mut connection = match place.take() {
                 Some(connection) => connection,
@@ -96,6 +99,7 @@ impl Writer {
                         writer: self,
                         place,
                         connection,
+                        _turn: turn,
                     });
                 }
                 Err(error) => {
@@ -112,6 +116,19 @@ impl Writer {
                 }
             }
         }
+    }
+
+    /// The place of the connection that writes, in turn.
+    async fn connection_by(
+        &self,
+        deadline: Instant,
+    ) -> StoreResult<(Place, MutexGuard<'_, Option<SqliteConnection>>)> {
+        let in_turn = async {
+            let turn = self.turn.take().await;
+            (turn, self.connection.lock().await)
+        };
+        let late = |_| busy("other writes take too long");
+        timeout_at(deadline, in_turn).await.map_err(late)
     }
 
     /// A connection of its own, beside the one that writes.
@@ -138,9 +155,7 @@ impl Writer {
     /// way.
     pub async fn truncate_log(&self) -> StoreResult<bool> {
         let deadline = Instant::now() + self.wait;
-        let mut place = timeout_at(deadline, self.connection.lock())
-            .await
-            .map_err(|_| busy("other writes take too long"))?;
+        let (_turn, mut place) = self.connection_by(deadline).await?;
         let mut connection = match place.take() {
             Some(connection) => connection,
             None => self.connected_by(deadline).await?,
@@ -183,6 +198,8 @@ pub(super) struct WriteTransaction<'a> {
     writer: &'a Writer,
     place: MutexGuard<'a, Option<SqliteConnection>>,
     connection: SqliteConnection,
+    // Given up last, when the connection is back in its place.
+    _turn: Place,
 }
 
 impl WriteTransaction<'_> {

@@ -4,9 +4,9 @@
 //! cost is bounded and shared out:
 //!
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
-//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted requester by
-//!    requester in turn, a client of a tenant or an anonymous client, and one holds at most half of the budget, so that one's
-//!    queue does not delay another's work, also where tenants share an address. The queue is bounded (setting
+//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted tenant by tenant in turn (or anonymous
+//!    client), that of a tenant client by client ([`crate::places`]). A client holds at most half of the budget, a tenant three
+//!    quarters, so that one's queue does not delay another's work, whatever their addresses. The queue is bounded (setting
 //!    `decoding_queue`); beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
 //!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of tenants and clients that have
@@ -29,9 +29,10 @@ mod turns;
 use crate::config::Settings;
 use crate::error::{Refusal, ServiceError};
 use crate::memory::Requester;
+use crate::places::Rounds;
 use crate::records::{Failure, Fault};
 use prometheus::Histogram;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
@@ -87,6 +88,7 @@ impl Decoding {
                 queue: Mutex::new(AdmissionQueue {
                     free: settings.decoding_memory.0,
                     share: settings.decoding_memory.0 / 2,
+                    group_share: settings.decoding_memory.0 / 4 * 3,
                     ..AdmissionQueue::default()
                 }),
             }),
@@ -361,16 +363,16 @@ struct AdmissionQueue {
     free: u64,
     /// Most bytes that one requester holds, unless it is one piece of work that needs more.
     share: u64,
+    /// Most bytes that one tenant holds, with the same exception.
+    group_share: u64,
     /// Bytes that each requester holds; none is 0.
     held: BTreeMap<Requester, u64>,
     /// The work that computes.
     running: Vec<Weak<Task>>,
     /// When work was last ended for others that wait.
     displaced: Option<Instant>,
-    /// Waiting work by requester, in order of arrival; no list is empty.
-    waiting: BTreeMap<Requester, VecDeque<Waiting>>,
-    /// The requesters in `waiting`; the first is next.
-    order: VecDeque<Requester>,
+    /// Waiting work.
+    waiting: Rounds<Waiting>,
 }
 
 struct Waiting {
@@ -437,7 +439,7 @@ impl Admission {
             }
             // Work that needs more than the budget runs alone.
             let memory = memory.min(self.budget);
-            queue.add(requester, Waiting { memory, admit });
+            queue.waiting.push(requester, Waiting { memory, admit });
         }
         self.advance();
         let mut admitted = std::pin::pin!(admitted);
@@ -488,60 +490,48 @@ impl Admission {
 
 impl AdmissionQueue {
     /// Whether a queue of `longest` has room for one more of this requester. One that has less than its equal
-    /// share has room also where others have filled the queue.
+    /// share of its tenant's equal share has room also where others have filled the queue.
     fn has_room(&self, requester: &Requester, longest: usize) -> bool {
-        let own = self.waiting.get(requester).map_or(0, VecDeque::len);
-        let requesters = self.waiting.len() + usize::from(own == 0);
-        let all: usize = self.waiting.values().map(VecDeque::len).sum();
-        all < longest || own * requesters < longest
-    }
-
-    fn add(&mut self, requester: Requester, work: Waiting) {
-        if !self.waiting.contains_key(&requester) {
-            self.order.push_back(requester.clone());
-        }
-        self.waiting.entry(requester).or_default().push_back(work);
+        let (groups, clients) = self.waiting.sharers_with(requester);
+        let own = self.waiting.len_of(requester);
+        self.waiting.len() < longest || own * groups * clients < longest
     }
 
     /// Takes the next piece of work if its memory is free. Nothing overtakes it, or large work
     /// would wait for ever; only requesters that hold their share are passed over.
     fn next(&mut self) -> Option<(Requester, Waiting)> {
         self.forget_gone();
-        let fits = |requester: &Requester| {
+        let fits = |requester: &Requester, work: &Waiting| {
             let held = self.held.get(requester).copied().unwrap_or(0);
-            let asked = self.waiting.get(requester).and_then(VecDeque::front);
-            let asked = asked.map_or(0, |work| work.memory);
-            held == 0 || requester.is_service() || held + asked <= self.share
+            let fits_group = || {
+                let of_group = |(other, _): &(&Requester, &u64)| other.group() == requester.group();
+                let together: u64 = self
+                    .held
+                    .iter()
+                    .filter(of_group)
+                    .map(|(_, held)| held)
+                    .sum();
+                together == 0 || together + work.memory <= self.group_share
+            };
+            let fits_client = held == 0 || held + work.memory <= self.share;
+            requester.is_service() || fits_client && fits_group()
         };
-        let place = self.order.iter().position(fits)?;
-        let requester = self.order[place].clone();
-        let list = self.waiting.get_mut(&requester)?;
-        if list.front()?.memory > self.free {
+        let (requester, work) = self.waiting.next(fits)?;
+        if work.memory > self.free {
             return None;
         }
-        let work = list.pop_front()?;
+        let requester = requester.clone();
+        let work = self.waiting.take(&requester)?;
         self.free -= work.memory;
         if work.memory > 0 {
             *self.held.entry(requester.clone()).or_default() += work.memory;
-        }
-        self.order.remove(place);
-        if list.is_empty() {
-            drop(self.waiting.remove(&requester));
-        } else {
-            self.order.push_back(requester.clone());
         }
         Some((requester, work))
     }
 
     /// Drops the work that nobody waits for any more.
     fn forget_gone(&mut self) {
-        self.waiting.retain(|_, list| {
-            list.retain(|work| !work.admit.is_closed());
-            !list.is_empty()
-        });
-        let waiting = &self.waiting;
-        self.order
-            .retain(|requester| waiting.contains_key(requester));
+        self.waiting.retain(|work| !work.admit.is_closed());
     }
 }
 
@@ -649,6 +639,27 @@ mod tests {
     }
 
     #[tokio::test(flavor = "multi_thread")]
+    async fn a_tenant_leaves_memory_to_others_whatever_its_addresses() {
+        let admission = decoding("8MiB", 100).admission.clone();
+        let caller = |tenant: &str, n: u8| {
+            let address = ClientAddress::of_peer(IpAddr::from([10, 0, 0, n]));
+            Requester::of_tenant(tenant.parse().unwrap(), address)
+        };
+        let mut held = Vec::new();
+        for n in 0..6 {
+            held.push(admission.enter(caller("a", n), 1 << 20).await.unwrap());
+        }
+        // It holds three quarters; from another address it waits, and another tenant does not.
+        let (waiting, seventh) = (admission.clone(), caller("a", 7));
+        let waits = tokio::spawn(async move { waiting.enter(seventh, 1 << 20).await.map(drop) });
+        until(|| admission.queue().waiting.len() == 1).await;
+        drop(admission.enter(caller("b", 1), 2 << 20).await.unwrap());
+        assert!(!waits.is_finished());
+        held.pop();
+        waits.await.unwrap().unwrap();
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
     async fn hanging_up_cancels_the_work() {
         let decoding = decoding("1MiB", 100);
         let (tell, told) = mpsc::channel();
@@ -688,16 +699,7 @@ mod tests {
                 order.lock().unwrap().push(who);
                 drop(admitted);
             }));
-            until(|| {
-                admission
-                    .queue()
-                    .waiting
-                    .values()
-                    .map(VecDeque::len)
-                    .sum::<usize>()
-                    > n
-            })
-            .await;
+            until(|| admission.queue().waiting.len() > n).await;
         }
         // The queue is full for the client that has filled it, and not for one that has nothing in it.
         assert!(admission.enter(client(1), 1).await.is_err());
@@ -707,13 +709,13 @@ mod tests {
             order_of_4.lock().unwrap().push(4);
             drop(admitted);
         }));
-        until(|| admission.queue().waiting.len() == 4).await;
+        until(|| admission.queue().waiting.len() == 8).await;
         drop(first);
         for task in tasks {
             task.await.unwrap();
         }
         assert_eq!(*order.lock().unwrap(), [1, 2, 3, 4, 1, 2, 1, 1]);
-        assert!(admission.queue().order.is_empty());
+        assert!(admission.queue().waiting.is_empty());
     }
 
     #[tokio::test(flavor = "multi_thread")]

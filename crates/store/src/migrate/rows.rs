@@ -171,7 +171,7 @@ pub(super) async fn count(of: &SqlStore) -> Result<Vec<TableCount>, MigrateError
 
 fn file_of(store: &SqlStore) -> StoreResult<&SqlitePool> {
     match &store.readers {
-        Readers::Sqlite(pool) => Ok(pool),
+        Readers::Sqlite(shared) => Ok(&shared.pool),
         Readers::Postgres(_) => Err(StoreError::database("rows are copied from SQLite only")),
     }
 }

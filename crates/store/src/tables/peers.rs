@@ -145,9 +145,9 @@ impl SqlStore {
     pub(crate) fn peers(self: &Arc<Self>) -> Option<Arc<dyn Peers>> {
         match &self.readers {
             Readers::Sqlite(_) => None,
-            Readers::Postgres(pool) => Some(Arc::new(PgPeers {
+            Readers::Postgres(shared) => Some(Arc::new(PgPeers {
                 store: self.clone(),
-                pool: pool.clone(),
+                pool: shared.pool.clone(),
             })),
         }
     }
