@@ -120,6 +120,7 @@ fn stops_wherever_it_is(
             id: "vol_0".into(),
             parameters: Map::new(),
             files: vec![file(field, volume)],
+            voxels: 0,
         };
         ((*field).to_owned(), stored)
     };
@@ -129,6 +130,7 @@ fn stops_wherever_it_is(
         parameters: work.parameters_from_text(&pairs).unwrap(),
         items: things.iter().map(stored).collect::<BTreeMap<_, _>>(),
         library: Vec::new(),
+        voxels: 0,
     };
     let never = Duration::from_secs(3600);
     // The first run also fills the caches that live as long as the process.

@@ -398,12 +398,16 @@ fn words(files: &[LocalFile]) -> Result<String, Failure> {
 
 impl UploadReader for FakeReader {
     fn inspect(&self, files: &[LocalFile], _: &Monitor<'_>) -> Result<UploadFacts, Failure> {
-        words(files)?;
+        let words = words(files)?;
         let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
         Ok(UploadFacts {
             format: "words".into(),
             compressed: false,
-            shape: [1, 2, 3],
+            shape: if words.starts_with("large ") {
+                [256; 3]
+            } else {
+                [1, 2, 3]
+            },
             frames: 1,
             spacing_mm: [1.0; 3],
             affine: [
@@ -516,6 +520,7 @@ impl Work for FakeWork {
 
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
         let words = words(&input.files)?;
+        let words = words.strip_prefix("large ").unwrap_or(&words);
         match words.split(' ').next().unwrap() {
             "slow" => work_for(Duration::from_secs(30), monitor)?,
             "brief" => work_for(Duration::from_millis(300), monitor)?,

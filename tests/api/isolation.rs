@@ -5,6 +5,7 @@ use crate::helpers::{Service, TestApp, fake_engine, heart, send_signal, text};
 use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use ventriform_service::jobs::{Isolation, serve_isolated};
 use ventriform_service::records::{Claimant, Filed, JobStore, NewJob, Tenant};
@@ -192,6 +193,18 @@ async fn file_suspected(data: &Path, volume: &str) {
     };
     store.rows.claim(&by, 0).await.unwrap().unwrap();
     store.rows.release_dead(None, None, 0).await.unwrap();
+}
+
+#[tokio::test]
+async fn a_job_on_a_large_volume_is_computed_apart_from_the_start() {
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let app = TestApp::on(data, isolated_engine(), |_| {}).await;
+    // In the process of the service, this would end the tests.
+    let job = app.finished("large abort").await;
+    assert_eq!(job["state"], "failed", "{job}");
+    let problem = "urn:ventriform:problem:attempt-limit";
+    assert_eq!(job["error"]["type"], problem, "{job}");
+    assert_eq!(app.finished("large sphere").await["state"], "succeeded");
 }
 
 #[tokio::test]

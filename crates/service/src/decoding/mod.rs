@@ -23,6 +23,7 @@
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
 //! ends at its next report.
 
+mod process_memory;
 mod thread_clock;
 mod turns;
 
@@ -31,6 +32,7 @@ use crate::error::{Refusal, ServiceError};
 use crate::memory::Requester;
 use crate::places::Rounds;
 use crate::records::{Failure, Fault};
+use process_memory::process_memory;
 use prometheus::Histogram;
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -70,6 +72,8 @@ pub struct Decoding {
     admission: Arc<Admission>,
     turns: Arc<Turns>,
     overruns: Arc<Semaphore>,
+    /// Most memory that a piece of work may need, bytes.
+    largest: u64,
     /// Time of any piece of work.
     time: Duration,
     /// Bytes of a file for which a second is added.
@@ -94,6 +98,7 @@ impl Decoding {
             }),
             turns: Turns::new(cores),
             overruns: Arc::new(Semaphore::new(cores * OVERRUNS_PER_CORE)),
+            largest: largest_work(settings.decoding_memory.0, process_memory()),
             time: settings.decoding_time.0,
             rate: settings.decoding_rate.0.max(1),
             waits,
@@ -104,7 +109,8 @@ impl Decoding {
     /// Dropping the future cancels the work. Its memory gives it no time: a small file may need much.
     ///
     /// # Errors
-    /// `busy` if too much waits, `decoding-time` if the work takes too long, `internal` if it panics.
+    /// `too-large` if the work needs more memory than the process can spare, `busy` if too much waits, `decoding-time` if the
+    /// work takes too long, `internal` if it panics.
     pub async fn run<T: Send + 'static>(
         &self,
         memory: u64,
@@ -123,6 +129,9 @@ impl Decoding {
         memory: u64,
         work: impl FnOnce(&Monitor<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
+        if memory > self.largest {
+            return Err(too_large(memory, self.largest));
+        }
         let (asked, requester) = (Instant::now(), Requester::current());
         let admitted = self.admission.enter(requester.clone(), memory).await?;
         let turn = self.turns.take(requester.clone()).await;
@@ -535,6 +544,24 @@ impl AdmissionQueue {
     }
 }
 
+/// Most memory that one piece of work may need: the budget, or half of what the process may have where that is more. Work that needs
+/// more than the budget runs alone.
+fn largest_work(budget: u64, process: Option<u64>) -> u64 {
+    process.map_or(u64::MAX, |bytes| budget.max(bytes / 2))
+}
+
+fn too_large(memory: u64, most: u64) -> ServiceError {
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    let detail = format!(
+        "This takes {} MiB of memory at once, more than the {} MiB that the service has for it.",
+        mebibytes(memory),
+        mebibytes(most)
+    );
+    Failure::new(Fault::Content, "too-large", detail)
+        .fix("Download the upload itself (`content`), or ask the operator for more memory or a larger `decoding_memory`.")
+        .into()
+}
+
 fn busy() -> ServiceError {
     let failure = Failure::new(
         Fault::Service,
@@ -636,6 +663,18 @@ mod tests {
         }
         let ended = decoding.run(512 << 20, compute).await;
         assert_eq!(ended.unwrap_err().failure.code, "decoding-time");
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn work_that_needs_more_than_the_process_can_spare_is_refused() {
+        assert_eq!(largest_work(5, Some(8)), 5);
+        assert_eq!(largest_work(5, Some(30)), 15);
+        let mut decoding = decoding("1MiB", 100);
+        Arc::get_mut(&mut decoding).unwrap().largest = largest_work(1 << 20, Some(8 << 20));
+        decoding.run(4 << 20, |_| ()).await.unwrap();
+        let refused = decoding.run((4 << 20) + 1, |_| ()).await.unwrap_err();
+        assert_eq!(refused.failure.code, "too-large");
+        assert_eq!(decoding.admission.queue().free, 1 << 20);
     }
 
     #[tokio::test(flavor = "multi_thread")]

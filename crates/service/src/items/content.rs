@@ -34,6 +34,8 @@ pub struct StoredItem {
     pub parameters: Map<String, Value>,
     /// The requested files, those that exist.
     pub files: Vec<LocalFile>,
+    /// Voxels of a volume; 0 of a product.
+    pub voxels: u64,
 }
 
 impl StoredItem {

@@ -44,6 +44,7 @@ impl Items {
         };
         let files = self.volume_files(id, &volume.files).await?;
         Ok(files.map(|files| StoredItem {
+            voxels: volume.item.voxels(),
             id: volume.item.id,
             parameters: Map::new(),
             files,
@@ -115,6 +116,7 @@ impl Items {
             id: product.id,
             parameters: product.parameters,
             files,
+            voxels: 0,
         })
     }
 

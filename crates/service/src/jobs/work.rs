@@ -118,6 +118,8 @@ pub struct WorkInput {
     pub items: BTreeMap<String, StoredItem>,
     /// The templates in the order of their ids, if [`Needs::library`] asked for them.
     pub library: Vec<StoredItem>,
+    /// Voxels of the largest of the volumes.
+    pub voxels: u64,
 }
 
 impl WorkInput {

@@ -33,6 +33,17 @@ pub struct StoredVolume {
     pub bytes: u64,
     /// Its files in the file store. Their names are not those given by the client.
     pub files: Vec<FileRecord>,
-    /// Facts about the content, found when it was uploaded; the queue does not read it.
+    /// Facts about the content, found when it was uploaded. Of them, the queue reads [`StoredVolume::voxels`] alone.
     pub facts: Value,
+}
+
+impl StoredVolume {
+    /// Voxels of all its frames together, as far as its facts say.
+    pub fn voxels(&self) -> u64 {
+        let shape = self.facts.get("shape").and_then(Value::as_array);
+        let lengths = shape.into_iter().flatten().chain(self.facts.get("frames"));
+        lengths
+            .filter_map(Value::as_u64)
+            .fold(1, u64::saturating_mul)
+    }
 }

@@ -1,6 +1,7 @@
 //! Collecting the input of a job from the store.
 
 use super::Queue;
+use crate::items::StoredItem;
 use crate::jobs::{Needs, Work, WorkInput};
 use crate::records::{Failure, Fault, Job, StoreError, StoreFault};
 use std::collections::BTreeMap;
@@ -44,7 +45,9 @@ impl Queue {
                 found.insert(field, item);
             }
         }
+        let others = found.values().map(|item: &StoredItem| item.voxels);
         Ok(Ok(WorkInput {
+            voxels: others.fold(volume.voxels, u64::max),
             volume: volume.id,
             files: volume.files,
             parameters: job.parameters.clone(),

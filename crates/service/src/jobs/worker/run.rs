@@ -8,6 +8,7 @@
 //! stops: a job of a living run is never without a worker.
 
 use super::WorkerSettings;
+use super::isolation::IN_PROCESS_VOXELS;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
 use crate::items::WorkOutput;
@@ -251,10 +252,14 @@ impl JobRunner {
         }
     }
 
-    /// How to compute the job in a process of its own, if it has to be.
-    fn isolation(&self, job: &Job) -> Option<Isolation> {
+    /// How to compute the job on volumes of at most `voxels` in a process of its own, if it has to be.
+    fn isolation(&self, job: &Job, voxels: u64) -> Option<Isolation> {
         let suspected = job.interruptions > 0 || job.crashes > 0;
-        let isolation = self.works.isolation().filter(|_| suspected)?;
+        let isolation = self.works.isolation();
+        if !suspected {
+            return isolation.filter(|_| voxels > IN_PROCESS_VOXELS).cloned();
+        }
+        let isolation = isolation?;
         tracing::warn!(
             job = %job.id, interruptions = job.interruptions, crashes = job.crashes,
             "the service died while this job was running: it is computed in a process of its own"
@@ -278,7 +283,8 @@ impl JobRunner {
         let (sender, result) = oneshot::channel();
         let (reports, progress) = mpsc::unbounded_channel();
         let cancel = cancel.clone();
-        let (isolation, kind) = (self.isolation(job), job.kind.clone());
+        let voxels = prepared.as_ref().map_or(0, |(_, input)| input.voxels);
+        let (isolation, kind) = (self.isolation(job, voxels), job.kind.clone());
         let threads = self.settings.threads;
         self.threads.spawn(move || {
             let computed = catch_unwind(AssertUnwindSafe(|| -> Result<WorkOutput, Ended> {
