@@ -160,7 +160,7 @@ pub async fn create_comparison(
         products::choose(&headers, &offers())?;
     }
     let trace_parent = super::observe::trace_parent(&request);
-    let object = json_object(request).await?;
+    let object = json_object(&app, request).await?;
     if let Some(name) = object
         .keys()
         .find(|name| !BODY_FIELDS.contains(&name.as_str()))

@@ -58,7 +58,7 @@ pub async fn state_identity(
     _: NoQuery,
     request: Request,
 ) -> Answer<Json<Map<String, Value>>> {
-    let stated = json_object(request).await?;
+    let stated = json_object(&app, request).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     let catalogue = app.service.items().catalogue();
     if catalogue.scan(&caller.tenant, &id).await?.is_none() {

@@ -140,7 +140,7 @@ pub async fn create_key(
     request: Request,
 ) -> Answer {
     let now = app.service.now();
-    let wanted = read(&json_object(request).await?, &caller)?;
+    let wanted = read(&json_object(&app, request).await?, &caller)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
     let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
     app.service.access.add_key(&key, &event).await?;

@@ -34,7 +34,7 @@ pub async fn hold_volume(
     request: Request,
 ) -> Answer<Json<LegalHoldBody>> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
-    let object = json_object(request).await?;
+    let object = json_object(&app, request).await?;
     if let Some(name) = object.keys().find(|name| *name != "reason") {
         return Err(unknown("field", name, &["reason"]));
     }

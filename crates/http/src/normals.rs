@@ -11,7 +11,7 @@ use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use super::query::Query;
 use super::quota::{reserve_item, reserve_job};
-use super::request::{charge_parsed, json_bytes, object_of, unknown};
+use super::request::{json_bytes, object_of, parsed, unknown};
 use super::webhook_request::webhook_of;
 use axum::extract::{Request, State};
 use serde::{Deserialize, Serialize};
@@ -162,8 +162,7 @@ pub async fn create_normals(
     // A table is short; whatever is longer is read as limits, under the budget of decoding.
     let table_limit = app.service.settings.json_limit.as_usize();
     let object = if bytes.len() <= table_limit {
-        charge_parsed(&bytes).await?;
-        Some(object_of(&bytes)?)
+        Some(parsed(&app, bytes.clone(), object_of).await?)
     } else {
         None
     };

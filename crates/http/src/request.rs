@@ -1,5 +1,6 @@
 //! Strict reading of paths and JSON bodies: what is unknown is refused.
 
+use super::app::App;
 use super::limits::BodyLimits;
 use super::memory::charge;
 use super::problem::{Answer, Problem, body, shorten};
@@ -12,6 +13,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::sync::LazyLock;
 use ventriform::parameters::nearest;
+use ventriform::progress::Monitor;
 
 /// Segments of the path, as [`axum::extract::Path`] reads them, but refused with a problem object.
 pub struct PathSegments<T>(pub T);
@@ -110,23 +112,36 @@ const CHARGED_AT_ONCE: usize = 64 << 10;
 /// Memory for a byte of JSON that is parsed: `[0,0]` takes a value and its place for two.
 const PARSED_MEMORY: u64 = 40;
 
-/// Charges for the value that JSON of that length becomes.
+/// Memory of decoding for a body that is parsed: its value is charged already, so this bounds only how many wait.
+const PARSING_MEMORY: u64 = 1 << 20;
+
+/// What `parse` makes of JSON. Charges for the value. What is longer than a request's head is parsed in turn with what
+/// others decode, off the threads that serve.
 ///
 /// # Errors
-/// 503 if there is no memory for it.
-pub async fn charge_parsed(bytes: &[u8]) -> Answer<()> {
-    if bytes.len() > UNCHARGED_BYTES {
-        charge(PARSED_MEMORY * bytes.len() as u64).await?;
+/// Those of `parse`, and 503 if there is no memory for the value or too much waits.
+pub async fn parsed<T: Send + 'static>(
+    app: &App,
+    bytes: Bytes,
+    parse: impl FnOnce(&[u8]) -> Answer<T> + Send + 'static,
+) -> Answer<T> {
+    if bytes.len() <= UNCHARGED_BYTES {
+        return parse(&bytes);
     }
-    Ok(())
+    let length = bytes.len() as u64;
+    charge(PARSED_MEMORY * length).await?;
+    let decoding = &app.service.decoding;
+    let parse = move |_: &Monitor<'_>| parse(&bytes);
+    decoding.run_on(length, PARSING_MEMORY, parse).await?
 }
 
 /// The JSON object in a request's body.
 ///
 /// # Errors
 /// As [`json_bytes`], and 400 if the body is not one JSON object.
-pub async fn json_object(request: Request) -> Answer<Map<String, Value>> {
-    object(&json_bytes(request).await?).await
+pub async fn json_object(app: &App, request: Request) -> Answer<Map<String, Value>> {
+    let bytes = json_bytes(request).await?;
+    parsed(app, bytes, object_of).await
 }
 
 /// The object in the field `parameters` of a JSON object; empty if it has none.
@@ -149,17 +164,13 @@ pub fn parameters_of(object: &Map<String, Value>) -> Answer<&Map<String, Value>>
 ///
 /// # Errors
 /// As [`json_object`].
-pub async fn merge_patch(request: Request) -> Answer<Map<String, Value>> {
+pub async fn merge_patch(app: &App, request: Request) -> Answer<Map<String, Value>> {
     let types = ["application/merge-patch+json", "application/json"];
-    object(&bytes_of(request, &types).await?).await
+    let bytes = bytes_of(request, &types).await?;
+    parsed(app, bytes, object_of).await
 }
 
-async fn object(bytes: &[u8]) -> Answer<Map<String, Value>> {
-    charge_parsed(bytes).await?;
-    object_of(bytes)
-}
-
-/// The JSON object in these bytes, for which the caller has charged.
+/// The JSON object in these bytes.
 ///
 /// # Errors
 /// 400 if they are not one JSON object.

@@ -119,7 +119,7 @@ pub async fn change<'a>(
     request: Request,
     tags_of: impl Fn() -> BoxFuture<'a, Answer<Tags>>,
 ) -> Answer<()> {
-    let patch = merge_patch(request).await?;
+    let patch = merge_patch(app, request).await?;
     for _ in 0..CHANGE_TRIES {
         let before = tags_of().await?;
         let after = merged(app, before.clone(), &patch)?;

@@ -211,7 +211,7 @@ pub async fn update_template(
 ) -> Answer<Json<TemplateBody>> {
     let tenant = &caller.tenant;
     find::<Templates>(&app, tenant, &id).await?;
-    for (field, value) in &merge_patch(request).await? {
+    for (field, value) in &merge_patch(&app, request).await? {
         let library = match (field.as_str(), value) {
             (LIBRARY_FIELD, Value::Bool(library)) => *library,
             (LIBRARY_FIELD, Value::Null) => false,

@@ -109,7 +109,7 @@ pub async fn create_webhook(
     _: NoQuery,
     request: Request,
 ) -> Answer {
-    let object = json_object(request).await?;
+    let object = json_object(&app, request).await?;
     let checked = GivenWebhook::from_json(&object)?
         .check(&app.service.hooks.guard)
         .await?;

@@ -12,7 +12,7 @@ use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
 use super::query::{NoQuery, QueryReader};
 use super::quota::reserve_item;
-use super::request::{PathSegments, bytes_of, charge_parsed};
+use super::request::{PathSegments, bytes_of, parsed};
 use crate::public_base::public_path;
 use axum::Json;
 use axum::extract::{Request, State};
@@ -104,7 +104,7 @@ pub async fn create_workitem(
         uid => uid,
     };
     let counting = reserve_item(&app, &caller, request.headers()).await?;
-    let attributes = data_set(request).await?;
+    let attributes = data_set(&app, request).await?;
     let (field, named) = match named {
         None => (SOP_INSTANCE_UID, attributes.text(SOP_INSTANCE_UID)),
         Some(ref uid) => ("workitem", Some(uid.as_str())),
@@ -328,7 +328,7 @@ pub async fn update_workitem(
     request: Request,
 ) -> Answer {
     let counting = reserve_item(&app, &caller, request.headers()).await?;
-    let (changes, stated) = claimed_data_set(query, &headers, request).await?;
+    let (changes, stated) = claimed_data_set(&app, query, &headers, request).await?;
     counting.arrived(text_of(&changes)?.len() as u64).await?;
     change(&app, &caller, &uid, |item, now| {
         item.update(stated.as_deref(), changes.clone(), now)?;
@@ -359,7 +359,7 @@ pub async fn change_workitem_state(
     headers: HeaderMap,
     request: Request,
 ) -> Answer {
-    let (wanted, stated) = claimed_data_set(query, &headers, request).await?;
+    let (wanted, stated) = claimed_data_set(&app, query, &headers, request).await?;
     if let Some(uid) = &stated {
         require_uid(TRANSACTION_UID, uid)?;
     }
@@ -407,7 +407,7 @@ pub async fn cancel_workitem(
     let details = if bytes.is_empty() {
         DataSetJson::default()
     } else {
-        parse(&bytes).await?
+        parsed(&app, bytes, parse).await?
     };
     let done = change(&app, &caller, &uid, |item, now| {
         item.request_cancel(&details, now)
@@ -520,23 +520,24 @@ fn transaction(query: QueryReader, headers: &HeaderMap) -> Answer<Option<String>
 
 /// The data set of the body, and the Transaction UID wherever the client states it.
 async fn claimed_data_set(
+    app: &App,
     query: QueryReader,
     headers: &HeaderMap,
     request: Request,
 ) -> Answer<(DataSetJson, Option<String>)> {
     let stated = transaction(query, headers)?;
-    let body = data_set(request).await?;
+    let body = data_set(app, request).await?;
     let stated = stated.or_else(|| body.text(TRANSACTION_UID).map(str::to_owned));
     Ok((body, stated))
 }
 
-async fn data_set(request: Request) -> Answer<DataSetJson> {
-    parse(&bytes_of(request, &JSON_TYPES).await?).await
+async fn data_set(app: &App, request: Request) -> Answer<DataSetJson> {
+    let bytes = bytes_of(request, &JSON_TYPES).await?;
+    parsed(app, bytes, parse).await
 }
 
 /// The data set in an array with one, or alone.
-async fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
-    charge_parsed(bytes).await?;
+fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
     let malformed = |reason: &str| body::malformed_json(reason);
     let value = serde_json::from_slice(bytes).map_err(|error| malformed(&error.to_string()))?;
     let object = match value {

@@ -74,7 +74,7 @@ pub async fn create_job(
     let headers = request.headers().clone();
     let counting = reserve_job(&app, &caller, &headers).await?;
     let trace_parent = observe::trace_parent(&request);
-    let object = json_object(request).await?;
+    let object = json_object(&app, request).await?;
     let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
     let (work, volume, parameters) = read_job(&app, &object, &mut order).await?;
     let filed = app
