@@ -11,7 +11,8 @@ use std::time::Duration;
 use tempfile::TempDir;
 use ventriform::volume::dicom::DicomHeader;
 use ventriform_service::access::{
-    AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, KeyRequest, Maker, Quota, Scope, verify,
+    AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, AuditRecord, KeyRequest, Maker, Quota,
+    Scope, verify,
 };
 use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
 use ventriform_service::hooks::{
@@ -667,7 +668,7 @@ async fn jobs_end_in_every_way(on: &Stores) {
             .unwrap();
     assert_eq!(back.progress, 0.5, "progress never goes back");
     assert_eq!(
-        on.a.delete_job(&job.id, now()).await.unwrap(),
+        on.a.delete_job(&job.id, None, now()).await.unwrap(),
         Deleted::InUse
     );
     let asked = on.a.interrupt(&job.id, now()).await.unwrap();
@@ -714,14 +715,12 @@ async fn jobs_end_in_every_way(on: &Stores) {
     let (_, lease) = on.claim().await.unwrap();
     let outcome = JobOutcome::Failed(failure("no-heart").at("volume"));
     on.b.finish(&lease, &outcome, now()).await.unwrap().unwrap();
-    assert_eq!(
-        on.a.delete_job(&job.id, now()).await.unwrap(),
-        Deleted::Done
-    );
-    assert_eq!(
-        on.a.delete_job(&job.id, now()).await.unwrap(),
-        Deleted::Unknown
-    );
+    let by = ErasureAgent::retention();
+    for (deleted, rows) in [(Deleted::Done, 1), (Deleted::Unknown, 1)] {
+        let done = on.a.delete_job(&job.id, Some(&by), now()).await.unwrap();
+        assert_eq!(done, deleted);
+        assert_eq!(rows_about(&*on.b, &job.id).await, rows);
+    }
     assert!(on.b.erased_at(&tenant(), &job.id).await.unwrap().is_some());
     // Interrupted by the death of the service up to the limit.
     on.file(&new_job(&volume)).await;
@@ -1522,7 +1521,7 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     assert_eq!(on.b.backlog().await.unwrap().pending, 2);
     assert_eq!(on.a.expire(limits(0, 1), now()).await.unwrap(), 0);
     // What was told about an erased job goes with it.
-    on.a.delete_job(&job.id, now()).await.unwrap();
+    on.a.delete_job(&job.id, None, now()).await.unwrap();
     assert!(
         on.b.deliveries(&tenant(), &job.id, 10)
             .await
@@ -1818,12 +1817,27 @@ async fn received_objects_become_volumes(on: &Stores) {
     let Added::New(group, None) = add("1", "aa").await else {
         panic!("it is new again")
     };
-    assert_eq!(on.b.remove(&other(), &group).await.unwrap(), None);
-    assert_eq!(
-        on.b.remove(&tenant(), &group).await.unwrap().unwrap(),
-        ["file-1-aa"]
-    );
+    let by = ErasureAgent::retention();
+    let of_other = on.b.remove(&other(), &group, Some(&by), now()).await;
+    assert_eq!(of_other.unwrap(), None);
+    let removed = on.b.remove(&tenant(), &group, Some(&by), now()).await;
+    assert_eq!(removed.unwrap().unwrap(), ["file-1-aa"]);
+    assert_eq!(rows_about(&*on.a, &group).await, 1);
     assert_eq!(on.b.waiting().await.unwrap(), (0, 0));
+}
+
+/// The number of rows of the audit trail by which retention has erased an item of the tenant.
+async fn rows_about(store: &SqlStore, item: &str) -> usize {
+    let filter = AuditFilter {
+        tenant: Some(tenant()),
+        object: Some(item.to_owned()),
+        ..AuditFilter::default()
+    };
+    let rows = store.audit(&filter, ALL).await.unwrap().items;
+    let by_age = |row: &&AuditRecord| {
+        row.event.agent == "retention" && row.event.activity == Activity::Delete
+    };
+    rows.iter().filter(by_age).count()
 }
 
 async fn work_items_change_once(on: &Stores) {
@@ -2257,7 +2271,7 @@ async fn everything_stored_counts_for_its_tenant(on: &Stores) {
     assert_eq!(added, 2048 + on.b.text_bytes(&all_texts).unwrap());
     for job in [filed, with_tags, with_all] {
         on.a.interrupt(&job.id, now()).await.unwrap();
-        on.a.delete_job(&job.id, now()).await.unwrap();
+        on.a.delete_job(&job.id, None, now()).await.unwrap();
     }
     assert_eq!(bytes(&tenant()).await, before + size);
     // A result: as many bytes as the tenant may store, or the job fails and nothing is added.

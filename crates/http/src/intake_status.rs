@@ -168,7 +168,8 @@ pub async fn forget_received(
 ) -> Answer<StatusCode> {
     let store = app.service.intake.store.clone();
     let (tenant, group, forgotten) = (caller.tenant.clone(), id.clone(), id.clone());
-    let remove = async move { store.remove(&tenant, &group).await };
+    let now = app.service.now();
+    let remove = async move { store.remove(&tenant, &group, None, now).await };
     let done = move |removed: &Option<_>| removed.as_ref().map(|_| (Activity::Delete, forgotten));
     let removed = caller.by.change(remove, done).await?;
     let files = removed.ok_or_else(|| {

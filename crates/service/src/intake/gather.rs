@@ -14,7 +14,8 @@ use super::session::Sessions;
 use crate::error::ServiceError;
 use crate::jobs::Queue;
 use crate::records::{
-    BlobError, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult, Timestamp,
+    BlobError, ErasureAgent, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult,
+    Timestamp,
 };
 use async_trait::async_trait;
 use futures::StreamExt;
@@ -405,8 +406,10 @@ impl Gatherer {
         if let Some(age) = self.settings.keep_failed {
             let age = Timestamp::try_from(age.as_millis()).unwrap_or(Timestamp::MAX);
             let failed = self.store.failed_before(now.saturating_sub(age)).await?;
+            let by = ErasureAgent::retention();
             for (tenant, id) in failed {
-                if let Some(files) = self.store.remove(&tenant, &id).await? {
+                let removed = self.store.remove(&tenant, &id, Some(&by), now).await?;
+                if let Some(files) = removed {
                     self.files.discard(&files).await?;
                 }
             }

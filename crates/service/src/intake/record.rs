@@ -2,7 +2,7 @@
 //! and the files that keep them.
 
 use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
-use crate::records::{BlobWriter, Timestamp};
+use crate::records::{BlobWriter, ErasureAgent, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -246,8 +246,14 @@ pub trait IntakeStore: Send + Sync + 'static {
     ) -> StoreResult<ListPage<IntakeGroup>>;
 
     /// Removes a tenant's group and returns the files of its objects; `None` if it has none with that
-    /// id.
-    async fn remove(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Vec<String>>>;
+    /// id. With `by`, a row of the audit trail says so, in the same transaction.
+    async fn remove(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        by: Option<&ErasureAgent>,
+        now: Timestamp,
+    ) -> StoreResult<Option<Vec<String>>>;
 
     /// The failed groups that have not changed since `before`.
     async fn failed_before(&self, before: Timestamp) -> StoreResult<Vec<(Tenant, String)>>;

@@ -15,9 +15,6 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// The name under which the upkeep erases.
-const BY_RETENTION: &str = "retention";
-
 /// Items beyond their age that are read at a time.
 const PAGE_ITEMS: u32 = 500;
 
@@ -276,10 +273,7 @@ fn by_retention(tenant: Tenant, id: String, before: Option<Timestamp>) -> Erasur
         id,
         cascade: false,
         renewed_before: before,
-        by: ErasureAgent {
-            name: BY_RETENTION.into(),
-            ..ErasureAgent::default()
-        },
+        by: ErasureAgent::retention(),
         reason: ErasureReason::Retention,
     }
 }

@@ -33,6 +33,16 @@ pub struct ErasureAgent {
     pub request: Option<String>,
 }
 
+impl ErasureAgent {
+    /// The service itself, which erases what is older than the operator keeps it.
+    pub fn retention() -> Self {
+        Self {
+            name: "retention".into(),
+            ..Self::default()
+        }
+    }
+}
+
 /// Why an item is erased.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

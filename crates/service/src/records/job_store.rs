@@ -1,7 +1,8 @@
 //! The interface to the jobs table.
 
 use super::{
-    Bounded, Deleted, ListPage, ListRequest, PagePlan, Product, ScanFilter, StoreResult, TagFilter,
+    Bounded, Deleted, ErasureAgent, ListPage, ListRequest, PagePlan, Product, ScanFilter,
+    StoreResult, TagFilter,
 };
 use super::{Failure, Filed, Job, JobState, NewJob, Priority, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -202,6 +203,12 @@ pub trait JobStore: Send + Sync + 'static {
     /// a write may wait.
     async fn check(&self) -> StoreResult<()>;
 
-    /// Deletes a job that has ended. [`Deleted::InUse`] if it has not.
-    async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted>;
+    /// Deletes a job that has ended. [`Deleted::InUse`] if it has not. With `by`, a row of the audit trail says so, in
+    /// the same transaction.
+    async fn delete_job(
+        &self,
+        id: &str,
+        by: Option<&ErasureAgent>,
+        now: Timestamp,
+    ) -> StoreResult<Deleted>;
 }

@@ -13,8 +13,8 @@ use crate::database::Transaction;
 use crate::query::{Target, query};
 use ventriform_service::access::{Activity, AuditEvent};
 use ventriform_service::records::{
-    AuditMark, Erased, ErasedFile, ErasedItem, ErasureOrder, Receipt, Resource, StoreResult,
-    Tenant, Timestamp, random_id,
+    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, Receipt, Resource,
+    StoreResult, Tenant, Timestamp, random_id,
 };
 
 /// The prefix of the ids of receipts.
@@ -70,14 +70,8 @@ pub(super) async fn erase(
     } else {
         Vec::new()
     };
-    let by = order.by.clone();
-    let event = AuditEvent {
-        key: by.key,
-        address: by.address,
-        request: by.request,
-        ..AuditEvent::new(now, Activity::Delete, tenant.clone(), by.name)
-    };
-    let recorded = append(to, &[event.on(&order.id)]).await?;
+    let event = erasure_event(&order.by, tenant, &order.id, now);
+    let recorded = append(to, &[event]).await?;
     let receipt = Receipt {
         id: random_id(RECEIPT_PREFIX),
         tenant: tenant.clone(),
@@ -105,6 +99,23 @@ pub(super) async fn erase(
     .execute(to)
     .await?;
     Ok(Erased::Done(Box::new(receipt)))
+}
+
+/// The row of the audit trail about an erasure.
+pub(super) fn erasure_event(
+    by: &ErasureAgent,
+    tenant: &Tenant,
+    item: &str,
+    now: Timestamp,
+) -> AuditEvent {
+    let by = by.clone();
+    let event = AuditEvent {
+        key: by.key,
+        address: by.address,
+        request: by.request,
+        ..AuditEvent::new(now, Activity::Delete, tenant.clone(), by.name)
+    };
+    event.on(item)
 }
 
 async fn has(

@@ -1,6 +1,7 @@
 //! The tables of received objects.
 
-use super::access::stored_bytes;
+use super::access::{append, stored_bytes};
+use super::erasure::erasure_event;
 use super::pages::push_page;
 use super::rows;
 use crate::database::{SqlStore, Transaction};
@@ -12,7 +13,8 @@ use ventriform_service::intake::{
     Protocol, ReceivedObject,
 };
 use ventriform_service::records::{
-    Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp, random_id,
+    ErasureAgent, Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp,
+    random_id,
 };
 
 /// The columns of a group, with what is counted of its objects.
@@ -203,7 +205,13 @@ impl IntakeStore for SqlStore {
         rows::page(rows, page, group, |group| group.sequence)
     }
 
-    async fn remove(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Vec<String>>> {
+    async fn remove(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        by: Option<&ErasureAgent>,
+        now: Timestamp,
+    ) -> StoreResult<Option<Vec<String>>> {
         let mut transaction = self.writer.begin().await?;
         let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
             .bind(id)
@@ -218,6 +226,9 @@ impl IntakeStore for SqlStore {
             .bind(id)
             .execute(&mut transaction)
             .await?;
+        if let Some(by) = by {
+            append(&mut transaction, &[erasure_event(by, tenant, id, now)]).await?;
+        }
         transaction.commit().await?;
         Ok(Some(files))
     }

@@ -17,9 +17,9 @@
 //! take an index of unfinished jobs, which looks small to it, for as good as the job's key; after a busy
 //! minute that index is full of entries of ended versions, and each of them is read.
 
-use super::access::stored_bytes;
+use super::access::{append, stored_bytes};
 use super::catalogue::insert_product;
-use super::erasure::record_deletion;
+use super::erasure::{erasure_event, record_deletion};
 use super::pages::{Times, push_page, push_tags, push_times};
 use super::rows::{self, to_json};
 use super::scans::push_scan;
@@ -29,9 +29,10 @@ use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
 use ventriform_service::records::{
-    Bounded, Claimant, DeathLimit, Deleted, Failure, Fault, Filed, Interrupted, Job, JobFilter,
-    JobOutcome, JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan, Priority,
-    Product, QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp, random_id,
+    Bounded, Claimant, DeathLimit, Deleted, ErasureAgent, Failure, Fault, Filed, Interrupted, Job,
+    JobFilter, JobOutcome, JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan,
+    Priority, Product, QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp,
+    random_id,
 };
 
 /// Number of last succeeded jobs whose durations are averaged.
@@ -564,7 +565,12 @@ impl JobStore for SqlStore {
         self.probe().await
     }
 
-    async fn delete_job(&self, id: &str, now: Timestamp) -> StoreResult<Deleted> {
+    async fn delete_job(
+        &self,
+        id: &str,
+        by: Option<&ErasureAgent>,
+        now: Timestamp,
+    ) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
         let row = query(
             "DELETE FROM jobs WHERE id = $1 AND state NOT IN ('queued', 'running')
@@ -580,7 +586,11 @@ impl JobStore for SqlStore {
                 None => Deleted::Unknown,
             });
         };
-        record_deletion(&mut transaction, &rows::tenant(&row)?, id, now).await?;
+        let tenant = rows::tenant(&row)?;
+        record_deletion(&mut transaction, &tenant, id, now).await?;
+        if let Some(by) = by {
+            append(&mut transaction, &[erasure_event(by, &tenant, id, now)]).await?;
+        }
         transaction.commit().await?;
         Ok(Deleted::Done)
     }

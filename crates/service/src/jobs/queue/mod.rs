@@ -7,8 +7,8 @@ mod peers;
 use super::JobObserver;
 use crate::items::{ExpiredPages, Items, milliseconds};
 use crate::records::{
-    Clock, DeathLimit, Deleted, Filed, Interrupted, Job, JobState, JobStore, Lease, NewJob,
-    QueueLoad, Resource, StoreError, Tenant, Timestamp, random_id,
+    Clock, DeathLimit, Deleted, ErasureAgent, Filed, Interrupted, Job, JobState, JobStore, Lease,
+    NewJob, QueueLoad, Resource, StoreError, Tenant, Timestamp, random_id,
 };
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -134,10 +134,10 @@ impl Queue {
     /// If the database fails.
     pub async fn delete_job(&self, id: &str) -> Result<Deleted, StoreError> {
         self.items.note_deleted_rows();
-        self.jobs.delete_job(id, self.clock.now()).await
+        self.jobs.delete_job(id, None, self.clock.now()).await
     }
 
-    /// Deletes the records of jobs that ended at least `age` ago.
+    /// Deletes the records of jobs that ended at least `age` ago; each leaves a row of the audit trail.
     ///
     /// # Errors
     /// If the database fails.
@@ -146,7 +146,10 @@ impl Queue {
         let mut pages = ExpiredPages::new(Resource::Job, before);
         while let Some(page) = pages.next(self.items.catalogue()).await? {
             for found in page {
-                self.delete_job(&found.id).await?;
+                self.items.note_deleted_rows();
+                let by = Some(ErasureAgent::retention());
+                let now = self.clock.now();
+                self.jobs.delete_job(&found.id, by.as_ref(), now).await?;
             }
         }
         Ok(())
