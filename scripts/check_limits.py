@@ -13,6 +13,7 @@ import json
 import os
 import random
 import re
+import selectors
 import socket
 import struct
 import subprocess
@@ -606,13 +607,98 @@ def c_store(service, data_set):
         time.sleep(1)
 
 
+def packed_volume(side):
+    """A gzipped scan of side^3 voxels of one byte: noise that repeats, of which a megabyte holds 100 million voxels."""
+    header = bytearray(nifti(1)[:352])
+    struct.pack_into("<8h", header, 40, 3, side, side, side, 1, 1, 1, 1)
+    struct.pack_into("<2h", header, 70, 2, 8)
+    packer = zlib.compressobj(6, zlib.DEFLATED, 31)
+    out, left = [packer.compress(bytes(header))], side ** 3
+    noise = random.Random(2).randbytes(1 << 10) * 1024
+    while left:
+        out.append(packer.compress(noise[:left]))
+        left -= min(left, len(noise))
+    return b"".join(out) + packer.flush()
+
+
+def large_volumes(service, seconds=20):
+    """Voxels and jobs of volumes that take little when they are uploaded, and all memory as numbers."""
+    said = []
+    for side in (300, 500, 610):
+        status, body = service.ask("POST", "/v1/volumes", packed_volume(side), dict(ATTACKER, **{"content-type": "application/octet-stream"}), 60)
+        assert status == 201, (status, body[:300])
+        volume = json.loads(body)["id"]
+        for path in ("preview.png", "voxels.nii.gz", "voxels.nii.gz?mask=true"):
+            said.append(service.ask("GET", f"/v1/volumes/{volume}/{path}", None, ATTACKER, 60)[0])
+        for kind in ("segmentation", "model"):
+            order = json.dumps({"kind": kind, "volume": volume}).encode()
+            status, body = service.ask("POST", "/v1/jobs", order, dict(JSON, **ATTACKER))
+            assert status == 202, (status, body[:300])
+    time.sleep(seconds)
+    return f"answers {said}"
+
+
+def repeated(service, request, connections=2000, seconds=8):
+    """The same kind of request on many connections at the same time, sent again on each when it is answered."""
+    waiting, said, end = selectors.DefaultSelector(), {}, time.time() + seconds
+    for number in range(connections):
+        try:
+            s = service.connect()
+            s.sendall(request(number, 0))
+            waiting.register(s, selectors.EVENT_READ, [number, 0])
+        except OSError:
+            said["broken"] = said.get("broken", 0) + 1
+        if time.time() > end:
+            break
+    while time.time() < end:
+        for key, _ in waiting.select(0.2):
+            s, state = key.fileobj, key.data
+            try:
+                answer = s.recv(1 << 16)
+                state[1] += 1
+                status = answer[9:12].decode("latin-1")
+                said[status] = said.get(status, 0) + 1
+                s.sendall(request(*state))
+            except OSError:
+                answer = b""
+            if not answer:
+                waiting.unregister(s)
+                s.close()
+    still = list(waiting.get_map().values())
+    for key in still:
+        key.fileobj.close()
+    return f"{len(still)} connections, answers {said}"
+
+
+def many_writes(service):
+    """Small changes, each of which waits for the connection to the database that writes."""
+    volume, scan = stored_scan(service), nifti(4)
+
+    def request(number, again):
+        if number % 2:
+            body, target, kind = json.dumps({"external_id": f"{number}-{again}"}).encode(), ("PATCH", f"/v1/volumes/{volume}"), "application/json"
+        else:
+            body, target, kind = scan[:-8] + struct.pack("<2i", number, again), ("POST", "/v1/volumes"), "application/octet-stream"
+        return head(*target, len(body), kind) + body
+
+    return repeated(service, request)
+
+
+def many_bodies(service):
+    """Bodies that take long to parse for their size."""
+    body = b'{"parameters":{"x":[' + b"0," * 60_000 + b"0]}}"
+    whole = head("POST", "/v1/jobs", len(body), "application/json") + body
+    return repeated(service, lambda *_: whole)
+
+
 # Settings of the service under an attack. Where a large job runs at the end, the service is not to wait for it.
 FLAGS = {few_threads: ["--blocking-threads", str(BLOCKING_THREADS)], hostile_archive: ["--dicomweb-allow", "127.0.0.0/8"],
-         large_jobs: ["--shutdown-grace", "1s"], half_patches: ["--shutdown-grace", "1s"]}
+         large_jobs: ["--shutdown-grace", "1s"], large_volumes: ["--shutdown-grace", "1s"], half_patches: ["--shutdown-grace", "1s"]}
 
 
 ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, few_threads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads,
-           hostile_archive, huge_normals, profiles, large_jobs, half_patches, late_bodies, work_item_changes, associations, header_bombs]
+           hostile_archive, huge_normals, profiles, large_jobs, half_patches, late_bodies, work_item_changes, associations, header_bombs,
+           large_volumes, many_writes, many_bodies]
 
 
 # Memory of the service: a third of the limit is left for attacks that come together.
