@@ -268,6 +268,7 @@ impl Write for Query<'_, Sqlite, SqliteArguments> {
 mod tests {
     use super::*;
     use sqlx::Row;
+    use ventriform_service::memory::{Ledger, MemoryBudget};
 
     async fn writer(folder: &std::path::Path, wait: u64) -> Writer {
         let options = SqliteConnectOptions::new()
@@ -388,5 +389,32 @@ mod tests {
         assert!(started.elapsed() < Duration::from_millis(4500));
         sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
         assert_eq!(write().await.unwrap(), 1);
+    }
+
+    #[tokio::test]
+    async fn a_tenant_waits_for_one_write_of_another_that_has_many() {
+        let folder = tempfile::tempdir().unwrap();
+        let writer = writer(folder.path(), 60_000).await;
+        let first = writer.begin().await.unwrap();
+        let budget = MemoryBudget::new(1 << 20);
+        let mut writes = Vec::new();
+        for n in 0..41 {
+            let tenant = if n < 40 { "a" } else { "b" };
+            let ledger = Ledger::new(&budget, Some(&tenant.parse().unwrap()));
+            let write = sqlx::query("INSERT INTO t VALUES (?)").bind(tenant);
+            let mut write = Box::pin(ledger.scope(write.write(&writer)));
+            // It asks before the next one does.
+            assert!(futures::poll!(&mut write).is_pending());
+            writes.push(write);
+        }
+        first.commit().await.unwrap();
+        for written in futures::future::join_all(writes).await {
+            assert_eq!(written.unwrap(), 1);
+        }
+        let mut other = writer.options.connect().await.unwrap();
+        let rows = sqlx::query("SELECT x FROM t ORDER BY rowid").fetch_all(&mut other);
+        let rows = rows.await.unwrap();
+        let of_b = rows.iter().position(|row| row.get::<String, _>(0) == "b");
+        assert_eq!((rows.len(), of_b), (41, Some(1)));
     }
 }
