@@ -118,14 +118,21 @@ impl<T> Rounds<T> {
     }
 
     /// Number of pieces of work of a requester.
-    pub fn len_of(&self, requester: &Requester) -> usize {
+    fn len_of(&self, requester: &Requester) -> usize {
         let round = self.groups.get(requester.group());
         let list = round.and_then(|round| round.clients.get(requester));
         list.map_or(0, VecDeque::len)
     }
 
+    /// Whether among at most `longest` pieces there is room for one more of this requester. One that has less than its
+    /// equal share of its group's equal share has room also where others have taken it.
+    pub fn has_room(&self, requester: &Requester, longest: usize) -> bool {
+        let (groups, clients) = self.sharers_with(requester);
+        self.len() < longest || self.len_of(requester) * groups * clients < longest
+    }
+
     /// The number of groups, and of clients in the group of a requester, if that had work waiting too.
-    pub fn sharers_with(&self, requester: &Requester) -> (usize, usize) {
+    fn sharers_with(&self, requester: &Requester) -> (usize, usize) {
         let Some(round) = self.groups.get(requester.group()) else {
             return (self.groups.len() + 1, 1);
         };
@@ -164,7 +171,16 @@ impl Places {
         self.take_for(Requester::current()).await
     }
 
-    async fn take_for(self: &Arc<Self>, requester: Requester) -> Place {
+    /// Whether one more of this requester may wait where `longest` may.
+    pub fn has_room(&self, requester: &Requester, longest: usize) -> bool {
+        let mut state = self.state();
+        // Some may have gone.
+        state.waiting.retain(|give| !give.is_closed());
+        state.waiting.has_room(requester, longest)
+    }
+
+    /// [`Places::take`] for that requester.
+    pub async fn take_for(self: &Arc<Self>, requester: Requester) -> Place {
         loop {
             let (give, given) = oneshot::channel();
             self.state().waiting.push(requester.clone(), give);

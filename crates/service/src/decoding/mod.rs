@@ -6,8 +6,9 @@
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
 //!    that much of the budget is free (setting `decoding_memory`). What waits is admitted tenant by tenant in turn (or anonymous
 //!    client), that of a tenant client by client ([`crate::places`]). A client holds at most half of the budget, a tenant three
-//!    quarters, so that one's queue does not delay another's work, whatever their addresses. The queue is bounded (setting
-//!    `decoding_queue`); beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
+//!    quarters; work that needs more than half of it holds half, one piece at a time in turn. So one's queue does not delay
+//!    another's work, whatever their addresses. What needs more than a quarter of the memory that the process may have, and
+//!    more than the budget, is refused. The queue is bounded (setting `decoding_queue`); beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
 //!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of tenants and clients that have
 //!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
@@ -30,7 +31,7 @@ mod turns;
 use crate::config::Settings;
 use crate::error::{Refusal, ServiceError};
 use crate::memory::Requester;
-use crate::places::Rounds;
+use crate::places::{Place, Places, Rounds};
 use crate::records::{Failure, Fault};
 use process_memory::process_memory;
 use prometheus::Histogram;
@@ -88,6 +89,7 @@ impl Decoding {
         Self {
             admission: Arc::new(Admission {
                 budget: settings.decoding_memory.0,
+                large: Places::new(1),
                 longest: settings.decoding_queue,
                 queue: Mutex::new(AdmissionQueue {
                     free: settings.decoding_memory.0,
@@ -361,6 +363,8 @@ impl Observer for TurnTaker {
 struct Admission {
     /// Memory of all work together, bytes.
     budget: u64,
+    /// The place for work that needs more than half of the budget.
+    large: Arc<Places>,
     /// Most waiting pieces of work.
     longest: usize,
     queue: Mutex<AdmissionQueue>,
@@ -370,9 +374,9 @@ struct Admission {
 struct AdmissionQueue {
     /// Bytes of the budget that nobody holds.
     free: u64,
-    /// Most bytes that one requester holds, unless it is one piece of work that needs more.
+    /// Most bytes that one requester holds.
     share: u64,
-    /// Most bytes that one tenant holds, with the same exception.
+    /// Most bytes that one tenant holds.
     group_share: u64,
     /// Bytes that each requester holds; none is 0.
     held: BTreeMap<Requester, u64>,
@@ -394,6 +398,8 @@ struct Admitted {
     admission: Arc<Admission>,
     requester: Requester,
     memory: u64,
+    /// The place of large work.
+    _large: Option<Place>,
 }
 
 impl Admitted {
@@ -436,25 +442,48 @@ impl Admission {
         requester: Requester,
         memory: u64,
     ) -> Result<Admitted, ServiceError> {
+        let share = self.budget / 2;
+        let mut large = if memory > share {
+            Some(self.enter_large(&requester).await?)
+        } else {
+            None
+        };
         let (admit, admitted) = oneshot::channel();
         {
             let mut queue = self.queue();
-            if !queue.has_room(&requester, self.longest) {
+            if !queue.waiting.has_room(&requester, self.longest) {
                 // Some of them may belong to clients that have gone.
                 queue.forget_gone();
-                if !queue.has_room(&requester, self.longest) {
+                if !queue.waiting.has_room(&requester, self.longest) {
                     return Err(busy());
                 }
             }
-            // Work that needs more than the budget runs alone.
-            let memory = memory.min(self.budget);
+            let memory = memory.min(share);
             queue.waiting.push(requester, Waiting { memory, admit });
         }
         self.advance();
         let mut admitted = std::pin::pin!(admitted);
         loop {
             tokio::select! {
-                admitted = &mut admitted => return admitted.map_err(ServiceError::internal),
+                admitted = &mut admitted => {
+                    let mut admitted = admitted.map_err(ServiceError::internal)?;
+                    admitted._large = large.take();
+                    return Ok(admitted);
+                }
+                () = tokio::time::sleep(ADMISSION_PATIENCE) => self.displace(),
+            }
+        }
+    }
+
+    /// Waits for the place of large work.
+    async fn enter_large(&self, requester: &Requester) -> Result<Place, ServiceError> {
+        if !self.large.has_room(requester, self.longest) {
+            return Err(busy());
+        }
+        let mut place = std::pin::pin!(self.large.take_for(requester.clone()));
+        loop {
+            tokio::select! {
+                place = &mut place => return Ok(place),
                 () = tokio::time::sleep(ADMISSION_PATIENCE) => self.displace(),
             }
         }
@@ -490,6 +519,7 @@ impl Admission {
                 admission: self.clone(),
                 requester,
                 memory: next.memory,
+                _large: None,
             };
             // Without a receiver, `admitted` is dropped and the memory is free again.
             let _ = next.admit.send(admitted);
@@ -498,14 +528,6 @@ impl Admission {
 }
 
 impl AdmissionQueue {
-    /// Whether a queue of `longest` has room for one more of this requester. One that has less than its equal
-    /// share of its tenant's equal share has room also where others have filled the queue.
-    fn has_room(&self, requester: &Requester, longest: usize) -> bool {
-        let (groups, clients) = self.waiting.sharers_with(requester);
-        let own = self.waiting.len_of(requester);
-        self.waiting.len() < longest || own * groups * clients < longest
-    }
-
     /// Takes the next piece of work if its memory is free. Nothing overtakes it, or large work
     /// would wait for ever; only requesters that hold their share are passed over.
     fn next(&mut self) -> Option<(Requester, Waiting)> {
@@ -544,10 +566,9 @@ impl AdmissionQueue {
     }
 }
 
-/// Most memory that one piece of work may need: the budget, or half of what the process may have where that is more. Work that needs
-/// more than the budget runs alone.
+/// Most memory that one piece of work may need: the budget, or a quarter of what the process may have where that is more.
 fn largest_work(budget: u64, process: Option<u64>) -> u64 {
-    process.map_or(u64::MAX, |bytes| budget.max(bytes / 2))
+    process.map_or(u64::MAX, |bytes| budget.max(bytes / 4))
 }
 
 fn too_large(memory: u64, most: u64) -> ServiceError {
@@ -668,13 +689,28 @@ mod tests {
     #[tokio::test(flavor = "multi_thread")]
     async fn work_that_needs_more_than_the_process_can_spare_is_refused() {
         assert_eq!(largest_work(5, Some(8)), 5);
-        assert_eq!(largest_work(5, Some(30)), 15);
+        assert_eq!(largest_work(5, Some(40)), 10);
         let mut decoding = decoding("1MiB", 100);
-        Arc::get_mut(&mut decoding).unwrap().largest = largest_work(1 << 20, Some(8 << 20));
+        Arc::get_mut(&mut decoding).unwrap().largest = largest_work(1 << 20, Some(16 << 20));
         decoding.run(4 << 20, |_| ()).await.unwrap();
         let refused = decoding.run((4 << 20) + 1, |_| ()).await.unwrap_err();
         assert_eq!(refused.failure.code, "too-large");
         assert_eq!(decoding.admission.queue().free, 1 << 20);
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn large_work_leaves_half_of_the_memory_to_other_work() {
+        let admission = decoding("4MiB", 100).admission.clone();
+        let large = admission.enter(client(1), 100 << 20).await.unwrap();
+        drop(admission.enter(client(2), 2 << 20).await.unwrap());
+        // Other large work waits.
+        let waiting = admission.clone();
+        let other = tokio::spawn(async move { waiting.enter(client(3), 3 << 20).await.map(drop) });
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        assert!(!other.is_finished());
+        drop(large);
+        other.await.unwrap().unwrap();
+        assert_eq!(admission.queue().free, 4 << 20);
     }
 
     #[tokio::test(flavor = "multi_thread")]
@@ -726,15 +762,16 @@ mod tests {
 
     #[tokio::test(flavor = "multi_thread")]
     async fn clients_are_admitted_in_turn_and_the_queue_is_bounded() {
-        let admission = decoding("1MiB", 7).admission.clone();
-        let first = admission.enter(client(1), 9 << 20).await.unwrap();
+        let admission = decoding("4MiB", 7).admission.clone();
+        let _kept = admission.enter(client(9), 2 << 20).await.unwrap();
+        let first = admission.enter(client(8), 2 << 20).await.unwrap();
         let order = Arc::new(Mutex::new(Vec::new()));
         let mut tasks = Vec::new();
         // Client 1 has four pieces waiting when the others come.
         for (n, who) in [1, 1, 1, 1, 2, 2, 3].into_iter().enumerate() {
             let (waiting, order) = (admission.clone(), order.clone());
             tasks.push(tokio::spawn(async move {
-                let admitted = waiting.enter(client(who), 1 << 20).await.unwrap();
+                let admitted = waiting.enter(client(who), 2 << 20).await.unwrap();
                 order.lock().unwrap().push(who);
                 drop(admitted);
             }));
@@ -744,7 +781,7 @@ mod tests {
         assert!(admission.enter(client(1), 1).await.is_err());
         let (waiting, order_of_4) = (admission.clone(), order.clone());
         tasks.push(tokio::spawn(async move {
-            let admitted = waiting.enter(client(4), 1 << 20).await.unwrap();
+            let admitted = waiting.enter(client(4), 2 << 20).await.unwrap();
             order_of_4.lock().unwrap().push(4);
             drop(admitted);
         }));
