@@ -304,7 +304,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
     ("memory", &["records", "error", "client"]),
     ("items", &["records", "error", "memory"]),
     ("jobs", &["records", "items"]),
-    ("access", &["records", "http_client"]),
+    ("access", &["records", "http_client", "memory"]),
     ("reservations", &["records", "access"]),
     ("quotas", &["records", "error", "access", "reservations"]),
     ("hooks", &["records", "http_client"]),
@@ -321,7 +321,10 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
             "hooks",
         ],
     ),
-    ("intake", &["records", "error", "client", "jobs", "access"]),
+    (
+        "intake",
+        &["records", "error", "client", "memory", "jobs", "access"],
+    ),
     ("worklist", &["records", "dicom_tags"]),
     (
         "stores",

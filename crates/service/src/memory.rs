@@ -102,10 +102,16 @@ impl Requester {
         }
     }
 
-    /// The one that the current request is answered for.
+    /// The one that the current request is answered for, or the current task works for.
     pub fn current() -> Self {
         let of_request = REQUEST_LEDGER.try_with(|ledger| ledger.holder.clone());
-        of_request.unwrap_or_else(|_| Self::new(None))
+        let of_task = of_request.or_else(|_| TASK_REQUESTER.try_with(Self::clone));
+        of_task.unwrap_or_else(|_| Self::new(None))
+    }
+
+    /// Does work as that of this requester: what a request begins in a task of its own is not the service's.
+    pub async fn scope<T>(self, work: impl Future<Output = T>) -> T {
+        TASK_REQUESTER.scope(self, work).await
     }
 
     /// An anonymous client.
@@ -321,6 +327,7 @@ impl Charges {
 
 tokio::task_local! {
     static REQUEST_LEDGER: Ledger;
+    static TASK_REQUESTER: Requester;
 }
 
 impl Ledger {
@@ -637,5 +644,18 @@ mod tests {
         assert_eq!(budget.used().total, 250_000);
         drop(ledger);
         assert_eq!(budget.used().total, 0);
+    }
+
+    #[tokio::test]
+    async fn a_task_of_its_own_works_for_who_began_it() {
+        let tenant: Tenant = "a".parse().unwrap();
+        let ledger = Ledger::new(&MemoryBudget::new(100), Some(&tenant));
+        let begun = ledger.scope(async {
+            let work = Requester::current().scope(async { Requester::current() });
+            tokio::spawn(work)
+        });
+        let requester = begun.await.await.unwrap();
+        assert_eq!(requester.group(), &Group::Tenant(tenant));
+        assert!(Requester::current().is_service());
     }
 }

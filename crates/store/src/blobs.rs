@@ -23,6 +23,7 @@ use time::format_description::StaticFormatDescription;
 use time::macros::format_description;
 use time::{Date, OffsetDateTime};
 use tokio::io::AsyncWrite;
+use ventriform_service::places::Places;
 use ventriform_service::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
     Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
@@ -45,10 +46,15 @@ const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-
 /// Content that [`BlobStore::check`] writes: more than the free rest of a block.
 pub(super) const PROBE_BYTES: &[u8] = &[b'v'; 8192];
 
+/// Uploads and received objects that are forced to disk at the same time, in turn: the disk is slow, and the threads for it are few.
+const SYNCS_AT_ONCE: usize = 32;
+
 /// Files below one folder.
 pub struct FileBlobs {
     pub(super) folder: PathBuf,
     pub(super) gauge: DiskGauge,
+    /// Places for forcing files to disk.
+    pub(super) syncs: Arc<Places>,
     verified: Arc<Verified>,
 }
 
@@ -79,6 +85,7 @@ impl FileBlobs {
         Ok(Self {
             folder: folder.to_owned(),
             gauge,
+            syncs: Places::new(SYNCS_AT_ONCE),
             verified: Arc::default(),
         })
     }
@@ -195,6 +202,7 @@ struct StagingFolder {
     folder: PathBuf,
     /// The root of the store.
     root: PathBuf,
+    syncs: Arc<Places>,
     verified: Arc<Verified>,
     /// Whether everything in the folder has been forced to disk.
     settled: AtomicBool,
@@ -289,6 +297,7 @@ impl StagedFiles for StagingFolder {
     }
 
     async fn settle(&self, _id: &str) -> Result<(), BlobError> {
+        let _turn = self.syncs.take().await;
         let folder = self.folder.clone();
         tokio::task::spawn_blocking(move || sync_all(&folder))
             .await
@@ -298,6 +307,7 @@ impl StagedFiles for StagingFolder {
     }
 
     async fn publish(self: Box<Self>, record: &ItemRecord) -> Result<(), BlobError> {
+        let _turn = self.syncs.take().await;
         let record = record.clone();
         tokio::task::spawn_blocking(move || self.publish_blocking(&record))
             .await
@@ -314,6 +324,7 @@ impl BlobStore for FileBlobs {
             gauge: (purpose == StagedFor::Upload).then(|| self.gauge.clone()),
             folder,
             root: self.folder.clone(),
+            syncs: self.syncs.clone(),
             verified: self.verified.clone(),
             settled: AtomicBool::new(false),
         }))

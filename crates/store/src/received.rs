@@ -7,8 +7,10 @@ use async_trait::async_trait;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::intake::{IncomingFile, ReceivedFiles};
+use ventriform_service::places::Places;
 use ventriform_service::records::{BlobError, BlobWriter, LocalFile, Timestamp, random_id};
 
 /// A file on the local disk into which an object is received; deleted on drop.
@@ -43,6 +45,7 @@ impl Drop for Receiving {
 struct Incoming {
     file: Receiving,
     root: PathBuf,
+    syncs: Arc<Places>,
 }
 
 #[async_trait]
@@ -57,6 +60,8 @@ impl IncomingFile for Incoming {
 
     async fn keep(self: Box<Self>, name: &str) -> Result<(), BlobError> {
         let place = self.root.join(RECEIVED_FOLDER).join(name);
+        let syncs = self.syncs.clone();
+        let _turn = syncs.take().await;
         let kept = tokio::task::spawn_blocking(move || {
             sync(&self.file.path)?;
             fs::rename(&self.file.path, &place)?;
@@ -72,6 +77,7 @@ impl ReceivedFiles for FileBlobs {
         Ok(Box::new(Incoming {
             file: Receiving::begin(self.new_staging_folder(), &self.gauge).await?,
             root: self.folder.clone(),
+            syncs: self.syncs.clone(),
         }))
     }
 

@@ -12,6 +12,7 @@ use super::record::{
 use super::session::{RecordedGroups, Session};
 use crate::access::{Activity, Agent};
 use crate::error::ServiceError;
+use crate::memory::Requester;
 use crate::records::{BlobError, Clock, Fault, StoreError, StoreFault, hex, random_id};
 use async_trait::async_trait;
 use sha2::{Digest, Sha256};
@@ -338,6 +339,7 @@ impl Receiver {
                     recorded: session.recorded(),
                 };
                 let kept = keeping.keep(incoming, examined, origin.clone());
+                let kept = Requester::current().scope(kept);
                 let kept = tokio::spawn(kept.in_current_span()).await;
                 kept.unwrap_or_else(|error| Err(ReceiveError::Storage(error.to_string())))
             }

@@ -28,6 +28,7 @@ pub(crate) use erase::{ExpiredPages, milliseconds};
 pub use pins::Pin;
 pub use sweep::{Custodian, Swept};
 
+use crate::memory::Requester;
 use crate::records::{BlobStore, Catalogue, Clock, Peers, StoreError, Timestamp};
 use pins::ItemLocks;
 use std::sync::Arc;
@@ -107,6 +108,7 @@ impl Items {
 async fn to_its_end<T: Send + 'static>(
     section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
 ) -> Result<T, StoreError> {
+    let section = Requester::current().scope(section);
     tokio::spawn(section.in_current_span())
         .await
         .unwrap_or_else(|error| Err(StoreError::database(error.to_string())))

@@ -6,6 +6,7 @@
 
 use super::event::{Activity, AuditEvent, Outcome};
 use super::recorder::{NotRecorded, Recorder};
+use crate::memory::Requester;
 use crate::records::{Clock, ErasureAgent, StoreError, Tenant, Timestamp};
 use std::fmt::{Debug, Formatter};
 use std::sync::Arc;
@@ -111,6 +112,7 @@ impl Agent {
             }
             Ok(changed)
         };
+        let task = Requester::current().scope(task);
         tokio::spawn(task.in_current_span())
             .await
             .unwrap_or_else(|error| Err(StoreError::database(error.to_string()).into()))
