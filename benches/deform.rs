@@ -64,7 +64,14 @@ fn benchmarks(criterion: &mut Criterion) {
     });
     let fitted = fit(&volume, &template, &settings, &monitor).expect("the phantom has a heart");
     group.bench_function("voxelise 128³", |b| {
-        b.iter(|| voxelise(black_box(&fitted.model.mesh), volume.shape, &volume.frame));
+        b.iter(|| {
+            voxelise(
+                black_box(&fitted.model.mesh),
+                volume.shape,
+                &volume.frame,
+                &monitor,
+            )
+        });
     });
     group.finish();
 }

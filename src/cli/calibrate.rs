@@ -11,7 +11,7 @@ use ventriform::evaluate::calibration::{
 };
 use ventriform::evaluate::sample::Sample;
 use ventriform::parameters::CalibrationChoice;
-use ventriform::progress::Plan;
+use ventriform::progress::{Monitor, Plan};
 use ventriform::reader::{Learnt, ReaderLevel, ReaderOffset};
 
 /// Learn how a reader draws the wall, from scans and the reader's masks
@@ -51,7 +51,12 @@ pub fn run(args: &CalibrateArgs) -> Result<()> {
         error,
     })?;
     let bar = Bar::over(Plan::SEGMENTATION);
-    let made = calibrate(&cases, &parameters, &|share| bar.show("fit", share));
+    let made = calibrate(
+        &cases,
+        &parameters,
+        &|share| bar.show("fit", share),
+        &Monitor::silent(),
+    );
     bar.finish();
     let made = made?;
     write_file(&args.output, made.profile.to_json().as_bytes())?;

@@ -15,6 +15,7 @@ use ventriform::evaluate::table::Evaluation;
 use ventriform::evaluate::{
     EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
 };
+use ventriform::progress::Monitor;
 
 /// Make models of the templates, fit them to every patient, write tables, plots and pictures
 #[derive(Debug, Args)]
@@ -173,6 +174,7 @@ pub fn run(args: &EvaluateArgs) -> Result<()> {
         &program.unwrap_or_default(),
         &args.out,
         &bar,
+        &Monitor::silent(),
     );
     bar.finish();
     let evaluation = made.map_err(with_advice)?;

@@ -7,6 +7,7 @@ use std::io::Read as _;
 use std::path::Path;
 use ventriform::mesh::TriMesh;
 use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
+use ventriform::progress::Monitor;
 use ventriform::volume::ReadLimits;
 use ventriform_service::work::problems::Explain;
 
@@ -64,7 +65,7 @@ pub(super) fn read_mesh(
 ) -> Result<TriMesh> {
     let context = || format!("{}", path.display());
     let bytes = mesh_bytes(path, limits.mesh_bytes).with_context(context)?;
-    let read = mesh_files::read_where_silent(&bytes, stated, limits.mesh_bytes)
+    let read = mesh_files::read_where_silent(&bytes, stated, limits.mesh_bytes, &Monitor::silent())
         .map_err(|error| anyhow!(error.with_advice()))
         .with_context(context)?;
     for assumed in &read.notes {

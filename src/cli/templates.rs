@@ -55,7 +55,7 @@ fn build(args: &BuildArgs) -> Result<()> {
         let (path, what) = cohort.source(case).with_context(|| {
             format!("the files of case {case} are missing from the cohort's folder")
         })?;
-        let reading = cohort.read_source(case, &path);
+        let reading = cohort.read_source(case, &path, &Monitor::silent());
         let reading = reading.with_context(|| path.display().to_string())?;
         for n in ascending(&args.cohort.points) {
             let context = || format!("the model of {case} with {n} points");

@@ -50,10 +50,10 @@ const INTERFACE_CRATES: &[&str] = &["axum", "hyper", "reqwest", "utoipa", "sqlx"
 const LIBRARY_USES: &[(&str, &[&str])] = &[
     ("text", &[]),
     ("geometry", &[]),
-    ("numeric", &["geometry"]),
-    ("mesh", &["geometry", "numeric"]),
-    ("mesh_files", &["geometry", "mesh"]),
     ("progress", &[]),
+    ("numeric", &["geometry", "progress"]),
+    ("mesh", &["geometry", "numeric"]),
+    ("mesh_files", &["geometry", "numeric", "mesh", "progress"]),
     ("grid", &["geometry", "numeric", "mesh", "progress"]),
     ("draw", &["geometry", "numeric", "mesh"]),
     (
@@ -105,7 +105,10 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
             "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
         ],
     ),
-    ("normals", &["text", "numeric", "model", "polar"]),
+    (
+        "normals",
+        &["text", "numeric", "progress", "model", "polar"],
+    ),
     ("comparison", &["model", "polar", "normals"]),
     (
         "reader",

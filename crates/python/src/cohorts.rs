@@ -1,15 +1,17 @@
 //! `calibrate`, `normals build` and `evaluate`: work on folders of cases.
 
 use crate::errors::{Stopped, broken, refused, stopped};
-use crate::run::{Tell, abandonable, run};
+use crate::run::{Tell, run, run_steps};
 use crate::values::with_fit;
+use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use std::path::PathBuf;
 use ventriform::deform::DeformParameters;
-use ventriform::evaluate::calibration::{Calibration, CalibrationError, CaseFigures};
-use ventriform::evaluate::calibration::{calibrate as learn, cases_of};
+use ventriform::evaluate::calibration::{
+    Calibration, CalibrationCase, CalibrationError, CaseFigures, calibrate as learn, cases_of,
+};
 use ventriform::evaluate::normals::{self, BuildError, NormalsOptions};
 use ventriform::evaluate::parameters::InSample;
 use ventriform::evaluate::rows::Variant;
@@ -24,28 +26,57 @@ use ventriform::progress::Plan;
 use ventriform::volume::ReadLimits;
 use ventriform::volume::given_mask::MaskChoice;
 
+/// The cases that a reader's profile is learnt on.
+#[derive(FromPyObject)]
+pub enum GivenCases {
+    /// Name, scan and mask of each.
+    Cases(Vec<(String, Py<NativeVolume>, Py<NativeVolume>)>),
+    /// The folder that they are in.
+    Folder(PathBuf),
+}
+
+impl GivenCases {
+    fn cases(self, mask: &str) -> Result<Vec<CalibrationCase>, CalibrationError> {
+        match self {
+            GivenCases::Cases(cases) => {
+                let case = |(name, scan, mask): (String, Py<NativeVolume>, Py<NativeVolume>)| {
+                    let [scan, mask] = [scan, mask].map(|volume| volume.get().files.clone());
+                    CalibrationCase { name, scan, mask }
+                };
+                Ok(cases.into_iter().map(case).collect())
+            }
+            GivenCases::Folder(folder) => {
+                cases_of(&folder, mask).map_err(|error| CalibrationError::Folder { folder, error })
+            }
+        }
+    }
+}
+
 /// The text of the profile, and the table of cases and problems as JSON.
 #[pyfunction]
 #[pyo3(signature = (cohort, mask, parameters, progress=None))]
 pub fn calibrate(
     py: Python<'_>,
-    cohort: PathBuf,
+    cohort: GivenCases,
     mask: String,
     parameters: &Bound<'_, PyDict>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(String, String)> {
     let parameters = with_fit::<CalibrationChoice>(parameters)?.fit;
-    abandonable(py, progress, move |tell: &Tell| {
-        let no_cohort = |error: &dyn std::fmt::Display| {
-            let fix = "Give a folder with a folder for each case, which holds a scan and a mask.";
-            Stopped::Failed(refused("cohort", error, fix))
+    let fix = match &cohort {
+        GivenCases::Folder(_) => {
+            "Give a folder with a folder for each case, which holds a scan and a mask."
+        }
+        GivenCases::Cases(_) => "Give a scan and a reader's mask of it for each case.",
+    };
+    run_steps(py, progress, move |tell, monitor| {
+        let no_cohort = |error| match error {
+            CalibrationError::Cancelled(cancelled) => Stopped::from(cancelled),
+            error => Stopped::Failed(refused("cohort", error, fix)),
         };
-        let cases = cases_of(&cohort, &mask).map_err(|error| {
-            let folder = cohort.clone();
-            no_cohort(&CalibrationError::Folder { folder, error })
-        })?;
-        let made = learn(&cases, &parameters, &|share| tell("fit", share));
-        let made = made.map_err(|error| no_cohort(&error))?;
+        let cases = cohort.cases(&mask).map_err(no_cohort)?;
+        let made = learn(&cases, &parameters, &|share| tell("fit", share), monitor);
+        let made = made.map_err(no_cohort)?;
         Ok((made.profile.to_json(), cases_table(&made)))
     })
 }
@@ -127,7 +158,7 @@ pub struct EvaluationOrder {
     program: Vec<u8>,
 }
 
-struct Told<'a>(&'a Tell);
+struct Told<'a>(Tell<'a>);
 
 impl EvaluationObserver for Told<'_> {
     fn progress(&self, step: EvaluationStep, fraction: f64) {
@@ -143,8 +174,9 @@ pub fn evaluate(
     order: EvaluationOrder,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<(String, String)>> {
-    abandonable(py, progress, move |tell: &Tell| {
+    run_steps(py, progress, move |tell, monitor| {
         let refuse = |error: EvaluateError| match error {
+            EvaluateError::Cancelled(cancelled) => Stopped::from(cancelled),
             EvaluateError::ModelParameter(error) => stopped(&error),
             error => Stopped::Failed(refused("cohort", error, "")),
         };
@@ -186,6 +218,7 @@ pub fn evaluate(
             &order.program,
             &order.out,
             &Told(tell),
+            monitor,
         );
         let made = made.map_err(refuse)?;
         if !made.has_fit() {

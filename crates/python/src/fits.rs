@@ -79,7 +79,7 @@ pub fn segment<'py>(
     let (names, parts, anonymous) = (order.formats, order.parts, order.deidentify);
     let (made, files) = run(py, Plan::SEGMENTATION, progress, |monitor| {
         let formats = formats(&names)?;
-        let (auto, models) = given.read(&parameters.mask.mesh)?;
+        let (auto, models) = given.read(&parameters.mask.mesh, monitor)?;
         let normals = normals(limits_given)?;
         let whose = whose(scan, parameters.frame, monitor)?.filter(|_| !anonymous);
         let order = SegmentationOrder {
@@ -150,7 +150,7 @@ pub fn beat<'py>(
             }
             whose => whose,
         }?;
-        let (auto, models) = given.read(&MeshStatement::default())?;
+        let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = GatedOrder {
             gates: &gates,
@@ -201,7 +201,7 @@ pub fn compare<'py>(
         let formats = formats(&names)?;
         // Of gates that are no volume together, the first says whose they are.
         let whose = whose(&stress, None, monitor).or_else(|_| whose(&stress, Some(0), monitor))?;
-        let (auto, models) = given.read(&MeshStatement::default())?;
+        let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = ComparisonOrder {
             stress: &stress,

@@ -5,9 +5,10 @@ use crate::models::NativeModel;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
-use ventriform::mesh_files::{self, MeshStatement};
+use ventriform::mesh_files::{self, MeshFileError, MeshStatement};
 use ventriform::normals::NormalLimits;
 use ventriform::parameters::FitParameters;
+use ventriform::progress::Monitor;
 use ventriform::reader::ReaderProfile;
 use ventriform::segmentation::{NamedMesh, NamedReader};
 use ventriform::volume::{ReadLimits, VolumeFile};
@@ -54,16 +55,20 @@ impl GivenModels {
     }
 
     /// Whether the built-in hearts are fitted, and the others, read.
-    pub fn read(self, stated: &MeshStatement) -> Result<(bool, Vec<NamedMesh>), Stopped> {
+    pub fn read(
+        self,
+        stated: &MeshStatement,
+        monitor: &Monitor<'_>,
+    ) -> Result<(bool, Vec<NamedMesh>), Stopped> {
         let read = self.models.into_iter().map(|model| match model {
             ModelSource::Mesh(mesh) => Ok(mesh),
-            ModelSource::Path(path) => mesh(&path, stated),
+            ModelSource::Path(path) => mesh(&path, stated, monitor),
         });
         Ok((self.auto, read.collect::<Result<_, _>>()?))
     }
 }
 
-fn mesh(path: &Path, stated: &MeshStatement) -> Result<NamedMesh, Stopped> {
+fn mesh(path: &Path, stated: &MeshStatement, monitor: &Monitor<'_>) -> Result<NamedMesh, Stopped> {
     let limit = ReadLimits::default().mesh_bytes;
     let size = std::fs::metadata(path)
         .map_err(|error| unreadable("model", path, &error))?
@@ -74,9 +79,13 @@ fn mesh(path: &Path, stated: &MeshStatement) -> Result<NamedMesh, Stopped> {
         return Err(Stopped::Failed(refused("model", reason, &fix)));
     }
     let bytes = std::fs::read(path).map_err(|error| unreadable("model", path, &error))?;
-    let read = mesh_files::read_where_silent(&bytes, stated, limit).map_err(|error| {
-        let reason = format!("{}: {error}", path.display());
-        Stopped::Failed(refused("model", reason, &advice(&error)))
+    let read = mesh_files::read_where_silent(&bytes, stated, limit, monitor);
+    let read = read.map_err(|error| match error {
+        MeshFileError::Cancelled(cancelled) => Stopped::from(cancelled),
+        error => {
+            let reason = format!("{}: {error}", path.display());
+            Stopped::Failed(refused("model", reason, &advice(&error)))
+        }
     })?;
     Ok(NamedMesh {
         name: stem(path),

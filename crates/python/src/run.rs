@@ -9,9 +9,6 @@
 //! 3. A signal, or an exception of that function, cancels the work. Its exception is raised when the work has ended,
 //!    which takes a stage at most 50 ms.
 //!
-//! [`abandonable`] is for work that has no monitor: it is left to itself when a signal arrives, and ends with its next
-//! report.
-//!
 //! Guaranteed: a panic becomes an exception.
 
 use crate::errors::{Stopped, broken, exception, internal};
@@ -19,7 +16,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -99,6 +96,12 @@ impl<T: Send> Watch<T> {
         *latest = Some((stage, fraction.max(before)));
     }
 
+    /// As [`Watch::tell`], of steps whose fractions each begin at 0.
+    fn tell_step(&self, step: &'static str, fraction: f64) {
+        *lock(&self.stage) = step;
+        *lock(&self.latest) = Some((step, fraction));
+    }
+
     fn end(&self, outcome: Outcome<T>) {
         if let Ok(Ok(_)) = &outcome {
             let stage = *lock(&self.stage);
@@ -159,6 +162,30 @@ pub fn run<T: Send>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Monitor<'_>) -> Result<T, Stopped> + Send,
 ) -> PyResult<T> {
+    watched(py, plan, progress, |_, monitor| work(monitor))
+}
+
+/// Tells a step of work and its completed fraction.
+pub type Tell<'a> = &'a (dyn Fn(&'static str, f64) + Sync);
+
+/// Does `work` of many scans, which tells its steps itself and not the stages of each scan.
+pub fn run_steps<T: Send>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(Tell<'_>, &Monitor<'_>) -> Result<T, Stopped> + Send,
+) -> PyResult<T> {
+    watched(py, Plan::SEGMENTATION, progress, |watch, monitor| {
+        let tell = |step, fraction| watch.tell_step(step, fraction);
+        work(&tell, &monitor.without_observer())
+    })
+}
+
+fn watched<T: Send>(
+    py: Python<'_>,
+    plan: Plan,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Watch<T>, &Monitor<'_>) -> Result<T, Stopped> + Send,
+) -> PyResult<T> {
     import_numpy(py)?;
     let pool = pool(py)?;
     let watch = Watch::new(plan);
@@ -166,7 +193,7 @@ pub fn run<T: Send>(
     std::thread::scope(|scope| {
         let act = move || {
             let monitor = Monitor::new(watched, watched.cancel.clone());
-            let act = AssertUnwindSafe(|| pool.install(|| work(&monitor)));
+            let act = AssertUnwindSafe(|| pool.install(|| work(watched, &monitor)));
             watched.end(catch_unwind(act));
         };
         let thread = std::thread::Builder::new().spawn_scoped(scope, act);
@@ -192,46 +219,4 @@ pub fn run<T: Send>(
             }
         }
     })
-}
-
-/// Tells the share that is done of work that has no monitor.
-pub type Tell = Box<dyn Fn(&'static str, f64) + Send + Sync>;
-
-/// The payload of a panic by which abandoned work ends.
-struct Abandoned;
-
-/// Does `work`, which has no monitor. When a signal arrives it is left to itself.
-pub fn abandonable<T: Send + 'static>(
-    py: Python<'_>,
-    progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&Tell) -> Result<T, Stopped> + Send + 'static,
-) -> PyResult<T> {
-    import_numpy(py)?;
-    let pool = pool(py)?;
-    let watch = Arc::new(Watch::new(Plan::SEGMENTATION));
-    let (watched, told) = (Arc::clone(&watch), Arc::clone(&watch));
-    let tell: Tell = Box::new(move |step, fraction| {
-        if told.cancel.is_cancelled() {
-            resume_unwind(Box::new(Abandoned));
-        }
-        *lock(&told.stage) = step;
-        *lock(&told.latest) = Some((step, fraction));
-    });
-    let act = move || {
-        let act = AssertUnwindSafe(|| pool.install(|| work(&tell)));
-        watched.end(catch_unwind(act));
-    };
-    let thread = std::thread::Builder::new().spawn(act);
-    thread.map_err(|error| exception(py, &broken(error)))?;
-    loop {
-        if let Some(outcome) = py.detach(|| watch.wait()) {
-            let made = raise(py, outcome)?;
-            watch.look(py, progress)?;
-            return Ok(made);
-        }
-        if let Err(error) = watch.look(py, progress) {
-            watch.cancel.cancel();
-            return Err(error);
-        }
-    }
 }

@@ -4,7 +4,9 @@ use crate::arrays::{affine, voxels};
 use crate::errors::{exception, refused, stopped};
 use crate::run::run;
 use numpy::{PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use ventriform::grid::{Affine, ArrayError, Volume};
@@ -98,6 +100,19 @@ impl NativeVolume {
         });
         let volumes: Vec<Volume> = volumes.collect::<PyResult<_>>()?;
         Ok(Self::new(vec![VolumeFile::of_arrays("the array", volumes)]))
+    }
+
+    /// Name and path, or name and bytes, of each of the files; none for arrays.
+    fn files<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+        let stored = self.files.iter().filter_map(|file| {
+            let content = match (file.path(), file.memory()) {
+                (Some(path), _) => path.as_os_str().into_bound_py_any(py),
+                (None, Some(bytes)) => Ok(PyBytes::new(py, bytes).into_any()),
+                (None, None) => return None,
+            };
+            Some(content.map(|content| (file.name().to_owned(), content)))
+        });
+        stored.collect()
     }
 
     /// Format, values and place, as JSON.

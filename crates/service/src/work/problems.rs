@@ -532,6 +532,7 @@ impl Explain for ReadMeshError {
 impl Explain for MeshFileError {
     fn explain(&self) -> Failure {
         let (kind, field) = match self {
+            MeshFileError::Cancelled(_) => (CANCELLED_FAILURE, None),
             MeshFileError::TooLong { .. } => ((Fault::TooLarge, "mesh-too-large"), None),
             MeshFileError::Size(_) => (UNSUITABLE_MODEL, Some("mesh_unit")),
             MeshFileError::Contradiction { field: "unit", .. } => {
@@ -544,10 +545,15 @@ impl Explain for MeshFileError {
         };
         failure(kind, self, field, mesh_file_advice(self))
     }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, MeshFileError::Cancelled(_))
+    }
 }
 
 fn mesh_file_advice(error: &MeshFileError) -> String {
     match error {
+        MeshFileError::Cancelled(_) => START_AGAIN.into(),
         MeshFileError::TooLong { .. } => {
             "Give a mesh of fewer triangles, or ask the operator to raise the limit.".into()
         }

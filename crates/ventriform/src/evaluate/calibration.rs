@@ -12,7 +12,7 @@
 //! Guaranteed: the same files give the same profile and figures, on any number of threads.
 
 use super::cohort::{case_file, mask_file, mask_on};
-use super::files::sha256;
+use super::files::sha256_of_volume;
 use super::paired::PairedDifference;
 use super::sample::Sample;
 use crate::deform::FittedModel;
@@ -31,14 +31,22 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A scan and a reader's mask of it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct CalibrationCase {
-    /// Its folder's name.
+    /// Its name in figures and problems: of a folder's case that of its folder.
     pub name: String,
-    /// The scan.
-    pub scan: PathBuf,
-    /// The mask.
-    pub mask: PathBuf,
+    /// The files of the scan.
+    pub scan: Vec<VolumeFile>,
+    /// The files of the mask.
+    pub mask: Vec<VolumeFile>,
+}
+
+impl CalibrationCase {
+    /// A case of two files.
+    pub fn of_files(name: String, scan: &Path, mask: &Path) -> Self {
+        let [scan, mask] = [scan, mask].map(|path| vec![VolumeFile::at(path)]);
+        Self { name, scan, mask }
+    }
 }
 
 /// The cases of `folder`, by name: its folders with a scan (`spect.nii.gz`, `.nii` or `.dcm`) and a mask
@@ -53,7 +61,7 @@ pub fn cases_of(folder: &Path, mask: &str) -> std::io::Result<Vec<CalibrationCas
         let scan = case_file(folder, &name, "spect");
         let mask = mask_file(folder, &name, mask);
         if let (Some(scan), Some(mask)) = (scan, mask) {
-            cases.push(CalibrationCase { name, scan, mask });
+            cases.push(CalibrationCase::of_files(name, &scan, &mask));
         }
     }
     cases.sort_by(|a, b| a.name.cmp(&b.name));
@@ -198,6 +206,9 @@ pub enum CalibrationError {
         /// Why.
         error: std::io::Error,
     },
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// No case can be used.
     #[error("no mask can be learnt from: {}", reasons.join("; "))]
     NoMask {
@@ -208,26 +219,30 @@ pub enum CalibrationError {
 
 /// Learns the profile of the reader who drew the masks of `cases`. `parameters` are those of the fits,
 /// and their edge is the wall that the distances start from. `progress` is told the share of the cases
-/// that is done, from any thread.
+/// that is done, from any thread; `monitor` is told nothing and may cancel.
 ///
 /// # Errors
-/// [`CalibrationError::NoMask`]. A case that cannot be used is a problem of the result.
+/// [`CalibrationError::NoMask`] or [`CalibrationError::Cancelled`]. A case that cannot be used is a problem of the result.
 pub fn calibrate(
     cases: &[CalibrationCase],
     parameters: &FitParameters,
     progress: &(dyn Fn(f64) + Sync),
+    monitor: &Monitor<'_>,
 ) -> Result<Calibration, CalibrationError> {
+    let monitor = &monitor.without_observer();
     let done = AtomicUsize::new(0);
     let read: Vec<Result<ReadCase, String>> = cases
         .par_iter()
         .with_max_len(1)
         .map(|case| {
-            let read = ReadCase::of(case, parameters);
+            let read = ReadCase::of(case, parameters, monitor);
+            // A case that ended because of the caller is no problem of the case.
+            monitor.check()?;
             let count = 1 + done.fetch_add(1, Ordering::Relaxed);
             progress(count as f64 / cases.len() as f64);
-            read
+            Ok(read)
         })
-        .collect();
+        .collect::<Result<_, Cancelled>>()?;
     let (mut usable, mut problems) = (Vec::new(), Vec::new());
     for (case, read) in cases.iter().zip(read) {
         match read {
@@ -252,26 +267,27 @@ pub fn calibrate(
         .enumerate()
         .with_max_len(1)
         .map(|(place, (name, case))| {
-            let judged = |learnt: Learnt| case.judged(&learnt.drawing());
+            let judged = |learnt: Learnt| case.judged(&learnt.drawing(), monitor);
             let other_offsets = reader::learn(&without_one(&measured, place));
             let other_level = reader::learn_level(&without_one(&levels, place));
-            CalibrationRow {
+            let held_out = other_offsets.map(|offsets| judged(Learnt::Edge(offsets)));
+            Ok(CalibrationRow {
                 case: name.clone(),
                 measured: case.measured,
                 level: case.level,
                 reader_ml: case.reader_ml,
-                without: case.judged(&ReaderDrawing::Edge(ReaderOffsets::default())),
+                without: case.judged(&ReaderDrawing::Edge(ReaderOffsets::default()), monitor)?,
                 by_edge: KindFigures {
-                    held_out: other_offsets.map(|offsets| judged(Learnt::Edge(offsets))),
-                    in_sample: judged(by_edge),
+                    held_out: held_out.transpose()?,
+                    in_sample: judged(by_edge)?,
                 },
                 by_level: KindFigures {
-                    held_out: Some(judged(Learnt::Level(other_level))),
-                    in_sample: judged(by_level),
+                    held_out: Some(judged(Learnt::Level(other_level))?),
+                    in_sample: judged(by_level)?,
                 },
-            }
+            })
         })
-        .collect();
+        .collect::<Result<_, Cancelled>>()?;
     let learnt = match MeanJaccards::of(&rows).kind() {
         ReaderKind::Edge => by_edge,
         ReaderKind::Level => by_level,
@@ -312,14 +328,16 @@ struct ReadCase {
 }
 
 impl ReadCase {
-    fn of(case: &CalibrationCase, parameters: &FitParameters) -> Result<Self, String> {
-        let monitor = Monitor::silent();
-        let files = [VolumeFile::at(&case.scan)];
-        let order = SegmentationOrder::of_built_in_hearts(&files, parameters);
-        let made = from_files(&order, &ReadLimits::default(), &monitor);
+    fn of(
+        case: &CalibrationCase,
+        parameters: &FitParameters,
+        monitor: &Monitor<'_>,
+    ) -> Result<Self, String> {
+        let order = SegmentationOrder::of_built_in_hearts(&case.scan, parameters);
+        let made = from_files(&order, &ReadLimits::default(), monitor);
         let made = made.map_err(|error| error.to_string())?;
         let volume = &made.reading.volume;
-        let drawn = mask_on(&case.mask, &parameters.mask, volume);
+        let drawn = mask_on(&case.mask, &parameters.mask, volume, monitor);
         let drawn = drawn.map_err(|error| format!("its mask: {error}"))?;
         let reference = made.segmentation.polar.as_ref().map(|map| map.reference);
         let reference = reference.ok_or("the fit has no polar map")?;
@@ -328,12 +346,12 @@ impl ReadCase {
         let measured = reader::measure(&fit, &made.segmentation.mask, &drawn, &frame)
             .ok_or("its mask and the fitted wall have too little in common")?;
         let cancelled = |error: Cancelled| error.to_string();
-        let image = WallImage::about(&fit, volume, reference, &monitor).map_err(cancelled)?;
+        let image = WallImage::about(&fit, volume, reference, monitor).map_err(cancelled)?;
         let level =
-            reader::measure_level(&fit, &image, &drawn, &frame, &monitor).map_err(cancelled)?;
+            reader::measure_level(&fit, &image, &drawn, &frame, monitor).map_err(cancelled)?;
         let learnt_on = LearntOn {
-            scan: sha256(&case.scan).map_err(|error| error.to_string())?,
-            mask: sha256(&case.mask).map_err(|error| error.to_string())?,
+            scan: sha256_of_volume(&case.scan).map_err(|error| error.to_string())?,
+            mask: sha256_of_volume(&case.mask).map_err(|error| error.to_string())?,
         };
         Ok(Self {
             reader_ml: drawn.count() as f64 * frame.voxel_volume() / 1000.0,
@@ -348,19 +366,21 @@ impl ReadCase {
     }
 
     /// The fit as `drawing` has it, against the reader's mask.
-    fn judged(&self, drawing: &ReaderDrawing) -> CaseFigures {
-        let monitor = Monitor::silent();
-        // Nobody cancels.
-        let moved = reader::drawn(self.fit.clone(), drawing, &self.image, &monitor);
-        let fit = moved.map_or_else(|_| self.fit.clone(), |moved| moved.0);
-        let mask = voxelise(&fit.mesh, self.drawn.shape, &self.frame);
-        let agreement = compare(&mask, &self.drawn, self.frame.spacing(), &monitor).ok();
+    fn judged(
+        &self,
+        drawing: &ReaderDrawing,
+        monitor: &Monitor<'_>,
+    ) -> Result<CaseFigures, Cancelled> {
+        let (fit, _) = reader::drawn(self.fit.clone(), drawing, &self.image, monitor)?;
+        let mask = voxelise(&fit.mesh, self.drawn.shape, &self.frame, monitor)?;
+        let agreement = compare(&mask, &self.drawn, self.frame.spacing(), monitor).ok();
+        monitor.check()?;
         let contours = agreement.as_ref().and_then(|a| a.contours);
-        CaseFigures {
+        Ok(CaseFigures {
             jaccard: agreement.map_or(0.0, |a| a.jaccard),
             contour: contours.map_or(f64::NAN, |c| c.mean_voxels),
             wall_ml: fit.wall_ml,
             cavity_ml: fit.wall.map_or(f64::NAN, |wall| wall.cavity_ml),
-        }
+        })
     }
 }

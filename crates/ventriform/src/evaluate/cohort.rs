@@ -10,7 +10,7 @@ use super::rows::Gold;
 use crate::grid::voxelise::Mask;
 use crate::mesh_files::MeshFormat;
 use crate::progress::Monitor;
-use crate::volume::given_mask::{GivenMask, GivenMaskError, MaskChoice, read_mask};
+use crate::volume::given_mask::{GivenMaskError, MaskChoice, read_mask};
 use crate::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeError, VolumeFile};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -234,32 +234,35 @@ impl Cohort {
     ///
     /// # Errors
     /// [`GivenMaskError`], of a scan always [`GivenMaskError::File`].
-    pub fn read_source(&self, template: &str, path: &Path) -> Result<Reading, GivenMaskError> {
-        let mut reading = read_volume(path).map_err(GivenMaskError::File)?;
+    pub fn read_source(
+        &self,
+        template: &str,
+        path: &Path,
+        monitor: &Monitor,
+    ) -> Result<Reading, GivenMaskError> {
+        let mut reading = read_volume(path, monitor).map_err(GivenMaskError::File)?;
         if self.manual.as_deref() == Some(template) {
-            reading.volume = read_mask_file(path, &self.masks)?.to_volume();
+            let (files, limits) = ([VolumeFile::at(path)], ReadLimits::default());
+            let mask = read_mask(&files, &self.masks, &limits, monitor)?;
+            reading.volume = mask.to_volume();
         }
         Ok(reading)
     }
 }
 
-/// Reads the structure of the mask at `path` that `choice` means.
+/// Reads the mask in `files` and brings it to the grid of `volume`.
 ///
 /// # Errors
 /// [`GivenMaskError`].
-pub fn read_mask_file(path: &Path, choice: &MaskChoice) -> Result<GivenMask, GivenMaskError> {
-    let (files, limits) = ([VolumeFile::at(path)], ReadLimits::default());
-    read_mask(&files, choice, &limits, &Monitor::silent())
-}
-
-/// Reads the mask at `path` and brings it to the grid of `volume`.
-///
-/// # Errors
-/// [`GivenMaskError`].
-pub fn mask_on(path: &Path, choice: &MaskChoice, volume: &Volume) -> Result<Mask, GivenMaskError> {
+pub fn mask_on(
+    files: &[VolumeFile],
+    choice: &MaskChoice,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Mask, GivenMaskError> {
     let grid = (volume.shape, &volume.frame);
-    let given = read_mask_file(path, choice)?;
-    Ok(given.on(grid, choice.resample, &Monitor::silent())?.mask)
+    let given = read_mask(files, choice, &ReadLimits::default(), monitor)?;
+    Ok(given.on(grid, choice.resample, monitor)?.mask)
 }
 
 /// The file `stem` of the folder `case` in `folder`, in the first format that exists.
@@ -284,14 +287,9 @@ pub fn mask_file(folder: &Path, case: &str, stem: &str) -> Option<PathBuf> {
 ///
 /// # Errors
 /// [`VolumeError`].
-pub fn read_volume(path: &Path) -> Result<Reading, VolumeError> {
+pub fn read_volume(path: &Path, monitor: &Monitor) -> Result<Reading, VolumeError> {
     let (options, limits) = (ReadOptions::default(), ReadLimits::default());
-    volume::read(
-        &[VolumeFile::at(path)],
-        &options,
-        &limits,
-        &Monitor::silent(),
-    )
+    volume::read(&[VolumeFile::at(path)], &options, &limits, monitor)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::error::EvaluateError;
 use crate::text::hex;
+use crate::volume::VolumeFile;
 use sha2::{Digest, Sha256};
 use std::io;
 use std::path::Path;
@@ -33,12 +34,16 @@ pub fn make_folder(path: &Path) -> Result<(), EvaluateError> {
     })
 }
 
-/// The SHA-256 of a file, hexadecimal.
+/// The SHA-256 of the stored bytes of a volume's files one after the other, hexadecimal.
 ///
 /// # Errors
-/// If it cannot be read.
-pub fn sha256(path: &Path) -> io::Result<String> {
-    sha256_of(&[path])
+/// If one cannot be read.
+pub fn sha256_of_volume(files: &[VolumeFile]) -> io::Result<String> {
+    let mut hash = Sha256::new();
+    for file in files {
+        file.stream_stored(&mut |bytes| hash.update(bytes))?;
+    }
+    Ok(hex(&hash.finalize()))
 }
 
 /// The SHA-256 of files one after the other, hexadecimal.

@@ -18,13 +18,16 @@ use crate::export::{self, Format, Metadata};
 use crate::grid::agreement::compare;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::judge::Fit;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 use crate::segmentation::{OrganSearch, built_in, fit_built_in};
-use crate::volume::Volume;
 use crate::volume::given_mask::MaskChoice;
+use crate::volume::{Volume, VolumeFile};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Bytes of the program that are hashed between two looks at the cancel token.
+const PROGRAM_BYTES_PER_CHECK: usize = 1 << 22;
 
 /// All fits of one patient.
 pub struct PatientFits {
@@ -63,8 +66,13 @@ pub fn fit_all(
     models: &[CohortModel],
     run: &FitRun<'_>,
     observer: &dyn EvaluationObserver,
+    monitor: &Monitor<'_>,
 ) -> Result<Vec<PatientFits>, EvaluateError> {
-    let key = Key::new().and(run.program);
+    let mut key = Key::new();
+    for part in run.program.chunks(PROGRAM_BYTES_PER_CHECK) {
+        monitor.check()?;
+        key = key.and(part);
+    }
     let done = AtomicUsize::new(0);
     let all = (cohort.patients.len() * (models.len() + usize::from(run.auto))).max(1);
     let advance = || {
@@ -82,7 +90,12 @@ pub fn fit_all(
                 .add_to(key.clone())
                 .and(format!("{:?}", run.parameters).as_bytes())
                 .and(format!("{:?}", run.masks).as_bytes());
-            let work = PatientWork { case, run, key };
+            let work = PatientWork {
+                case,
+                run,
+                key,
+                monitor,
+            };
             work.fit_all(&files, models, &advance)
         })
         .collect()
@@ -129,6 +142,7 @@ struct PatientWork<'a> {
     case: &'a str,
     run: &'a FitRun<'a>,
     key: Key,
+    monitor: &'a Monitor<'a>,
 }
 
 impl PatientWork<'_> {
@@ -154,9 +168,8 @@ impl PatientWork<'_> {
             let fit = match record::read(&path, &key) {
                 Some(kept) => kept,
                 None => {
-                    let images =
-                        images.get_or_insert_with(|| PatientImages::read(files, self.run.masks));
-                    let fit = images.fit(model, self.run.parameters);
+                    let images = self.images(files, &mut images)?;
+                    let fit = images.fit(model, self.run.parameters, self.monitor)?;
                     self.write_mesh(&name, model, &fit)?;
                     record::write(&path, &key, &fit)?;
                     fit
@@ -168,16 +181,15 @@ impl PatientWork<'_> {
         if self.run.auto {
             let path = self.run.folder.join(format!("{}_auto.json", self.case));
             let key = self.key.clone().and(b"auto").text();
-            let kept = record::read(&path, &key);
-            let computed = kept.is_none();
-            let fit = kept.unwrap_or_else(|| {
-                let images =
-                    images.get_or_insert_with(|| PatientImages::read(files, self.run.masks));
-                images.fit_auto(self.run.parameters)
-            });
-            if computed {
-                record::write(&path, &key, &fit)?;
-            }
+            let fit = match record::read(&path, &key) {
+                Some(kept) => kept,
+                None => {
+                    let images = self.images(files, &mut images)?;
+                    let fit = images.fit_auto(self.run.parameters, self.monitor)?;
+                    record::write(&path, &key, &fit)?;
+                    fit
+                }
+            };
             patient.auto = Some(fit);
             advance();
         }
@@ -193,6 +205,19 @@ impl PatientWork<'_> {
         }
         patient.note_problems(models);
         Ok(patient)
+    }
+
+    /// The patient's images, which are read when the first fit needs them.
+    fn images<'i>(
+        &self,
+        files: &PatientFiles,
+        read: &'i mut Option<PatientImages>,
+    ) -> Result<&'i mut PatientImages, Cancelled> {
+        let images = match read.take() {
+            Some(images) => images,
+            None => PatientImages::read(files, self.run.masks, self.monitor)?,
+        };
+        Ok(read.insert(images))
     }
 
     /// Writes the fitted mesh, for `ventriform statistics` and for viewers.
@@ -283,58 +308,81 @@ struct PatientImages {
 }
 
 impl PatientImages {
-    fn read(files: &PatientFiles, masks: &MaskChoice) -> Self {
+    fn read(
+        files: &PatientFiles,
+        masks: &MaskChoice,
+        monitor: &Monitor<'_>,
+    ) -> Result<Self, Cancelled> {
         let [scan, golds @ ..] = &files.paths;
         let volume = match (scan, &files.scan) {
-            (Some(path), Ok(_)) => read_volume(path)
+            (Some(path), Ok(_)) => read_volume(path, monitor)
                 .map(|reading| reading.volume)
                 .map_err(|error| error.to_string()),
             (_, Err(reason)) => Err(reason.clone()),
             (None, Ok(_)) => Err("its scan is gone".to_owned()),
         };
         let golds = golds.each_ref().map(|path| {
-            let mask = mask_on(path.as_ref()?, masks, volume.as_ref().ok()?);
+            let files = [VolumeFile::at(path.as_ref()?)];
+            let mask = mask_on(&files, masks, volume.as_ref().ok()?, monitor);
             Some(mask.map_err(|error| error.to_string()))
         });
-        Self {
+        // A file that was not read because of the caller is no problem of the file.
+        monitor.check()?;
+        Ok(Self {
             volume,
             golds,
             search: OrganSearch::default(),
-        }
-    }
-
-    fn fit(&mut self, model: &CohortModel, parameters: &DeformParameters) -> CohortFit {
-        self.measured(|search, volume| {
-            let fit = search.fit(volume, &model.ready, parameters, &Monitor::silent());
-            fit.map_err(|error| error.to_string())
         })
     }
 
-    fn fit_auto(&mut self, parameters: &DeformParameters) -> CohortFit {
-        self.measured(|search, volume| {
-            let fit = fit_built_in(volume, parameters, search, &Monitor::silent());
+    fn fit(
+        &mut self,
+        model: &CohortModel,
+        parameters: &DeformParameters,
+        monitor: &Monitor<'_>,
+    ) -> Result<CohortFit, Cancelled> {
+        let make = |search: &mut OrganSearch, volume: &Volume| {
+            let fit = search.fit(volume, &model.ready, parameters, monitor);
             fit.map_err(|error| error.to_string())
-        })
+        };
+        self.measured(make, monitor)
+    }
+
+    fn fit_auto(
+        &mut self,
+        parameters: &DeformParameters,
+        monitor: &Monitor<'_>,
+    ) -> Result<CohortFit, Cancelled> {
+        let make = |search: &mut OrganSearch, volume: &Volume| {
+            let fit = fit_built_in(volume, parameters, search, monitor);
+            fit.map_err(|error| error.to_string())
+        };
+        self.measured(make, monitor)
     }
 
     /// The fit that `make` makes of the volume, measured against the gold standards.
     fn measured(
         &mut self,
         make: impl FnOnce(&mut OrganSearch, &Volume) -> Result<Fit, String>,
-    ) -> CohortFit {
+        monitor: &Monitor<'_>,
+    ) -> Result<CohortFit, Cancelled> {
+        let without_fit = |outcome| Ok(CohortFit::without_fit(outcome));
         let volume = match &self.volume {
             Ok(volume) => volume,
-            Err(reason) => return CohortFit::without_fit(FitOutcome::Unreadable(reason.clone())),
+            Err(reason) => return without_fit(FitOutcome::Unreadable(reason.clone())),
         };
-        let silent = Monitor::silent();
-        let fit = match make(&mut self.search, volume) {
+        let made = make(&mut self.search, volume);
+        // A fit that ended because of the caller is not lost.
+        monitor.check()?;
+        let fit = match made {
             Ok(fit) => fit,
-            Err(reason) => return CohortFit::without_fit(FitOutcome::Lost(reason)),
+            Err(reason) => return without_fit(FitOutcome::Lost(reason)),
         };
-        let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame, monitor)?;
         let spacing = volume.frame.spacing();
         let agreements = (self.golds.each_ref())
-            .map(|gold| compare(&mask, gold.as_ref()?.as_ref().ok()?, spacing, &silent).ok());
-        CohortFit::of(&fit, agreements)
+            .map(|gold| compare(&mask, gold.as_ref()?.as_ref().ok()?, spacing, monitor).ok());
+        monitor.check()?;
+        Ok(CohortFit::of(&fit, agreements))
     }
 }

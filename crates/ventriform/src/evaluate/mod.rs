@@ -48,7 +48,8 @@ pub use observer::{EvaluationObserver, EvaluationStep};
 pub use parameters::EvaluationParameters;
 
 use crate::parameters::FitParameters;
-use calibration::{Calibration, CalibrationCase, calibrate};
+use crate::progress::{Cancelled, Monitor};
+use calibration::{Calibration, CalibrationCase, CalibrationError, calibrate};
 use files::{make_folder, write_whole};
 use findings::findings;
 use fits::{FitRun, PatientFits};
@@ -60,10 +61,11 @@ use table::Evaluation;
 
 /// Evaluates `cohort` and writes everything to the folder `out`: `evaluation.html`,
 /// `evaluation.json`, `table1.csv`, `figure3.csv`, `fits.csv`, `models/`, `fits/` and `slices/`. `program`
-/// is any bytes that identify the program: fits of another program are made again.
+/// is any bytes that identify the program: fits of another program are made again. `monitor` is told nothing and may
+/// cancel; fits that were made until then are kept.
 ///
 /// # Errors
-/// Where a parameter is out of range, no model can be made, or the results cannot be written. A
+/// Where a parameter is out of range, no model can be made, the results cannot be written, or the caller cancels. A
 /// single template, patient or fit that fails is named in the results and is no error.
 pub fn evaluate(
     cohort: &Cohort,
@@ -71,13 +73,15 @@ pub fn evaluate(
     program: &[u8],
     out: &Path,
     observer: &dyn EvaluationObserver,
+    monitor: &Monitor<'_>,
 ) -> Result<Evaluation, EvaluateError> {
+    let monitor = &monitor.without_observer();
     parameters.validate()?;
     let (models_folder, fits_folder) = (out.join("models"), out.join("fits"));
     make_folder(&models_folder)?;
     make_folder(&fits_folder)?;
     observer.progress(EvaluationStep::Models, 0.0);
-    let (models, problems) = models::build(cohort, parameters);
+    let (models, problems) = models::build(cohort, parameters, monitor)?;
     if models.is_empty() {
         let reasons = problems.into_iter().map(|(_, reason)| reason).collect();
         return Err(EvaluateError::NoModel { reasons });
@@ -93,12 +97,12 @@ pub fn evaluate(
         folder: &fits_folder,
         masks: &cohort.masks,
     };
-    let patients = fits::fit_all(cohort, &models, &run, observer)?;
+    let patients = fits::fit_all(cohort, &models, &run, observer, monitor)?;
     observer.progress(EvaluationStep::Pictures, 1.0);
-    let mut evaluation = summarise(cohort, &models, &patients, problems, parameters)?;
+    let mut evaluation = summarise(cohort, &models, &patients, problems, parameters, monitor)?;
     if parameters.leave_one_out {
         evaluation.leave_one_out = LeaveOneOut::of(&evaluation.rows, Gold::Expert);
-        evaluation.reader = reader(cohort, parameters);
+        evaluation.reader = reader(cohort, parameters, monitor)?;
     }
     evaluation.settings = parameters.settings(cohort);
     make_folder(&out.join(table::SLICES_FOLDER))?;
@@ -112,6 +116,7 @@ fn summarise(
     patients: &[PatientFits],
     of_models: Vec<(String, String)>,
     parameters: &EvaluationParameters,
+    monitor: &Monitor<'_>,
 ) -> Result<Evaluation, EvaluateError> {
     let in_sample = &parameters.in_sample;
     let rows: Vec<FitRow> = patients
@@ -132,7 +137,7 @@ fn summarise(
             .collect(),
         problems: problems.chain(of_models).chain(of_patients).collect(),
         findings: findings(&rows, &figure3),
-        pictures: pictures::draw(cohort, models, patients, &rows, in_sample)?,
+        pictures: pictures::draw(cohort, models, patients, &rows, in_sample, monitor)?,
         leave_one_out: None,
         reader: None,
         models: figure3,
@@ -142,16 +147,17 @@ fn summarise(
 
 /// The profile of the reader who drew the patients' masks, with its held-out figures; `None` without any
 /// mask to learn from.
-fn reader(cohort: &Cohort, parameters: &EvaluationParameters) -> Option<Calibration> {
+fn reader(
+    cohort: &Cohort,
+    parameters: &EvaluationParameters,
+    monitor: &Monitor<'_>,
+) -> Result<Option<Calibration>, Cancelled> {
     let cases: Vec<CalibrationCase> = cohort
         .patients
         .iter()
         .filter_map(|name| {
-            Some(CalibrationCase {
-                scan: cohort.scan(name)?,
-                mask: cohort.gold(name, Gold::Expert)?,
-                name: name.clone(),
-            })
+            let (scan, mask) = (cohort.scan(name)?, cohort.gold(name, Gold::Expert)?);
+            Some(CalibrationCase::of_files(name.clone(), &scan, &mask))
         })
         .collect();
     let fit = FitParameters {
@@ -159,7 +165,10 @@ fn reader(cohort: &Cohort, parameters: &EvaluationParameters) -> Option<Calibrat
         mask: cohort.masks.clone(),
         ..FitParameters::default()
     };
-    calibrate(&cases, &fit, &|_| ()).ok()
+    match calibrate(&cases, &fit, &|_| (), monitor) {
+        Err(CalibrationError::Cancelled(cancelled)) => Err(cancelled),
+        made => Ok(made.ok()),
+    }
 }
 
 fn write_results(out: &Path, evaluation: &Evaluation) -> Result<(), EvaluateError> {

@@ -13,7 +13,7 @@ use crate::optimise::{
 };
 use crate::parameters::{ModelParameters, ParameterError};
 use crate::pipeline::starts;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 use crate::surface::{self, Surface, SurfaceError};
 use crate::volume::given_mask::GivenMaskError;
 use rayon::prelude::*;
@@ -78,15 +78,24 @@ fn during<E: std::error::Error + Send + Sync + 'static>(
 
 /// Makes every model that `parameters` ask for. Returns the models and, for each that could not
 /// be made, the template and the reason.
+///
+/// # Errors
+/// [`Cancelled`].
 pub fn build(
     cohort: &Cohort,
     parameters: &EvaluationParameters,
-) -> (Vec<CohortModel>, Vec<(String, String)>) {
+    monitor: &Monitor<'_>,
+) -> Result<(Vec<CohortModel>, Vec<(String, String)>), Cancelled> {
     let made: Vec<Vec<Result<CohortModel, ModelError>>> = cohort
         .templates
         .par_iter()
-        .map(|case| of_template(cohort, case, parameters).unwrap_or_else(|error| vec![Err(error)]))
+        .map(|case| {
+            let made = of_template(cohort, case, parameters, monitor);
+            made.unwrap_or_else(|error| vec![Err(error)])
+        })
         .collect();
+    // A model that was not made because of the caller is no problem of its template.
+    monitor.check()?;
     let (mut models, mut problems) = (Vec::new(), Vec::new());
     for (case, made) in cohort.templates.iter().zip(made) {
         for model in made {
@@ -96,26 +105,28 @@ pub fn build(
             }
         }
     }
-    (models, problems)
+    Ok((models, problems))
 }
 
 fn of_template(
     cohort: &Cohort,
     case: &str,
     parameters: &EvaluationParameters,
+    monitor: &Monitor<'_>,
 ) -> Result<Vec<Result<CohortModel, ModelError>>, ModelError> {
     let (path, _) = cohort.source(case).ok_or(ModelError::Gone)?;
-    let reading = cohort.read_source(case, &path);
+    let reading = cohort.read_source(case, &path, monitor);
     let reading = reading.map_err(|error| ModelError::Read {
         path,
         error: Box::new(error),
     })?;
     let defaults = parameters.model_parameters(None)?;
-    let surface = surface::extract(&reading.volume, &defaults.surface, &Monitor::silent())?;
+    let surface = surface::extract(&reading.volume, &defaults.surface, monitor)?;
     let source = TemplateSurface {
         case,
         reference: Reference::new(&surface),
         surface,
+        monitor,
     };
     let makes = |variant: Variant| parameters.variants.contains(&variant);
     let mut models = Vec::new();
@@ -142,11 +153,12 @@ struct TemplateSurface<'a> {
     case: &'a str,
     surface: Surface,
     reference: Reference,
+    monitor: &'a Monitor<'a>,
 }
 
 impl TemplateSurface<'_> {
     fn thin_out(&self, points: usize) -> Result<CohortModel, ModelError> {
-        let mesh = decimate(&self.surface.mesh, points, &Monitor::silent())
+        let mesh = decimate(&self.surface.mesh, points, self.monitor)
             .map_err(during(|| format!("the reference model of {points} points")))?;
         self.finish(mesh, Variant::Reference, points)
     }
@@ -156,10 +168,10 @@ impl TemplateSurface<'_> {
         points: usize,
         parameters: &ModelParameters,
     ) -> Result<[CohortModel; 2], ModelError> {
-        let monitor = Monitor::silent();
+        let monitor = self.monitor;
         let what = || format!("{points} points");
-        let tiled = starts::tile(&self.surface, parameters, &monitor).map_err(during(what))?;
-        let best = starts::best(tiled, &self.reference, parameters, &monitor, |_| {})
+        let tiled = starts::tile(&self.surface, parameters, monitor).map_err(during(what))?;
+        let best = starts::best(tiled, &self.reference, parameters, monitor, |_| {})
             .map_err(during(what))?;
         let papers = OptimiseParameters {
             fitness: FitnessForm::Raw,
@@ -171,7 +183,7 @@ impl TemplateSurface<'_> {
             },
             ..OptimiseParameters::default()
         };
-        let flipped = optimise::optimise(&best.tiled, &self.reference, &papers, &monitor)
+        let flipped = optimise::optimise(&best.tiled, &self.reference, &papers, monitor)
             .map_err(during(what))?;
         let mut steps = vec![self.row(&flipped.mesh, Variant::Flipped, points)?];
         if parameters.optimise.fit.rounds > 0 {
@@ -212,7 +224,7 @@ impl TemplateSurface<'_> {
         let json =
             export::encode(Format::Json, &mesh, &Metadata::new(title)).map_err(during(what))?;
         let ready =
-            Template::new(mesh, Organ::LeftVentricle, &Monitor::silent()).map_err(during(what))?;
+            Template::new(mesh, Organ::LeftVentricle, self.monitor).map_err(during(what))?;
         Ok(CohortModel {
             template: self.case.to_owned(),
             kind: row.kind,

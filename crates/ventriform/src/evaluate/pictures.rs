@@ -14,6 +14,7 @@ use super::rows::{self, FitRow, Gold, ModelKind};
 use super::table::Picture;
 use crate::progress::Monitor;
 use crate::segmentation::slices;
+use crate::volume::VolumeFile;
 use rayon::prelude::*;
 
 /// The pictures of all patients that have a fit of the kind that is shown.
@@ -26,6 +27,7 @@ pub fn draw(
     patients: &[PatientFits],
     rows: &[FitRow],
     in_sample: &InSample,
+    monitor: &Monitor<'_>,
 ) -> Result<Vec<Picture>, EvaluateError> {
     let Some(kind) = shown(rows) else {
         return Ok(Vec::new());
@@ -40,7 +42,7 @@ pub fn draw(
             else {
                 return Ok(None);
             };
-            let png = png(cohort, &patient.case, model, fit)?;
+            let png = png(cohort, &patient.case, model, fit, monitor)?;
             Ok(png.map(|png| Picture {
                 case: patient.case.clone(),
                 caption: caption(patient, model, fit) + ", " + in_sample.of(&patient.case).as_str(),
@@ -70,21 +72,24 @@ fn png(
     case: &str,
     model: &CohortModel,
     fit: &CohortFit,
+    monitor: &Monitor<'_>,
 ) -> Result<Option<Vec<u8>>, EvaluateError> {
     let (Some(cut), Some(scan)) = (fit.cut(), cohort.scan(case)) else {
         return Ok(None);
     };
-    let monitor = Monitor::silent();
-    let reading = read_volume(&scan).map_err(|error| EvaluateError::Scan {
+    let reading = read_volume(&scan, monitor);
+    monitor.check()?;
+    let reading = reading.map_err(|error| EvaluateError::Scan {
         case: case.to_owned(),
         error: Box::new(error),
     })?;
     let volume = reading.volume;
     let expert = cohort
         .gold(case, Gold::Expert)
-        .and_then(|path| mask_on(&path, &cohort.masks, &volume).ok());
+        .and_then(|path| mask_on(&[VolumeFile::at(path)], &cohort.masks, &volume, monitor).ok());
+    monitor.check()?;
     let mesh = fit.mesh(model);
-    let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), &monitor)?;
+    let png = slices::png(&volume, &mesh, &cut, expert.as_ref(), monitor)?;
     Ok(Some(png))
 }
 

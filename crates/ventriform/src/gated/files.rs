@@ -288,7 +288,7 @@ impl GatedHeart {
         monitor: &Monitor<'_>,
     ) -> Result<[Mask; 2], Cancelled> {
         let volume = &self.reading.gates[gate];
-        let wall = voxelise(mesh, volume.shape, &volume.frame);
+        let wall = voxelise(mesh, volume.shape, &volume.frame, monitor)?;
         let cavity = self.cavity(mesh, &wall, gate, monitor)?;
         Ok([wall, cavity])
     }

@@ -21,6 +21,11 @@ const MIN_LABELLED_VOXELS: usize = 1000;
 /// consists of pieces, an image with few counts does not.
 const MIN_PIECEWISE_SHARE: f64 = 0.5;
 
+/// Voxels between two looks at the cancel token.
+const VOXELS_PER_CHECK: usize = 1 << 18;
+/// Rows of voxels between two looks at the cancel token.
+const ROWS_PER_CHECK: usize = 1024;
+
 /// The content of a volume.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
@@ -155,7 +160,7 @@ pub fn label_map(
     let (mut labelled, mut same) = (0usize, 0usize);
     let mut many = false;
     for (index, row) in volume.voxels.chunks(volume.shape[0]).enumerate() {
-        if index.is_multiple_of(1024) {
+        if index.is_multiple_of(ROWS_PER_CHECK) {
             monitor.check()?;
             if many && !pieces(&counts, true) {
                 return Ok(None);
@@ -200,19 +205,28 @@ pub fn label_map(
 
 /// The voxels of every value if all are whole numbers, 0 and the background among them; `None` for
 /// intensities. Unlike [`label_map`] it asks nothing of how they lie. Missing values are not counted.
-pub fn whole_values(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn whole_values(
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<BTreeMap<i64, usize>>, Cancelled> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
-    for run in volume.voxels.chunk_by(|a, b| a == b) {
-        let value = run[0];
-        if value.is_nan() {
-            continue;
+    for portion in volume.voxels.chunks(VOXELS_PER_CHECK) {
+        monitor.check()?;
+        for run in portion.chunk_by(|a, b| a == b) {
+            let value = run[0];
+            if value.is_nan() {
+                continue;
+            }
+            if value.fract() != 0.0 || !(value.abs() < 9.2e18) || counts.len() > MOST_LABELS {
+                return Ok(None);
+            }
+            *counts.entry(value as i64).or_default() += run.len();
         }
-        if value.fract() != 0.0 || !(value.abs() < 9.2e18) || counts.len() > MOST_LABELS {
-            return None;
-        }
-        *counts.entry(value as i64).or_default() += run.len();
     }
-    (!counts.is_empty() && counts.len() <= MOST_LABELS).then_some(counts)
+    Ok((!counts.is_empty() && counts.len() <= MOST_LABELS).then_some(counts))
 }
 
 /// The objects of a map with the label counts `labels` (0 left out), and the value of its background.
@@ -220,12 +234,22 @@ pub fn whole_values(volume: &Volume) -> Option<BTreeMap<i64, usize>> {
 /// The background is 0, unless most of the volume's border has another value that cannot be an object:
 /// a negative one, one of a map without any 0, or one that nine tenths of the border have. Then 0 is
 /// an object like any other.
-pub fn objects(volume: &Volume, labels: &BTreeMap<i64, usize>) -> (BTreeMap<i64, usize>, i64) {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn objects(
+    volume: &Volume,
+    labels: &BTreeMap<i64, usize>,
+    monitor: &Monitor,
+) -> Result<(BTreeMap<i64, usize>, i64), Cancelled> {
     let value = |v: f32| if v.is_nan() { 0 } else { v as i64 };
     let [nx, ny, nz] = volume.shape;
     let mut border: BTreeMap<i64, usize> = BTreeMap::new();
     let mut all = 0;
     for (row, voxels) in volume.voxels.chunks(nx).enumerate() {
+        if row.is_multiple_of(ROWS_PER_CHECK) {
+            monitor.check()?;
+        }
         let (j, k) = (row % ny, row / ny);
         let whole = j == 0 || k == 0 || j + 1 == ny || k + 1 == nz;
         let ends = [voxels[0], voxels[nx - 1]];
@@ -246,15 +270,19 @@ pub fn objects(volume: &Volume, labels: &BTreeMap<i64, usize>) -> (BTreeMap<i64,
     };
     let mut objects = labels.clone();
     if outer == 0 || !surrounds {
-        return (objects, 0);
+        return Ok((objects, 0));
     }
     objects.remove(&outer);
     // Missing values are no object.
-    let zeros = volume.voxels.iter().filter(|v| **v == 0.0).count();
+    let mut zeros = 0;
+    for portion in volume.voxels.chunks(VOXELS_PER_CHECK) {
+        monitor.check()?;
+        zeros += portion.iter().filter(|v| **v == 0.0).count();
+    }
     if zeros > 0 {
         objects.insert(0, zeros);
     }
-    (objects, outer)
+    Ok((objects, outer))
 }
 
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
@@ -376,7 +404,7 @@ mod tests {
         };
         let found = |v: &Volume| {
             let labels = label_map(v, &Monitor::silent()).unwrap().unwrap();
-            let (objects, background) = objects(v, &labels);
+            let (objects, background) = objects(v, &labels, &Monitor::silent()).unwrap();
             (objects.into_keys().collect::<Vec<_>>(), background)
         };
         assert_eq!(found(&ball(1.0, 0.0)), (vec![1], 0));

@@ -8,13 +8,17 @@
 //! inside it are found with exact orientation tests, and the voxels between pairs of
 //! crossings are set. A column that runs exactly through an edge or a vertex is moved by a
 //! symbolic epsilon (first j, then k), so that it crosses exactly one of the triangles that
-//! meet there. O(triangles + columns + crossings).
+//! meet there. Crossings are sorted by column and then within each. O(triangles + columns + crossings).
 
 use robust::{Coord, orient2d};
 
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use crate::mesh::TriMesh;
+use crate::progress::{Cancelled, Monitor};
+
+/// Crossings, or columns, between two looks at the cancel token.
+const CROSSINGS_PER_CHECK: usize = 1 << 16;
 
 /// A binary volume, i fastest.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,26 +46,72 @@ impl Mask {
 
 /// The voxels of the grid `shape` at `frame` whose centres lie inside the closed `mesh`
 /// (LPS mm). Parts of the mesh beyond the grid are cut off.
-pub fn voxelise(mesh: &TriMesh, shape: [usize; 3], frame: &VoxelToPatient) -> Mask {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn voxelise(
+    mesh: &TriMesh,
+    shape: [usize; 3],
+    frame: &VoxelToPatient,
+    monitor: &Monitor,
+) -> Result<Mask, Cancelled> {
     let corners: Vec<Vec3> = mesh.vertices.iter().map(|p| frame.to_voxel(p)).collect();
     let mut crossings: Vec<(u32, f64)> = Vec::new();
     for triangle in &mesh.triangles {
+        monitor.check()?;
         let corners = triangle.map(|v| corners[v as usize]);
         cross_columns(&corners, shape, &mut crossings);
     }
-    crossings.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut mask = Mask::empty(shape);
-    for column in crossings.chunk_by(|a, b| a.0 == b.0) {
-        let row = column[0].0 as usize * shape[0];
-        for pair in column.chunks_exact(2) {
-            let first = pair[0].1.ceil().max(0.0) as usize;
-            let end = ((pair[1].1.ceil()).max(0.0) as usize).min(shape[0]);
+    let (mut sorted, ends) = by_column(&crossings, shape[1] * shape[2], monitor)?;
+    let mut begin = 0;
+    for (column, end) in ends.into_iter().enumerate() {
+        if column.is_multiple_of(CROSSINGS_PER_CHECK) {
+            monitor.check()?;
+        }
+        let column_crossings = &mut sorted[begin..end];
+        begin = end;
+        column_crossings.sort_unstable_by(f64::total_cmp);
+        let row = column * shape[0];
+        for pair in column_crossings.chunks_exact(2) {
+            let first = pair[0].ceil().max(0.0) as usize;
+            let end = (pair[1].ceil().max(0.0) as usize).min(shape[0]);
             if first < end {
                 mask.voxels[row + first..row + end].fill(true);
             }
         }
     }
-    mask
+    Ok(mask)
+}
+
+/// The places along i of all crossings, those of a column together, and the end of each column.
+fn by_column(
+    crossings: &[(u32, f64)],
+    columns: usize,
+    monitor: &Monitor,
+) -> Result<(Vec<f64>, Vec<usize>), Cancelled> {
+    let mut ends = vec![0_usize; columns];
+    for part in crossings.chunks(CROSSINGS_PER_CHECK) {
+        monitor.check()?;
+        for (column, _) in part {
+            ends[*column as usize] += 1;
+        }
+    }
+    let mut before = 0;
+    for end in &mut ends {
+        // The place of the column's next crossing, which is its end after the last.
+        before += std::mem::replace(end, before);
+    }
+    let mut sorted = vec![0.0; crossings.len()];
+    for part in crossings.chunks(CROSSINGS_PER_CHECK) {
+        monitor.check()?;
+        for (column, i) in part {
+            let place = &mut ends[*column as usize];
+            sorted[*place] = *i;
+            *place += 1;
+        }
+    }
+    Ok((sorted, ends))
 }
 
 /// Appends (column, i) for every column that passes through the triangle.
@@ -132,7 +182,7 @@ mod tests {
     fn a_torus_is_filled_where_its_formula_says() {
         // Against the triangles' own winding number, brute force.
         let mesh = shapes::torus(11.0, 5.0, 31, 17);
-        let mask = voxelise(&mesh, [40, 41, 42], &frame());
+        let mask = voxelise(&mesh, [40, 41, 42], &frame(), &Monitor::silent()).unwrap();
         let mut checked = 0;
         for k in (0..42).step_by(3) {
             for j in (0..41).step_by(3) {
@@ -185,7 +235,7 @@ mod tests {
             ],
         };
         let frame = VoxelToPatient::centred([21, 21, 21], [1.0; 3], Vec3::zeros()).unwrap();
-        let mask = voxelise(&mesh, [21, 21, 21], &frame);
+        let mask = voxelise(&mesh, [21, 21, 21], &frame, &Monitor::silent()).unwrap();
         for k in -10i32..=10 {
             for j in -10i32..=10 {
                 for i in -10i32..=10 {
@@ -204,12 +254,13 @@ mod tests {
 
     #[test]
     fn a_mesh_beyond_the_grid_is_cut_off() {
+        let count = |mesh: &TriMesh| {
+            let mask = voxelise(mesh, [40, 41, 42], &frame(), &Monitor::silent());
+            mask.unwrap().count()
+        };
         let mut mesh = shapes::icosphere(60.0, 2);
-        assert_eq!(
-            voxelise(&mesh, [40, 41, 42], &frame()).count(),
-            40 * 41 * 42
-        );
+        assert_eq!(count(&mesh), 40 * 41 * 42);
         mesh.vertices.iter_mut().for_each(|p| p.x += 500.0);
-        assert_eq!(voxelise(&mesh, [40, 41, 42], &frame()).count(), 0);
+        assert_eq!(count(&mesh), 0);
     }
 }

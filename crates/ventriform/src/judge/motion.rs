@@ -183,7 +183,7 @@ fn wall_like(
     monitor: &Monitor,
 ) -> Result<Vec<f32>, Cancelled> {
     let shape = [SIDE_SAMPLES; 3];
-    let mask = voxelise(mesh, shape, frame).voxels;
+    let mask = voxelise(mesh, shape, frame, monitor)?.voxels;
     let blurred = |mut values: Vec<f32>, sigma: f64| {
         let kernel = || Kernel::gaussian(sigma / SAMPLE_STEP_MM, 3.0);
         blur(&mut values, shape, &[kernel(), kernel(), kernel()], monitor)?;

@@ -6,19 +6,21 @@
 use super::error::MeshFileError;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::numeric::order::sort_watched;
+use crate::progress::Monitor;
 
 /// Checks that `mesh` is closed and oriented.
 ///
 /// # Errors
-/// [`MeshFileError::Open`], otherwise [`MeshFileError::Orientation`].
-pub(super) fn check(mesh: &TriMesh) -> Result<(), MeshFileError> {
+/// [`MeshFileError::Open`], otherwise [`MeshFileError::Orientation`]; [`MeshFileError::Cancelled`].
+pub(super) fn check(mesh: &TriMesh, monitor: &Monitor<'_>) -> Result<(), MeshFileError> {
     let mut sides: Vec<([u32; 2], bool)> = Vec::with_capacity(3 * mesh.triangles.len());
     for [a, b, c] in &mesh.triangles {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
             sides.push(([from.min(to), from.max(to)], from < to));
         }
     }
-    sides.sort_unstable();
+    sort_watched(&mut sides, Ord::cmp, monitor)?;
     let (mut open, mut one_way) = (Vec::new(), Vec::new());
     for edge in sides.chunk_by(|a, b| a.0 == b.0) {
         let forward = edge.iter().filter(|side| side.1).count();

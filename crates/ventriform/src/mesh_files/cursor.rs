@@ -4,6 +4,7 @@ use super::MeshFormat;
 use super::error::MeshFileError;
 use super::number::NumberType;
 use super::parsed::damaged;
+use crate::progress::Monitor;
 
 /// Longest line of text, bytes.
 const MAX_LINE_BYTES: usize = 1 << 16;
@@ -14,15 +15,23 @@ pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     format: MeshFormat,
+    monitor: Monitor<'static>,
 }
 
 impl<'a> Cursor<'a> {
-    pub fn new(bytes: &'a [u8], format: MeshFormat) -> Self {
+    /// The beginning of `bytes`; everything that is taken checks the cancel token.
+    pub fn new(bytes: &'a [u8], format: MeshFormat, monitor: &Monitor<'_>) -> Self {
         Self {
             bytes,
             at: 0,
             format,
+            monitor: monitor.without_observer(),
         }
+    }
+
+    /// The monitor whose cancel token is checked.
+    pub fn monitor(&self) -> &Monitor<'static> {
+        &self.monitor
     }
 
     /// The bytes that are left.
@@ -40,6 +49,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If there are fewer.
     pub fn take(&mut self, count: usize) -> Result<&'a [u8], MeshFileError> {
+        self.monitor.check()?;
         let rest = self.rest();
         if count > rest.len() {
             return Err(self.damaged(format!(
@@ -71,6 +81,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If it is longer than [`MAX_LINE_BYTES`].
     pub fn line(&mut self) -> Result<Option<&'a [u8]>, MeshFileError> {
+        self.monitor.check()?;
         let rest = self.rest();
         if rest.is_empty() {
             return Ok(None);
@@ -93,6 +104,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If it is longer than [`MAX_WORD_BYTES`].
     pub fn word(&mut self) -> Result<Option<&'a [u8]>, MeshFileError> {
+        self.monitor.check()?;
         let rest = self.rest();
         let white = rest.iter().position(|b| !b.is_ascii_whitespace());
         let Some(begin) = white else {

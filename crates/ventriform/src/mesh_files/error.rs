@@ -2,10 +2,14 @@
 
 use super::MeshFormat;
 use super::size::UnlikelySize;
+use crate::progress::Cancelled;
 
 /// Why a file gives no surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshFileError {
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The file, or what it unpacks to, is larger than the limit.
     #[error("the mesh has {bytes} bytes; the limit is {limit}")]
     TooLong {

@@ -10,6 +10,7 @@ use super::number::NumberType;
 use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion};
@@ -173,7 +174,11 @@ struct Buffer<'a> {
     uri: Option<Cow<'a, str>>,
 }
 
-pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
+pub(super) fn parse(
+    bytes: &[u8],
+    limit: u64,
+    monitor: &Monitor<'_>,
+) -> Result<Parsed, MeshFileError> {
     let (json, binary) = if bytes.starts_with(b"glTF") {
         chunks(bytes)?
     } else {
@@ -203,6 +208,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
                     .and_then(|uri| uri.split_once(";base64,"));
                 let (_, data) =
                     data.ok_or_else(|| unsupported("a buffer in another file".into()))?;
+                monitor.check()?;
                 let decoded = STANDARD.decode(data.as_bytes());
                 Cow::Owned(decoded.map_err(|error| {
                     broken(format!("buffer {number}"), format!("its base64: {error}"))
@@ -228,7 +234,8 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
         budget: limit,
         seen: vec![false; document.nodes.0.len()],
         vertices: Vec::new(),
-        faces: Faces::default(),
+        faces: Faces::new(monitor),
+        monitor: monitor.without_observer(),
     };
     if let Some((frame, unit)) = stated {
         // The positions of our own files are those of the patient; their node leads to the world of glTF.
@@ -293,6 +300,7 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), MeshFileError> {
 struct Reader<'a> {
     document: &'a Document<'a>,
     buffers: Vec<Cow<'a, [u8]>>,
+    monitor: Monitor<'static>,
     /// Whether positions are taken as they are stored.
     patient: bool,
     /// Bytes of vertices and triangles that may still be made.
@@ -359,6 +367,7 @@ impl Reader<'_> {
                     let (numbers, count) = self.numbers(position, 3)?;
                     let start = self.vertices.len();
                     for p in numbers.chunks_exact(3) {
+                        self.monitor.check()?;
                         let p = Vec3::new(p[0], p[1], p[2]);
                         self.vertices.push(if self.patient {
                             p
@@ -463,6 +472,7 @@ impl Reader<'_> {
         };
         let mut numbers = Vec::with_capacity(accessor.count * width);
         for element in 0..accessor.count {
+            self.monitor.check()?;
             let at = accessor.byte_offset + element * stride;
             let components = there[at..at + each].chunks_exact(kind.bytes());
             numbers.extend(components.map(|c| kind.read(c, false)));

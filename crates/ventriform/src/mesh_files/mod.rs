@@ -50,6 +50,7 @@ pub use statement::{MeshFrame, MeshStatement, MeshUnit};
 use crate::geometry::Vec3;
 use crate::geometry::frame;
 use crate::mesh::TriMesh;
+use crate::progress::Monitor;
 use parsed::Parsed;
 
 /// Formats of meshes that are read.
@@ -143,7 +144,20 @@ pub fn recognise(start: &[u8], length: u64) -> Option<MeshFormat> {
 /// # Errors
 /// [`MeshFileError`].
 pub fn read(bytes: &[u8], stated: &MeshStatement, limit: u64) -> Result<ReadMesh, MeshFileError> {
-    let read = look(bytes, stated, limit)?;
+    read_watched(bytes, stated, limit, &Monitor::silent())
+}
+
+/// As [`read`], until the caller cancels.
+///
+/// # Errors
+/// [`MeshFileError`].
+pub fn read_watched(
+    bytes: &[u8],
+    stated: &MeshStatement,
+    limit: u64,
+    monitor: &Monitor<'_>,
+) -> Result<ReadMesh, MeshFileError> {
+    let read = look_watched(bytes, stated, limit, monitor)?;
     match read.unlikely {
         Some(unlikely) => Err(MeshFileError::Size(unlikely)),
         None => Ok(read),
@@ -158,10 +172,11 @@ pub fn read_where_silent(
     bytes: &[u8],
     stated: &MeshStatement,
     limit: u64,
+    monitor: &Monitor<'_>,
 ) -> Result<ReadMesh, MeshFileError> {
     let mut stated = *stated;
     loop {
-        match read(bytes, &stated, limit) {
+        match read_watched(bytes, &stated, limit, monitor) {
             Err(MeshFileError::Contradiction { field: "unit", .. }) if stated.unit.is_some() => {
                 stated.unit = None;
             }
@@ -178,6 +193,19 @@ pub fn read_where_silent(
 /// # Errors
 /// [`MeshFileError`], never [`MeshFileError::Size`].
 pub fn look(bytes: &[u8], stated: &MeshStatement, limit: u64) -> Result<ReadMesh, MeshFileError> {
+    look_watched(bytes, stated, limit, &Monitor::silent())
+}
+
+/// As [`look`], until the caller cancels.
+///
+/// # Errors
+/// [`MeshFileError`], never [`MeshFileError::Size`].
+pub fn look_watched(
+    bytes: &[u8],
+    stated: &MeshStatement,
+    limit: u64,
+    monitor: &Monitor<'_>,
+) -> Result<ReadMesh, MeshFileError> {
     let length = bytes.len() as u64;
     if length > limit {
         return Err(MeshFileError::TooLong {
@@ -188,15 +216,15 @@ pub fn look(bytes: &[u8], stated: &MeshStatement, limit: u64) -> Result<ReadMesh
     let start = &bytes[..bytes.len().min(1024)];
     let format = recognise(start, length).ok_or_else(|| error::unknown(start))?;
     let parsed = match format {
-        MeshFormat::Stl => stl::parse(bytes),
-        MeshFormat::Ply => ply::parse(bytes),
-        MeshFormat::Obj => obj::parse(bytes),
-        MeshFormat::Vtk => vtk::parse(bytes),
-        MeshFormat::Vtp => vtp::parse(bytes, limit),
-        MeshFormat::Gltf => gltf::parse(bytes, limit),
-        MeshFormat::Json => json::parse(bytes),
+        MeshFormat::Stl => stl::parse(bytes, monitor),
+        MeshFormat::Ply => ply::parse(bytes, monitor),
+        MeshFormat::Obj => obj::parse(bytes, monitor),
+        MeshFormat::Vtk => vtk::parse(bytes, monitor),
+        MeshFormat::Vtp => vtp::parse(bytes, limit, monitor),
+        MeshFormat::Gltf => gltf::parse(bytes, limit, monitor),
+        MeshFormat::Json => json::parse(bytes, monitor),
     }?;
-    finish(format, parsed, stated)
+    finish(format, parsed, stated, monitor)
 }
 
 /// Steps 3 to 6.
@@ -204,7 +232,9 @@ fn finish(
     format: MeshFormat,
     parsed: Parsed,
     stated: &MeshStatement,
+    monitor: &Monitor<'_>,
 ) -> Result<ReadMesh, MeshFileError> {
+    monitor.check()?;
     if parsed.triangles.is_empty() {
         return Err(MeshFileError::Empty);
     }
@@ -219,7 +249,8 @@ fn finish(
         vertices: parsed.vertices,
         triangles: parsed.triangles,
     };
-    weld::close(&mut mesh, parsed.corners_only, &mut notes)?;
+    weld::close(&mut mesh, parsed.corners_only, &mut notes, monitor)?;
+    monitor.check()?;
 
     let world = format == MeshFormat::Gltf;
     let used_unit = unit.unwrap_or(if world {

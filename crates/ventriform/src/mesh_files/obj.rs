@@ -6,6 +6,7 @@ use super::error::MeshFileError;
 use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 
 const OWN_FORMAT: MeshFormat = MeshFormat::Obj;
 
@@ -65,11 +66,11 @@ pub(super) fn is_obj(start: &[u8]) -> bool {
     known
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    let mut cursor = Cursor::new(bytes, OWN_FORMAT);
+pub(super) fn parse(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
+    let mut cursor = Cursor::new(bytes, OWN_FORMAT, monitor);
     let mut said = Said::default();
     let mut vertices: Vec<Vec3> = Vec::new();
-    let mut faces = Faces::default();
+    let mut faces = Faces::new(monitor);
     let mut lines = 0;
     while let Some(line) = cursor.line()? {
         let mut words = words(line);

@@ -5,6 +5,7 @@ use super::error::MeshFileError;
 use super::said::Said;
 use super::statement::{MeshFrame, MeshUnit};
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 
 /// Points and triangles as the file states them.
 #[derive(Debug, Default)]
@@ -28,9 +29,9 @@ impl Parsed {
 }
 
 /// Triangles of polygons and strips, whose corners are checked.
-#[derive(Debug, Default)]
 pub(super) struct Faces {
     pub triangles: Vec<[u32; 3]>,
+    monitor: Monitor<'static>,
     /// Polygons so far.
     faces: usize,
     /// Polygons of more than three corners.
@@ -40,10 +41,21 @@ pub(super) struct Faces {
 }
 
 impl Faces {
+    /// None yet; every corner checks the cancel token.
+    pub fn new(monitor: &Monitor<'_>) -> Self {
+        Self {
+            triangles: Vec::new(),
+            monitor: monitor.without_observer(),
+            faces: 0,
+            split: 0,
+            thin: 0,
+        }
+    }
+
     /// Adds a polygon over `count` vertices: the triangles from its first corner.
     ///
     /// # Errors
-    /// [`MeshFileError::NoSuchVertex`].
+    /// [`MeshFileError::NoSuchVertex`] or [`MeshFileError::Cancelled`].
     pub fn polygon(
         &mut self,
         corners: impl IntoIterator<Item = f64>,
@@ -74,7 +86,7 @@ impl Faces {
     /// Adds a strip: every corner from the third on makes a triangle with the two before it.
     ///
     /// # Errors
-    /// [`MeshFileError::NoSuchVertex`].
+    /// [`MeshFileError::NoSuchVertex`] or [`MeshFileError::Cancelled`].
     pub fn strip(
         &mut self,
         corners: impl IntoIterator<Item = f64>,
@@ -97,6 +109,7 @@ impl Faces {
     }
 
     fn index(&self, corner: f64, face: usize, count: usize) -> Result<u32, MeshFileError> {
+        self.monitor.check()?;
         let whole = corner.fract() == 0.0 && corner >= 0.0 && corner < count as f64;
         if whole && corner < f64::from(u32::MAX) {
             Ok(corner as u32)

@@ -10,6 +10,7 @@ use super::number::NumberType;
 use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 
 const OWN_FORMAT: MeshFormat = MeshFormat::Ply;
 /// Most properties of an element, and most elements.
@@ -35,11 +36,11 @@ struct Element {
     properties: Vec<Property>,
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    let mut cursor = Cursor::new(bytes, OWN_FORMAT);
+pub(super) fn parse(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
+    let mut cursor = Cursor::new(bytes, OWN_FORMAT, monitor);
     let (encoding, elements, said) = header(&mut cursor)?;
     let mut vertices = Vec::new();
-    let mut faces = Faces::default();
+    let mut faces = Faces::new(monitor);
     // Faces refer to vertices, which may come later.
     let number = |name: &[u8]| elements.iter().find(|e| e.name == name).map(|e| e.count);
     let count = number(b"vertex").unwrap_or(0) as usize;

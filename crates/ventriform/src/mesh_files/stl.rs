@@ -10,6 +10,7 @@ use super::number::NumberType;
 use super::parsed::Parsed;
 use super::said::Said;
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
@@ -34,20 +35,21 @@ pub(super) fn is_text(text: &[u8]) -> bool {
     lower.starts_with(b"solid") && (has(b"facet") || has(b"endsolid"))
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
+pub(super) fn parse(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
     if is_binary(bytes, bytes.len() as u64) {
-        binary(bytes)
+        binary(bytes, monitor)
     } else {
-        text(bytes)
+        text(bytes, monitor)
     }
 }
 
-fn binary(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
+fn binary(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
     let mut said = Said::default();
     said.hear(&bytes[..80])?;
     let body = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES);
     let mut parsed = soup(body.len());
     for triangle in body {
+        monitor.check()?;
         for corner in triangle[12..48].chunks_exact(12) {
             let axis = |a: usize| NumberType::F32.read(&corner[4 * a..], false);
             parsed.vertices.push(Vec3::new(axis(0), axis(1), axis(2)));
@@ -56,8 +58,8 @@ fn binary(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
     Ok(numbered(parsed).said(said))
 }
 
-fn text(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
-    let mut cursor = Cursor::new(bytes, MeshFormat::Stl);
+fn text(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
+    let mut cursor = Cursor::new(bytes, MeshFormat::Stl, monitor);
     let mut said = Said::default();
     let mut parsed = soup(0);
     let mut inside = false;

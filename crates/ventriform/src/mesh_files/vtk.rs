@@ -10,6 +10,7 @@ use super::number::NumberType;
 use super::parsed::{Faces, Parsed};
 use super::said::Said;
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 
 const OWN_FORMAT: MeshFormat = MeshFormat::Vtk;
 
@@ -22,9 +23,9 @@ enum Cells {
     Other,
 }
 
-pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
+pub(super) fn parse(bytes: &[u8], monitor: &Monitor<'_>) -> Result<Parsed, MeshFileError> {
     let mut reader = Reader {
-        cursor: Cursor::new(bytes, OWN_FORMAT),
+        cursor: Cursor::new(bytes, OWN_FORMAT, monitor),
         binary: false,
     };
     let version = reader.cursor.line()?.unwrap_or_default();
@@ -43,7 +44,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, MeshFileError> {
         }
     };
     let mut vertices: Vec<Vec3> = Vec::new();
-    let mut faces = Faces::default();
+    let mut faces = Faces::new(monitor);
     let mut others = 0;
     while let Some(word) = reader.cursor.word()? {
         let word = word.to_ascii_uppercase();
@@ -236,7 +237,7 @@ impl Reader<'_> {
                 self.texts(entries)?;
                 continue;
             }
-            self.cursor = Cursor::new(before, OWN_FORMAT);
+            self.cursor = Cursor::new(before, OWN_FORMAT, self.cursor.monitor());
             let kind = self.kind()?;
             let entries = self.require(entries, 1, kind)?;
             if self.binary {

@@ -11,6 +11,7 @@ use super::parsed::{Faces, Parsed, damaged};
 use super::said::Said;
 use super::xml::{self, Tag};
 use crate::geometry::Vec3;
+use crate::progress::Monitor;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 
@@ -45,8 +46,12 @@ struct Piece<'a> {
     others: bool,
 }
 
-pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
-    let mut file = File::default();
+pub(super) fn parse(
+    bytes: &[u8],
+    limit: u64,
+    monitor: &Monitor<'_>,
+) -> Result<Parsed, MeshFileError> {
+    let mut file = File::new(monitor);
     let mut path: Vec<&[u8]> = Vec::new();
     let mut pieces: Vec<Piece<'_>> = Vec::new();
     let mut texts: Vec<(&'static str, Array<'_>)> = Vec::new();
@@ -130,7 +135,7 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
         }
     }
     let mut vertices = Vec::new();
-    let mut faces = Faces::default();
+    let mut faces = Faces::new(monitor);
     for piece in &pieces {
         file.add(piece, &mut vertices, &mut faces)?;
     }
@@ -142,8 +147,8 @@ pub(super) fn parse(bytes: &[u8], limit: u64) -> Result<Parsed, MeshFileError> {
 }
 
 /// The statements of the whole file, and the bytes that may still be unpacked.
-#[derive(Debug, Default)]
 struct File<'a> {
+    monitor: Monitor<'static>,
     big_endian: bool,
     wide_headers: bool,
     packed: bool,
@@ -153,6 +158,18 @@ struct File<'a> {
 }
 
 impl File<'_> {
+    fn new(monitor: &Monitor<'_>) -> Self {
+        Self {
+            monitor: monitor.without_observer(),
+            big_endian: false,
+            wide_headers: false,
+            packed: false,
+            appended: &[],
+            raw: false,
+            budget: 0,
+        }
+    }
+
     fn open(&mut self, tag: &Tag<'_>) -> Result<(), MeshFileError> {
         let unsupported = |what: String| MeshFileError::Unsupported {
             format: OWN_FORMAT,
@@ -248,7 +265,7 @@ impl File<'_> {
             what: "an array of points or cells without a type of numbers".into(),
         })?;
         if let Content::Text(text) = array.content {
-            let mut cursor = Cursor::new(text.trim_ascii(), OWN_FORMAT);
+            let mut cursor = Cursor::new(text.trim_ascii(), OWN_FORMAT, &self.monitor);
             let mut numbers = Vec::new();
             while !cursor.rest().is_empty() {
                 numbers.push(cursor.number()?);
@@ -263,6 +280,7 @@ impl File<'_> {
             });
         }
         let bytes = self.bytes(array.content)?;
+        self.monitor.check()?;
         let numbers = bytes.chunks_exact(kind.bytes());
         match numbers.remainder() {
             [] => Ok(numbers.map(|n| kind.read(n, self.big_endian)).collect()),
@@ -274,7 +292,7 @@ impl File<'_> {
     fn text(&mut self, array: Array<'_>) -> Result<Vec<u8>, MeshFileError> {
         let bytes = match array.content {
             Content::Text(text) => {
-                let mut cursor = Cursor::new(text, OWN_FORMAT);
+                let mut cursor = Cursor::new(text, OWN_FORMAT, &self.monitor);
                 let mut bytes = Vec::new();
                 while let Some(word) = cursor.word()? {
                     let code = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
@@ -300,7 +318,9 @@ impl File<'_> {
                 (rest, self.raw)
             }
         };
+        let monitor = self.monitor.clone();
         let first = |count: u64| -> Result<Vec<u8>, MeshFileError> {
+            monitor.check()?;
             let found = if raw {
                 source[..source
                     .len()
@@ -357,6 +377,7 @@ impl File<'_> {
         let mut rest = &all[head as usize..];
         let mut bytes = Vec::new();
         for (block, packed) in sizes[3..].iter().enumerate() {
+            monitor.check()?;
             let (own, later) = rest.split_at(*packed as usize);
             rest = later;
             let unpacked = match last {

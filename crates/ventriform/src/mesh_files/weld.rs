@@ -4,6 +4,8 @@ use super::closed;
 use super::error::MeshFileError;
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::numeric::order::sort_watched;
+use crate::progress::{Cancelled, Monitor};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
@@ -20,13 +22,19 @@ pub(super) fn close(
     mesh: &mut TriMesh,
     corners_only: bool,
     notes: &mut Vec<String>,
+    monitor: &Monitor<'_>,
 ) -> Result<(), MeshFileError> {
     let stated = mesh.vertices.len();
     tidy(mesh, notes);
-    if !corners_only && closed::check(mesh).is_ok() {
-        return Ok(());
+    if !corners_only {
+        match closed::check(mesh, monitor) {
+            Err(cancelled @ MeshFileError::Cancelled(_)) => return Err(cancelled),
+            Err(_) => {}
+            Ok(()) => return Ok(()),
+        }
     }
-    apply(mesh, &equal(&mesh.vertices));
+    apply(mesh, &equal(&mesh.vertices, monitor)?);
+    monitor.check()?;
     let joined = stated - mesh.vertices.len().min(stated);
     tidy(mesh, notes);
     if !corners_only && joined > 0 {
@@ -34,16 +42,21 @@ pub(super) fn close(
             "{joined} vertices with the coordinates of others were joined with them."
         ));
     }
-    let Err(error) = closed::check(mesh) else {
-        return Ok(());
+    let error = match closed::check(mesh, monitor) {
+        Ok(()) => return Ok(()),
+        Err(cancelled @ MeshFileError::Cancelled(_)) => return Err(cancelled),
+        Err(error) => error,
     };
     let greatest = mesh.vertices.iter().map(|p| p.amax()).fold(0.0, f64::max);
     let mut nearer = mesh.clone();
-    apply(&mut nearer, &near(&mesh.vertices, greatest * WELD_SHARE));
+    let first = near(&mesh.vertices, greatest * WELD_SHARE, monitor)?;
+    apply(&mut nearer, &first);
     let joined = mesh.vertices.len() - nearer.vertices.len();
     let mut later = Vec::new();
     tidy(&mut nearer, &mut later);
-    if joined == 0 || closed::check(&nearer).is_err() {
+    let still_open = closed::check(&nearer, monitor).is_err();
+    monitor.check()?;
+    if joined == 0 || still_open {
         return Err(error);
     }
     notes.push(format!(
@@ -106,7 +119,7 @@ fn apply(mesh: &mut TriMesh, first: &[u32]) {
 }
 
 /// For each point the first with the same coordinates.
-fn equal(points: &[Vec3]) -> Vec<u32> {
+fn equal(points: &[Vec3], monitor: &Monitor<'_>) -> Result<Vec<u32>, Cancelled> {
     // Adding zero makes both zeros one.
     let coordinates = |v: u32| points[v as usize].map(|x| x + 0.0);
     let compare = |a: &u32, b: &u32| {
@@ -115,25 +128,26 @@ fn equal(points: &[Vec3]) -> Vec<u32> {
         places.fold(Ordering::Equal, Ordering::then).then(a.cmp(b))
     };
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
-    order.sort_unstable_by(compare);
+    sort_watched(&mut order, compare, monitor)?;
     let mut first: Vec<u32> = (0..points.len() as u32).collect();
     for pair in order.windows(2) {
         if coordinates(pair[0]) == coordinates(pair[1]) {
             first[pair[1] as usize] = first[pair[0] as usize];
         }
     }
-    first
+    Ok(first)
 }
 
 /// For each point the first that is kept within `distance` along each axis. Those that are kept are farther apart, so
 /// that a cell of that size holds few.
-fn near(points: &[Vec3], distance: f64) -> Vec<u32> {
+fn near(points: &[Vec3], distance: f64, monitor: &Monitor<'_>) -> Result<Vec<u32>, Cancelled> {
     let mut kept: BTreeMap<[i64; 3], u32> = BTreeMap::new();
     let mut first: Vec<u32> = (0..points.len() as u32).collect();
     if !(distance > 0.0) {
-        return first;
+        return Ok(first);
     }
     for (v, p) in points.iter().enumerate() {
+        monitor.check()?;
         let cell: [i64; 3] = (*p / distance).map(|x| x.floor() as i64).into();
         let around = (0..27).map(|n| {
             [n % 3, n / 3 % 3, n / 9]
@@ -153,5 +167,5 @@ fn near(points: &[Vec3], distance: f64) -> Vec<u32> {
             }
         }
     }
-    first
+    Ok(first)
 }

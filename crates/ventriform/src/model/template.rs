@@ -171,7 +171,7 @@ fn cup_of(
     let Ok(frame) = VoxelToPatient::centred(shape, [NODE_SPACING_MM; 3], centre) else {
         return Err(none);
     };
-    let mask = voxelise(mesh, shape, &frame);
+    let mask = voxelise(mesh, shape, &frame, monitor)?;
     let picture = Volume {
         shape,
         voxels: mask

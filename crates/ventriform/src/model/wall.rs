@@ -648,7 +648,7 @@ mod tests {
             let middle = Vec3::repeat(f64::from(size) / 2.0);
             let frame = VoxelToPatient::new(linear, cup.centre - linear * middle).unwrap();
             let shape = [size as usize; 3];
-            let mask = voxelise(&mesh, shape, &frame);
+            let mask = voxelise(&mesh, shape, &frame, &monitor).unwrap();
             let cavity = wall.cavity(&mask, &frame, &monitor).unwrap();
             let both = cavity.voxels.iter().zip(&mask.voxels);
             assert_eq!(both.filter(|(cavity, wall)| **cavity && **wall).count(), 0);

@@ -23,6 +23,7 @@ use super::sizes::FEWEST_CASES;
 use crate::numeric::decimals::round;
 use crate::numeric::order::quantile;
 use crate::polar::{MapGaussian, RAY_COLUMNS, RAY_ROWS};
+use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 
 /// Rounds of matching.
@@ -64,17 +65,29 @@ pub struct GroupKind {
     pub attenuation_corrected: bool,
 }
 
+/// Why there is no group.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GroupError {
+    /// The people make none.
+    #[error(transparent)]
+    Normals(#[from] NormalsError),
+    /// The caller asked for an end.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
 /// The group of these people, and those of them that are left out.
 ///
 /// # Errors
-/// [`NormalsError::TooFewCases`].
+/// [`NormalsError::TooFewCases`], [`GroupError::Cancelled`].
 pub fn group_of(
     kind: &GroupKind,
     people: &[HealthyScan],
-) -> Result<(NormalGroup, Vec<ExcludedCase>), NormalsError> {
+    monitor: &Monitor,
+) -> Result<(NormalGroup, Vec<ExcludedCase>), GroupError> {
     let all: Vec<&HealthyScan> = people.iter().collect();
     enough(kind, all.len())?;
-    let (kept, odd): (Vec<_>, Vec<_>) = (all.iter().copied().zip(left_out(&all)?))
+    let (kept, odd): (Vec<_>, Vec<_>) = (all.iter().copied().zip(left_out(&all, monitor)?))
         .partition(|(_, judged)| judged.extent_percent <= MOST_EXTENT_PERCENT);
     let excluded = odd.iter().map(|(person, judged)| ExcludedCase {
         case: person.case.case.clone(),
@@ -89,7 +102,7 @@ pub fn group_of(
     let judged = if excluded.is_empty() {
         kept.into_iter().map(|(_, judged)| judged).collect()
     } else {
-        left_out(&people)?
+        left_out(&people, monitor)?
     };
     let group = NormalGroup {
         sex: kind.sex,
@@ -97,7 +110,7 @@ pub fn group_of(
         tracer: kind.tracer.clone(),
         attenuation_corrected: kind.attenuation_corrected,
         cases: people.iter().map(|person| person.case.clone()).collect(),
-        map: LimitMap::from(&limits_of(&places_of(&people))),
+        map: LimitMap::from(&limits_of(&places_of(&people), monitor)?),
         figures: figure_limits(&people),
         leave_one_out: specificity(judged),
     };
@@ -124,13 +137,13 @@ fn places_of<'a>(people: &[&'a HealthyScan]) -> Vec<&'a ScanPlaces> {
 }
 
 /// Every person by the limits of the others.
-fn left_out(people: &[&HealthyScan]) -> Result<Vec<LeftOut>, NormalsError> {
+fn left_out(people: &[&HealthyScan], monitor: &Monitor) -> Result<Vec<LeftOut>, GroupError> {
     let judged = people.par_iter().enumerate().map(|(index, person)| {
         let others: Vec<&ScanPlaces> = (people.iter().enumerate())
             .filter(|(other, _)| *other != index)
             .map(|(_, person)| &person.places)
             .collect();
-        let found = figures(&person.places, &limits_of(&others))
+        let found = figures(&person.places, &limits_of(&others, monitor)?)
             .ok_or(NormalsError::TooLittleWall { percent: 0.0 })?;
         Ok(LeftOut {
             case: person.case.case.clone(),
@@ -155,7 +168,10 @@ fn specificity(cases: Vec<LeftOut>) -> Specificity {
 }
 
 /// Mean, standard deviation and patterns of these scans. The mean's own mean over the places is 1.
-pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn limits_of(scans: &[&ScanPlaces], monitor: &Monitor) -> Result<PlaceLimits, Cancelled> {
     let places = RAY_ROWS * RAY_COLUMNS;
     let people_at: Vec<usize> = (0..places)
         .map(|index| {
@@ -190,8 +206,11 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
         let precision = limits.precision();
         let matched: Vec<(Vec<Option<f64>>, Option<Coefficients>)> = scans
             .iter()
-            .map(|scan| shares_of(scan, &limits, &precision))
-            .collect();
+            .map(|scan| {
+                monitor.check()?;
+                Ok(shares_of(scan, &limits, &precision))
+            })
+            .collect::<Result<_, Cancelled>>()?;
         let at = |index: usize| matched.iter().filter_map(move |(shares, _)| shares[index]);
         let factor = mean_at(places, at);
         let variance: Vec<f64> = (0..places)
@@ -226,11 +245,11 @@ pub fn limits_of(scans: &[&ScanPlaces]) -> PlaceLimits {
             .map(|(index, value)| Some((*value)? * factor(index) / level))
             .collect()
     };
-    PlaceLimits {
+    Ok(PlaceLimits {
         mean: scaled(&limits.mean, &|_| 1.0),
         sd: scaled(&limits.sd, &of_mean),
         covariance: limits.covariance,
-    }
+    })
 }
 
 /// The shares of the mean that a matched scan has at every place, its pattern taken off, and the pattern.

@@ -38,7 +38,7 @@ mod sizes;
 #[cfg(test)]
 mod tests;
 
-pub use build::{GroupKind, HealthyScan, group_of, limits_of};
+pub use build::{GroupError, GroupKind, HealthyScan, group_of, limits_of};
 pub(crate) use document::names_protocol;
 pub use document::{
     ExcludedCase, GlobalLimit, LeftOut, LimitMap, MOST_NORMALS_BYTES, NormalCase, NormalGroup,

@@ -1,6 +1,6 @@
 //! Properties of limits and of scans beside them, on walls made of numbers.
 
-use super::build::{GroupKind, HealthyScan, group_of, limits_of};
+use super::build::{GroupError, GroupKind, HealthyScan, group_of, limits_of};
 use super::document::{NormalCase, NormalGroup, NormalLimits};
 use super::error::NormalsError;
 use super::kind::{GroupSex, ScanKind, Sex};
@@ -8,6 +8,7 @@ use super::perfusion::{DEFICIT_OF_FULL_SCORE, HeartFigure, Z_LIMIT, figures, sco
 use super::place_limits::{PlaceLimits, ScanPlaces};
 use crate::geometry::random::{Purpose, stream, uniform};
 use crate::polar::{Level, RAY_COLUMNS, RAY_ROWS, segment_at};
+use crate::progress::Monitor;
 use std::sync::LazyLock;
 
 const PLACE_COUNT: usize = RAY_ROWS * RAY_COLUMNS;
@@ -82,8 +83,11 @@ fn people(number: u64) -> Vec<HealthyScan> {
 }
 
 fn group() -> NormalGroup {
-    static HEALTHY_GROUP: LazyLock<NormalGroup> =
-        LazyLock::new(|| group_of(&kind(), &people(14)).unwrap().0);
+    static HEALTHY_GROUP: LazyLock<NormalGroup> = LazyLock::new(|| {
+        group_of(&kind(), &people(14), &Monitor::silent())
+            .unwrap()
+            .0
+    });
     HEALTHY_GROUP.clone()
 }
 
@@ -135,7 +139,7 @@ fn limits_of_equal_hearts_are_that_heart_and_the_least_deviation() {
     let scans: Vec<ScanPlaces> = (1..=20_u32)
         .map(|n| wall(|r, c| f64::from(n) * even(r, c)))
         .collect();
-    let limits = limits_of(&scans.iter().collect::<Vec<_>>());
+    let limits = limits_of(&scans.iter().collect::<Vec<_>>(), &Monitor::silent()).unwrap();
     let known: Vec<f64> = limits.mean.iter().flatten().copied().collect();
     assert_eq!(known.len(), PLACE_COUNT - 3 * RAY_COLUMNS);
     let level = known.iter().sum::<f64>() / known.len() as f64;
@@ -311,14 +315,18 @@ fn masked_places_are_in_no_figure() {
 #[test]
 fn each_person_is_judged_by_the_limits_of_the_others() {
     let people = people(13);
-    let (group, excluded) = group_of(&kind(), &people).unwrap();
+    let (group, excluded) = group_of(&kind(), &people, &Monitor::silent()).unwrap();
     assert_eq!(excluded, []);
     for (index, judged) in group.leave_one_out.cases.iter().enumerate() {
         let others: Vec<&ScanPlaces> = (people.iter().enumerate())
             .filter(|(other, _)| *other != index)
             .map(|(_, person)| &person.places)
             .collect();
-        let found = figures(&people[index].places, &limits_of(&others)).unwrap();
+        let found = figures(
+            &people[index].places,
+            &limits_of(&others, &Monitor::silent()).unwrap(),
+        )
+        .unwrap();
         assert!((judged.extent_percent - found.extent_percent).abs() < 1e-4);
         assert!((judged.deficit_percent - found.deficit_percent).abs() < 1e-4);
     }
@@ -339,7 +347,7 @@ fn a_heart_with_a_defect_is_left_out_of_the_limits() {
             *uptake = uptake.map(|uptake| 0.4 * uptake);
         }
     }
-    let (group, excluded) = group_of(&kind(), &people).unwrap();
+    let (group, excluded) = group_of(&kind(), &people, &Monitor::silent()).unwrap();
     assert_eq!(excluded.len(), 1);
     assert_eq!(excluded[0].case, "n3");
     assert!(
@@ -360,9 +368,12 @@ fn figures_have_mean_deviation_and_quantiles() {
 
 #[test]
 fn fewer_than_twelve_people_make_no_group() {
-    let error = group_of(&kind(), &people(8)).unwrap_err();
+    let error = group_of(&kind(), &people(8), &Monitor::silent()).unwrap_err();
     assert!(
-        matches!(error, NormalsError::TooFewCases { cases: 8, .. }),
+        matches!(
+            error,
+            GroupError::Normals(NormalsError::TooFewCases { cases: 8, .. })
+        ),
         "{error}"
     );
 }
@@ -375,7 +386,9 @@ fn threads_change_nothing() {
             .num_threads(threads)
             .build()
             .unwrap();
-        let (group, _) = pool.install(|| group_of(&kind(), &people)).unwrap();
+        let (group, _) = pool
+            .install(|| group_of(&kind(), &people, &Monitor::silent()))
+            .unwrap();
         NormalLimits::new(
             "0.0.0",
             true,

@@ -89,7 +89,7 @@ impl SegmentedVolume {
                     .into(),
             }
         })?;
-        let mask = place.mask(&segmentation.mask, &segmentation.fit.model.mesh);
+        let mask = place.mask(&segmentation.mask, &segmentation.fit.model.mesh, monitor)?;
         let mut files = vec![self.mask(MASK_FILE, &mask, &place, monitor)?];
         if let (Some(mask), Some(surface)) = (
             &segmentation.other_mask,
@@ -99,7 +99,8 @@ impl SegmentedVolume {
                 WallEdge::Apparent => ANATOMICAL_MASK,
                 WallEdge::Anatomical => APPARENT_MASK,
             };
-            files.push(self.mask(name, &place.mask(mask, &surface.mesh), &place, monitor)?);
+            let mask = place.mask(mask, &surface.mesh, monitor)?;
+            files.push(self.mask(name, &mask, &place, monitor)?);
         }
         files.extend(self.labels(&mask, &place, monitor)?);
         monitor.report(Stage::Export, 0.5)?;

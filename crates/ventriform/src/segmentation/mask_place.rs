@@ -4,6 +4,7 @@ use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::{Mask, voxelise};
 use crate::mesh::TriMesh;
 use crate::parameters::MaskGrid;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Reading;
 use crate::volume::nifti::StatedGrid;
 use std::borrow::Cow;
@@ -51,12 +52,20 @@ impl<'a> MaskPlace<'a> {
     }
 
     /// `mask`, which is that of the inside of `mesh` on the scan's grid, on this grid.
-    pub fn mask<'m>(&self, mask: &'m Mask, mesh: &TriMesh) -> Cow<'m, Mask> {
-        if self.covering {
-            Cow::Owned(voxelise(mesh, self.shape, &self.frame))
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn mask<'m>(
+        &self,
+        mask: &'m Mask,
+        mesh: &TriMesh,
+        monitor: &Monitor,
+    ) -> Result<Cow<'m, Mask>, Cancelled> {
+        Ok(if self.covering {
+            Cow::Owned(voxelise(mesh, self.shape, &self.frame, monitor)?)
         } else {
             Cow::Borrowed(mask)
-        }
+        })
     }
 
     /// Warning about masks on the grid of `frame` if its axes are not at right angles.

@@ -148,11 +148,10 @@ pub fn segment(
         None => (fit, None),
     };
     monitor.report(Stage::Report, 0.0)?;
-    let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
-    let other_mask = fit
-        .model
-        .other_surface(parameters.deform.edge)
-        .map(|other| voxelise(&other.mesh, volume.shape, &volume.frame));
+    let voxels_in = |mesh| voxelise(mesh, volume.shape, &volume.frame, monitor);
+    let mask = voxels_in(&fit.model.mesh)?;
+    let other = fit.model.other_surface(parameters.deform.edge);
+    let other_mask = other.map(|other| voxels_in(&other.mesh)).transpose()?;
     monitor.report(Stage::Report, 0.5)?;
     let agreement = match expert {
         // Both masks are on the volume's grid, so this fails only when cancelled.

@@ -128,7 +128,7 @@ fn slice(
         .map(|p| field.at(&place(p)))
         .collect();
 
-    let inside = voxelise(fit, [SLICE_SIDE_PX, SLICE_SIDE_PX, 1], frame).voxels;
+    let inside = voxelise(fit, [SLICE_SIDE_PX, SLICE_SIDE_PX, 1], frame, monitor)?.voxels;
     let white = (0..SLICE_SIDE_PX * SLICE_SIDE_PX)
         .filter(|p| inside[*p])
         .map(|p| values[p])
@@ -191,7 +191,7 @@ mod tests {
         // Apex at -z; the cup's own axis therefore points down.
         let mesh = shapes::cup(60.0, 30.0, 10.0, 32);
         let frame = VoxelToPatient::centred([40; 3], [4.0; 3], Vec3::new(0.0, 0.0, -30.0)).unwrap();
-        let wall = voxelise(&mesh, [40; 3], &frame);
+        let wall = voxelise(&mesh, [40; 3], &frame, &Monitor::silent()).unwrap();
         let volume = Volume {
             shape: [40; 3],
             voxels: wall

@@ -48,14 +48,15 @@ pub(super) fn select<'a>(
                 return Err(SurfaceError::InexactLabel { label });
             }
             if !volume.voxels.contains(&(label as f32)) {
-                let present = survey::whole_values(volume).into_iter().flatten().collect();
+                let present = survey::whole_values(volume, monitor)?;
+                let present = present.into_iter().flatten().collect();
                 return Err(SurfaceError::NoSuchLabel { label, present });
             }
             label::select(volume, parameters, label, facts, monitor)
         }
         // An explicit iso-value applies to the values themselves, not to a smoothed mask.
         (Isolate::Auto, Some(present)) if parameters.iso == IsoLevel::Auto => {
-            let (objects, background) = survey::objects(volume, present);
+            let (objects, background) = survey::objects(volume, present, monitor)?;
             if background != 0 {
                 facts.warnings.push(format!(
                     "the value {background}, which surrounds the rest, was taken for the background"

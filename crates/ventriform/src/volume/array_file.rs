@@ -20,6 +20,9 @@ use crate::grid::gates::SAME_PLACE_MM;
 use crate::progress::Monitor;
 use std::sync::Arc;
 
+/// Voxels that are copied between two looks at the cancel token.
+const VOXELS_PER_COPY: usize = 1 << 20;
+
 /// Volumes of one grid.
 pub(super) struct ArrayFile {
     name: String,
@@ -96,10 +99,15 @@ impl OpenVolume for ArrayFile {
     }
 
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {
-        monitor.check()?;
-        let voxels = self.volumes[frame].voxels.clone();
+        let held = &self.volumes[frame].voxels;
+        let mut voxels = Vec::with_capacity(held.len());
+        for portion in held.chunks(VOXELS_PER_COPY) {
+            monitor.check()?;
+            voxels.extend_from_slice(portion);
+        }
         let mut tally = Tally::default();
         tally.add_portion(&voxels);
+        monitor.check()?;
         Ok(Decoded {
             voxels,
             tally,

@@ -221,7 +221,9 @@ pub(super) fn read(
     };
     let header = file.header();
     let shape = header.shape;
-    let intensity = decoded.tally.with_labels(&decoded.voxels, shape[0]);
+    let intensity = decoded
+        .tally
+        .with_labels(&decoded.voxels, shape[0], monitor)?;
     let volume = Volume {
         shape,
         voxels: decoded.voxels,

@@ -397,6 +397,7 @@ fn open_as(
     let mut inside = in_folder.then_some("the folder");
     let mut members = Vec::with_capacity(files.len());
     for file in files {
+        monitor.check()?;
         match archive::files_in(file, limits)? {
             Some(packed) => {
                 inside = inside.or(Some(file.name()));
@@ -409,14 +410,14 @@ fn open_as(
     if inside.is_some() {
         members.sort_by(|a, b| a.name().cmp(b.name()));
     }
-    let found = recognise(&members, inside, limits)?;
+    let found = recognise(&members, inside, limits, monitor)?;
     let file: Box<dyn OpenVolume> = match found.volume {
         Recognised::Nifti { header, voxels } => {
             Box::new(nifti::NiftiFile::open(header, voxels, limits)?)
         }
         Recognised::Gates(files) => Box::new(GateFiles::open(&files, limits)?),
         Recognised::Dicom(files) => Box::new(DicomFile::open(&files, limits, monitor)?),
-        Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits)?),
+        Recognised::Mesh(file) => Box::new(SurfaceFile::open(file, stated, limits, monitor)?),
         Recognised::Arrays(file) => Box::new(ArrayFile::open(file, limits)?),
     };
     Ok(Opened {

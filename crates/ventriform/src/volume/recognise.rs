@@ -6,6 +6,7 @@ use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
 use crate::grid::gates::GATE_COUNTS;
+use crate::progress::{Cancelled, Monitor};
 
 /// Unpacked bytes that are examined.
 const EXAMINED_BYTES: usize = 1024;
@@ -71,9 +72,11 @@ pub(super) fn recognise<'a>(
     files: &'a [VolumeFile],
     inside: Option<&str>,
     limits: &ReadLimits,
+    monitor: &Monitor,
 ) -> Result<Found<'a>, VolumeError> {
     let mut sorted = Sorted::default();
     for file in files {
+        monitor.check()?;
         match look(file, limits) {
             Ok((FileKind::NiftiSingle, _)) => sorted.singles.push(file),
             Ok((FileKind::NiftiHeader, _)) => sorted.headers.push(file),
@@ -84,7 +87,7 @@ pub(super) fn recognise<'a>(
             Err(error) => return Err(error),
         }
     }
-    let volume = sorted.volume(inside, limits)?;
+    let volume = sorted.volume(inside, limits, monitor)?;
     Ok(Found {
         notes: sorted.notes(&volume),
         volume,
@@ -97,6 +100,7 @@ impl<'a> Sorted<'a> {
         &self,
         inside: Option<&str>,
         limits: &ReadLimits,
+        monitor: &Monitor,
     ) -> Result<Recognised<'a>, VolumeError> {
         let kinds = [self.singles.len(), self.headers.len(), self.dicom.len()];
         match (kinds, &self.others[..]) {
@@ -114,7 +118,7 @@ impl<'a> Sorted<'a> {
             ([0, 0, dicom], _) if dicom > 0 => Ok(Recognised::Dicom(self.dicom.clone())),
             ([0, 0, 0], []) if self.empty.is_empty() => Err(VolumeError::NoFile),
             ([0, 0, 0], others) => {
-                if let Some(mesh) = only_mesh(others, limits) {
+                if let Some(mesh) = only_mesh(others, limits, monitor)? {
                     return Ok(Recognised::Mesh(mesh));
                 }
                 let analyze = others.iter().find(|(_, start)| is_analyze(start));
@@ -234,14 +238,19 @@ impl<'a> Sorted<'a> {
 fn only_mesh<'a>(
     others: &[(&'a VolumeFile, Vec<u8>)],
     limits: &ReadLimits,
-) -> Option<&'a VolumeFile> {
-    let mut meshes = others
-        .iter()
-        .filter(|(file, start)| surface_file::recognise(file, start, limits).is_some());
-    match (meshes.next(), meshes.next()) {
-        (Some((file, _)), None) => Some(file),
-        _ => None,
+    monitor: &Monitor,
+) -> Result<Option<&'a VolumeFile>, Cancelled> {
+    let mut only = None;
+    for (file, start) in others {
+        if surface_file::recognise(file, start, limits, monitor)?.is_none() {
+            continue;
+        }
+        if only.is_some() {
+            return Ok(None);
+        }
+        only = Some(*file);
     }
+    Ok(only)
 }
 
 /// The name of `file` without `ending` and `.gz`, in lower case; `None` if it ends otherwise.

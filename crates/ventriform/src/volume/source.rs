@@ -177,6 +177,57 @@ impl VolumeFile {
         files
     }
 
+    /// The path of a file on disk; `None` for what is in memory or in an archive.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.content {
+            Content::Path(path) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// The bytes of a file in memory; `None` for files on disk, files in an archive, and arrays.
+    pub fn memory(&self) -> Option<&[u8]> {
+        match &self.content {
+            Content::Memory(bytes) => Some(bytes),
+            _ => None,
+        }
+    }
+
+    /// Gives the stored bytes to `take`, portion by portion. Of arrays these are for each volume its shape (64-bit whole
+    /// numbers), the affine to LPS mm (64-bit floats, by rows) and the voxels (32-bit floats, i fastest), least
+    /// significant byte first.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn stream_stored(&self, take: &mut dyn FnMut(&[u8])) -> io::Result<()> {
+        if let Content::Arrays(volumes) = &self.content {
+            for volume in volumes.iter() {
+                let shape = volume.shape.map(|size| (size as u64).to_le_bytes());
+                take(shape.as_flattened());
+                let matrix = volume.frame.matrix();
+                for (row, column) in (0..4).flat_map(|row| [0, 1, 2, 3].map(|column| (row, column)))
+                {
+                    take(&matrix[(row, column)].to_le_bytes());
+                }
+                for portion in volume.voxels.chunks(PORTION_BYTES / size_of::<f32>()) {
+                    let bytes: Vec<u8> = portion.iter().flat_map(|v| v.to_le_bytes()).collect();
+                    take(&bytes);
+                }
+            }
+            return Ok(());
+        }
+        let mut reader = self.bytes()?;
+        let mut portion = vec![0; PORTION_BYTES];
+        loop {
+            match reader.read(&mut portion) {
+                Ok(0) => return Ok(()),
+                Ok(got) => take(&portion[..got]),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
     /// The name used in messages.
     pub fn name(&self) -> &str {
         &self.name
@@ -652,6 +703,8 @@ impl Read for Members {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
+    use crate::geometry::frame::VoxelToPatient;
 
     #[test]
     fn the_other_half_lies_beside() {
@@ -670,6 +723,46 @@ mod tests {
         assert_eq!(names(at("a.img.gz")), ["a.img.gz", "a.hdr"]);
         assert_eq!(names(at("b.nii.gz")), ["b.nii.gz"]);
         assert_eq!(names(at("b.hdr")), ["b.hdr"]);
+    }
+
+    #[test]
+    fn stored_bytes_are_those_of_the_file_and_tell_arrays_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.nii");
+        let bytes: Vec<u8> = (0..3 * PORTION_BYTES + 5).map(|n| n as u8).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        let stored = |file: &VolumeFile| {
+            let mut all = Vec::new();
+            file.stream_stored(&mut |part| all.extend_from_slice(part))
+                .unwrap();
+            all
+        };
+        let (on_disk, memory) = (
+            VolumeFile::at(&path),
+            VolumeFile::in_memory("a", bytes.clone()),
+        );
+        assert_eq!((on_disk.path(), on_disk.memory()), (Some(&*path), None));
+        assert_eq!((memory.path(), memory.memory()), (None, Some(&*bytes)));
+        assert!(stored(&on_disk) == bytes && stored(&memory) == bytes);
+        let array = |mm: f64, value: f32| {
+            let frame = VoxelToPatient::centred([2, 3, 4], [mm; 3], Vec3::zeros()).unwrap();
+            let volume = Volume {
+                shape: [2, 3, 4],
+                voxels: vec![value; 24],
+                frame,
+                integral: false,
+            };
+            VolumeFile::of_arrays("the array", vec![volume])
+        };
+        assert_eq!(stored(&array(4.0, 1.0)).len(), 3 * 8 + 16 * 8 + 24 * 4);
+        assert_eq!(stored(&array(4.0, 1.0)), stored(&array(4.0, 1.0)));
+        assert_ne!(stored(&array(4.0, 1.0)), stored(&array(4.0, 2.0)));
+        assert_ne!(stored(&array(4.0, 1.0)), stored(&array(5.0, 1.0)));
+        assert!(
+            VolumeFile::at("/nowhere/at/all")
+                .stream_stored(&mut |_| ())
+                .is_err()
+        );
     }
 
     #[test]

@@ -10,6 +10,7 @@
 use super::VolumeError;
 use super::facts::{IntensitySummary, LabelCount};
 use crate::grid::survey::many_are_pieces;
+use crate::progress::{Cancelled, Monitor};
 use std::collections::BTreeMap;
 
 /// Voxels per partial sum.
@@ -32,7 +33,10 @@ pub fn summarise(voxels: &[f32], row: usize) -> IntensitySummary {
     for portion in voxels.chunks(VOXELS_PER_SUM) {
         tally.add_portion(portion);
     }
-    tally.with_labels(voxels, row)
+    let quiet = Monitor::silent();
+    let figures = tally.with_labels(voxels, row, &quiet);
+    // Nobody cancels; without labels it is the same volume.
+    figures.unwrap_or_else(|_| tally.summary(None))
 }
 
 /// A warning if all values are the same.
@@ -126,13 +130,21 @@ impl Tally {
 
     /// The figures over `voxels`, all of which have been added, with their labels if they look like a
     /// label map.
-    pub(super) fn with_labels(&self, voxels: &[f32], row: usize) -> IntensitySummary {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn with_labels(
+        &self,
+        voxels: &[f32],
+        row: usize,
+        monitor: &Monitor,
+    ) -> Result<IntensitySummary, Cancelled> {
         let labels = if self.is_whole() {
-            labels(voxels, row)
+            labels(voxels, row, monitor)?
         } else {
             None
         };
-        self.summary(labels)
+        Ok(self.summary(labels))
     }
 
     /// The figures so far; all zero if no voxel is finite.
@@ -231,18 +243,26 @@ impl Lanes {
 
 /// The labels of `voxels`, which are whole, if there are few different ones and neighbours are mostly
 /// alike.
-fn labels(voxels: &[f32], row: usize) -> Option<Vec<LabelCount>> {
+fn labels(
+    voxels: &[f32],
+    row: usize,
+    monitor: &Monitor,
+) -> Result<Option<Vec<LabelCount>>, Cancelled> {
     let mut coherence = Coherence::new(row);
     let portions = || voxels.chunks(VOXELS_PER_SUM);
     for (n, portion) in portions().enumerate() {
+        monitor.check()?;
         coherence.add(n * VOXELS_PER_SUM, portion);
     }
     if !coherence.suits_labels() {
-        return None;
+        return Ok(None);
     }
     let mut counts = LabelCounts::new();
-    portions().for_each(|portion| counts.add(portion));
-    counts.labels()
+    for portion in portions() {
+        monitor.check()?;
+        counts.add(portion);
+    }
+    Ok(counts.labels())
 }
 
 /// Whether a voxel has a label: not background and not missing.
@@ -428,8 +448,8 @@ mod tests {
                 whole.add_whole_portion(portion);
             }
             assert_eq!(
-                any.with_labels(&voxels, 128),
-                whole.with_labels(&voxels, 128)
+                any.with_labels(&voxels, 128, &Monitor::silent()),
+                whole.with_labels(&voxels, 128, &Monitor::silent())
             );
             assert!(whole.summary(None).integral);
         }
@@ -532,7 +552,8 @@ mod tests {
                 Some(_) => some += 1,
                 None => none += 1,
             }
-            assert_eq!(labels(&voxels, row), expected, "round {round}");
+            let found = labels(&voxels, row, &Monitor::silent()).unwrap();
+            assert_eq!(found, expected, "round {round}");
             // The same in portions of other lengths.
             let mut coherence = Coherence::new(row);
             let (mut before, mut counts) = (0, LabelCounts::new());

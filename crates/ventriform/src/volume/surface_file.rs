@@ -18,8 +18,8 @@ use crate::geometry::bvh::Aabb;
 use crate::geometry::frame::VoxelToPatient;
 use crate::grid::voxelise::voxelise;
 use crate::mesh::TriMesh;
-use crate::mesh_files::{self, MeshFormat, MeshStatement, UnlikelySize};
-use crate::progress::Monitor;
+use crate::mesh_files::{self, MeshFileError, MeshFormat, MeshStatement, UnlikelySize};
+use crate::progress::{Cancelled, Monitor};
 
 /// Distance of the voxels, mm.
 const SPACING_MM: f64 = 1.0;
@@ -48,27 +48,41 @@ pub(super) fn recognise(
     file: &VolumeFile,
     start: &[u8],
     limits: &ReadLimits,
-) -> Option<MeshFormat> {
-    let source = Source::open(file, limits.mesh_bytes).ok()?;
+    monitor: &Monitor,
+) -> Result<Option<MeshFormat>, Cancelled> {
+    let Ok(source) = Source::open(file, limits.mesh_bytes) else {
+        return Ok(None);
+    };
     if !source.is_gzip() {
-        return mesh_files::recognise(start, source.capacity());
+        return Ok(mesh_files::recognise(start, source.capacity()));
     }
     // How long a packed file is unpacked is known by unpacking it. A binary STL file states it.
-    let count = start.get(80..84)?;
+    let Some(count) = start.get(80..84) else {
+        return Ok(None);
+    };
     let stated = 84 + 50 * u64::from(u32::from_le_bytes([count[0], count[1], count[2], count[3]]));
-    mesh_files::recognise(start, 0).or_else(|| {
-        let fits = stated <= limits.mesh_bytes && stated <= source.capacity();
-        let bytes = fits.then(|| whole(file, limits).ok()).flatten()?;
-        mesh_files::recognise(&bytes, bytes.len() as u64)
+    let known = mesh_files::recognise(start, 0);
+    if known.is_some() || stated > limits.mesh_bytes || stated > source.capacity() {
+        return Ok(known);
+    }
+    Ok(match whole(file, limits, monitor) {
+        Ok(bytes) => mesh_files::recognise(&bytes, bytes.len() as u64),
+        Err(VolumeError::Cancelled(cancelled)) => return Err(cancelled),
+        Err(_) => None,
     })
 }
 
 /// The unpacked bytes of `file`.
-fn whole(file: &VolumeFile, limits: &ReadLimits) -> Result<Vec<u8>, VolumeError> {
+fn whole(
+    file: &VolumeFile,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Vec<u8>, VolumeError> {
     let mut source = Source::open(file, limits.mesh_bytes)?;
     let mut bytes = Vec::new();
     let mut portion = vec![0; PORTION_BYTES];
     loop {
+        monitor.check()?;
         let got = source.fill(&mut portion)?;
         if got == 0 {
             break;
@@ -88,18 +102,23 @@ impl SurfaceFile {
         file: &VolumeFile,
         stated: &MeshStatement,
         limits: &ReadLimits,
+        monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
         let packed = Source::open(file, limits.mesh_bytes)?.is_gzip();
-        let bytes = whole(file, limits)?;
-        let refused = |error| VolumeError::Mesh {
-            file: file.name().into(),
-            error,
+        let bytes = whole(file, limits, monitor)?;
+        let refused = |error| match error {
+            MeshFileError::Cancelled(cancelled) => VolumeError::Cancelled(cancelled),
+            error => VolumeError::Mesh {
+                file: file.name().into(),
+                error,
+            },
         };
-        let read = mesh_files::look(&bytes, stated, limits.mesh_bytes).map_err(refused)?;
+        let read = mesh_files::look_watched(&bytes, stated, limits.mesh_bytes, monitor);
+        let read = read.map_err(refused)?;
         drop(bytes);
         let (shape, frame) = grid(&read.mesh).ok_or_else(|| VolumeError::Mesh {
             file: file.name().into(),
-            error: mesh_files::MeshFileError::Flat,
+            error: MeshFileError::Flat,
         })?;
         let mut warnings = vec![format!(
             "The file is a closed surface of {} triangles; its inside was voxelised at {:.3} mm.",
@@ -126,10 +145,10 @@ impl SurfaceFile {
         })
     }
 
-    fn voxels(&self) -> Vec<f32> {
-        let mask = voxelise(&self.mesh, self.shape, &self.placement.frame);
+    fn voxels(&self, monitor: &Monitor) -> Result<Vec<f32>, Cancelled> {
+        let mask = voxelise(&self.mesh, self.shape, &self.placement.frame, monitor)?;
         let value = |inside: &bool| f32::from(u8::from(*inside));
-        mask.voxels.iter().map(value).collect()
+        Ok(mask.voxels.iter().map(value).collect())
     }
 }
 
@@ -176,7 +195,7 @@ impl OpenVolume for SurfaceFile {
     fn problem(&self) -> Option<VolumeError> {
         Some(VolumeError::Mesh {
             file: self.name.clone(),
-            error: mesh_files::MeshFileError::Size(self.unlikely?),
+            error: MeshFileError::Size(self.unlikely?),
         })
     }
 
@@ -185,8 +204,7 @@ impl OpenVolume for SurfaceFile {
     }
 
     fn decode_frame(&mut self, _frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {
-        monitor.check()?;
-        let voxels = self.voxels();
+        let voxels = self.voxels(monitor)?;
         let mut tally = Tally::default();
         tally.add_portion(&voxels);
         Ok(Decoded {
@@ -202,8 +220,7 @@ impl OpenVolume for SurfaceFile {
         take: &mut dyn FnMut(usize, &[f32]),
         monitor: &Monitor,
     ) -> Result<(), VolumeError> {
-        monitor.check()?;
-        take(0, &self.voxels());
+        take(0, &self.voxels(monitor)?);
         Ok(())
     }
 

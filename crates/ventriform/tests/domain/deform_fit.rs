@@ -56,7 +56,7 @@ fn placed(mut mesh: TriMesh, centre: Vec3, axis: Vec3, scale: f64) -> TriMesh {
 /// A blurred image of `wall`: 1 in the wall, multiplied by `uptake` at each point.
 fn scan(wall: &TriMesh, n: usize, uptake: impl Fn(&Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred([n; 3], [SPACING_MM; 3], Vec3::zeros()).unwrap();
-    let mask = voxelise(wall, [n; 3], &frame);
+    let mask = voxelise(wall, [n; 3], &frame, &Monitor::silent()).unwrap();
     let mut volume = picture(n, 0.0, |_| 0.0);
     for (v, inside) in mask.voxels.iter().enumerate() {
         let index = [v % n, v / n % n, v / (n * n)];
@@ -76,7 +76,7 @@ fn ventricle(mesh: TriMesh) -> Template {
 }
 
 fn jaccard(mesh: &TriMesh, truth: &TriMesh, volume: &Volume) -> f64 {
-    let mask = |m: &TriMesh| voxelise(m, volume.shape, &volume.frame);
+    let mask = |m: &TriMesh| voxelise(m, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
     compare(
         &mask(mesh),
         &mask(truth),

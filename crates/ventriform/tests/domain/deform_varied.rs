@@ -103,7 +103,13 @@ fn no_varied_patient_is_lost() {
             "{name}: {off} mm, {angle} degrees"
         );
         assert_eq!(dark, name.contains("without any uptake"), "{name}");
-        let mask = voxelise(&fit.model.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(
+            &fit.model.mesh,
+            volume.shape,
+            &volume.frame,
+            &Monitor::silent(),
+        )
+        .unwrap();
         let truth = Mask {
             shape: truth.shape,
             voxels: truth.voxels.iter().map(|v| *v > 0.5).collect(),

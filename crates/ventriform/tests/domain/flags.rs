@@ -142,7 +142,7 @@ fn the_right_ventricles_wall_is_not_taken_for_an_infarcted_septum_without_doubt(
         let Phantom { volume, truth, .. } = scan(&beside);
         let fit = segmented(&volume).unwrap();
         let wall = &fit.model.surfaces.as_ref().unwrap().anatomical.mesh;
-        let mask = voxelise(wall, volume.shape, &volume.frame);
+        let mask = voxelise(wall, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
         let truth = Mask {
             shape: truth.shape,
             voxels: truth.voxels.iter().map(|v| *v > 0.5).collect(),

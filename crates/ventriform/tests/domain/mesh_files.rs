@@ -14,8 +14,9 @@ use ventriform::export::{Format, Metadata, Part, encode};
 use ventriform::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes, topology};
 use ventriform::mesh_files::{
-    MeshFileError, MeshFrame, MeshStatement, MeshUnit, ReadMesh, look, read,
+    MeshFileError, MeshFrame, MeshStatement, MeshUnit, ReadMesh, look, read, read_watched,
 };
+use ventriform::progress::{CancelToken, Cancelled, Monitor, Silent};
 
 const MAX_BYTES: u64 = 1 << 24;
 
@@ -57,6 +58,18 @@ fn heart() -> TriMesh {
         *v = turn * *v + Vec3::new(-31.7, 143.9, -612.3);
     }
     mesh
+}
+
+#[test]
+fn a_reading_that_is_cancelled_gives_no_mesh_in_any_format() {
+    let token = CancelToken::new();
+    token.cancel();
+    let monitor = Monitor::new(&Silent, token);
+    for format in Format::ALL {
+        let bytes = encode(format, &heart(), &Metadata::new("cancelled")).unwrap();
+        let read = read_watched(&bytes, &silent(), MAX_BYTES, &monitor);
+        assert_eq!(read, Err(MeshFileError::Cancelled(Cancelled)), "{format:?}");
+    }
 }
 
 #[test]

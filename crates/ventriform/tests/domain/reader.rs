@@ -6,14 +6,14 @@
 use std::path::Path;
 use tempfile::TempDir;
 use ventriform::deform::WallEdge;
-use ventriform::evaluate::calibration::{Calibration, calibrate, cases_of};
+use ventriform::evaluate::calibration::{Calibration, CalibrationError, calibrate, cases_of};
 use ventriform::evaluate::sample::Sample;
 use ventriform::export::Format;
 use ventriform::grid::Volume;
 use ventriform::grid::voxelise::voxelise;
 use ventriform::model::Organ;
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
+use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::reader::{
     Learnt, LearntOn, ReaderDrawing, ReaderKind, ReaderLevel, ReaderOffset, ReaderOffsets,
     ReaderProfile, WallImage, drawn, measure,
@@ -87,7 +87,7 @@ fn cohort(seeds: &[u64], offsets: &ReaderOffsets) -> TempDir {
         let image = WallImage::about(&fit, volume, 1.0, &Monitor::silent()).unwrap();
         let (fit, share) = drawn(fit, &drawing, &image, &Monitor::silent()).unwrap();
         assert_eq!(share, 1.0);
-        let mask = voxelise(&fit.mesh, volume.shape, &volume.frame);
+        let mask = voxelise(&fit.mesh, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
         write_mask(&case, &mask.voxels, volume);
     }
     folder
@@ -209,7 +209,7 @@ fn a_level_draws_mask_and_mesh_alike_and_keeps_infarcts() {
     let [mesh, fitted] = [&made, &plain].map(|made| &made.segmentation.fit.model.mesh);
     assert_eq!(mesh.triangles, fitted.triangles);
     let volume = &made.reading.volume;
-    let own = voxelise(mesh, volume.shape, &volume.frame);
+    let own = voxelise(mesh, volume.shape, &volume.frame, &Monitor::silent()).unwrap();
     assert_eq!(own.voxels, made.segmentation.mask.voxels);
     // Dark wall stays wall: of the known wall as much is in the mask as by the fit.
     let share = |mask: &[bool]| {
@@ -234,9 +234,36 @@ fn a_level_draws_mask_and_mesh_alike_and_keeps_infarcts() {
     assert!(page.contains("drawn as reader one: at 50 % of the wall's brightest uptake"));
 }
 
+#[test]
+fn a_calibration_that_is_cancelled_blames_no_case() {
+    let drawn_by = ReaderOffsets {
+        endocardium: -2.5,
+        epicardium: 2.5,
+        rim: 0.0,
+    };
+    let folder = cohort(&[5, 6], &drawn_by);
+    let cases = cases_of(folder.path(), "lv_expert_img").unwrap();
+    let token = CancelToken::new();
+    let monitor = Monitor::new(&Silent, token.clone());
+    // After the first case, and before the others are judged.
+    let ended = calibrate(
+        &cases,
+        &FitParameters::default(),
+        &|_| token.cancel(),
+        &monitor,
+    );
+    assert!(matches!(ended, Err(CalibrationError::Cancelled(_))));
+}
+
 fn calibrated(folder: &Path) -> Calibration {
     let cases = cases_of(folder, "lv_expert_img").unwrap();
-    calibrate(&cases, &FitParameters::default(), &|_| ()).unwrap()
+    calibrate(
+        &cases,
+        &FitParameters::default(),
+        &|_| (),
+        &Monitor::silent(),
+    )
+    .unwrap()
 }
 
 #[test]

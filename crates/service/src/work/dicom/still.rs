@@ -47,18 +47,23 @@ pub fn object(
         limits,
     )?;
     let mesh = stored::mesh(item, MESH_FILE)?;
+    // A silent monitor is never cancelled.
+    let voxels_in = || {
+        let mask = voxelise(&mesh, facts.shape, &frame, &Monitor::silent());
+        mask.map_err(|error| broken_result(&error))
+    };
     let mask = match Resource::of(&item.id) {
         // A mask that is stored on another grid than the scan's.
         Some(Resource::Segmentation)
             if item.parameters.get("mask_grid") == Some(&"orthogonal".into()) =>
         {
-            voxelise(&mesh, facts.shape, &frame)
+            voxels_in()?
         }
         Some(Resource::Segmentation) => {
             let volume = stored::voxels(item, MASK_FILE, facts.shape, limits)?;
             stored::mask(&volume, |value| value > 0.5)
         }
-        _ => voxelise(&mesh, facts.shape, &frame),
+        _ => voxels_in()?,
     };
     let report = stored::required(item, REPORT_FILE)?;
     let text = stored::report_text(&report)?;

@@ -20,8 +20,8 @@ use crate::evaluate::error::EvaluateError;
 use crate::evaluate::files::{sha256_of, write_whole};
 use crate::gated::{self, GatedOrder, beat_figures};
 use crate::normals::{
-    ExcludedCase, GroupKind, GroupSex, HealthyScan, HeartFigure, NormalCase, NormalLimits,
-    NormalsError, ScanPlaces, group_of,
+    ExcludedCase, GroupError, GroupKind, GroupSex, HealthyScan, HeartFigure, NormalCase,
+    NormalLimits, NormalsError, ScanPlaces, group_of,
 };
 use crate::parameters::{BeatChoice, NormalsParameters};
 use crate::progress::{Cancelled, Monitor, Stage};
@@ -210,12 +210,15 @@ pub fn of_scans(
     let mut groups = Vec::new();
     for (number, (kind, people)) in kinds.iter().enumerate() {
         monitor.report(Stage::Report, number as f64 / kinds.len() as f64)?;
-        match group_of(kind, people) {
+        match group_of(kind, people, monitor) {
             Ok((group, odd)) => {
                 groups.push(group);
                 excluded.extend(odd);
             }
-            Err(error) => return Err(BuildError::Normals { error, excluded }),
+            Err(GroupError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(GroupError::Normals(error)) => {
+                return Err(BuildError::Normals { error, excluded });
+            }
         }
     }
     if groups.is_empty() {

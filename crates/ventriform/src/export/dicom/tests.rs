@@ -9,6 +9,7 @@ use crate::grid::voxelise::voxelise;
 use crate::mesh::shapes;
 use crate::normals::{GroupSex, NormalsFlag, NormalsUsed};
 use crate::polar::{PolarSegment, PolarSummary};
+use crate::progress::Monitor;
 use crate::report::segmentation_report::tests::first_report;
 use crate::report::{
     PerfusionReport, RaisedFlag, SegmentScore, SegmentationReport, TerritoryScore, Thickness,
@@ -99,7 +100,7 @@ impl Scene {
         for vertex in &mut mesh.vertices {
             *vertex += frame.to_patient(&middle) - centre + Vec3::new(1.0, -2.0, 3.0);
         }
-        let mask = voxelise(&mesh, SCAN_SHAPE, &frame);
+        let mask = voxelise(&mesh, SCAN_SHAPE, &frame, &Monitor::silent()).unwrap();
         assert!(mask.count() > 500);
         let mut report = first_report();
         report.volumes_ml.wall = 101.25;

@@ -77,10 +77,14 @@ impl GivenMask {
     ///
     /// # Errors
     /// [`GivenMaskError`].
-    pub fn of_volume(volume: &Volume, choice: &MaskChoice) -> Result<Self, GivenMaskError> {
-        let held = structures::of_volume(volume);
+    pub fn of_volume(
+        volume: &Volume,
+        choice: &MaskChoice,
+        monitor: &Monitor,
+    ) -> Result<Self, GivenMaskError> {
+        let held = structures::of_volume(volume, monitor)?;
         let chosen = choice::choose(&held, choice)?;
-        let voxels = held.voxels(volume, chosen);
+        let voxels = held.voxels(volume, chosen, monitor)?;
         Self::new(volume, voxels, held.describe(chosen))
     }
 
@@ -121,9 +125,9 @@ pub fn read_mask(
     };
     let surface = read::surface(files, &choice.mesh, limits, monitor).map_err(unreadable)?;
     if let Some((surface, reading)) = surface {
-        let held = structures::of_volume(&reading.volume);
+        let held = structures::of_volume(&reading.volume, monitor)?;
         let chosen = choice::choose(&held, choice)?;
-        let voxels = held.voxels(&reading.volume, chosen);
+        let voxels = held.voxels(&reading.volume, chosen, monitor)?;
         let mut given = GivenMask::new(&reading.volume, voxels, held.describe(chosen))?;
         given.surface = Some(surface).filter(|_| chosen == 1);
         return Ok(given);
@@ -134,8 +138,8 @@ pub fn read_mask(
         let chosen = choice::choose(&held, choice)?;
         let segment = u16::try_from(chosen).unwrap_or_default();
         let reading = read::read_segment(files, segment, limits, monitor).map_err(unreadable)?;
-        let carries = |v: &f32| *v == f32::from(segment);
-        let voxels = reading.volume.voxels.iter().map(carries).collect();
+        let carries = |v: f32| v == f32::from(segment);
+        let voxels = structures::those(&reading.volume.voxels, carries, monitor)?;
         return GivenMask::new(&reading.volume, voxels, held.describe(chosen));
     }
     let reading = read::read(files, &ReadOptions::default(), limits, monitor);
@@ -145,7 +149,7 @@ pub fn read_mask(
         return Err(GivenMaskError::Volumes { frames });
     }
     if !read::labels_are_rounded(&reading) {
-        return GivenMask::of_volume(&reading.volume, choice);
+        return GivenMask::of_volume(&reading.volume, choice, monitor);
     }
     let held = structures::of_labels(&reading.facts);
     let chosen = choice::choose(&held, choice)?;

@@ -19,6 +19,9 @@ const SAME_LATTICE_VOXELS: f64 = 1e-3;
 /// Voxels between two checks of the cancel token.
 const VOXELS_PER_CHECK: usize = 1 << 14;
 
+/// Rows of voxels between two checks of the cancel token.
+const ROWS_PER_CHECK: usize = 1024;
+
 /// Most voxels of the box that holds two masks.
 const MOST_VOXELS: u64 = 1 << 28;
 
@@ -50,9 +53,12 @@ impl GivenMask {
         let lattice = self.lattice(frame);
         let mut mask = Mask::empty(shape);
         let (mut inside, mut all) = (0, 0);
-        for (v, _) in self.mask.voxels.iter().enumerate().filter(|(_, set)| **set) {
-            if all % VOXELS_PER_CHECK == 0 {
+        for (v, set) in self.mask.voxels.iter().enumerate() {
+            if v % VOXELS_PER_CHECK == 0 {
                 monitor.check()?;
+            }
+            if !*set {
+                continue;
             }
             all += 1;
             let index = frame.to_voxel(&self.centre(v));
@@ -75,7 +81,7 @@ impl GivenMask {
             });
         }
         if let Some(surface) = &self.surface {
-            let mask = voxelise(surface, shape, frame);
+            let mask = voxelise(surface, shape, frame, monitor)?;
             if !mask.voxels.contains(&true) {
                 return Err(GivenMaskError::Empty);
             }
@@ -118,12 +124,12 @@ impl GivenMask {
     /// [`GivenMaskError::TooFarApart`].
     pub fn holding(&self, other: &Self, monitor: &Monitor) -> Result<Self, GivenMaskError> {
         let (mut low, mut high) = ([0_i64; 3], self.mask.shape.map(|n| n as i64 - 1));
-        for (n, (v, _)) in (other.mask.voxels.iter().enumerate())
-            .filter(|(_, set)| **set)
-            .enumerate()
-        {
-            if n % VOXELS_PER_CHECK == 0 {
+        for (v, set) in other.mask.voxels.iter().enumerate() {
+            if v % VOXELS_PER_CHECK == 0 {
                 monitor.check()?;
+            }
+            if !*set {
+                continue;
             }
             let index = self.frame.to_voxel(&other.centre(v));
             for axis in 0..3 {
@@ -143,6 +149,9 @@ impl GivenMask {
         let before = low.map(|l| -l as usize);
         let [nx, ny, _] = self.mask.shape;
         for (row, values) in self.mask.voxels.chunks(nx).enumerate() {
+            if row % ROWS_PER_CHECK == 0 {
+                monitor.check()?;
+            }
             let (j, k) = (row % ny + before[1], row / ny + before[2]);
             let begin = before[0] + shape[0] * (j + shape[1] * k);
             mask.voxels[begin..begin + nx].copy_from_slice(values);

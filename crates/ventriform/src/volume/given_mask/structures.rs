@@ -1,7 +1,7 @@
 //! The structures in a mask's file.
 
 use crate::grid::survey;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 use crate::volume::Segment;
 use crate::volume::{Volume, VolumeFacts};
 use std::collections::BTreeMap;
@@ -61,6 +61,9 @@ pub(super) enum HeldKind {
     /// Intensities.
     None,
 }
+
+/// Voxels between two looks at the cancel token.
+const VOXELS_PER_CHECK: usize = 1 << 18;
 
 /// Whole numbers that are labels however they lie.
 const SMALL_LABELS: usize = 8;
@@ -140,63 +143,61 @@ pub(super) fn of_labels(facts: &VolumeFacts) -> HeldStructures {
 }
 
 /// The structures of a volume.
-pub(super) fn of_volume(volume: &Volume) -> HeldStructures {
-    let finite = volume.voxels.iter().copied().filter(|v| v.is_finite());
-    let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
-    });
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) fn of_volume(volume: &Volume, monitor: &Monitor) -> Result<HeldStructures, Cancelled> {
+    let (low, high, not_finite) = survey::range(&volume.voxels, monitor)?;
     let held = |kind, objects: Vec<MaskStructure>, all| HeldStructures {
         kind,
         objects,
         all,
         range: [low, high],
     };
-    if let Some(values) = survey::whole_values(volume) {
+    if let Some(values) = survey::whole_values(volume, monitor)? {
         let mut labels = values.clone();
         labels.remove(&0);
         let objects = match labels.len() {
             // Every voxel is of the one structure, or none.
-            1 if values.len() == 1 && low == high && !has_gaps(volume) => labels,
-            _ => survey::objects(volume, &labels).0,
+            1 if values.len() == 1 && low == high && not_finite == 0 => labels,
+            _ => survey::objects(volume, &labels, monitor)?.0,
         };
         // Counts are whole numbers, too.
-        let counts = || matches!(survey::label_map(volume, &Monitor::silent()), Ok(None));
-        if objects.len() > SMALL_LABELS && counts() {
-            return held(HeldKind::None, Vec::new(), Vec::new());
+        if objects.len() > SMALL_LABELS && survey::label_map(volume, monitor)?.is_none() {
+            return Ok(held(HeldKind::None, Vec::new(), Vec::new()));
         }
         let list = |map: BTreeMap<i64, usize>| {
             map.into_iter()
                 .map(|(number, voxels)| label(number, voxels))
                 .collect()
         };
-        return held(HeldKind::Labels, list(objects), list(values));
+        return Ok(held(HeldKind::Labels, list(objects), list(values)));
     }
     let one = || vec![label(1, 0)];
-    if let Some(background) = two_values(volume) {
+    if let Some(background) = two_values(volume, monitor)? {
         let background = background.to_bits();
-        return held(HeldKind::TwoValues { background }, one(), Vec::new());
+        return Ok(held(HeldKind::TwoValues { background }, one(), Vec::new()));
     }
     // Scaling may exceed 1 by rounding.
-    if low >= 0.0 && high <= 1.0 + 1e-5 {
+    Ok(if low >= 0.0 && high <= 1.0 + 1e-5 {
         held(HeldKind::Probabilities, one(), Vec::new())
     } else {
         held(HeldKind::None, Vec::new(), Vec::new())
-    }
-}
-
-fn has_gaps(volume: &Volume) -> bool {
-    volume.voxels.iter().any(|v| v.is_nan())
+    })
 }
 
 /// The value at most of the border of a volume that has two values, missing ones counted as one; `None`
 /// for more or fewer.
-fn two_values(volume: &Volume) -> Option<f32> {
+fn two_values(volume: &Volume, monitor: &Monitor) -> Result<Option<f32>, Cancelled> {
     let [nx, ny, nz] = volume.shape;
     let value = |v: f32| if v.is_nan() { 0.0 } else { v };
     let first = value(volume.voxels[0]);
     let mut other = None;
     let mut border = [0_usize; 2];
     for (n, v) in volume.voxels.iter().enumerate() {
+        if n.is_multiple_of(VOXELS_PER_CHECK) {
+            monitor.check()?;
+        }
         let v = value(*v);
         let at = [n % nx, n / nx % ny, n / (nx * ny)];
         let outer = at
@@ -208,11 +209,10 @@ fn two_values(volume: &Volume) -> Option<f32> {
         } else if *other.get_or_insert(v) == v {
             border[1] += usize::from(outer);
         } else {
-            return None;
+            return Ok(None);
         }
     }
-    let other = other?;
-    Some(if border[0] >= border[1] { first } else { other })
+    Ok(other.map(|other| if border[0] >= border[1] { first } else { other }))
 }
 
 impl HeldStructures {
@@ -227,7 +227,15 @@ impl HeldStructures {
     }
 
     /// The voxels of `volume` that are of structure number `chosen`.
-    pub(super) fn voxels(&self, volume: &Volume, chosen: i64) -> Vec<bool> {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(super) fn voxels(
+        &self,
+        volume: &Volume,
+        chosen: i64,
+        monitor: &Monitor,
+    ) -> Result<Vec<bool>, Cancelled> {
         let inside = |v: f32| match self.kind {
             HeldKind::Segments | HeldKind::Labels => v == chosen as f32,
             HeldKind::Probabilities => v > 0.5,
@@ -237,6 +245,23 @@ impl HeldStructures {
             }
             HeldKind::None => false,
         };
-        volume.voxels.iter().map(|v| inside(*v)).collect()
+        those(&volume.voxels, inside, monitor)
     }
+}
+
+/// Of which of the values `inside` is true.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) fn those(
+    values: &[f32],
+    inside: impl Fn(f32) -> bool,
+    monitor: &Monitor,
+) -> Result<Vec<bool>, Cancelled> {
+    let mut found = Vec::with_capacity(values.len());
+    for portion in values.chunks(VOXELS_PER_CHECK) {
+        monitor.check()?;
+        found.extend(portion.iter().map(|v| inside(*v)));
+    }
+    Ok(found)
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::Vec3;
+use crate::progress::{CancelToken, Cancelled, Silent};
 use crate::volume::nifti::{self, StoredType};
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
@@ -44,7 +45,19 @@ fn named(label: &str) -> MaskChoice {
 }
 
 fn of(volume: &Volume, choice: &MaskChoice) -> Result<GivenMask, GivenMaskError> {
-    GivenMask::of_volume(volume, choice)
+    GivenMask::of_volume(volume, choice, &Monitor::silent())
+}
+
+#[test]
+fn a_mask_that_is_cancelled_is_refused_as_that() {
+    let token = CancelToken::new();
+    token.cancel();
+    let monitor = Monitor::new(&Silent, token);
+    for inside in [1.0, 0.25, 255.0] {
+        let scan = volume(|p| if wall(p) { inside } else { 0.0 });
+        let made = GivenMask::of_volume(&scan, &MaskChoice::default(), &monitor);
+        assert_eq!(made, Err(GivenMaskError::Cancelled(Cancelled)));
+    }
 }
 
 #[test]
@@ -399,7 +412,7 @@ fn a_surface_is_voxelised_on_the_grid_of_the_volume() {
     let grid = frame();
     let centre = grid.to_patient(&Vec3::new(5.3, 4.1, 2.8));
     mesh.vertices.iter_mut().for_each(|p| *p += centre);
-    let wanted = voxelise(&mesh, GRID_SHAPE, &grid);
+    let wanted = voxelise(&mesh, GRID_SHAPE, &grid, &Monitor::silent()).unwrap();
     let text = |mesh: &TriMesh, head: &str| {
         let points = mesh
             .vertices
