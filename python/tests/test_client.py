@@ -28,6 +28,47 @@ def test_upload_submit_wait_download_search(service: str, scan: pathlib.Path, fi
         assert list(client.search("volumes")) == []
 
 
+def test_whatever_holds_a_scan_is_uploaded(
+    service: str, scan: pathlib.Path, gated: pathlib.Path, tmp_path: pathlib.Path
+) -> None:
+    import nibabel
+    import numpy as np
+
+    sitk = pytest.importorskip("SimpleITK")
+    image = nibabel.load(scan)
+    (tmp_path / "folder/deep").mkdir(parents=True)
+    (tmp_path / "folder/deep/scan.nii.gz").write_bytes(scan.read_bytes())
+    # A pair of files is one volume.
+    nibabel.save(nibabel.Nifti1Pair(np.asarray(image.dataobj), image.affine), tmp_path / "pair.img")
+    with Client(service) as client, open(scan, "rb") as opened:
+        sources = {
+            "path": scan,
+            "text": str(scan),
+            "list": [scan],
+            "folder": tmp_path / "folder",
+            "pair": tmp_path / "pair.hdr",
+            "paths": [tmp_path / "pair.hdr", tmp_path / "pair.img"],
+            "bytes": scan.read_bytes(),
+            "open file": opened,
+            "Volume of a file": vf.read(scan),
+            "Volume of arrays": vf.Volume(np.asarray(image.dataobj), image.affine),
+            "nibabel": image,
+            "SimpleITK": sitk.ReadImage(str(scan)),
+        }
+        surfaces = set()
+        for name, source in sources.items():
+            stored = client.upload(source)
+            assert stored.shape == list(image.shape), name
+            done = client.wait(client.submit("segmentation", stored, model="auto").id)
+            # Its header names the volume.
+            surfaces.add(client.download(f"/v1/segmentations/{done.segmentation}/mesh.stl")[80:])
+        # The same voxels at the same place are the same result.
+        assert len(surfaces) == 1
+        whole = nibabel.load(gated)
+        beats = client.upload(vf.Volume(np.asarray(whole.dataobj), whole.affine), "beat.nii")
+        assert beats.frames == 8
+
+
 def test_a_refusal_has_field_reason_and_fix(service: str, scan: pathlib.Path) -> None:
     with Client(service) as client:
         volume = client.upload(scan)

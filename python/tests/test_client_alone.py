@@ -117,6 +117,11 @@ def test_other_arguments_are_checked(tmp_path: pathlib.Path) -> None:
     with Client("http://127.0.0.1:9") as client:
         assert refusal(lambda: client.upload(tmp_path)).field == "scan"
         assert refusal(lambda: client.upload("\0")).field == "scan"
+        (tmp_path / "text").write_text("no bytes")
+        with open(tmp_path / "text") as text:
+            assert refusal(lambda: client.upload(text)).field == "scan"
+        for nothing in (3, None, object(), {"a": 1}, [tmp_path / "text", b"x"]):
+            assert refusal(lambda nothing=nothing: client.upload(nothing)).field == "scan"  # type: ignore[misc]
         assert refusal(lambda: client.upload(b"x", 3)).field == "name"  # type: ignore[arg-type]
         assert refusal(lambda: client.request("GET", "/v1", color="red")).field == "options"
         assert refusal(lambda: client.download("/\0")).field == "url"
@@ -134,6 +139,31 @@ def test_numbers_of_numpy_and_uploads_are_sent(server: Server) -> None:
     }
     assert second["parameters"] == {"orbit": "180", "resample": True, "expert": "vol_1"}
     assert server.got[2][0] == "/v1/volumes?volume=vol_1&gated=true"
+
+
+def sent_files(body: bytes) -> dict[str, bytes]:
+    """The files of an upload's zip archive."""
+    import io
+    import zipfile
+
+    start = body.index(b"PK\3\4")
+    with zipfile.ZipFile(io.BytesIO(body[start:])) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_several_files_are_sent_as_one_archive(server: Server, tmp_path: pathlib.Path) -> None:
+    (tmp_path / "series/deep").mkdir(parents=True)
+    for name in ("series/a.dcm", "series/deep/b.dcm", "series/.hidden", "a.dcm"):
+        (tmp_path / name).write_bytes(name.encode())
+    with Client(address(server)) as client:
+        client.upload(tmp_path / "series")
+        client.upload([tmp_path / "series/a.dcm", tmp_path / "a.dcm"], "two")
+        client.upload([b"one", b"other"])
+    folder, paths, contents = (body for _, _, body in server.got)
+    assert sent_files(folder) == {"a.dcm": b"series/a.dcm", "deep/b.dcm": b"series/deep/b.dcm"}
+    assert b'filename="series.zip"' in folder and b'filename="two"' in paths
+    assert sorted(sent_files(paths).values()) == [b"a.dcm", b"series/a.dcm"]
+    assert sorted(sent_files(contents).values()) == [b"one", b"other"]
 
 
 def test_what_cannot_be_sent_is_refused_by_its_name() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import pathlib
+import pickle
 import shutil
 from typing import Any
 
@@ -38,12 +40,27 @@ def test_arrays_images_bytes_and_files_give_equal_fits(scan: pathlib.Path, fit: 
         "big-endian": vf.Volume(data.astype(">f8"), image.affine),
         "LPS": vf.Volume(data, lps, frame="LPS"),
         "list": [str(scan)],
+        "open file": io.BytesIO(scan.read_bytes()),
+        "open files": [io.BytesIO(scan.read_bytes())],
     }
     for name, source in sources.items():
         made = vf.segment(source)
         assert np.array_equal(made.mask, fit.mask), name
         assert figures(made) == figures(fit), name
         assert np.array_equal(made.affine, fit.affine), name
+
+
+def test_an_open_file_is_read_once_and_kept(scan: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    with open(scan, "rb") as opened:
+        volume = vf.read(opened)
+    assert np.array_equal(pickle.loads(pickle.dumps(volume)).array, vf.read(scan).array)
+    (tmp_path / "text.nii").write_text("no bytes")
+    with open(tmp_path / "text.nii") as text, pytest.raises(vf.InputError) as raised:
+        vf.read(text)
+    assert raised.value.field == "source" and "'rb'" in raised.value.fix
+    with pytest.raises(vf.InputError) as raised:
+        vf.read(text)
+    assert "closed" in raised.value.reason
 
 
 def test_datasets_of_pydicom_are_their_files() -> None:

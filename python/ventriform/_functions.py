@@ -35,16 +35,19 @@ def read(source: Any, *, frame: str = "RAS") -> Volume:
 
     Parameters
     ----------
-    source : path, sequence of paths, bytes, or image
-        NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a `Volume`; an image
-        of nibabel or SimpleITK; a dataset of pydicom, or those of a series. Files are read again when they are used, so
-        they must stay where they are.
+    source : path, sequence of paths, bytes, open file, or image
+        NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a file that is open
+        in binary mode, from where it is to its end; a `Volume`; an image of nibabel or SimpleITK; a dataset of pydicom, or
+        those of a series. Files named by paths are read again when they are used, so they must stay where they are.
     frame : {'RAS', 'LPS'}
         The patient frame of the volume's affine.
     """
     kept = checked(frame)
     if isinstance(source, Volume):
         return source.in_frame(kept)
+    # Its bytes are given out once.
+    if not _inputs.is_path(source) and _inputs.is_open_file(source):
+        source = _inputs.content(source)
     native = _inputs.native(source, unwrap)
     native.frames()
     return Volume._of(native, kept, _kept(source))

@@ -1,4 +1,4 @@
-"""What functions take: paths, bytes, arrays, and images of nibabel, SimpleITK and pydicom.
+"""What functions take: paths, bytes, open files, arrays, and images of nibabel, SimpleITK and pydicom.
 
 Images are recognised by what they can do, so that none of those packages is needed.
 """
@@ -16,6 +16,8 @@ from ._errors import InputError
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+Native = _native.NativeVolume
 
 #: Whole numbers beyond this are not told apart by the 32-bit floats that voxels are kept in.
 MOST_EXACT_WHOLE = 1 << 24
@@ -92,6 +94,23 @@ def is_bytes(source: Any) -> bool:
     return isinstance(source, (bytes, bytearray, memoryview))
 
 
+def is_open_file(source: Any) -> bool:
+    """Whether it is a file that is open for reading, or what reads like one."""
+    return callable(getattr(source, "read", None))
+
+
+def content(file: Any) -> bytes:
+    """The bytes that an open file still has to give."""
+    fix = "Open the file for reading in binary mode: open(path, 'rb')."
+    try:
+        found = file.read()
+    except (OSError, ValueError) as error:
+        raise InputError("source", f"The open file cannot be read: {error}.", fix) from error
+    if not is_bytes(found):
+        raise InputError("source", f"The open file gives {type(found).__name__}, not bytes.", fix)
+    return bytes(found)
+
+
 def is_nibabel(source: Any) -> bool:
     """Whether it is an image of nibabel."""
     return hasattr(source, "dataobj") and hasattr(source, "affine")
@@ -155,9 +174,15 @@ def of_simpleitk(image: Any) -> _native.NativeVolume:
 
 def unplaced(array: NDArray[np.float32], sizes_mm: Sequence[float]) -> _native.NativeVolume:
     """Voxels whose place in the patient no header states, as a NIfTI file that states none: they are read with its warning."""
+    return _native.NativeVolume.from_bytes([("the image", nifti_bytes(array, sizes_mm, None))])
+
+
+def nifti_bytes(array: NDArray[np.float32], sizes_mm: Sequence[float], ras: Sequence[Sequence[float]] | None) -> bytes:
+    """A NIfTI-1 file of 32-bit floats (i, j, k) or (i, j, k, gate); `ras` is the affine to RAS mm, if the file states one."""
     if max(array.shape) > MOST_NIFTI_VOXELS:
-        reason = f"The array has the shape {array.shape}, and the image does not state its place."
-        raise InputError("affine", reason, "Give ventriform.Volume(array, affine).")
+        reason = f"The array has the shape {array.shape}, and a NIfTI-1 file holds at most {MOST_NIFTI_VOXELS} voxels along an axis."
+        fix = "Give ventriform.Volume(array, affine)." if ras is None else "Write it as a file of another format, and give its path."
+        raise InputError("array", reason, fix)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
     struct.pack_into("<8h", header, 40, array.ndim, *array.shape, *[1] * (7 - array.ndim))
@@ -165,9 +190,27 @@ def unplaced(array: NDArray[np.float32], sizes_mm: Sequence[float]) -> _native.N
     struct.pack_into("<8f", header, 76, 1.0, *sizes_mm, *[1.0] * 4)
     struct.pack_into("<3f", header, 108, 352.0, 1.0, 0.0)
     header[123] = 2
+    if ras is not None:
+        struct.pack_into("<h", header, 254, 1)
+        struct.pack_into("<12f", header, 280, *[number for row in ras[:3] for number in row])
     header[344:348] = b"n+1\0"
-    content = bytes(header) + array.astype("<f4", copy=False).tobytes(order="F")
-    return _native.NativeVolume.from_bytes([("the image", content)])
+    return bytes(header) + array.astype("<f4", copy=False).tobytes(order="F")
+
+
+def files(volume: Native) -> list[tuple[str, Any]]:
+    """Name and path, or name and bytes, of the files that a volume is in; of arrays one file is made."""
+    import numpy as np
+
+    stored = volume.files()
+    if stored:
+        return stored
+    gates = [volume.voxels(gate)[0] for gate in range(volume.frames())]
+    array = gates[0] if len(gates) == 1 else np.stack(gates, axis=-1)
+    ras = np.array(volume.affine(), dtype=np.float64)
+    ras[:2] *= -1.0
+    ras += 0.0
+    sizes_mm = np.linalg.norm(ras[:3, :3], axis=0).tolist()
+    return [("array.nii", nifti_bytes(array, sizes_mm, ras.tolist()))]
 
 
 def dicom_bytes(dataset: Any, index: int = 0) -> tuple[str, bytes]:
@@ -187,7 +230,6 @@ def dicom_bytes(dataset: Any, index: int = 0) -> tuple[str, bytes]:
 
 
 Source = Any
-Native = _native.NativeVolume
 
 
 def native(source: Source, unwrap: Callable[[Any], Native | None]) -> Native:
@@ -199,6 +241,8 @@ def native(source: Source, unwrap: Callable[[Any], Native | None]) -> Native:
         return Native.from_paths([os.fspath(source)])
     if is_bytes(source):
         return Native.from_bytes([("bytes", bytes(source))])
+    if is_open_file(source):
+        return Native.from_bytes([("the open file", content(source))])
     if is_nibabel(source):
         return of_nibabel(source)
     if is_simpleitk(source):
@@ -210,6 +254,8 @@ def native(source: Source, unwrap: Callable[[Any], Native | None]) -> Native:
             return Native.from_paths([os.fspath(one) for one in source])
         if all(is_bytes(one) for one in source):
             return Native.from_bytes([(f"bytes{n}", bytes(one)) for n, one in enumerate(source, 1)])
+        if all(is_open_file(one) for one in source):
+            return Native.from_bytes([(f"file{n}", content(one)) for n, one in enumerate(source, 1)])
         if all(is_pydicom(one) for one in source):
             return Native.from_bytes([dicom_bytes(one, n) for n, one in enumerate(source, 1)])
         if len(source) == 1:
@@ -217,13 +263,14 @@ def native(source: Source, unwrap: Callable[[Any], Native | None]) -> Native:
     raise InputError(
         "source",
         f"A value of type {type(source).__name__} is no volume.",
-        "Give a path, paths, bytes, a ventriform.Volume, an image of nibabel or SimpleITK, or datasets of pydicom.",
+        "Give a path, paths, bytes, an open file, a ventriform.Volume, an image of nibabel or SimpleITK, or datasets of pydicom.",
     )
 
 
 def gates(source: Source, unwrap: Callable[[Any], Native | None]) -> list[Native]:
     """The volumes of a gated study: one that holds all gates, or one for each."""
     apart = isinstance(source, Sequence) and not is_path(source) and not is_bytes(source) and len(source) > 1
-    if apart and not any(is_path(one) or is_bytes(one) or is_pydicom(one) for one in source):
+    files_apart = (is_path, is_bytes, is_open_file, is_pydicom)
+    if apart and not any(check(one) for one in source for check in files_apart):
         return [native(one, unwrap) for one in source]
     return [native(source, unwrap)]

@@ -5,15 +5,18 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
+import tempfile
 import time
-from collections.abc import Iterator, Mapping
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 from . import _tables
 from ._errors import InputError, VentriformError
-from ._inputs import is_bytes, is_path
-from ._results import extra, teller
+from ._inputs import content, files, is_bytes, is_open_file, is_path, native
+from ._results import extra, teller, unwrap
 from .reports import Job, StoredVolume
 
 if TYPE_CHECKING:
@@ -21,6 +24,11 @@ if TYPE_CHECKING:
 
     import httpx
 
+
+Made = TypeVar("Made")
+
+#: Bytes of a file that are copied to an archive at once.
+COPIED_BYTES = 1 << 20
 
 #: Time between two questions for a job whose stream of events has ended.
 POLL_SECONDS = 0.2
@@ -146,23 +154,47 @@ class Client:
             raise InputError("url", f"{target}: {error}.", _ADDRESS) from error
 
     def upload(self, scan: Any, name: str | None = None) -> StoredVolume:
-        """Stores a volume. Takes a path or bytes: a file, or a zip archive of a series."""
+        """Stores a volume.
+
+        Parameters
+        ----------
+        scan : path, sequence of paths, bytes, open file, Volume or image
+            What `ventriform.read` takes. One file is sent as it is. The files of a series, a pair or a folder are sent as one
+            zip archive: of a folder those that `read` would look at. An array or an image is sent as a NIfTI file of 32-bit
+            floats.
+        name : str, optional
+            The file's name at the service, where there is another than its own.
+
+        Raises
+        ------
+        InputError
+            If it cannot be read or sent.
+        ServiceError
+            If the service refuses it, or is away.
+        """
         if name is not None and not isinstance(name, str):
             raise InputError("name", f"It is a {type(name).__name__}.", "Give the name of a file.")
-        if is_path(scan):
-            try:
-                file = open(scan, "rb")
-            except (OSError, ValueError) as error:
-                raise InputError("scan", f"{error}.", "Give the path of a file that can be read.") from error
-            with file:
-                return self._store(file, name or os.fsdecode(os.path.basename(scan)))
-        if not is_bytes(scan):
-            raise InputError("scan", f"A {type(scan).__name__} cannot be sent.", "Give a path or bytes.")
-        return self._store(io.BytesIO(bytes(scan)), name or "scan")
+        if is_bytes(scan):
+            return self._store(io.BytesIO(bytes(scan)), name or "scan")
+        if is_open_file(scan):
+            own = getattr(scan, "name", None)
+            known = os.path.basename(own) if isinstance(own, str) else "scan"
+            return self._store(io.BytesIO(_named(content, scan)), name or known or "scan")
+        found = _named(lambda: files(native(scan, unwrap)))
+        if len(found) > 1:
+            folder = os.fsdecode(os.path.basename(os.path.normpath(scan))) if is_path(scan) else "scan"
+            with tempfile.TemporaryFile() as archive:
+                _pack(found, archive)
+                return self._store(archive, name or f"{folder}.zip")
+        own, stored = found[0]
+        if is_bytes(stored):
+            return self._store(io.BytesIO(stored), name or own)
+        with _open(stored) as file:
+            return self._store(file, name or own)
 
     def _store(self, file: Any, name: str) -> StoredVolume:
-        files = {"file": (name, file, "application/octet-stream")}
-        return StoredVolume.from_dict(_object(self.request("POST", "/v1/volumes", files=files)))
+        sent = {"file": (name, file, "application/octet-stream")}
+        return StoredVolume.from_dict(_object(self.request("POST", "/v1/volumes", files=sent)))
 
     def submit(self, kind: str, volume: str | StoredVolume, **parameters: Any) -> Job:
         """Files a job on a stored volume.
@@ -283,6 +315,39 @@ _OWN = {
     "volume": "what `upload` returned, or its id",
 }
 """What the values of a job beside its parameters are."""
+
+
+def _named(make: Callable[..., Made], *given: Any) -> Made:
+    """What `make` makes of the parameter `scan`, by whose name it is refused."""
+    try:
+        return make(*given)
+    except InputError as error:
+        if error.field not in (None, "source"):
+            raise
+        raise type(error)("scan", error.reason, error.fix, error.code) from error
+
+
+def _open(path: Any) -> BinaryIO:
+    try:
+        return open(path, "rb")
+    except (OSError, ValueError) as error:
+        raise InputError("scan", f"{error}.", "Give the path of a file that can be read.") from error
+
+
+def _pack(found: list[tuple[str, Any]], archive: BinaryIO) -> None:
+    """Writes files to a zip archive, unpacked: volumes are packed already, or are not worth it on the way."""
+    taken: set[str] = set()
+    with zipfile.ZipFile(archive, "w", strict_timestamps=False) as packed:
+        for number, (own, stored) in enumerate(found, 1):
+            # Files of several folders may have one name.
+            named = own if own not in taken else f"{number}/{own}"
+            taken.add(named)
+            if is_bytes(stored):
+                packed.writestr(named, stored)
+                continue
+            with _open(stored) as file, packed.open(named, "w", force_zip64=True) as into:
+                shutil.copyfileobj(file, into, COPIED_BYTES)
+    archive.seek(0)
 
 
 def _url(address: Any, fix: str) -> httpx.URL:
