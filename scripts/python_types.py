@@ -129,7 +129,7 @@ def stub():
     tree = ast.parse(source)
     lines = ['"""Signatures of `_functions`. Written by scripts/python_types.py: change that, or the library\'s tables."""', ""]
     results = [alias.name for node in tree.body if getattr(node, "module", "") == "_results" for alias in node.names]
-    lines += ["import os", "from collections.abc import Mapping, Sequence", "from typing import Any, Literal", ""]
+    lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from typing import Any, Literal", ""]
     lines += [f"from ._results import {', '.join(name for name in results if name[0].isupper())}", ""]
     for node in tree.body:
         if isinstance(node, ast.Assign) and node.targets[0].id not in ("__all__",):

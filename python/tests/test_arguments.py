@@ -18,7 +18,7 @@ BAD: dict[str, tuple[str, Any]] = {
     "calibrate name": ("name", lambda: vf.calibrate(".", name=None)),  # type: ignore[arg-type]
     "normals list": ("cohort", lambda: vf.build_normals(["a"])),  # type: ignore[arg-type]
     "evaluate None": ("cohort", lambda: vf.evaluate(None, "out")),  # type: ignore[arg-type]
-    "evaluate out": ("out", lambda: vf.evaluate(".", None)),  # type: ignore[arg-type]
+    "evaluate out": ("out", lambda: vf.evaluate(".", 3)),  # type: ignore[arg-type]
     "evaluate points": ("points", lambda: vf.evaluate(".", "out", points=67)),  # type: ignore[arg-type]
     "evaluate a point": ("points", lambda: vf.evaluate(".", "out", points=[-1])),
     "evaluate words": ("points", lambda: vf.evaluate(".", "out", points="67")),  # type: ignore[arg-type]

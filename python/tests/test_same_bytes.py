@@ -114,6 +114,22 @@ def test_a_calibration_and_an_evaluation(folder: pathlib.Path, command: Command,
     made = vf.calibrate(cohort)
     assert made.profile.to_bytes() == (tmp_path / "reader.json").read_bytes()
     assert [case["case"] for case in made.cases] == ["p0", "p1"]
+    pairs = [(cohort / f"{case}/spect.nii.gz", cohort / f"{case}/lv_expert_img.nii.gz") for case in ("p0", "p1")]
+    named = {case: pair for case, pair in zip(("p0", "p1"), pairs, strict=True)}
+    contents = [(scan.read_bytes(), vf.read(mask)) for scan, mask in pairs]
+    for cases in (named, pairs, iter(pairs), reversed(pairs), contents):
+        assert vf.calibrate(cases).profile.to_bytes() == made.profile.to_bytes()
+    assert vf.calibrate(named).cases == made.cases
+    assert [case["case"] for case in vf.calibrate(pairs).cases] == ["case1", "case2"]
+    # Arrays have hashes of their own, and teach the same.
+    volumes = [vf.read(scan) for scan, _ in pairs]
+    masks = [vf.read(mask) for _, mask in pairs]
+    arrays = [
+        tuple(vf.Volume(one.array, one.affine) for one in pair) for pair in zip(volumes, masks, strict=True)
+    ]
+    ours, theirs = (json.loads(one.profile.to_bytes()) for one in (vf.calibrate(arrays), made))
+    assert ours.pop("learnt_on") != theirs.pop("learnt_on") and ours == theirs
+    assert vf.calibrate(arrays).profile.to_bytes() == vf.calibrate(arrays).profile.to_bytes()
     read_back = vf.segment(cohort / "p0/spect.nii.gz", reader=made.profile)
     command("segment", cohort / "p0/spect.nii.gz", "--model", "auto", "--reader", tmp_path / "reader.json", "-o", tmp_path / "out")
     assert_same(read_back.files, tmp_path / "out")
@@ -125,6 +141,11 @@ def test_a_calibration_and_an_evaluation(folder: pathlib.Path, command: Command,
     for name in ("table1.csv", "figure3.csv"):
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes()
     assert evaluation.table("table1") and evaluation.to_dict()
+    kept = vf.evaluate(cohort, points=[67], models=["optimised", "auto"])
+    assert kept.to_dict() == evaluation.to_dict() and kept.table("fits") == evaluation.table("fits")
+    temporary = pathlib.Path(kept.folder)
+    del kept
+    assert not temporary.exists()
 
 
 @pytest.mark.skipif(not (DATA / "cohort").is_dir(), reason="../shared/data/cohort is absent")

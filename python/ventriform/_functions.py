@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from . import _checks, _inputs, _native
@@ -256,18 +256,24 @@ def measure(
 
 @with_table("calibrate")
 def calibrate(
-    cohort: Path, *, mask: str = "lv_expert_img", name: str = "reader", progress: Any = None, **parameters: Any
+    cohort: Path | Mapping[str, tuple[Any, Any]] | Iterable[tuple[Any, Any]],
+    *,
+    mask: str = "lv_expert_img",
+    name: str = "reader",
+    progress: Any = None,
+    **parameters: Any,
 ) -> Calibration:
     """Learns how a reader draws the wall, as `ventriform calibrate`.
 
-    Ctrl-C returns at once; fits that have begun end by themselves.
-
     Parameters
     ----------
-    cohort : path
-        A folder with a folder for each case, which holds spect.nii.gz (or .nii, .dcm) and the reader's mask.
+    cohort : path, dict of str to (scan, mask), or iterable of (scan, mask)
+        A folder with a folder for each case, which holds spect.nii.gz (or .nii, .dcm) and the reader's mask. Or the cases
+        themselves: scans as `read` takes them, masks as `measure` does. Without names they are case1, case2 and so on. Files
+        give the profile, byte for byte, that a folder of them gives in that order; the profile names a file by its hash,
+        and an array by that of its values and place.
     mask : str
-        Name of the masks' files, without .nii.gz.
+        Name of the masks' files in a folder, without .nii.gz.
     name : str
         The reader's name in reports.
     progress : callable or tqdm, optional
@@ -285,9 +291,9 @@ def calibrate(
     """
     import json
 
-    folder, of_masks = _checks.path("cohort", cohort), _checks.text("mask", mask)
+    of_masks = _checks.text("mask", mask)
     _checks.text("name", name)
-    text, figures = _native.calibrate(folder, of_masks, parameters, teller(progress))
+    text, figures = _native.calibrate(_cases(cohort), of_masks, parameters, teller(progress))
     table = json.loads(figures)
     return Calibration(Profile(text.encode(), name), table["cases"], table["problems"])
 
@@ -319,7 +325,7 @@ def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> N
 
 def evaluate(
     cohort: Path,
-    out: Path,
+    out: Path | None = None,
     *,
     points: Sequence[int] = (67, 110, 150, 200, 300),
     reference_points: Sequence[int] = (67,),
@@ -336,14 +342,15 @@ def evaluate(
 ) -> Evaluation:
     """Makes models of a cohort's templates, fits them to every patient and writes tables, as `ventriform evaluate`.
 
-    Ctrl-C returns at once; fits that have begun end by themselves. Existing fits in `out` are reused.
+    Existing fits in `out` are reused, those of a call that Ctrl-C ended too.
 
     Parameters
     ----------
     cohort : path
         A folder with a folder for each case: spect.nii.gz, lv_expert_img.nii.gz and lv_truth.nii.gz.
-    out : path
-        Folder for the results, made if it is missing.
+    out : path, optional
+        Folder for the results, made if it is missing. Without it they are in a temporary one, for as long as what is
+        returned is kept.
     points, reference_points : sequence of int
         Numbers of points of our models, and of the reference model.
     models : sequence of {'reference', 'retiled', 'optimised', 'auto'}
@@ -374,11 +381,14 @@ def evaluate(
     InputError
         If the folder is no cohort, or no fit succeeded.
     """
+    import tempfile
+
     _checks.one_of("method", method, ("refined", "paper"))
     _check_mesh(mesh_unit, mesh_frame)
-    folder = _checks.path("out", out)
+    if out is not None:
+        _checks.path("out", out)
     order = {
-        "cohort": _checks.path("cohort", cohort), "out": folder,
+        "cohort": _checks.path("cohort", cohort),
         "points": _checks.wholes("points", points, 0, _checks.MOST_POINTS),
         "reference_points": _checks.wholes("reference_points", reference_points, 0, _checks.MOST_POINTS),
         "models": _checks.words("models", models), "method": method,
@@ -388,7 +398,10 @@ def evaluate(
         "in_sample": ["all"] if in_sample == "all" else _checks.words("in_sample", in_sample),
         "program": _program(),
     }
-    return Evaluation(folder, _native.evaluate(order, teller(progress)))
+    told = teller(progress)
+    temporary = tempfile.TemporaryDirectory(prefix="ventriform-") if out is None else None
+    folder = temporary.name if temporary is not None else _checks.path("out", out)
+    return Evaluation(folder, _native.evaluate({**order, "out": folder}, told), temporary=temporary)
 
 
 def phantom(
@@ -471,6 +484,31 @@ def _stem(source: Any, otherwise: str) -> str:
     if not _inputs.is_path(source):
         return otherwise
     return os.path.basename(os.fspath(source)).split(".")[0] or otherwise
+
+
+def _cases(cohort: Any) -> Any:
+    """The folder of a cohort as it is, or name, scan and mask of each case."""
+    if _inputs.is_path(cohort):
+        return _checks.path("cohort", cohort)
+    fix = "Give a folder, pairs (scan, mask), or a dictionary of names and such pairs."
+    if isinstance(cohort, Mapping):
+        named = list(cohort.items())
+    elif _inputs.is_bytes(cohort) or not isinstance(cohort, Iterable):
+        raise InputError("cohort", f"A {type(cohort).__name__} is neither a folder nor cases.", fix)
+    else:
+        named = [(f"case{number}", pair) for number, pair in enumerate(cohort, 1)]
+    cases = []
+    for name, pair in named:
+        if not isinstance(name, str):
+            raise InputError("cohort", f"The name {name!r} is no text.", fix)
+        if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+            raise InputError("cohort", f"{name} is no pair of a scan and a mask.", fix)
+        try:
+            scan, mask = (_inputs.native(one, unwrap) for one in (pair[0], _mask(pair[1])))
+        except InputError as error:
+            raise InputError("cohort", f"{name}: {error.reason}", error.fix, error.code) from error
+        cases.append((name, scan, mask))
+    return cases
 
 
 def _check_mesh(unit: str | None, frame: str | None) -> None:

@@ -1,7 +1,7 @@
 """Signatures of `_functions`. Written by scripts/python_types.py: change that, or the library's tables."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume
@@ -221,7 +221,7 @@ def measure(
     progress: Any = None,
 ) -> Measured: ...
 def calibrate(
-    cohort: Path,
+    cohort: Path | Mapping[str, tuple[Any, Any]] | Iterable[tuple[Any, Any]],
     *,
     mask: str = 'lv_expert_img',
     name: str = 'reader',
@@ -300,7 +300,7 @@ def build_normals(
 ) -> NormalLimits: ...
 def evaluate(
     cohort: Path,
-    out: Path,
+    out: Path | None = None,
     *,
     points: Sequence[int] = (67, 110, 150, 200, 300),
     reference_points: Sequence[int] = (67,),

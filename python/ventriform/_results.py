@@ -734,16 +734,21 @@ class Evaluation:
     Attributes
     ----------
     folder : str
-        Where the files are: evaluation.html, evaluation.json, table1.csv, figure3.csv, fits.csv, models/ and fits/.
+        Where the files are: evaluation.html, evaluation.json, table1.csv, figure3.csv, fits.csv, models/ and fits/. Of an
+        evaluation without `out` it is removed with this object.
     problems : list of (str, str)
         Cases or models that could not be used, and why.
     """
 
-    __slots__ = ("folder", "problems")
+    __slots__ = ("_temporary", "folder", "problems")
 
-    def __init__(self, folder: str, problems: list[tuple[str, str]]) -> None:
+    def __init__(self, folder: str, problems: list[tuple[str, str]], *, temporary: Any = None) -> None:
         self.folder = folder
         self.problems = problems
+        self._temporary = temporary
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Evaluation, (self.folder, self.problems)
 
     def table(self, name: str) -> list[dict[str, str]]:
         """The rows of `table1`, `figure3` or `fits`."""
