@@ -11,6 +11,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
+use super::table::{CellKind, Table};
 use super::text::leaves;
 
 const DOCUMENT_STYLE: &str = include_str!("document.css");
@@ -146,6 +147,38 @@ pub fn figures(figures: &[HeadlineFigure]) -> Markup {
                 div.figure {
                     b { (figure.value) " " small { (figure.unit) } }
                     span { (figure.label) }
+                }
+            }
+        }
+    }
+}
+
+/// A table that is scrolled where there is no room for it; `name` says what it is.
+pub fn table(table: &Table, name: &str) -> Markup {
+    let number = |column: usize| table.columns[column].kind == CellKind::Number;
+    let names_row = |column: usize| table.columns[column].kind == CellKind::Name;
+    html! {
+        div.scroll tabindex="0" role="group" aria-label=(format!("{name}, scrollable")) {
+            table {
+                thead {
+                    tr {
+                        @for (at, column) in table.columns.iter().enumerate() {
+                            th.n[number(at)] scope="col" { (column.title) }
+                        }
+                    }
+                }
+                tbody {
+                    @for row in &table.rows {
+                        tr {
+                            @for (at, cell) in row.iter().enumerate().take(table.columns.len()) {
+                                @if names_row(at) {
+                                    th scope="row" { (cell) }
+                                } @else {
+                                    td.n[number(at)] { (cell) }
+                                }
+                            }
+                        }
+                    }
                 }
             }
         }

@@ -1,83 +1,162 @@
-//! Digits, a dash, the sign for per cent and some capitals as strokes: enough to label a picture without a
-//! font.
+//! Characters as pixels, for pictures that no viewer's font is at hand for: Noto Sans Mono in four sizes and two weights.
+//!
+//! Drawn are the printable characters of ASCII, Latin-1 and Latin Extended-A, and what [`drawn_as`] draws by one of them.
+//! Any other character, a control character too, is drawn as [`UNKNOWN_CHARACTER`]: no character is left out.
 
-/// A point of a stroke: `x` 0..=10 to the right, `y` 0..=14 down from the top of a capital.
-pub type GlyphPoint = (i8, i8);
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
-/// Height of a capital or a digit in the strokes' units.
-pub const CAPITAL_HEIGHT: f64 = 14.0;
-/// Width of a character.
-pub const GLYPH_WIDTH: f64 = 10.0;
+/// Stands for a character that cannot be drawn.
+pub const UNKNOWN_CHARACTER: char = '\u{fffd}';
 
-/// The strokes of a character; none for one that is not known.
-#[rustfmt::skip]
-pub fn strokes(character: char) -> &'static [&'static [GlyphPoint]] {
+/// Height of a text (SVG's font size) as a share of the height of its line.
+const SIZE_SHARE: f64 = 0.734;
+
+/// Thickness of characters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weight {
+    /// That of running text.
+    Regular,
+    /// That of headings.
+    Bold,
+}
+
+/// Characters of one size and weight, all of one width.
+#[derive(Debug, Clone, Copy)]
+pub struct Font {
+    weight: FontWeight,
+    raster: RasterHeight,
+}
+
+impl Font {
+    /// The characters whose height is next to `size`, pixels (SVG's font size).
+    pub fn nearest(size: f64, weight: Weight) -> Self {
+        const RASTERS: [RasterHeight; 4] = [
+            RasterHeight::Size16,
+            RasterHeight::Size20,
+            RasterHeight::Size24,
+            RasterHeight::Size32,
+        ];
+        let distance = |raster: RasterHeight| (SIZE_SHARE * raster.val() as f64 - size).abs();
+        let raster = RASTERS.into_iter().reduce(|best, next| {
+            if distance(next) < distance(best) {
+                next
+            } else {
+                best
+            }
+        });
+        Self {
+            weight: match weight {
+                Weight::Regular => FontWeight::Regular,
+                Weight::Bold => FontWeight::Bold,
+            },
+            raster: raster.unwrap_or(RasterHeight::Size16),
+        }
+    }
+
+    /// Width of a character with its spacing, pixels.
+    pub fn character_width(self) -> usize {
+        get_raster_width(self.weight, self.raster)
+    }
+
+    /// Height of a line, pixels.
+    pub fn line_height(self) -> usize {
+        self.raster.val()
+    }
+
+    /// How far below the top of a line the middle of its capitals lies, pixels.
+    pub fn capital_middle(self) -> f64 {
+        match self.raster {
+            RasterHeight::Size16 => 8.5,
+            RasterHeight::Size20 => 11.0,
+            RasterHeight::Size24 => 12.5,
+            RasterHeight::Size32 => 16.5,
+        }
+    }
+
+    /// How much of each pixel `character` covers, 0 to 255, row by row: [`Font::character_width`] times
+    /// [`Font::line_height`] of them; none for a character that has no ink.
+    pub fn coverage(self, character: char) -> &'static [u8] {
+        let glyph = |character| get_raster(character, self.weight, self.raster);
+        let glyph = glyph(drawn_as(character)).or_else(|| glyph(UNKNOWN_CHARACTER));
+        glyph.map_or(&[][..], |glyph| glyph.pixels())
+    }
+}
+
+/// The character that `character` is drawn as: dashes, quotation marks and spaces as those of ASCII, what the font lacks
+/// as [`UNKNOWN_CHARACTER`], any other as itself.
+pub fn drawn_as(character: char) -> char {
     match character {
-        '0' => &[&[
-            (5, 0), (8, 1), (10, 4), (10, 10), (8, 13), (5, 14), (2, 13), (0, 10), (0, 4), (2, 1),
-            (5, 0),
-        ]],
-        '1' => &[&[(1, 4), (6, 0), (6, 14)]],
-        '2' => &[&[(0, 4), (1, 1), (3, 0), (7, 0), (9, 1), (10, 4), (9, 7), (0, 14), (10, 14)]],
-        '3' => &[
-            &[(0, 2), (3, 0), (7, 0), (9, 1), (10, 3), (9, 6), (7, 7), (4, 7)],
-            &[(7, 7), (9, 8), (10, 10), (9, 13), (7, 14), (3, 14), (0, 12)],
-        ],
-        '4' => &[&[(8, 14), (8, 0), (0, 10), (10, 10)]],
-        '5' => &[&[
-            (9, 0), (1, 0), (0, 7), (3, 5), (6, 5), (9, 6), (10, 9), (9, 12), (7, 14), (3, 14),
-            (0, 12),
-        ]],
-        '6' => &[&[
-            (9, 1), (7, 0), (4, 0), (1, 3), (0, 7), (0, 10), (1, 13), (4, 14), (6, 14), (9, 13),
-            (10, 10), (10, 9), (9, 6), (6, 5), (4, 5), (1, 6), (0, 9),
-        ]],
-        '7' => &[&[(0, 0), (10, 0), (4, 14)]],
-        '8' => &[&[
-            (3, 7), (1, 5), (1, 2), (3, 0), (7, 0), (9, 2), (9, 5), (7, 7), (3, 7), (0, 9), (0, 12),
-            (3, 14), (7, 14), (10, 12), (10, 9), (7, 7),
-        ]],
-        '9' => &[&[
-            (1, 13), (3, 14), (6, 14), (9, 11), (10, 7), (10, 4), (9, 1), (6, 0), (4, 0), (1, 1),
-            (0, 4), (0, 5), (1, 8), (4, 9), (6, 9), (9, 8), (10, 5),
-        ]],
-        '-' => &[&[(2, 8), (8, 8)]],
-        '%' => &[
-            &[(9, 0), (1, 14)],
-            &[(1, 0), (3, 0), (4, 2), (3, 4), (1, 4), (0, 2), (1, 0)],
-            &[(7, 10), (9, 10), (10, 12), (9, 14), (7, 14), (6, 12), (7, 10)],
-        ],
-        'A' => &[&[(0, 14), (5, 0), (10, 14)], &[(2, 9), (8, 9)]],
-        'C' => &[&[
-            (10, 3), (8, 1), (6, 0), (4, 0), (1, 2), (0, 5), (0, 9), (1, 12), (4, 14), (6, 14),
-            (8, 13), (10, 11),
-        ]],
-        'D' => &[&[
-            (1, 0), (1, 14), (5, 14), (8, 12), (10, 9), (10, 5), (8, 2), (5, 0), (1, 0),
-        ]],
-        'E' => &[&[(9, 0), (1, 0), (1, 14), (9, 14)], &[(1, 7), (7, 7)]],
-        'H' => &[&[(1, 0), (1, 14)], &[(9, 0), (9, 14)], &[(1, 7), (9, 7)]],
-        'I' => &[&[(5, 0), (5, 14)]],
-        'K' => &[&[(1, 0), (1, 14)], &[(9, 0), (1, 8)], &[(4, 6), (10, 14)]],
-        'L' => &[&[(1, 0), (1, 14), (9, 14)]],
-        'N' => &[&[(0, 14), (0, 0), (10, 14), (10, 0)]],
-        'O' => &[&[
-            (5, 0), (8, 1), (10, 4), (10, 10), (8, 13), (5, 14), (2, 13), (0, 10), (0, 4), (2, 1),
-            (5, 0),
-        ]],
-        'R' => &[
-            &[(1, 14), (1, 0), (6, 0), (9, 1), (10, 3), (10, 5), (9, 7), (6, 8), (1, 8)],
-            &[(5, 8), (10, 14)],
-        ],
-        'S' => &[&[
-            (10, 3), (8, 1), (6, 0), (4, 0), (1, 1), (0, 3), (1, 6), (3, 7), (7, 7), (9, 8),
-            (10, 11), (9, 13), (6, 14), (4, 14), (2, 13), (0, 11),
-        ]],
-        'T' => &[&[(0, 0), (10, 0)], &[(5, 0), (5, 14)]],
-        'U' => &[&[(0, 0), (0, 10), (2, 13), (5, 14), (8, 13), (10, 10), (10, 0)]],
-        'V' => &[&[(0, 0), (5, 14), (10, 0)]],
-        'W' => &[&[(0, 0), (2, 14), (5, 4), (8, 14), (10, 0)]],
-        'X' => &[&[(0, 0), (10, 14)], &[(10, 0), (0, 14)]],
-        _ => &[],
+        '\u{2010}'..='\u{2015}' | '\u{2212}' => '-',
+        '\u{2018}' | '\u{2019}' => '\'',
+        '\u{201c}' | '\u{201d}' => '"',
+        '\u{a0}' | '\u{2002}'..='\u{200a}' | '\u{202f}' => ' ',
+        ' '..='~' | '\u{a1}'..='\u{ac}' | '\u{ae}'..='\u{17f}' => character,
+        _ => UNKNOWN_CHARACTER,
+    }
+}
+
+/// Whether all of `text` is drawn as it is written.
+pub fn is_drawn(text: &str) -> bool {
+    !text.chars().any(|c| drawn_as(c) == UNKNOWN_CHARACTER)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: [f64; 4] = [12.0, 15.0, 18.0, 23.0];
+    const WEIGHTS: [Weight; 2] = [Weight::Regular, Weight::Bold];
+
+    /// Whatever a name is written in, each of its characters leaves ink, and those of ASCII are told apart.
+    #[test]
+    fn every_character_is_drawn_and_those_of_ascii_differ() {
+        for (size, weight) in SIZES.into_iter().flat_map(|s| WEIGHTS.map(|w| (s, w))) {
+            let font = Font::nearest(size, weight);
+            let pixels = font.character_width() * font.line_height();
+            let mut seen = std::collections::BTreeMap::new();
+            for character in (0..=0xffff).filter_map(char::from_u32) {
+                let coverage = font.coverage(character);
+                assert_eq!(coverage.len(), pixels, "{character:?}");
+                let space = drawn_as(character) == ' ';
+                assert_eq!(coverage.iter().all(|c| *c == 0), space, "{character:?}");
+                if character.is_ascii_graphic() {
+                    let other = seen.insert(coverage, character);
+                    assert_eq!(other, None, "{character:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn capitals_lie_about_their_middle() {
+        for (size, weight) in SIZES.into_iter().flat_map(|s| WEIGHTS.map(|w| (s, w))) {
+            let font = Font::nearest(size, weight);
+            let lines = font.coverage('H').chunks(font.character_width());
+            let inked = lines.map(|line| line.iter().any(|c| *c > 100));
+            let rows: Vec<usize> = (0..)
+                .zip(inked)
+                .filter(|(_, ink)| *ink)
+                .map(|(n, _)| n)
+                .collect();
+            let middle = (rows[0] + rows[rows.len() - 1] + 1) as f64 / 2.0;
+            assert!(
+                (middle - font.capital_middle()).abs() <= 0.5,
+                "{size}: {middle}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_known() {
+        for (text, whole) in [
+            ("Müller^Jürgen − 5 °", true),
+            ("Łukasz Őry", true),
+            ("山田^太郎", false),
+            ("Ιωάννης", false),
+            ("a\u{202e}b", false),
+            ("a\nb", false),
+        ] {
+            assert_eq!(is_drawn(text), whole, "{text}");
+        }
     }
 }

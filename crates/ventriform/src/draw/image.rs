@@ -1,4 +1,6 @@
-//! Pixels, and the one PNG encoder.
+//! Pixels, the one PNG encoder, and the decoder of what it wrote.
+
+use std::io::Cursor;
 
 /// Pixels of one (grey), three (RGB) or four (RGBA) bytes, row by row from the top left.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,6 +66,88 @@ impl<const CHANNELS: usize> Image<CHANNELS> {
     }
 }
 
+impl Image<3> {
+    /// The pixels of a PNG file with eight bits per channel; transparent pixels become white.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    pub fn from_png(png: &[u8]) -> Result<Self, String> {
+        let text = |error: png::DecodingError| error.to_string();
+        let mut decoder = png::Decoder::new(Cursor::new(png));
+        decoder.set_transformations(png::Transformations::normalize_to_color8());
+        let mut reader = decoder.read_info().map_err(text)?;
+        let size = reader.output_buffer_size().ok_or("too large")?;
+        let mut bytes = vec![0; size];
+        let info = reader.next_frame(&mut bytes).map_err(text)?;
+        bytes.truncate(info.buffer_size());
+        let channels = info.color_type.samples();
+        let pixel = |p: &[u8]| match *p {
+            [grey] => [grey; 3],
+            [grey, alpha] => over_white([grey; 3], alpha),
+            [red, green, blue, alpha] => over_white([red, green, blue], alpha),
+            _ => [p[0], p[1], p[2]],
+        };
+        Ok(Self {
+            width: info.width as usize,
+            height: info.height as usize,
+            pixels: bytes.chunks_exact(channels).map(pixel).collect(),
+        })
+    }
+
+    /// The image with `width` pixels in a row and as many rows as keep its shape: each pixel is the mean of what it
+    /// covers of the image.
+    #[must_use]
+    pub fn of_width(&self, width: usize) -> Self {
+        let height = (self.height * width + self.width / 2) / self.width.max(1);
+        if (width, height) == (self.width, self.height) || self.pixels.is_empty() {
+            return self.clone();
+        }
+        let columns = covered(self.width, width);
+        let rows = covered(self.height, height);
+        let mut pixels = Vec::with_capacity(width * height);
+        for row in &rows {
+            for column in &columns {
+                let mut sums = [0.0; 3];
+                for (y, high) in row {
+                    for (x, wide) in column {
+                        let pixel = self.pixels[y * self.width + x];
+                        for (sum, part) in sums.iter_mut().zip(pixel) {
+                            *sum += high * wide * f64::from(part);
+                        }
+                    }
+                }
+                pixels.push(sums.map(|sum| sum.round().clamp(0.0, 255.0) as u8));
+            }
+        }
+        Self {
+            width,
+            height,
+            pixels,
+        }
+    }
+}
+
+/// Of each of `to` equal parts of a row of `from` pixels, the pixels that it covers, and their shares of it.
+fn covered(from: usize, to: usize) -> Vec<Vec<(usize, f64)>> {
+    let ratio = from as f64 / to as f64;
+    let part = |number: usize| {
+        let (low, high) = (number as f64 * ratio, (number + 1) as f64 * ratio);
+        let last = (high.ceil() as usize).min(from);
+        (low as usize..last)
+            .map(|pixel| {
+                let inside = high.min(pixel as f64 + 1.0) - low.max(pixel as f64);
+                (pixel, inside.max(0.0) / ratio)
+            })
+            .collect()
+    };
+    (0..to).map(part).collect()
+}
+
+fn over_white(colour: [u8; 3], alpha: u8) -> [u8; 3] {
+    let (own, white) = (u32::from(alpha), u32::from(255 - alpha));
+    colour.map(|c| ((u32::from(c) * own + 255 * white) / 255) as u8)
+}
+
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -97,5 +181,33 @@ pub(crate) mod tests {
         assert_eq!((row.width, row.height), (4, 3));
         let expected = [1, 0, 0, 0, 1, 0, 2, 2, 1, 0, 0, 0];
         assert_eq!(row.pixels.as_flattened(), expected);
+    }
+
+    #[test]
+    fn a_png_is_read_again_and_what_is_clear_is_white() {
+        let mut image = Image::filled(3, 2, [9, 8, 7]);
+        image.pixels[4] = [1, 2, 3];
+        assert_eq!(Image::from_png(&image.png()), Ok(image));
+        let grey = Image::from_png(&Image::filled(2, 1, [5]).png());
+        assert_eq!(grey, Ok(Image::filled(2, 1, [5; 3])));
+        let clear = Image::from_png(&Image::filled(1, 1, [1, 2, 3, 0]).png());
+        assert_eq!(clear, Ok(Image::filled(1, 1, [255; 3])));
+        assert!(Image::from_png(b"no picture").is_err());
+    }
+
+    #[test]
+    fn a_reduced_image_has_the_means_of_what_it_covers() {
+        let mut image = Image::filled(3, 3, [0; 3]);
+        image.pixels[4] = [90, 180, 45];
+        let one = image.of_width(1);
+        assert_eq!((one.width, one.height), (1, 1));
+        assert_eq!(one.pixels, [[10, 20, 5]]);
+        let two = image.of_width(2);
+        assert_eq!(two.pixels, [[10, 20, 5]; 4]);
+        assert_eq!(image.of_width(3), image);
+        // Twice as large, each pixel is four.
+        let large = image.of_width(6);
+        assert_eq!(large.pixels[2 * 6 + 3], [90, 180, 45]);
+        assert_eq!(large.pixels[5 * 6 + 5], [0; 3]);
     }
 }

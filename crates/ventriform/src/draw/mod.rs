@@ -3,7 +3,8 @@
 //! | in | out | module |
 //! |---|---|---|
 //! | pixels | a PNG file | [`image`] |
-//! | polygons, lines, circles, labels | SVG, or pixels | [`vector`] |
+//! | polygons, lines, circles, labels, pictures | SVG, or pixels | [`vector`] |
+//! | headings, sentences, figures, tables, pictures | one picture of a page | [`sheet`] |
 //! | counts, series, bars | charts as inline SVG | [`chart`] |
 //! | a triangle mesh | shaded pictures from three sides, and one to turn | [`views`] |
 //! | headings, figures, tables | one self-contained HTML page | [`document`] |
@@ -14,8 +15,10 @@
 pub mod chart;
 pub mod document;
 pub mod facets;
-mod glyphs;
+pub mod glyphs;
 pub mod image;
+pub mod sheet;
+pub mod table;
 pub mod text;
 pub mod vector;
 pub mod views;

@@ -3,13 +3,14 @@
 //! In: shapes in pixels from the top left, x to the right and y down, each drawn over those
 //! before it. Out: [`Drawing::svg`] or [`Drawing::image`]. In the pixels, lines, circles and text
 //! are smooth: a pixel at an edge is blended by how far inside its centre lies. Polygons are not,
-//! so that no seams show between neighbours. Text in the pixels consists of strokes and can
-//! contain only the characters of `glyphs`.
+//! so that no seams show between neighbours. Text in the pixels has the characters and the four sizes of `glyphs`,
+//! which are all of one width ([`text_width`]).
 
 use maud::{Markup, html};
 
-use super::glyphs;
+use super::glyphs::{Font, Weight};
 use super::image::Image;
+use super::text::data_uri;
 
 /// Pixels to the right and down from the top left corner.
 pub type Point = [f64; 2];
@@ -61,10 +62,14 @@ pub enum VectorShape {
     },
     /// A line of text.
     Label {
-        /// Its middle.
-        middle: Point,
+        /// The height of the capitals' middle, and the place that `anchor` says.
+        at: Point,
+        /// The part of the text that is there.
+        anchor: Anchor,
         /// The text.
         text: String,
+        /// Thickness of its characters.
+        weight: Weight,
         /// Height of a line of text, pixels (SVG's font size).
         size: f64,
         /// Its colour.
@@ -72,18 +77,46 @@ pub enum VectorShape {
         /// Colour of a rim about each character.
         rim: Option<Rgb>,
     },
+    /// Another picture.
+    Picture {
+        /// Its top left corner.
+        corner: [usize; 2],
+        /// Its pixels.
+        image: Image<3>,
+    },
+}
+
+/// The part of a text whose place is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// Its left end.
+    Start,
+    /// Its middle.
+    Middle,
+    /// Its right end.
+    End,
+}
+
+impl Anchor {
+    fn svg(self) -> Option<&'static str> {
+        match self {
+            Self::Start => Some("start"),
+            // That of the whole picture.
+            Self::Middle => None,
+            Self::End => Some("end"),
+        }
+    }
 }
 
 /// Width of the rim about a character, pixels.
 const HALO_WIDTH_PX: f64 = 1.5;
 /// Height of a capital as a share of a text's size.
 const CAPITAL_HEIGHT_SHARE: f64 = 0.7;
-/// Width of a character's strokes as a share of a text's size.
-const STROKE_WIDTH_SHARE: f64 = 0.1;
-/// Width of a stroke's unit as a share of its height: characters are slim.
-const GLYPH_ASPECT: f64 = 0.75;
-/// Room between characters as a share of their width.
-const GLYPH_SPACING_SHARE: f64 = 0.4;
+
+/// Width of `text` in a picture's pixels.
+pub fn text_width(text: &str, size: f64, weight: Weight) -> usize {
+    text.chars().count() * Font::nearest(size, weight).character_width()
+}
 
 impl Drawing {
     /// An SVG file with a viewer's own sans-serif font.
@@ -142,17 +175,27 @@ impl VectorShape {
                     stroke-width=(width) {}
             },
             Self::Label {
-                middle: [x, y],
+                at: [x, y],
+                anchor,
                 text,
+                weight,
                 size,
                 ink,
                 rim,
             } => html! {
                 text x=(format_args!("{x:.1}")) y=(format_args!("{:.1}", y + CAPITAL_HEIGHT_SHARE / 2.0 * size))
+                    text-anchor=[anchor.svg()] font-weight=[(*weight == Weight::Bold).then_some("bold")]
                     font-size=(size) fill=(hex(*ink)) stroke=[rim.map(hex)]
                     stroke-width=[rim.map(|_| 2.0 * HALO_WIDTH_PX)] paint-order=[rim.map(|_| "stroke")] {
                     (text)
                 }
+            },
+            Self::Picture {
+                corner: [x, y],
+                image,
+            } => html! {
+                image x=(x) y=(y) width=(image.width) height=(image.height)
+                    href=(data_uri("image/png", &image.png())) {}
             },
         }
     }
@@ -179,29 +222,54 @@ impl VectorShape {
                 });
             }
             Self::Label {
-                middle,
+                at,
+                anchor,
                 text,
+                weight,
                 size,
                 ink,
                 rim,
             } => {
-                let width = STROKE_WIDTH_SHARE * size;
-                let lines = text_lines(*middle, text, *size);
-                for ends in lines.iter().filter(|_| rim.is_some()) {
-                    paint_line(
-                        image,
-                        *ends,
-                        rim.unwrap_or_default(),
-                        width + 2.0 * HALO_WIDTH_PX,
-                    );
+                let font = Font::nearest(*size, *weight);
+                let start = text_start(*at, *anchor, text, font);
+                if let Some(rim) = rim {
+                    paint_text(image, start, text, font, *rim, RIM);
                 }
-                for ends in lines {
-                    paint_line(image, ends, *ink, width);
+                paint_text(image, start, text, font, *ink, &[([0, 0], 1.0)]);
+            }
+            Self::Picture {
+                corner: [left, top],
+                image: picture,
+            } => {
+                let width = picture.width.min(image.width.saturating_sub(*left));
+                // Beyond the right side there is no row of pixels to begin in.
+                let rows = if width > 0 {
+                    image.height.saturating_sub(*top)
+                } else {
+                    0
+                };
+                let lines = picture.pixels.chunks_exact(picture.width.max(1));
+                for (row, pixels) in lines.take(rows).enumerate() {
+                    let start = (top + row) * image.width + left;
+                    image.pixels[start..start + width].copy_from_slice(&pixels[..width]);
                 }
             }
         }
     }
 }
+
+/// The places about a character's pixel that its rim covers too: columns and rows away, and by which share.
+const RIM: &[([i64; 2], f64)] = &[
+    ([0, 0], 1.0),
+    ([-1, 0], 1.0),
+    ([1, 0], 1.0),
+    ([0, -1], 1.0),
+    ([0, 1], 1.0),
+    ([-1, -1], 0.6),
+    ([1, -1], 0.6),
+    ([-1, 1], 0.6),
+    ([1, 1], 0.6),
+];
 
 /// Mixes `colour` into the pixels of the box about `corners` by the share that `coverage` gives for
 /// their centres, clamped to 0..=1.
@@ -218,13 +286,16 @@ fn blend(image: &mut Image<3>, corners: &[Point], colour: Rgb, coverage: impl Fn
         for column in columns.clone() {
             let share = coverage([column as f64 + 0.5, row as f64 + 0.5]).clamp(0.0, 1.0);
             if share > 0.0 {
-                let pixel = &mut image.pixels[row * image.width + column];
-                for (old, new) in pixel.iter_mut().zip(colour) {
-                    let mixed = f64::from(*old) * (1.0 - share) + f64::from(new) * share;
-                    *old = mixed.round() as u8;
-                }
+                mix(&mut image.pixels[row * image.width + column], colour, share);
             }
         }
+    }
+}
+
+fn mix(pixel: &mut Rgb, colour: Rgb, share: f64) {
+    for (old, new) in pixel.iter_mut().zip(colour) {
+        let mixed = f64::from(*old) * (1.0 - share) + f64::from(new) * share;
+        *old = mixed.round() as u8;
     }
 }
 
@@ -273,28 +344,53 @@ fn paint_line(image: &mut Image<3>, [from, to]: [Point; 2], stroke: Rgb, width: 
     });
 }
 
-/// The strokes of `text` about `middle` as lines.
-fn text_lines([x, y]: Point, text: &str, size: f64) -> Vec<[Point; 2]> {
-    let unit = CAPITAL_HEIGHT_SHARE * size / glyphs::CAPITAL_HEIGHT;
-    let width = glyphs::GLYPH_WIDTH * GLYPH_ASPECT * unit;
-    let advance = width * (1.0 + GLYPH_SPACING_SHARE);
-    let count = text.chars().count() as f64;
-    let left = x - (count * advance - GLYPH_SPACING_SHARE * width) / 2.0;
-    let top = y - CAPITAL_HEIGHT_SHARE * size / 2.0;
-    let mut lines = Vec::new();
-    for (place, character) in text.chars().enumerate() {
-        let start = left + place as f64 * advance;
-        let point = |(x, y): (i8, i8)| {
-            [
-                start + f64::from(x) * GLYPH_ASPECT * unit,
-                top + f64::from(y) * unit,
-            ]
-        };
-        for stroke in glyphs::strokes(character) {
-            lines.extend(stroke.windows(2).map(|p| [point(p[0]), point(p[1])]));
+/// Column and row of the top left pixel of `text`.
+fn text_start([x, y]: Point, anchor: Anchor, text: &str, font: Font) -> [i64; 2] {
+    let width = (text.chars().count() * font.character_width()) as f64;
+    let left = match anchor {
+        Anchor::Start => x,
+        Anchor::Middle => x - width / 2.0,
+        Anchor::End => x - width,
+    };
+    let top = y - font.capital_middle();
+    [left.round() as i64, top.round() as i64]
+}
+
+/// Mixes `colour` into the pixels that `text` covers, and those at `places` beside them. What lies outside of the picture
+/// is left out.
+fn paint_text(
+    image: &mut Image<3>,
+    [left, top]: [i64; 2],
+    text: &str,
+    font: Font,
+    colour: Rgb,
+    places: &[([i64; 2], f64)],
+) {
+    let width = font.character_width();
+    let mut shares = std::collections::BTreeMap::<usize, f64>::new();
+    for (number, character) in text.chars().enumerate() {
+        for (pixel, coverage) in font.coverage(character).iter().enumerate() {
+            if *coverage == 0 {
+                continue;
+            }
+            let column = left + (number * width + pixel % width) as i64;
+            let row = top + (pixel / width) as i64;
+            for ([across, down], share) in places {
+                let within =
+                    |at: i64, size: usize| usize::try_from(at).ok().filter(|at| *at < size);
+                let column = within(column + across, image.width);
+                let row = within(row + down, image.height);
+                let (Some(column), Some(row)) = (column, row) else {
+                    continue;
+                };
+                let all = shares.entry(row * image.width + column).or_default();
+                *all = f64::max(*all, share * f64::from(*coverage) / 255.0);
+            }
         }
     }
-    lines
+    for (pixel, share) in shares {
+        mix(&mut image.pixels[pixel], colour, share);
+    }
 }
 
 #[cfg(test)]
@@ -353,8 +449,10 @@ mod tests {
     #[test]
     fn both_pictures_have_the_label() {
         let label = drawing(VectorShape::Label {
-            middle: [20.0, 20.0],
+            at: [20.0, 20.0],
+            anchor: Anchor::Middle,
             text: "0&".into(),
+            weight: Weight::Bold,
             size: 20.0,
             ink: [0; 3],
             rim: Some([255, 0, 0]),
@@ -365,5 +463,66 @@ mod tests {
         let image = label.image();
         let count = |colour: Rgb| image.pixels.iter().filter(|p| **p == colour).count();
         assert!(count([0; 3]) > 5 && count([255, 0, 0]) > 20);
+    }
+
+    /// Columns with ink, first and last, of a text at 20 pixels from the left.
+    fn ink_columns(anchor: Anchor) -> [usize; 2] {
+        let label = drawing(VectorShape::Label {
+            at: [20.0, 20.0],
+            anchor,
+            text: "HH".into(),
+            weight: Weight::Regular,
+            size: 12.0,
+            ink: [0; 3],
+            rim: None,
+        });
+        let image = label.image();
+        let dark = |column: &usize| (0..40).any(|row| image.pixels[row * 40 + column][0] < 128);
+        let columns: Vec<usize> = (0..40).filter(dark).collect();
+        [columns[0], columns[columns.len() - 1]]
+    }
+
+    #[test]
+    fn a_text_lies_where_its_anchor_says() {
+        let width = text_width("HH", 12.0, Weight::Regular);
+        let [left, right] = ink_columns(Anchor::Start);
+        assert!(left >= 20 && right < 20 + width);
+        let [left, right] = ink_columns(Anchor::End);
+        assert!(left >= 20 - width && right < 20);
+        let [left, right] = ink_columns(Anchor::Middle);
+        assert!(left >= 20 - width.div_ceil(2) && right <= 20 + width.div_ceil(2));
+    }
+
+    #[test]
+    fn what_lies_outside_of_the_picture_is_left_out() {
+        let mut shapes = Vec::new();
+        for at in [[-9.0, 20.0], [39.0, 1.0], [20.0, 40.0], [90.0, 90.0]] {
+            shapes.push(VectorShape::Label {
+                at,
+                anchor: Anchor::Start,
+                text: "Wg\u{5c71}".into(),
+                weight: Weight::Bold,
+                size: 23.0,
+                ink: [0; 3],
+                rim: Some([9; 3]),
+            });
+        }
+        for corner in [[38, 37], [40, 0], [0, 40], [99, 38], [99, 99]] {
+            let image = Image::filled(4, 5, [7, 200, 30]);
+            shapes.push(VectorShape::Picture { corner, image });
+        }
+        let picture = Drawing {
+            shapes,
+            ..drawing(VectorShape::Circle {
+                centre: [0.0; 2],
+                radius: 1.0,
+                stroke: [0; 3],
+                width: 1.0,
+            })
+        };
+        let image = picture.image();
+        let count = |colour: Rgb| image.pixels.iter().filter(|p| **p == colour).count();
+        assert_eq!(count([7, 200, 30]), 2 * 3);
+        assert!(picture.svg().contains("data:image/png;base64,"));
     }
 }

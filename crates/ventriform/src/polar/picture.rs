@@ -7,7 +7,8 @@ use serde::Deserialize;
 
 use super::figure::{FigureMap, WallFigure};
 use super::{Level, Pixel, PlaceState, PolarMap, Projection, RAY_COLUMNS, RAY_ROWS, territory};
-use crate::draw::vector::{Drawing, Point, Rgb, VectorShape};
+use crate::draw::glyphs::Weight;
+use crate::draw::vector::{Anchor, Drawing, Point, Rgb, VectorShape};
 
 /// Height of the picture, pixels.
 const PICTURE_HEIGHT_PX: usize = 640;
@@ -379,11 +380,13 @@ fn label(
 ) -> VectorShape {
     let (share, turns) = label_place(segment, rings);
     VectorShape::Label {
-        middle: screen(share, turns),
+        at: screen(share, turns),
+        anchor: Anchor::Middle,
         text: mean.map_or_else(
             || "-".to_owned(),
             |mean| format!("{:.decimals$}", mean + 0.0),
         ),
+        weight: Weight::Bold,
         size: TEXT_HEIGHT_PX,
         ink: if bright { BLACK_RGB } else { WHITE_RGB },
         rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),
@@ -406,8 +409,10 @@ fn sides(map: &PolarMap) -> impl Iterator<Item = VectorShape> {
 
 fn text(middle: Point, text: String) -> VectorShape {
     VectorShape::Label {
-        middle,
+        at: middle,
+        anchor: Anchor::Middle,
         text,
+        weight: Weight::Regular,
         size: TEXT_HEIGHT_PX,
         ink: BLACK_RGB,
         rim: None,

@@ -10,7 +10,8 @@
 use super::hearts::{ComparedHeart, ComparedHearts};
 use crate::comparison::WhichScan;
 use crate::draw::Image;
-use crate::draw::vector::VectorShape;
+use crate::draw::glyphs::Weight;
+use crate::draw::vector::{Anchor, VectorShape};
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Aabb;
 use crate::grid::field::Field;
@@ -195,8 +196,10 @@ fn label(picture: &mut Image<3>, top: usize, kind: Kind, scan: WhichScan) {
         (12.0, scan.as_str().to_uppercase()),
     ] {
         let shape = VectorShape::Label {
-            middle: [LABEL_WIDTH_PX as f64 / 2.0, centre + offset],
+            at: [LABEL_WIDTH_PX as f64 / 2.0, centre + offset],
+            anchor: Anchor::Middle,
             text,
+            weight: Weight::Regular,
             size: LABEL_PX,
             ink: INK_RGB,
             rim: None,
