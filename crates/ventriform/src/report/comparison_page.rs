@@ -10,13 +10,21 @@ use super::sections::Program;
 use super::summaries::object;
 use super::whose;
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument};
+use crate::draw::table::{Table, TableColumn};
 use crate::draw::text::{data_uri, number, signed};
 use crate::volume::Provenance;
 
 /// How to read the polar maps.
-const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; \
+pub(super) const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; \
     differences in points, stress scaled to rest where nothing changed; z in standard deviations from the normal \
     mean; scores from 0 (normal) to 4 (none).";
+
+/// How to read the slices.
+pub(super) const SLICES_HINT: &str = "Stress above rest at the same levels, each by the greatest uptake of its own wall. Short axis from apex to base, \
+    vertical long axis from septum to lateral wall, horizontal long axis from inferior to anterior wall.";
+
+/// The title of a comparison's page.
+pub(super) const TITLE: &str = "Left ventricle: rest and stress";
 
 /// A comparison's report with its pictures.
 #[derive(Debug, Clone, Copy)]
@@ -52,8 +60,8 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
     let warnings = warnings.into_iter().flat_map(|scan| &scan.warnings);
     let (sign, headline) = flags_headline(report.flags.len(), "comparison");
     HtmlDocument {
-        title: "Left ventricle: rest and stress",
-        subtitle: &origin(report),
+        title: TITLE,
+        subtitle: &origin(report, page.scan.is_some()),
         body: html! {
             (whose::section(page.scan))
             (document::verdict(sign, &headline, &checks(report)))
@@ -65,9 +73,12 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
             section {
                 h2 { "Territories and segments" }
                 (territories(report))
-                (segments(report))
+                (document::table(&segment_table(report), "Table of segments"))
             }
-            (scans(report))
+            section {
+                h2 { "Both scans" }
+                (document::table(&scan_table(report, page.scan.is_some()), "Table of both scans"))
+            }
             (particulars(report))
         },
         data: None,
@@ -76,11 +87,11 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
     .html()
 }
 
-/// One line on what both scans are.
-fn origin(report: &ComparisonReport) -> String {
+/// One line on what both scans are. Of scans that are not `named`, the description is left out: it may say whose they are.
+pub(super) fn origin(report: &ComparisonReport, named: bool) -> String {
     let described = |name: &str, scan: &ComparedScan| {
         let parts = [
-            scan.series_description.clone(),
+            scan.series_description.clone().filter(|_| named),
             scan.radiopharmaceutical.clone(),
             scan.injected_dose
                 .as_ref()
@@ -142,7 +153,8 @@ fn checks(report: &ComparisonReport) -> Vec<(bool, String)> {
     checks
 }
 
-fn figures(report: &ComparisonReport) -> Markup {
+/// The main figures.
+pub(super) fn headline_figures(report: &ComparisonReport) -> Vec<HeadlineFigure> {
     let percent = |at: usize| {
         let share = report.summed_percent.map(|percents| percents[at]);
         share.map_or(String::new(), |share| format!(" ({} %)", number(share, 0)))
@@ -177,15 +189,21 @@ fn figures(report: &ComparisonReport) -> Markup {
             "ejection fraction at rest",
         ),
     ];
-    let all: Vec<HeadlineFigure> = all.into_iter().flatten().collect();
+    all.into_iter().flatten().collect()
+}
+
+/// The figures that are missing, and why.
+pub(super) fn missing_figures(report: &ComparisonReport) -> Vec<String> {
+    let scores = "No scores and no z: the scans were compared with no normal limits.";
+    let scores = report.sss.is_none().then(|| scores.to_owned());
+    let beats = (!report.no_beat.is_empty()).then(|| not_compared(report));
+    scores.into_iter().chain(beats).collect()
+}
+
+fn figures(report: &ComparisonReport) -> Markup {
     html! {
-        (document::figures(&all))
-        @if report.sss.is_none() {
-            p.hint { "No scores and no z: the scans were compared with no normal limits." }
-        }
-        @if !report.no_beat.is_empty() {
-            p.hint { (not_compared(report)) }
-        }
+        (document::figures(&headline_figures(report)))
+        @for hint in missing_figures(report) { p.hint { (hint) } }
     }
 }
 
@@ -206,10 +224,7 @@ fn slices(page: &ComparisonPage) -> Markup {
         @if let Some(png) = page.slices {
             section {
                 h2 { "Slices" }
-                p.hint {
-                    "Stress above rest at the same levels, each by the greatest uptake of its own wall. Short axis from apex to "
-                    "base, vertical long axis from septum to lateral wall, horizontal long axis from inferior to anterior wall."
-                }
+                p.hint { (SLICES_HINT) }
                 figure.paper.wide {
                     img src=(data_uri("image/png", png)) alt="Slices of the heart at stress above those at rest";
                 }
@@ -237,38 +252,47 @@ const UPTAKE_COLUMNS: [&str; 5] = [
     "fixed, %",
 ];
 
+/// The walls of the arteries; `None` if there are none.
+pub(super) fn territory_table(report: &ComparisonReport) -> Option<Table> {
+    let rows = report.territories.iter();
+    let rows = rows.map(|territory| {
+        let name = [territory.name.clone()];
+        name.into_iter().chain(uptake(&territory.uptake)).collect()
+    });
+    (!report.territories.is_empty()).then(|| Table {
+        columns: [TableColumn::name("Territory")]
+            .into_iter()
+            .chain(UPTAKE_COLUMNS.map(TableColumn::number))
+            .collect(),
+        rows: rows.collect(),
+    })
+}
+
 fn territories(report: &ComparisonReport) -> Markup {
+    let table = territory_table(report);
     html! {
-        @if !report.territories.is_empty() {
-            div.scroll tabindex="0" role="group" aria-label="Table of territories, scrollable" {
-                table {
-                    thead {
-                        tr {
-                            th scope="col" { "Territory" }
-                            @for column in UPTAKE_COLUMNS { th.n scope="col" { (column) } }
-                        }
-                    }
-                    tbody {
-                        @for territory in &report.territories {
-                            tr {
-                                th scope="row" { (territory.name) }
-                                @for cell in uptake(&territory.uptake) { td.n { (cell) } }
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        @if let Some(table) = table { (document::table(&table, "Table of territories")) }
     }
 }
 
-fn segments(report: &ComparisonReport) -> Markup {
+/// The segments.
+pub(super) fn segment_table(report: &ComparisonReport) -> Table {
     let scored = report.sss.is_some();
     let beating = report.beat.is_some();
     let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
     let known = |value: Option<f64>, decimals| signed(value.unwrap_or(f64::NAN), decimals);
-    let more = |segment: &ComparedSegmentReport| {
-        let mut cells = Vec::new();
+    let mut titles = vec![TableColumn::number("No."), TableColumn::name("Segment")];
+    titles.extend(UPTAKE_COLUMNS.map(TableColumn::number));
+    if scored {
+        titles.extend(["score at stress", "score at rest"].map(TableColumn::number));
+    }
+    if beating {
+        let changes = ["motion, change, mm", "thickening, change, points"];
+        titles.extend(changes.map(TableColumn::number));
+    }
+    let row = |segment: &ComparedSegmentReport| {
+        let mut cells = vec![segment.segment.to_string(), segment.name.clone()];
+        cells.extend(uptake(&segment.uptake));
         if scored {
             cells.extend([score(segment.stress_score), score(segment.rest_score)]);
         }
@@ -280,46 +304,23 @@ fn segments(report: &ComparisonReport) -> Markup {
         }
         cells
     };
-    html! {
-        div.scroll tabindex="0" role="group" aria-label="Table of segments, scrollable" {
-            table {
-                thead {
-                    tr {
-                        th.n scope="col" { "No." }
-                        th scope="col" { "Segment" }
-                        @for column in UPTAKE_COLUMNS { th.n scope="col" { (column) } }
-                        @if scored {
-                            th.n scope="col" { "score at stress" }
-                            th.n scope="col" { "score at rest" }
-                        }
-                        @if beating {
-                            th.n scope="col" { "motion, change, mm" }
-                            th.n scope="col" { "thickening, change, points" }
-                        }
-                    }
-                }
-                tbody {
-                    @for segment in &report.segments {
-                        tr {
-                            td.n { (segment.segment) }
-                            th scope="row" { (segment.name) }
-                            @for cell in uptake(&segment.uptake) { td.n { (cell) } }
-                            @for cell in more(segment) { td.n { (cell) } }
-                        }
-                    }
-                }
-            }
-        }
+    Table {
+        columns: titles,
+        rows: report.segments.iter().map(row).collect(),
     }
 }
 
-/// The known facts of both scans, side by side.
-fn scans(report: &ComparisonReport) -> Markup {
+/// The known facts of both scans, side by side. Of scans that are not `named`, the description is left out: it may say whose
+/// they are.
+pub(super) fn scan_table(report: &ComparisonReport, named: bool) -> Table {
     let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "not stated".to_owned());
     let both = [&report.stress, &report.rest];
     let row = |name: &'static str, of: &dyn Fn(&ComparedScan) -> String| (name, both.map(of));
-    let rows = [
-        row("series", &|scan| text(&scan.series_description)),
+    let mut rows = Vec::new();
+    if named {
+        rows.push(row("series", &|scan| text(&scan.series_description)));
+    }
+    rows.extend([
         row("tracer", &|scan| text(&scan.radiopharmaceutical)),
         row("total dose by the header, MBq", &|scan| {
             text(&scan.injected_dose)
@@ -343,6 +344,10 @@ fn scans(report: &ComparisonReport) -> Markup {
         row("confidence of the fit, %", &|scan| {
             number(100.0 * scan.confidence, 0)
         }),
+        row("below the threshold, % of the wall", &|scan| {
+            let known = scan.polar.as_ref();
+            known.map_or("–".to_owned(), |polar| number(polar.extent_percent, 1))
+        }),
         row("normal limits", &|scan| match &scan.perfusion {
             None => "none".to_owned(),
             Some(perfusion) => {
@@ -357,29 +362,42 @@ fn scans(report: &ComparisonReport) -> Markup {
                 )
             }
         }),
+        row("below the limit, % of the wall", &|scan| {
+            let known = scan.perfusion.as_ref();
+            known.map_or("–".to_owned(), |perfusion| {
+                number(perfusion.extent_percent, 1)
+            })
+        }),
         row("deficit score, %", &|scan| {
             let known = scan.perfusion.as_ref();
             known.map_or("–".to_owned(), |perfusion| {
                 number(perfusion.deficit_percent, 1)
             })
         }),
-    ];
-    html! {
-        section {
-            h2 { "Both scans" }
-            div.scroll tabindex="0" role="group" aria-label="Table of both scans, scrollable" {
-                table {
-                    thead {
-                        tr { th scope="col" { "" } th scope="col" { "Stress" } th scope="col" { "Rest" } }
-                    }
-                    tbody {
-                        @for (name, [stress, rest]) in rows {
-                            tr { th scope="row" { (name) } td { (stress) } td { (rest) } }
-                        }
-                    }
-                }
-            }
-        }
+    ]);
+    if let Some(beat) = &report.beat {
+        let volumes = [
+            (
+                "end-diastolic volume, ml",
+                [beat.stress_edv_ml, beat.rest_edv_ml],
+            ),
+            (
+                "end-systolic volume, ml",
+                [beat.stress_esv_ml, beat.rest_esv_ml],
+            ),
+        ];
+        rows.extend(volumes.map(|(name, both)| (name, both.map(|ml| number(ml, 0)))));
+    }
+    Table {
+        columns: vec![
+            TableColumn::name(""),
+            TableColumn::text("Stress"),
+            TableColumn::text("Rest"),
+        ],
+        rows: rows
+            .into_iter()
+            .map(|(name, [stress, rest])| vec![name.to_owned(), stress, rest])
+            .collect(),
     }
 }
 

@@ -243,8 +243,42 @@ impl UptakeChange {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use crate::report::segmentation_report::tests::first_report;
+    use serde_json::json;
+
+    /// A report of two scans without beats and limits.
+    pub(crate) fn first_comparison() -> ComparisonReport {
+        let input = serde_json::to_value(first_report().input).unwrap();
+        let scan = |cavity_ml: f64| {
+            json!({
+                "template": "heart", "confidence": 0.9, "cavity_ml": cavity_ml, "muscle_ml": 120.5, "input": input,
+                "warnings": [],
+            })
+        };
+        let uptake = json!({
+            "stress_percent": 61.5, "rest_percent": 80.25, "difference_points": 18.75, "reversible_percent": 90.0,
+            "fixed_percent": 1.5,
+        });
+        let of = |name: &str, value: &str| {
+            let mut part = uptake.clone();
+            part[name] = serde_json::from_str(value).unwrap();
+            part["name"] = "LAD".into();
+            part
+        };
+        let segments: Vec<Value> = (1..=17)
+            .map(|number| of("segment", &number.to_string()))
+            .collect();
+        serde_json::from_value(json!({
+            "tid": 1.125, "reversible_percent": 12.5, "reversible_points": 12.25, "fixed_percent": 0.0, "scale": 2.0,
+            "matched_percent": 70.0, "compared_percent": 95.0, "turn_degrees": 0.0, "correlation": 0.9,
+            "segments": segments, "territories": [of("name", "\"LAD\"")],
+            "stress": scan(80.0), "rest": scan(71.0), "parameters": {},
+            "flags": [{"code": "tid_uncertain", "reason": "A large defect blurs the ratio of the cavities."}],
+        }))
+        .unwrap()
+    }
 
     #[test]
     fn a_reason_for_no_beat_says_which_scan_and_why() {

@@ -6,7 +6,8 @@
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
 //! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of a
-//! [`ComparisonReport`].
+//! [`ComparisonReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for viewers that show
+//! nothing else: a [`DrawnPage`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
 //! with the feature `schema`, what the OpenAPI document describes.
@@ -19,7 +20,8 @@ mod beat_page;
 mod beat_report;
 pub mod closeness;
 mod comparison_page;
-mod comparison_report;
+pub(crate) mod comparison_report;
+mod comparison_sheet;
 pub mod distance;
 mod distance_pictures;
 pub mod elements;
@@ -36,6 +38,8 @@ mod raised_flag;
 mod sections;
 mod segmentation_page;
 pub(crate) mod segmentation_report;
+mod segmentation_sheet;
+mod sheet_parts;
 mod stage_facts;
 mod summaries;
 pub mod summary;
@@ -52,6 +56,7 @@ pub use comparison_report::{
     BeatChange, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
     NoBeat, NoBeatCode, UptakeChange,
 };
+pub use comparison_sheet::{ComparisonSheet, comparison_sheet};
 pub use distance_pictures::vertex_colours;
 pub use fit_report::{
     EvidenceReport, FitReport, FittedVolumes, LocalisationReport, LongAxis, Posture, Thickness,
@@ -72,6 +77,8 @@ pub use segmentation_report::{
     AgreementReport, AppliedReaderReport, CandidateReport, RefusedTemplateReport, Resolution,
     SegmentationParts, SegmentationReport,
 };
+pub use segmentation_sheet::{SegmentationSheet, segmentation_sheet};
+pub use sheet_parts::DrawnPage;
 pub use summaries::{
     BeatSummary, ComparisonSummary, ModelSummary, NormalGroupSummary, NormalsSummary,
     ReaderSummary, SegmentationSummary, TemplateSummary, object,

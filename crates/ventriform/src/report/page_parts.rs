@@ -3,6 +3,7 @@
 use super::input::FileFacts;
 use super::perfusion_report::PerfusionReport;
 use crate::draw::document::{self, HeadlineFigure, Sign};
+use crate::draw::table::{Table, TableColumn};
 use crate::draw::text::{data_uri, number, signed};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
@@ -92,26 +93,28 @@ pub(super) fn limits_hint(perfusion: Option<&PerfusionReport>) -> &'static str {
     }
 }
 
-/// The wall beside normal limits, if some were given.
-pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
-    let Some(perfusion) = perfusion else {
-        return Markup::default();
-    };
+/// Whose limits the wall stands beside.
+pub(super) fn limits_line(perfusion: &PerfusionReport) -> String {
     let used = &perfusion.normals;
     let corrected = if used.attenuation_corrected {
         "with"
     } else {
         "without"
     };
-    let whose = format!(
-        "Limits: {}, {} cases, sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}.",
+    format!(
+        "Limits: {}, {} cases, sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}. Figures: {}.",
         used.people,
         used.cases,
         used.sex.as_str(),
         used.protocol,
         used.tracer,
-        used.sha256
-    );
+        used.sha256,
+        perfusion.note
+    )
+}
+
+/// The main figures beside normal limits.
+pub(super) fn limits_figures(perfusion: &PerfusionReport) -> Vec<HeadlineFigure> {
     let figures = [
         figure(perfusion.deficit_percent, 1, "%", "deficit score"),
         figure(
@@ -131,39 +134,46 @@ pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
             format!("summed score ({} %)", number(perfusion.summed_percent, 0)),
         ),
     ];
-    let figures: Vec<HeadlineFigure> = figures.into_iter().flatten().collect();
+    figures.into_iter().flatten().collect()
+}
+
+/// The segments beside normal limits.
+pub(super) fn score_table(perfusion: &PerfusionReport) -> Table {
     let z = |z: Option<f64>| z.map_or("–".to_owned(), |z| signed(z, 1));
     let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
+    let rows = perfusion.segments.iter().map(|segment| {
+        vec![
+            segment.segment.to_string(),
+            segment.name.clone(),
+            z(segment.z),
+            score(segment.score),
+            number(segment.extent_percent, 1),
+        ]
+    });
+    Table {
+        columns: vec![
+            TableColumn::number("No."),
+            TableColumn::name("Segment"),
+            TableColumn::number("mean z"),
+            TableColumn::number("score, 0 to 4"),
+            TableColumn::number("below the limit, % of area"),
+        ],
+        rows: rows.collect(),
+    }
+}
+
+/// The wall beside normal limits, if some were given.
+pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
+    let Some(perfusion) = perfusion else {
+        return Markup::default();
+    };
     html! {
         section {
             h2 { "Beside normal limits" }
-            p.hint { (whose) " Figures: " (perfusion.note) "." }
-            (document::figures(&figures))
+            p.hint { (limits_line(perfusion)) }
+            (document::figures(&limits_figures(perfusion)))
             ul.warnings { @for flag in &perfusion.flags { li { (flag.reason) } } }
-            div.scroll tabindex="0" role="group" aria-label="Table of scores, scrollable" {
-                table {
-                    thead {
-                        tr {
-                            th.n scope="col" { "No." }
-                            th scope="col" { "Segment" }
-                            th.n scope="col" { "mean z" }
-                            th.n scope="col" { "score, 0 to 4" }
-                            th.n scope="col" { "below the limit, % of area" }
-                        }
-                    }
-                    tbody {
-                        @for segment in &perfusion.segments {
-                            tr {
-                                td.n { (segment.segment) }
-                                th scope="row" { (segment.name) }
-                                td.n { (z(segment.z)) }
-                                td.n { (score(segment.score)) }
-                                td.n { (number(segment.extent_percent, 1)) }
-                            }
-                        }
-                    }
-                }
-            }
+            (document::table(&score_table(perfusion), "Table of scores"))
         }
     }
 }

@@ -12,6 +12,7 @@ use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
 use super::whose;
 use crate::draw::document::{self, HeadlineFigure, HtmlDocument};
+use crate::draw::table::{CellKind, Table, TableColumn};
 use crate::draw::text::{data_uri, number, signed};
 use crate::draw::views;
 use crate::mesh::TriMesh;
@@ -45,7 +46,7 @@ pub fn segmentation_page(page: &SegmentationPage) -> String {
     let report = page.report;
     let reasons = report.flags.iter().map(|flag| flag.reason.as_str());
     HtmlDocument {
-        title: &format!("{}: segmentation", organ(report)),
+        title: &title(report),
         subtitle: &origin(report),
         body: html! {
             (whose::section(page.scan))
@@ -76,7 +77,7 @@ fn shows_scan(page: &SegmentationPage) -> bool {
 fn embedded(page: &SegmentationPage) -> Option<Value> {
     let report = page.report;
     Embedded {
-        name: &format!("{}: segmentation", organ(report)),
+        name: &title(report),
         mesh: (page.mesh, page.uncertainty),
         other: page.other,
         fit: Some(json!({
@@ -90,6 +91,11 @@ fn embedded(page: &SegmentationPage) -> Option<Value> {
         region: page.region.filter(|_| page.slices.is_some()),
     }
     .json()
+}
+
+/// The title of the page.
+pub(super) fn title(report: &SegmentationReport) -> String {
+    format!("{}: segmentation", organ(report))
 }
 
 /// The organ's name as a heading begins.
@@ -108,7 +114,7 @@ fn organ(report: &SegmentationReport) -> String {
 }
 
 /// One line on where the segmentation comes from.
-fn origin(report: &SegmentationReport) -> String {
+pub(super) fn origin(report: &SegmentationReport) -> String {
     let model = format!("Model {}", report.template);
     let parts = [model].into_iter().chain(volume_line(&report.input));
     let parts = parts.chain(report.reader.as_ref().map(drawn_by));
@@ -230,7 +236,8 @@ fn verdict(report: &SegmentationReport) -> Markup {
     document::verdict(sign, &headline, &checks(report))
 }
 
-fn figures(report: &SegmentationReport) -> Markup {
+/// The main figures.
+pub(super) fn headline_figures(report: &SegmentationReport) -> Vec<HeadlineFigure> {
     let measures = report.measures.as_ref();
     let extent = report.polar.as_ref().map(|polar| polar.extent_percent);
     let mut rows = size_rows(report);
@@ -261,8 +268,11 @@ fn figures(report: &SegmentationReport) -> Markup {
             "95th percentile of the distance between the contours",
         ),
     ]);
-    let figures: Vec<HeadlineFigure> = rows.into_iter().flatten().collect();
-    document::figures(&figures)
+    rows.into_iter().flatten().collect()
+}
+
+fn figures(report: &SegmentationReport) -> Markup {
+    document::figures(&headline_figures(report))
 }
 
 /// Volumes, thickness and mass: of both walls of a ventricle where the report has them.
@@ -335,11 +345,11 @@ fn size_rows(report: &SegmentationReport) -> Vec<Option<HeadlineFigure>> {
     ]
 }
 
-/// The slices as a picture; `touched` if the script draws them with the scan, which is without the expert's mask.
-fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
+/// What the slices show, and the name of each.
+pub(super) fn slice_names(report: &SegmentationReport) -> (&'static str, [&'static str; 3]) {
     let polar = report.polar.as_ref();
     let unknown = polar.is_some_and(|polar| polar.orientation == UNKNOWN_ORIENTATION);
-    let (about, names) = match report.is_ventricle() {
+    match report.is_ventricle() {
         true if unknown => (
             "Planes of the heart through the middle of its cavity, which side is anterior unknown: \
              apex on top of the second and on the right of the third.",
@@ -355,7 +365,12 @@ fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
              left of the first two, anterior on top of the first and on the left of the third.",
             ["Axial", "Coronal", "Sagittal"],
         ),
-    };
+    }
+}
+
+/// The slices as a picture; `touched` if the script draws them with the scan, which is without the expert's mask.
+fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
+    let (about, names) = slice_names(report);
     html! {
         section {
             h2 { "Slices" }
@@ -378,14 +393,11 @@ fn slices(report: &SegmentationReport, png: &[u8], touched: bool) -> Markup {
 /// The orientation of a polar map without sides.
 const UNKNOWN_ORIENTATION: &str = "unknown";
 
-/// The polar map beside its segments.
-fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
-    let Some(figures) = &report.polar else {
-        return Markup::default();
-    };
-    let percent = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 1);
-    let sides = match figures.orientation.as_str() {
-        UNKNOWN_ORIENTATION => {
+/// How to read the polar map.
+pub(super) fn polar_hint(report: &SegmentationReport) -> String {
+    let polar = report.polar.as_ref();
+    let sides = match polar.map(|polar| polar.orientation.as_str()) {
+        Some(UNKNOWN_ORIENTATION) => {
             "base outside. Orientation unknown: nothing in the image or its header tells which side \
              is anterior, so segments have numbers within their level but no sides and no arteries; \
              `superior` or `anterior` can state a direction"
@@ -395,15 +407,60 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
              arteries"
         }
     };
+    format!(
+        "Polar map of the 17 segments of the American Heart Association: apex in the centre, {sides}. In per cent of the \
+         hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold; grey is outside of \
+         the wall.",
+        limits_hint(report.perfusion.as_ref())
+    )
+}
+
+/// Uptake of the segments and of the arteries' territories; `None` without a polar map.
+pub(super) fn uptake_table(report: &SegmentationReport) -> Option<Table> {
+    let figures = report.polar.as_ref()?;
+    let percent = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 1);
+    let below = number(figures.threshold_percent, 0);
+    let segments = figures.segments.iter().map(|segment| {
+        vec![
+            segment.number.to_string(),
+            segment.name.clone(),
+            segment.territory.clone().unwrap_or("–".to_owned()),
+            percent(segment.mean_percent),
+            number(segment.extent_percent, 1),
+        ]
+    });
+    let territories = figures.territories.iter().map(|territory| {
+        vec![
+            String::new(),
+            "all of the territory".to_owned(),
+            territory.name.clone(),
+            percent(territory.mean_percent),
+            number(territory.extent_percent, 1),
+        ]
+    });
+    Some(Table {
+        columns: vec![
+            TableColumn::number("No."),
+            TableColumn::name("Segment"),
+            TableColumn::text("Artery"),
+            TableColumn::number("mean, %"),
+            TableColumn::number(format!("below {below} %, % of area")),
+        ],
+        rows: segments.chain(territories).collect(),
+    })
+}
+
+/// The polar map beside its segments.
+fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
+    let (Some(figures), Some(table)) = (&report.polar, uptake_table(report)) else {
+        return Markup::default();
+    };
+    let rows = table.rows.iter().enumerate();
+    let rows = rows.map(|(at, row)| (figures.segments.get(at).map(|segment| segment.number), row));
     html! {
         section {
             h2 { "Uptake of the wall" }
-            p.hint {
-                "Polar map of the 17 segments of the American Heart Association: apex in the "
-                "centre, " (sides) ". In per cent of the hottest quarter of this scan's own wall. "
-                (limits_hint(report.perfusion.as_ref())) " The cyan line encloses the wall below the "
-                "threshold; grey is outside of the wall."
-            }
+            p.hint { (polar_hint(report)) }
             div.row.beside {
                 div {
                     (document::place("polar"))
@@ -415,32 +472,20 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
                     table {
                         thead {
                             tr {
-                                th.n scope="col" { "No." }
-                                th scope="col" { "Segment" }
-                                th scope="col" { "Artery" }
-                                th.n scope="col" { "mean, %" }
-                                th.n scope="col" {
-                                    "below " (number(figures.threshold_percent, 0)) " %, % of area"
+                                @for column in &table.columns {
+                                    th.n[column.kind == CellKind::Number] scope="col" { (column.title) }
                                 }
                             }
                         }
                         tbody {
-                            @for segment in &figures.segments {
-                                tr data-segment=(segment.number) {
-                                    td.n { (segment.number) }
-                                    th scope="row" { (segment.name) }
-                                    td { (segment.territory.as_deref().unwrap_or("–")) }
-                                    td.n { (percent(segment.mean_percent)) }
-                                    td.n { (number(segment.extent_percent, 1)) }
-                                }
-                            }
-                            @for territory in &figures.territories {
-                                tr {
-                                    td.n {}
-                                    th scope="row" { "all of the territory" }
-                                    td { (territory.name) }
-                                    td.n { (percent(territory.mean_percent)) }
-                                    td.n { (number(territory.extent_percent, 1)) }
+                            // The script finds segments by their numbers.
+                            @for (segment, row) in rows {
+                                tr data-segment=[segment] {
+                                    td.n { (row[0]) }
+                                    th scope="row" { (row[1]) }
+                                    td { (row[2]) }
+                                    td.n { (row[3]) }
+                                    td.n { (row[4]) }
                                 }
                             }
                         }
@@ -451,13 +496,13 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
     }
 }
 
-/// Measures against the expert's mask, where there was one.
-fn agreement(report: &SegmentationReport) -> Markup {
+/// Measures against the expert's mask, where there was one: name, value, unit.
+pub(super) fn agreement_rows(report: &SegmentationReport) -> Vec<[String; 3]> {
     let Some(measures) = report.measures else {
-        return Markup::default();
+        return Vec::new();
     };
     let difference = measures.volume_difference_percent;
-    let rows = [
+    [
         ("Jaccard (E_J)", Some(measures.jaccard), 3, ""),
         ("Dice", Some(measures.dice), 3, ""),
         (
@@ -484,13 +529,22 @@ fn agreement(report: &SegmentationReport) -> Markup {
     ]
     .into_iter()
     .filter_map(|(name, value, decimals, unit)| Some((name, number(value?, decimals), unit)))
-    .chain(difference.map(|share| ("Difference of the volumes", signed(share, 1), "%")));
+    .chain(difference.map(|share| ("Difference of the volumes", signed(share, 1), "%")))
+    .map(|(name, value, unit)| [name.to_owned(), value, unit.to_owned()])
+    .collect()
+}
+
+fn agreement(report: &SegmentationReport) -> Markup {
+    let rows = agreement_rows(report);
+    if rows.is_empty() {
+        return Markup::default();
+    }
     html! {
         section {
             h2 { "Against the expert's mask" }
             table.narrow {
                 tbody {
-                    @for (name, value, unit) in rows {
+                    @for [name, value, unit] in rows {
                         tr { th scope="row" { (name) } td.n { (value) } td { (unit) } }
                     }
                 }
