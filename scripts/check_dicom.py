@@ -373,6 +373,7 @@ def check_comparison(program, folder):
         if name != "measurements":
             assert stress.SOPInstanceUID in str(data), name
             assert data.pixel_array.shape == (data.Rows, data.Columns, 3), name
+            assert data.BurnedInAnnotation == ("YES" if name == "page" else "NO"), name
     sr = highdicom.sr.srread(out / "measurements.dcm")
     evidence = {s.StudyInstanceUID for name in ("CurrentRequestedProcedureEvidenceSequence", "PertinentOtherEvidenceSequence")
                 for s in sr[name].value}

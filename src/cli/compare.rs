@@ -28,7 +28,8 @@ Both scans are fitted by the same model. Where both are gated, a beat is fitted 
 Writes comparison.json (TID, reversible and fixed share of the wall, segments, territories, flags), segments.csv and polar maps
 (polar_stress, polar_rest, polar_difference; with normal limits also polar_z_stress, polar_score_stress, ...), and of each scan the
 fitted wall (mesh_stress.glb, mesh_rest.glb, ...) and the image about the heart (region_stress.nii.gz, region_rest.nii.gz); slices.png
-(stress above rest), report.html and, with --dicom, measurements.dcm, page.dcm, polar_stress.dcm, polar_rest.dcm and polar_difference.dcm.
+(stress above rest), report.html and, with --dicom, measurements.dcm, page.dcm (the report as
+one picture), polar_stress.dcm, polar_rest.dcm and polar_difference.dcm.
 One scan given twice and scans of two patients are refused.")]
 pub struct CompareArgs {
     /// The scan at stress: a file, or all files of it

@@ -53,7 +53,7 @@ pub struct DicomArgs {
     #[arg(long, value_name = "UID", requires = "dicom")]
     frame_of_reference_uid: Option<String>,
     /// Remove the patient's identity from the DICOM objects (PS3.15, basic profile) and leave it out of
-    /// report.html
+    /// report.html and page.dcm
     #[arg(long)]
     deidentify: bool,
     /// Secret from which --deidentify derives new UIDs: with the same secret, objects of one study

@@ -168,6 +168,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
             "mesh",
             "progress",
             "grid",
+            "draw",
             "volume",
             "polar",
             "normals",

@@ -113,13 +113,15 @@ impl ComparedHearts {
         let results = DicomComparison::new(structure, scans, &report, &text);
         let mut objects = Vec::new();
         for object in ComparisonObject::ALL {
-            let bytes = match object.picture() {
-                None => results.measurements()?,
-                Some(name) => match content(files, name) {
-                    Some(png) => results.picture(object, png)?,
-                    None => continue,
-                },
+            let pictures = object.pictures().iter();
+            let pictures: Vec<(&str, &[u8])> = pictures
+                .filter_map(|name| Some((*name, content(files, name)?)))
+                .collect();
+            let bytes = match object {
+                ComparisonObject::Measurements => Some(results.measurements()?),
+                _ => results.picture(object, &pictures)?,
             };
+            let Some(bytes) = bytes else { continue };
             objects.push(NamedFile {
                 name: object.file_name().into(),
                 media_type: DicomObject::MEDIA_TYPE,

@@ -13,8 +13,9 @@ const REPORT_FILE: &str = "comparison.json";
 
 /// The names of the files of which `object` is made.
 pub fn source_files(object: ComparisonObject) -> Vec<String> {
-    let names = [Some(REPORT_FILE), object.picture()];
-    names.into_iter().flatten().map(str::to_owned).collect()
+    let pictures = object.pictures().iter().copied();
+    let names = [REPORT_FILE].into_iter().chain(pictures);
+    names.map(str::to_owned).collect()
 }
 
 /// The bytes of one object; `None` if the comparison has no such picture.
@@ -40,12 +41,16 @@ pub fn object(
     let scans = [source(&result.source)?, source(rest)?];
     let structure = Structure::of("left_ventricle");
     let comparison = DicomComparison::new(structure, &scans, &report, &text);
-    let made = match object.picture() {
-        None => comparison.measurements(),
-        Some(name) => match stored::read(&result.files, name)? {
-            None => return Ok(None),
-            Some(png) => comparison.picture(object, &png),
-        },
-    };
-    made.map(Some).map_err(|error| error.explain())
+    if object == ComparisonObject::Measurements {
+        return (comparison.measurements().map(Some)).map_err(|error| error.explain());
+    }
+    let mut pictures = Vec::new();
+    for name in object.pictures() {
+        pictures.extend(stored::read(&result.files, name)?.map(|png| (*name, png)));
+    }
+    let pictures: Vec<(&str, &[u8])> = (pictures.iter())
+        .map(|(name, png)| (*name, png.as_slice()))
+        .collect();
+    let made = comparison.picture(object, &pictures);
+    made.map_err(|error| error.explain())
 }

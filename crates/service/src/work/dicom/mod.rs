@@ -67,7 +67,7 @@ const BEAT_OBJECTS: &[ResultObject] = &[
 
 const COMPARISON_OBJECTS: &[ResultObject] = &[
     ResultObject::Comparison(ComparisonObject::Measurements),
-    ResultObject::Comparison(ComparisonObject::Slices),
+    ResultObject::Comparison(ComparisonObject::Page),
     ResultObject::Comparison(ComparisonObject::Polar(WhichScan::Stress)),
     ResultObject::Comparison(ComparisonObject::Polar(WhichScan::Rest)),
     ResultObject::Comparison(ComparisonObject::Difference),
@@ -87,7 +87,7 @@ impl ResultObject {
     pub fn is_of(self, product: &Product) -> bool {
         let picture = match self {
             Self::Still(DicomObject::Polar) => Some(still::POLAR_FILE),
-            Self::Comparison(object) => object.picture(),
+            Self::Comparison(object) => object.needed_picture(),
             _ => None,
         };
         picture.is_none_or(|name| product.file(name).is_some())

@@ -2,7 +2,7 @@
 //! Captures.
 //!
 //! In: the report of a comparison, both scans with their images, and the pictures. Out: the bytes of
-//! [`ComparisonObject`]s. All belong to the patient and the study of the scan at stress; the report refers to the images
+//! [`ComparisonObject`]s. The page joins the pictures and what the report says into one. All belong to the patient and the study of the scan at stress; the report refers to the images
 //! of both scans, each in its own study.
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one of
@@ -23,8 +23,10 @@ use super::structured_report::{
 use super::uid::Uids;
 use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
 use crate::comparison::WhichScan;
+use crate::draw::Image;
 use crate::report::{
     ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
+    ComparisonSheet, DrawnPage, comparison_sheet,
 };
 use dicom_dictionary_std::uids;
 
@@ -33,8 +35,8 @@ use dicom_dictionary_std::uids;
 pub enum ComparisonObject {
     /// The figures: Comprehensive 3D SR Storage.
     Measurements,
-    /// Slices of stress above those of rest: Secondary Capture.
-    Slices,
+    /// The page of the report as one picture: Secondary Capture.
+    Page,
     /// The polar map of a scan: Secondary Capture.
     Polar(WhichScan),
     /// The difference of both maps: Secondary Capture.
@@ -45,7 +47,7 @@ impl ComparisonObject {
     /// All of them.
     pub const ALL: [Self; 5] = [
         Self::Measurements,
-        Self::Slices,
+        Self::Page,
         Self::Polar(WhichScan::Stress),
         Self::Polar(WhichScan::Rest),
         Self::Difference,
@@ -56,14 +58,23 @@ impl ComparisonObject {
         self.facts().name
     }
 
-    /// The file of the comparison with the picture that the object shows, a PNG; `None` for the figures.
-    pub fn picture(self) -> Option<&'static str> {
+    /// The files of the comparison with the pictures that the object shows, PNG: of a page those that there are, of a polar
+    /// map the one that it is. None for the figures.
+    pub fn pictures(self) -> &'static [&'static str] {
         match self {
-            Self::Measurements => None,
-            Self::Slices => Some("slices.png"),
-            Self::Polar(WhichScan::Stress) => Some("polar_stress.png"),
-            Self::Polar(WhichScan::Rest) => Some("polar_rest.png"),
-            Self::Difference => Some("polar_difference.png"),
+            Self::Measurements => &[],
+            Self::Page => &PAGE_PICTURES,
+            Self::Polar(WhichScan::Stress) => &["polar_stress.png"],
+            Self::Polar(WhichScan::Rest) => &["polar_rest.png"],
+            Self::Difference => &["polar_difference.png"],
+        }
+    }
+
+    /// The picture without which there is no such object.
+    pub fn needed_picture(self) -> Option<&'static str> {
+        match self {
+            Self::Measurements | Self::Page => None,
+            Self::Polar(_) | Self::Difference => self.pictures().first().copied(),
         }
     }
 
@@ -77,7 +88,7 @@ impl ComparisonObject {
         };
         match self {
             Self::Measurements => DicomObject::Measurements.facts(),
-            Self::Slices => picture("page.dcm", 9107, "slices, stress above rest"),
+            Self::Page => picture("page.dcm", 9107, "page of rest and stress"),
             Self::Polar(WhichScan::Stress) => {
                 picture("polar_stress.dcm", 9108, "polar map at stress")
             }
@@ -88,6 +99,27 @@ impl ComparisonObject {
         }
     }
 }
+
+/// Slices of stress above those of rest.
+const SLICES_PICTURE: &str = "slices.png";
+
+/// The pictures of a page: the slices, and polar maps with their titles.
+const PAGE_MAPS: [(&str, &str); 5] = [
+    ("polar_stress.png", "Stress"),
+    ("polar_rest.png", "Rest"),
+    ("polar_difference.png", "Rest less stress"),
+    ("polar_z_stress.png", "Stress against normal limits, z"),
+    ("polar_z_rest.png", "Rest against normal limits, z"),
+];
+
+const PAGE_PICTURES: [&str; 6] = [
+    SLICES_PICTURE,
+    PAGE_MAPS[0].0,
+    PAGE_MAPS[1].0,
+    PAGE_MAPS[2].0,
+    PAGE_MAPS[3].0,
+    PAGE_MAPS[4].0,
+];
 
 /// The results of a comparison.
 pub struct DicomComparison<'a> {
@@ -139,21 +171,62 @@ impl<'a> DicomComparison<'a> {
         set.file()
     }
 
-    /// The bytes of an object that shows a picture, from that picture as a PNG.
+    /// The bytes of an object that shows pictures: `pictures` are those of [`ComparisonObject::pictures`] that there are, each
+    /// with its name. `None` for the figures, and for an object whose [`ComparisonObject::needed_picture`] is not there.
     ///
     /// # Errors
     /// See [`DicomError`].
-    pub fn picture(&self, object: ComparisonObject, png: &[u8]) -> Result<Vec<u8>, DicomError> {
+    pub fn picture(
+        &self,
+        object: ComparisonObject,
+        pictures: &[(&str, &[u8])],
+    ) -> Result<Option<Vec<u8>>, DicomError> {
         self.check()?;
+        let name = object.file_name();
+        let decoded = |picture: &str| {
+            let found = pictures.iter().find(|(known, _)| *known == picture);
+            found
+                .map(|(_, png)| capture::decoded(name, png))
+                .transpose()
+        };
+        let drawn = match object {
+            ComparisonObject::Measurements => None,
+            ComparisonObject::Page => {
+                let slices = decoded(SLICES_PICTURE)?;
+                let mut maps = Vec::new();
+                for (map, title) in PAGE_MAPS {
+                    maps.extend(decoded(map)?.map(|image| (title, image)));
+                }
+                Some(self.page(slices.as_ref(), &maps))
+            }
+            ComparisonObject::Polar(_) | ComparisonObject::Difference => {
+                let map = object.needed_picture().map(decoded).transpose()?;
+                map.flatten().map(capture::anonymous)
+            }
+        };
+        let Some(drawn) = drawn else {
+            return Ok(None);
+        };
         let mut set = DataSet::new();
         let scan = match object {
             ComparisonObject::Polar(WhichScan::Rest) if self.is_one_study() => &self.scans[1],
             _ => &self.scans[0],
         };
-        let name = object.file_name();
-        capture::put(scan, self.structure, name, png, &mut set)?;
-        self.put(object, self.uids.over(name, png), &mut set);
-        set.file()
+        capture::put(scan, self.structure, name, &drawn, &mut set)?;
+        let pixels = drawn.image.pixels.as_flattened();
+        self.put(object, self.uids.over(name, pixels), &mut set);
+        set.file().map(Some)
+    }
+
+    /// The page, which names patient and studies unless a scan is freed of the identity.
+    fn page(&self, slices: Option<&Image<3>>, maps: &[(&'static str, Image<3>)]) -> DrawnPage {
+        let [stress, rest] = self.scans.each_ref().map(SourceScan::shown);
+        comparison_sheet(&ComparisonSheet {
+            report: self.report,
+            slices,
+            maps,
+            scans: stress.zip(rest).map(|(stress, rest)| [stress, rest]),
+        })
     }
 
     fn check(&self) -> Result<(), DicomError> {

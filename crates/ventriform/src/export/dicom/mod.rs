@@ -11,6 +11,9 @@
 //! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest and
 //!    stress: a report and pictures.
 //!
+//! The picture of a page names patient and study in its pixels (Burned In Annotation YES), unless the scan is freed of the
+//! identity.
+//!
 //! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
 //! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
 //! input gives the same bytes, UIDs included, and other input gives other UIDs. A scan whose
@@ -54,7 +57,7 @@ use self::uid::Uids;
 use super::ExportError;
 use crate::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
-use crate::report::SegmentationReport;
+use crate::report::{DrawnPage, SegmentationReport, SegmentationSheet, segmentation_sheet};
 use dicom_dictionary_std::{tags, uids};
 
 /// Why a result cannot be written as DICOM.
@@ -129,7 +132,7 @@ pub enum DicomObject {
     Measurements,
     /// The polar map: Secondary Capture.
     Polar,
-    /// The slices with contours: Secondary Capture.
+    /// The page of the report as one picture: Secondary Capture.
     Page,
 }
 
@@ -216,7 +219,7 @@ impl DicomObject {
                 uids::SECONDARY_CAPTURE_IMAGE_STORAGE,
                 "OT",
                 9107,
-                "slices with contours",
+                "page of the report",
             ),
         }
     }
@@ -282,7 +285,7 @@ impl<'a> DicomResults<'a> {
         }
     }
 
-    /// Adds the figures of a segmentation, for [`DicomObject::Measurements`].
+    /// Adds the figures of a segmentation, for [`DicomObject::Measurements`] and [`DicomObject::Page`].
     #[must_use]
     pub fn with_figures(self, report: &'a SegmentationReport) -> Self {
         Self {
@@ -316,14 +319,14 @@ impl<'a> DicomResults<'a> {
         }
     }
 
-    /// The bytes of `object`; `None` for a picture that is not there.
+    /// The bytes of `object`; `None` for a picture that is not there: a polar map, or a page where there are no figures.
     ///
     /// # Errors
     /// See [`DicomError`].
     pub fn write(&self, object: DicomObject) -> Result<Option<Vec<u8>>, DicomError> {
         let there = match object {
             DicomObject::Polar => self.polar.is_some(),
-            DicomObject::Page => self.slices.is_some(),
+            DicomObject::Page => self.figures.is_some(),
             _ => true,
         };
         if there {
@@ -333,31 +336,30 @@ impl<'a> DicomResults<'a> {
         }
     }
 
-    /// The bytes of `object`; a picture that is not there is empty.
+    /// The bytes of `object`; a picture that is not there cannot be read.
     fn write_always(&self, object: DicomObject) -> Result<Vec<u8>, DicomError> {
         self.scan.check()?;
         let mut set = DataSet::new();
+        let picture = self.picture(object)?;
         match object {
             DicomObject::Mask => segmentation::put(self, &mut set)?,
             DicomObject::Contours => structure_set::put(self, &mut set)?,
             DicomObject::Mesh => stl::put(self, &mut set)?,
             DicomObject::Surface => surface::put(self, &mut set)?,
             DicomObject::Measurements => measurements::put(self, &mut set),
-            DicomObject::Polar | DicomObject::Page => {
-                let picture = match object {
-                    DicomObject::Polar => self.polar,
-                    _ => self.slices,
-                };
-                let png = picture.unwrap_or_default();
-                capture::put(self.scan, self.structure, object.file_name(), png, &mut set)?;
-            }
+            DicomObject::Polar | DicomObject::Page => {}
+        }
+        if let Some(picture) = &picture {
+            let name = object.file_name();
+            capture::put(self.scan, self.structure, name, picture, &mut set)?;
         }
         let facts = object.facts();
         let end = self.end.map(|end| format!(", {}", end.name()));
+        let instance = self.instance(object, picture.as_ref());
         put_facts(
             self.scan,
             &facts,
-            [self.instance(object), self.series(object)],
+            [instance, self.series(object)],
             format!(
                 "{}: {}{}",
                 self.structure.label,
@@ -367,6 +369,29 @@ impl<'a> DicomResults<'a> {
             &mut set,
         );
         set.file()
+    }
+
+    /// What a Secondary Capture shows; `None` for other objects.
+    fn picture(&self, object: DicomObject) -> Result<Option<DrawnPage>, DicomError> {
+        let name = object.file_name();
+        match (object, self.figures) {
+            (DicomObject::Polar, _) => {
+                let map = capture::decoded(name, self.polar.unwrap_or_default())?;
+                Ok(Some(capture::anonymous(map)))
+            }
+            (DicomObject::Page, Some(report)) => {
+                let decoded = |png| capture::decoded(name, png);
+                let slices = self.slices.map(decoded).transpose()?;
+                let polar = self.polar.map(decoded).transpose()?;
+                Ok(Some(segmentation_sheet(&SegmentationSheet {
+                    report,
+                    slices: slices.as_ref(),
+                    polar: polar.as_ref(),
+                    scan: self.scan.shown(),
+                })))
+            }
+            _ => Ok(None),
+        }
     }
 
     /// Label, description and creator of a segmentation.
@@ -394,19 +419,14 @@ impl<'a> DicomResults<'a> {
         set.item(tags::REFERENCED_SERIES_SEQUENCE, series);
     }
 
-    fn instance(&self, object: DicomObject) -> String {
-        let cavity = self
-            .cavity
-            .map(|mask| mask.voxels.iter().map(|v| u8::from(*v)));
-        let cavity: Option<Vec<u8>> = cavity.map(Iterator::collect);
-        let content = match object {
-            DicomObject::Mask => cavity.as_deref(),
-            DicomObject::Polar => self.polar,
-            DicomObject::Page => self.slices,
-            _ => None,
-        };
-        let name = object.file_name();
-        self.uids.over(name, content.unwrap_or_default())
+    fn instance(&self, object: DicomObject, picture: Option<&DrawnPage>) -> String {
+        let cavity = (self.cavity)
+            .filter(|_| object == DicomObject::Mask)
+            .map(|mask| mask.voxels.iter().map(|v| u8::from(*v)).collect());
+        let pixels = picture.map(|picture| picture.image.pixels.as_flattened().to_vec());
+        let content: Option<Vec<u8>> = cavity.or(pixels);
+        self.uids
+            .over(object.file_name(), &content.unwrap_or_default())
     }
 
     fn series(&self, object: DicomObject) -> String {

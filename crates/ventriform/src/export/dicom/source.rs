@@ -335,6 +335,11 @@ impl SourceScan {
         }
     }
 
+    /// What a picture may name of the scan; `None` of a scan without identity.
+    pub(super) fn shown(&self) -> Option<&Provenance> {
+        (!self.deidentified).then_some(&self.provenance)
+    }
+
     /// As [`legible`], for this scan.
     pub(super) fn check(&self) -> Result<(), DicomError> {
         legible(&self.provenance)

@@ -10,10 +10,11 @@ use crate::mesh::shapes;
 use crate::normals::{GroupSex, NormalsFlag, NormalsUsed};
 use crate::polar::{PolarSegment, PolarSummary};
 use crate::progress::Monitor;
+use crate::report::comparison_report::tests::first_comparison;
 use crate::report::segmentation_report::tests::first_report;
 use crate::report::{
-    PerfusionReport, RaisedFlag, SegmentScore, SegmentationReport, TerritoryScore, Thickness,
-    Thicknesses, VolumeIntervalsReport, WallVolumes,
+    ComparisonReport, PerfusionReport, RaisedFlag, SegmentScore, SegmentationReport,
+    TerritoryScore, Thickness, Thicknesses, VolumeIntervalsReport, WallVolumes,
 };
 use crate::volume::Provenance;
 use dicom_core::Tag;
@@ -880,7 +881,8 @@ fn a_volume_without_dicom_images_names_no_source() {
 #[test]
 fn pictures_keep_their_pixels_and_oblique_rows_are_refused() {
     let scene = straight();
-    let set = scene.read(DicomObject::Page);
+    let set = scene.read(DicomObject::Polar);
+    assert_eq!(text(&set, tags::BURNED_IN_ANNOTATION), "NO");
     assert_eq!(
         (text(&set, tags::ROWS), text(&set, tags::COLUMNS)),
         ("3".into(), "5".into())
@@ -901,6 +903,204 @@ fn pictures_keep_their_pixels_and_oblique_rows_are_refused() {
         scene.results().write(DicomObject::Mask),
         Err(DicomError::Oblique)
     );
+}
+
+fn pixels(set: &InMemDicomObject) -> Vec<u8> {
+    let pixels = set.element(tags::PIXEL_DATA).unwrap().to_bytes().unwrap();
+    pixels.into_owned()
+}
+
+/// The page of that scan, and whether it says that it names somebody.
+fn page_of(scene: &Scene) -> (Vec<u8>, bool) {
+    let set = scene.read(DicomObject::Page);
+    let burned_in = text(&set, tags::BURNED_IN_ANNOTATION);
+    assert!(["YES", "NO"].contains(&burned_in.as_str()));
+    (pixels(&set), burned_in == "YES")
+}
+
+/// Each part of the identity is in the pixels, and they say so; without any they say that there is none.
+#[test]
+fn a_page_names_patient_and_study_and_says_so() {
+    let of = |scan: Provenance| page_of(&Scene::new(Matrix3::identity(), scan, true));
+    let (named, burned_in) = of(provenance());
+    assert!(burned_in);
+    let other = || Some("19990909".to_owned());
+    let changes: [fn(&mut Provenance) -> &mut Option<String>; 9] = [
+        |scan| &mut scan.patient_name,
+        |scan| &mut scan.patient_id,
+        |scan| &mut scan.patient_birth_date,
+        |scan| &mut scan.patient_sex,
+        |scan| &mut scan.study_date,
+        |scan| &mut scan.study_description,
+        |scan| &mut scan.study_id,
+        |scan| &mut scan.accession_number,
+        |scan| &mut scan.referring_physician,
+    ];
+    let nobody = Provenance {
+        study_uid: Some("1.2.3.4".into()),
+        ..Provenance::default()
+    };
+    let (unnamed, burned_in) = of(nobody.clone());
+    assert!(!burned_in);
+    for (number, field) in changes.into_iter().enumerate() {
+        let mut scan = provenance();
+        *field(&mut scan) = other();
+        assert_ne!(of(scan).0, named, "{number}");
+        let mut alone = nobody.clone();
+        *field(&mut alone) = other();
+        let (shown, burned_in) = of(alone);
+        assert!(burned_in && shown != unnamed, "{number}");
+    }
+}
+
+/// Two patients with the same heart have the same page once they are freed of their identity, whatever they are given
+/// in its place, and whatever the file said of the scan.
+#[test]
+fn a_page_freed_of_the_identity_names_nobody() {
+    let other = Provenance {
+        patient_name: Some("山田^太郎=山田".into()),
+        patient_id: Some("P-99".into()),
+        study_description: Some("Follow-up of Yamada".into()),
+        series_description: Some("Yamada at rest".into()),
+        radiopharmaceutical: Some("Yamada's tracer".into()),
+        convolution_kernel: Some("Yamada's filter".into()),
+        ..provenance()
+    };
+    let stated = [None, Some("TRIAL-1".to_owned())];
+    let pages = [provenance(), other].into_iter().zip(stated);
+    let pages: Vec<(Vec<u8>, bool)> = pages
+        .map(|(scan, patient_id)| {
+            let mut scene = Scene::new(Matrix3::identity(), scan, true);
+            scene.report.warnings = vec![format!("{patient_id:?} is left out.")];
+            let how = Deidentification {
+                secret: b"s".to_vec(),
+            };
+            let stated = StatedIdentity {
+                patient_id,
+                ..StatedIdentity::default()
+            };
+            scene.scan = scene.scan.deidentified(&how, &stated);
+            page_of(&scene)
+        })
+        .collect();
+    assert!(pages[0] == pages[1], "the pixels differ");
+    assert!(!pages[0].1);
+}
+
+/// A page holds its pictures: each of them, and each figure, changes its pixels and its UID.
+#[test]
+fn a_page_holds_pictures_and_figures() {
+    let scene = straight();
+    let page = |results: DicomResults<'_>| {
+        let bytes = results.write(DicomObject::Page).unwrap().unwrap();
+        let set = from_reader(&bytes[..]).unwrap();
+        (pixels(&set), text(&set, tags::SOP_INSTANCE_UID))
+    };
+    let whole = page(scene.results());
+    let black = Image::filled(5, 3, [0; 3]).png();
+    for pictures in [
+        (None, Some(&scene.png[..])),
+        (Some(&black[..]), Some(&scene.png[..])),
+        (Some(&scene.png[..]), None),
+        (Some(&scene.png[..]), Some(&black[..])),
+    ] {
+        let other = page(scene.results().with_pictures(pictures.0, pictures.1));
+        assert!(other.0 != whole.0 && other.1 != whole.1);
+    }
+    let changes: [fn(&mut SegmentationReport); 4] = [
+        |report| report.volumes_ml.wall += 1.0,
+        |report| report.flags[0].reason.push('!'),
+        |report| report.flags.clear(),
+        |report| report.template.push('x'),
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut other = straight();
+        change(&mut other.report);
+        assert!(page(other.results()).0 != whole.0, "{number}");
+    }
+    // Without a report there is no page.
+    let bare = DicomResults {
+        figures: None,
+        ..scene.results()
+    };
+    assert_eq!(bare.write(DicomObject::Page), Ok(None));
+    let damaged = scene.results().with_pictures(Some(b"no picture"), None);
+    assert!(matches!(
+        damaged.write(DicomObject::Page),
+        Err(DicomError::Picture {
+            name: "page.dcm",
+            ..
+        })
+    ));
+}
+
+/// A page is of the two scans: it says what the report says, and names whom both files name.
+#[test]
+fn a_page_of_a_comparison_names_both_studies_unless_one_is_freed_of_the_identity() {
+    let report = first_comparison();
+    let structure = Structure::of("left_ventricle");
+    let scan = |change: fn(&mut Provenance)| {
+        let mut provenance = provenance();
+        change(&mut provenance);
+        Scene::new(Matrix3::identity(), provenance, true).scan
+    };
+    let page = |scans: &[SourceScan; 2], report: &ComparisonReport, pictures: &[(&str, &[u8])]| {
+        let made = DicomComparison::new(structure, scans, report, "");
+        let bytes = made.picture(ComparisonObject::Page, pictures).unwrap();
+        let set = from_reader(&bytes.unwrap()[..]).unwrap();
+        let burned_in = text(&set, tags::BURNED_IN_ANNOTATION);
+        (pixels(&set), burned_in)
+    };
+    let same: fn(&mut Provenance) = |_| {};
+    let both = [scan(same), scan(same)];
+    let (named, burned_in) = page(&both, &report, &[]);
+    assert_eq!(burned_in, "YES");
+    let next_day: fn(&mut Provenance) = |scan| {
+        scan.study_uid = Some("1.2.3.7".into());
+        scan.study_date = Some("20250116".into());
+    };
+    let two_days = [scan(same), scan(next_day)];
+    assert_ne!(page(&two_days, &report, &[]).0, named);
+
+    let png = Image::filled(5, 3, [10, 20, 30]).png();
+    for picture in ComparisonObject::Page.pictures() {
+        let (shown, _) = page(&both, &report, &[(*picture, &png[..])]);
+        assert_ne!(shown, named, "{picture}");
+    }
+    let mut other = report.clone();
+    other.tid += 0.5;
+    assert_ne!(page(&both, &other, &[]).0, named);
+
+    let free = |scan: SourceScan| {
+        let how = Deidentification {
+            secret: b"s".to_vec(),
+        };
+        scan.deidentified(&how, &StatedIdentity::default())
+    };
+    let stranger: fn(&mut Provenance) = |scan| scan.patient_name = Some("Doe^John".into());
+    let mut described = report.clone();
+    described.stress.series_description = Some("Doe at stress".into());
+    described.rest.warnings.push("Doe.dcm was left out.".into());
+    let freed = page(&[free(scan(same)), free(scan(same))], &report, &[]);
+    assert_eq!(freed.1, "NO");
+    let others = [free(scan(stranger)), free(scan(stranger))];
+    assert!(page(&others, &described, &[]) == freed);
+    let half = [free(scan(same)), scan(stranger)];
+    assert!(page(&half, &report, &[]) == freed);
+
+    // A polar map is a file of the comparison; without it there is no such object.
+    let made = DicomComparison::new(structure, &both, &report, "");
+    for object in ComparisonObject::ALL {
+        let alone = made.picture(object, &[]).unwrap();
+        assert_eq!(alone.is_some(), object == ComparisonObject::Page);
+        let Some(name) = object.needed_picture() else {
+            continue;
+        };
+        let bytes = made.picture(object, &[(name, &png[..])]).unwrap().unwrap();
+        let set = from_reader(&bytes[..]).unwrap();
+        assert_eq!(pixels(&set)[..45], [10, 20, 30].repeat(15));
+        assert_eq!(text(&set, tags::BURNED_IN_ANNOTATION), "NO");
+    }
 }
 
 #[test]
