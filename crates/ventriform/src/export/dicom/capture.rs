@@ -30,10 +30,13 @@ pub(super) fn put(
     scan: &SourceScan,
     structure: Structure,
     name: &'static str,
-    picture: &DrawnPage,
+    picture: DrawnPage,
     set: &mut DataSet,
 ) -> Result<(), DicomError> {
-    let image = &picture.image;
+    let DrawnPage {
+        image,
+        is_identified,
+    } = picture;
     let side = |length: usize| {
         u16::try_from(length).map_err(|_| DicomError::Picture {
             name,
@@ -47,7 +50,7 @@ pub(super) fn put(
     set.text(tags::DERIVATION_DESCRIPTION, structure.label);
     set.known(tags::BODY_PART_EXAMINED, Some(structure.body_part));
     set.empty(tags::PATIENT_ORIENTATION);
-    let burned_in = if picture.is_identified { "YES" } else { "NO" };
+    let burned_in = if is_identified { "YES" } else { "NO" };
     set.text(tags::BURNED_IN_ANNOTATION, burned_in);
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
     if let Some(images) = scan.images() {
@@ -62,6 +65,6 @@ pub(super) fn put(
     set.short(tags::BITS_STORED, 8);
     set.short(tags::HIGH_BIT, 7);
     set.short(tags::PIXEL_REPRESENTATION, 0);
-    set.bytes(tags::PIXEL_DATA, image.pixels.as_flattened().to_vec());
+    set.bytes(tags::PIXEL_DATA, image.pixels.into_flattened());
     Ok(())
 }

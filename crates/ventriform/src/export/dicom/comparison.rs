@@ -212,9 +212,9 @@ impl<'a> DicomComparison<'a> {
             ComparisonObject::Polar(WhichScan::Rest) if self.is_one_study() => &self.scans[1],
             _ => &self.scans[0],
         };
-        capture::put(scan, self.structure, name, &drawn, &mut set)?;
-        let pixels = drawn.image.pixels.as_flattened();
-        self.put(object, self.uids.over(name, pixels), &mut set);
+        let instance = self.uids.over(name, drawn.image.pixels.as_flattened());
+        capture::put(scan, self.structure, name, drawn, &mut set)?;
+        self.put(object, instance, &mut set);
         set.file().map(Some)
     }
 

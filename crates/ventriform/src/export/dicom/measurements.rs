@@ -148,7 +148,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
     let mask = SeriesReference {
         series: results.series(DicomObject::Mask),
         class: uids::SEGMENTATION_STORAGE,
-        instance: results.instance(DicomObject::Mask),
+        instance: results.instance(DicomObject::Mask, None),
     };
     report::put(
         &[results.scan],
@@ -255,7 +255,7 @@ fn of_part(results: &DicomResults<'_>, part: &Part) -> Option<DataSet> {
 }
 
 fn segment_reference(results: &DicomResults<'_>) -> DataSet {
-    let instance = results.instance(DicomObject::Mask);
+    let instance = results.instance(DicomObject::Mask, None);
     let mut item = reference(uids::SEGMENTATION_STORAGE, &instance);
     item.short(tags::REFERENCED_SEGMENT_NUMBER, 1);
     item

@@ -341,6 +341,7 @@ impl<'a> DicomResults<'a> {
         self.scan.check()?;
         let mut set = DataSet::new();
         let picture = self.picture(object)?;
+        let instance = self.instance(object, picture.as_ref());
         match object {
             DicomObject::Mask => segmentation::put(self, &mut set)?,
             DicomObject::Contours => structure_set::put(self, &mut set)?,
@@ -349,13 +350,12 @@ impl<'a> DicomResults<'a> {
             DicomObject::Measurements => measurements::put(self, &mut set),
             DicomObject::Polar | DicomObject::Page => {}
         }
-        if let Some(picture) = &picture {
+        if let Some(picture) = picture {
             let name = object.file_name();
             capture::put(self.scan, self.structure, name, picture, &mut set)?;
         }
         let facts = object.facts();
         let end = self.end.map(|end| format!(", {}", end.name()));
-        let instance = self.instance(object, picture.as_ref());
         put_facts(
             self.scan,
             &facts,
@@ -419,14 +419,15 @@ impl<'a> DicomResults<'a> {
         set.item(tags::REFERENCED_SERIES_SEQUENCE, series);
     }
 
+    /// SOP Instance UID of `object`; of a Secondary Capture it needs what that shows.
     fn instance(&self, object: DicomObject, picture: Option<&DrawnPage>) -> String {
-        let cavity = (self.cavity)
+        let cavity: Option<Vec<u8>> = (self.cavity)
             .filter(|_| object == DicomObject::Mask)
             .map(|mask| mask.voxels.iter().map(|v| u8::from(*v)).collect());
-        let pixels = picture.map(|picture| picture.image.pixels.as_flattened().to_vec());
-        let content: Option<Vec<u8>> = cavity.or(pixels);
+        let pixels = picture.map(|picture| picture.image.pixels.as_flattened());
+        let content = cavity.as_deref().or(pixels);
         self.uids
-            .over(object.file_name(), &content.unwrap_or_default())
+            .over(object.file_name(), content.unwrap_or_default())
     }
 
     fn series(&self, object: DicomObject) -> String {
