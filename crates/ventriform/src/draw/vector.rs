@@ -258,17 +258,18 @@ impl VectorShape {
     }
 }
 
-/// The places about a character's pixel that its rim covers too: columns and rows away, and by which share.
+/// The places about a character's pixel that its rim covers too: columns and rows away, and how many times as much, up to
+/// all. A character's edge is smooth: beside a pixel that it covers by half, its rim covers the next one whole.
 const RIM: &[([i64; 2], f64)] = &[
-    ([0, 0], 1.0),
-    ([-1, 0], 1.0),
-    ([1, 0], 1.0),
-    ([0, -1], 1.0),
-    ([0, 1], 1.0),
-    ([-1, -1], 0.6),
-    ([1, -1], 0.6),
-    ([-1, 1], 0.6),
-    ([1, 1], 0.6),
+    ([0, 0], 2.0),
+    ([-1, 0], 2.0),
+    ([1, 0], 2.0),
+    ([0, -1], 2.0),
+    ([0, 1], 2.0),
+    ([-1, -1], 1.2),
+    ([1, -1], 1.2),
+    ([-1, 1], 1.2),
+    ([1, 1], 1.2),
 ];
 
 /// Mixes `colour` into the pixels of the box about `corners` by the share that `coverage` gives for
@@ -384,7 +385,7 @@ fn paint_text(
                     continue;
                 };
                 let all = shares.entry(row * image.width + column).or_default();
-                *all = f64::max(*all, share * f64::from(*coverage) / 255.0);
+                *all = f64::max(*all, share * f64::from(*coverage) / 255.0).min(1.0);
             }
         }
     }

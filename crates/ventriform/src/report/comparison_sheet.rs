@@ -70,12 +70,14 @@ fn pictures_and_figures(sheet: &ComparisonSheet<'_>) -> Block {
     facts.extend(missing.map(|hint| Block::Sentence(Tone::Soft, hint)));
     let mut table = scan_table(report, sheet.scans.is_some());
     if let Some(scans) = sheet.scans {
-        let rows: [(&str, fn(&Provenance) -> &Option<String>); 2] = [
-            ("reconstruction", |scan| &scan.reconstruction_method),
-            ("filter", |scan| &scan.convolution_kernel),
+        let rows = [
+            (
+                "reconstruction",
+                scans.map(|scan| &scan.reconstruction_method),
+            ),
+            ("filter", scans.map(|scan| &scan.convolution_kernel)),
         ];
-        for (name, of) in rows {
-            let both = scans.map(of);
+        for (name, both) in rows {
             if both.iter().any(|text| text.is_some()) {
                 let text = |text: &Option<String>| text.clone().unwrap_or("not stated".into());
                 let [stress, rest] = both.map(text);
