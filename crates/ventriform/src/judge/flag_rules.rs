@@ -5,6 +5,7 @@ use super::dark_apex;
 use super::evidence::Evidence;
 use super::field_of_view;
 use super::flags::{ApexDirection, Flag};
+use super::liver_side;
 use super::septum;
 use crate::deform::dynamics::StopReason;
 use crate::deform::{FittedModel, Orbit, WallSurfaces};
@@ -60,7 +61,7 @@ pub(super) fn flags(
     }
     if ventricle {
         flags.extend(cut(model, volume));
-        flags.extend(mirrored(model));
+        flags.extend(mirrored(model, volume));
         flags.extend(implausible(model, evidence));
     }
     flags
@@ -169,8 +170,19 @@ const UPWARD_SINE: f64 = 0.2;
 /// Greatest angle of the patient's superior direction to the frame's at which the frame's x tells left from right.
 const UPRIGHT_COSINE: f64 = 0.7;
 
-/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient.
-fn mirrored(model: &FittedModel) -> Option<Flag> {
+/// Part of the long axis's direction to the patient's left up to which the apex leaves left and right open, so that the liver's
+/// side is asked: 14 degrees. Usual hearts point 27 degrees and more to the left.
+const OPEN_SIDE_SINE: f64 = 0.25;
+/// Share of the bright activity below the heart by which the left outweighs the right from which on a heart is flagged. In 65
+/// simulated scans (seed 8801) the right outweighs the left by 0.02 and more, in four real ones by 0.46 and more.
+const LIVER_FLAG_SHARE: f64 = 0.25;
+
+/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, or of a liver on the left
+/// below one that hardly points to a side.
+fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
+    if !claims {
+        return None;
+    }
     let (cup, orientation) = (model.cup.as_ref()?, model.patient_orientation.as_ref()?);
     let claims =
         orientation.source != OrientationSource::Unknown && orientation.superior.z > UPRIGHT_COSINE;
@@ -180,13 +192,20 @@ fn mirrored(model: &FittedModel) -> Option<Flag> {
         (ApexDirection::Posterior, axis.y, MIRRORED_SINE),
         (ApexDirection::Superior, axis.z, UPWARD_SINE),
     ];
-    let found = directions.into_iter().find(|(_, part, most)| part > most);
-    found
-        .filter(|_| claims)
-        .map(|(towards, part, _)| Flag::Mirrored {
-            towards,
-            degrees: part.clamp(-1.0, 1.0).asin().to_degrees(),
-        })
+    let apex = directions.into_iter().find(|(_, part, most)| part > most);
+    if let Some((towards, part, _)) = apex {
+        let degrees = part.clamp(-1.0, 1.0).asin().to_degrees();
+        return Some(Flag::Mirrored { towards, degrees });
+    }
+    if axis.x > OPEN_SIDE_SINE {
+        return None;
+    }
+    let wall = model.sensed_wall.as_ref()?;
+    let uptake = field_of_view::bright_uptake(wall, volume);
+    let right = liver_side::liver_side(volume, cup, uptake)?;
+    (right <= -LIVER_FLAG_SHARE).then_some(Flag::LiverOnTheLeft {
+        share: 0.5 - 0.5 * right,
+    })
 }
 
 /// Number of different values from which on a volume is taken for an image.

@@ -102,6 +102,17 @@ pub enum Flag {
         /// Share of area with an edge.
         active: f64,
     },
+    /// Bright activity as the liver's lies on the left, below an apex that hardly points to a side.
+    #[error(
+        "{:.0} % of the bright activity below the heart lies to the left of the body's middle, and the apex points to neither side: \
+         left and right may be exchanged in the file (compare with another view: the liver lies on the right). The sides of the \
+         polar map are those of the file",
+        100.0 * share
+    )]
+    LiverOnTheLeft {
+        /// Share of the bright activity below the heart that lies on the left, 0..=1.
+        share: f64,
+    },
     /// The apex points where no apex does.
     #[error("{}", mirrored_text(*towards, *degrees))]
     Mirrored {
@@ -203,7 +214,7 @@ impl Flag {
             Flag::NotAtRest { .. } => "not_at_rest",
             Flag::Folded { .. } => "folded",
             Flag::PoorContrast { .. } => "poor_contrast",
-            Flag::Mirrored { .. } => "mirrored",
+            Flag::Mirrored { .. } | Flag::LiverOnTheLeft { .. } => "mirrored",
             Flag::FieldOfView { .. } => "field_of_view",
             Flag::TouchesBorder { .. } => "touches_border",
             Flag::ImplausibleShape { .. } => "implausible_shape",

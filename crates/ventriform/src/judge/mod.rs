@@ -24,6 +24,7 @@ mod field_of_view;
 mod fit;
 mod flag_rules;
 pub mod flags;
+mod liver_side;
 pub mod logistic;
 pub mod motion;
 mod node_terms;

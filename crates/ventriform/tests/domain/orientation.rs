@@ -207,6 +207,27 @@ fn a_heart_the_wrong_way_round_is_flagged_and_none_that_is_not() {
     }
 }
 
+/// An apex that points straight to the front tells no side: the liver does.
+#[test]
+fn below_an_apex_that_points_to_the_front_the_liver_tells_the_side() {
+    let parameters = PhantomParameters {
+        shape: [52; 3],
+        spacing_mm: [5.0; 3],
+        apex_direction: [0.03, -0.88, -0.48],
+        pose_spread_deg: 0.0,
+        gut: 0.1,
+        ..PhantomParameters::default()
+    };
+    let volume = phantom(&parameters, &Monitor::silent()).unwrap().volume;
+    let right = segmented(&file(&volume, None, 1), &[]);
+    let axis = right.fit.model.cup.as_ref().unwrap().axis;
+    assert!(axis.x.abs() < 0.1, "{axis}");
+    assert!(!is_mirrored(&right));
+    assert!(is_mirrored(&segmented(&file(&volume, Some(0), 1), &[])));
+    // It is told of frames that claim a patient only.
+    assert!(!is_mirrored(&segmented(&file(&volume, Some(0), 0), &[])));
+}
+
 /// Without codes nothing says how the axes lie in the patient: the wall is found, its sides are not known.
 #[test]
 fn a_file_without_codes_has_no_sides_unless_they_are_stated() {
