@@ -1,10 +1,10 @@
 //! The rules by which a fit gets its flags.
 
 use super::confidence;
-use super::dark_apex;
+use super::dark_apex::{self, DarkApex};
 use super::evidence::Evidence;
 use super::field_of_view;
-use super::flags::{ApexDirection, Flag};
+use super::flags::{ApexDirection, DarkPart, Flag};
 use super::liver_side;
 use super::septum;
 use crate::deform::dynamics::StopReason;
@@ -112,20 +112,17 @@ fn motion_flag_probability(orbit: Orbit) -> f64 {
     }
 }
 
-/// The flag of an apex that was not seen by the search, or is dark on the fitted wall.
+/// The flag of an apex that was not seen by the search, or is dark on the fitted wall, all round or in part.
 fn dark_apex(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     let found = model.localisation.as_ref()?;
     let in_search = found.dark_apex.map(|uptake| Flag::DarkApex {
         uptake,
-        length_assumed: true,
+        part: DarkPart::Whole,
     });
     in_search.or_else(|| {
         let wall = model.sensed_wall.as_ref()?;
-        let uptake = dark_apex::dark_apex_uptake(model.apparent_mesh(), wall, volume)?;
-        Some(Flag::DarkApex {
-            uptake,
-            length_assumed: false,
-        })
+        let DarkApex { uptake, part } = dark_apex::dark_apex(model.apparent_mesh(), wall, volume)?;
+        Some(Flag::DarkApex { uptake, part })
     })
 }
 
@@ -180,12 +177,12 @@ const LIVER_FLAG_SHARE: f64 = 0.25;
 /// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, or of a liver on the left
 /// below one that hardly points to a side.
 fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
-    if !claims {
-        return None;
-    }
     let (cup, orientation) = (model.cup.as_ref()?, model.patient_orientation.as_ref()?);
     let claims =
         orientation.source != OrientationSource::Unknown && orientation.superior.z > UPRIGHT_COSINE;
+    if !claims {
+        return None;
+    }
     let axis = cup.axis;
     let directions = [
         (ApexDirection::Right, -axis.x, MIRRORED_SINE),

@@ -66,21 +66,13 @@ pub enum Flag {
         /// Number of different values.
         values: usize,
     },
-    /// The apical wall is too dark to be seen.
-    #[error(
-        "the apical wall takes up {:.0} % as much as the {}",
-        100.0 * uptake,
-        if *length_assumed {
-            "basal one: the length of the model is that of a mean heart of this breadth"
-        } else {
-            "brightest, all round: the model may end short of the apex, its cavity and wall be too small"
-        }
-    )]
+    /// The apical wall, or a part of it, is too dark to be seen.
+    #[error("{}", dark_apex_text(*uptake, *part))]
     DarkApex {
-        /// Uptake of the apical wall relative to the basal wall, or to the brightest.
+        /// Uptake of what is dark of the apical wall, relative to the basal wall ([`DarkPart::Whole`]) or to the brightest.
         uptake: f64,
-        /// Whether the length comes from the breadth. Otherwise it is that of the wall that shows.
-        length_assumed: bool,
+        /// What is dark.
+        part: DarkPart,
     },
     /// The motion did not come to rest.
     #[error("the model did not come to rest: {}", reason.as_str())]
@@ -102,6 +94,14 @@ pub enum Flag {
         /// Share of area with an edge.
         active: f64,
     },
+    /// The apex points where no apex does.
+    #[error("{}", mirrored_text(*towards, *degrees))]
+    Mirrored {
+        /// Where it points.
+        towards: ApexDirection,
+        /// Angle of the long axis to the plane across that direction, degrees.
+        degrees: f64,
+    },
     /// Bright activity as the liver's lies on the left, below an apex that hardly points to a side.
     #[error(
         "{:.0} % of the bright activity below the heart lies to the left of the body's middle, and the apex points to neither side: \
@@ -112,14 +112,6 @@ pub enum Flag {
     LiverOnTheLeft {
         /// Share of the bright activity below the heart that lies on the left, 0..=1.
         share: f64,
-    },
-    /// The apex points where no apex does.
-    #[error("{}", mirrored_text(*towards, *degrees))]
-    Mirrored {
-        /// Where it points.
-        towards: ApexDirection,
-        /// Angle of the long axis to the plane across that direction, degrees.
-        degrees: f64,
     },
     /// The image ends in the wall.
     #[error(
@@ -155,6 +147,38 @@ pub enum Flag {
         /// Share of basal rays without wall.
         gaps: f64,
     },
+}
+
+/// The part of an apical wall that takes up too little to be seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DarkPart {
+    /// All of it, as the search saw: the length comes from the breadth.
+    Whole,
+    /// All round, on the fitted wall: the length is that of the wall that shows.
+    AllRound,
+    /// A sector of it, on the fitted wall.
+    Sector {
+        /// Its angle about the axis, degrees.
+        degrees: f64,
+    },
+}
+
+fn dark_apex_text(uptake: f64, part: DarkPart) -> String {
+    let percent = 100.0 * uptake;
+    match part {
+        DarkPart::Whole => format!(
+            "the apical wall takes up {percent:.0} % as much as the basal one: the length of the model is that of a mean \
+             heart of this breadth"
+        ),
+        DarkPart::AllRound => format!(
+            "the apical wall takes up {percent:.0} % as much as the brightest, all round: the model may end short of the \
+             apex, its cavity and wall be too small"
+        ),
+        DarkPart::Sector { degrees } => format!(
+            "over {degrees:.0} degrees of its circumference the apical wall takes up {percent:.0} % as much as the \
+             brightest: there the contours, and what they add to the volumes, follow from the wall about them"
+        ),
+    }
 }
 
 /// The two positions in the projections, in words.
