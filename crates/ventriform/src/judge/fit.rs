@@ -1,6 +1,6 @@
 //! A fitted model and its judgement.
 
-use super::Judgement;
+use super::{Flag, Judgement};
 use crate::deform::{FittedModel, WallEdge};
 
 /// A fitted model and how likely it is right.
@@ -20,7 +20,7 @@ impl Fit {
     }
 
     /// A figure to rank templates by: the share of area with edges, less strain, misfit and
-    /// flags, and, where the apex does not show, less the change of the model's length. Without
+    /// flags of the fit, and, where the apex does not show, less the change of the model's length. Without
     /// the last term a model that shrinks to the visible part of the wall would rank higher,
     /// because more of its area sees an edge.
     pub fn merit(&self) -> f64 {
@@ -29,6 +29,15 @@ impl Fit {
             - 0.5 * model.change_of_length().abs()
             - 0.5 * model.strain.sqrt()
             - 0.05 * model.residual
-            - 0.02 * self.judgement.flags.len() as f64
+            - 0.02 * self.flags_of_fit() as f64
+    }
+
+    /// The number of flags but those of what the image lacks: a model that ends short of a dark apex or of a cut does not
+    /// see it, and is no better for that.
+    fn flags_of_fit(&self) -> usize {
+        let of_image =
+            |flag: &&Flag| matches!(flag, Flag::DarkApex { .. } | Flag::FieldOfView { .. });
+        let flags = &self.judgement.flags;
+        flags.len() - flags.iter().filter(of_image).count()
     }
 }

@@ -15,6 +15,7 @@ use ventriform::grid::agreement::compare;
 use ventriform::grid::field::Field;
 use ventriform::grid::voxelise::voxelise;
 use ventriform::judge::Flag;
+use ventriform::judge::flags::DarkPart;
 use ventriform::locate::{Hints, LocateError};
 use ventriform::mesh::{TriMesh, shapes};
 use ventriform::model::struts::struts;
@@ -422,6 +423,19 @@ fn merit_falls_with_misfit_strain_and_doubts_and_rises_with_what_is_seen() {
                 .push(Flag::UncertainPlace { confidence: 0.1 })
         },
         0.02,
+    );
+    // A model that ends short of a dark apex, or of the image's end, does not see it.
+    falls(
+        &|fit| {
+            fit.judgement.flags.extend([
+                Flag::DarkApex {
+                    uptake: 0.3,
+                    part: DarkPart::Sector { degrees: 90.0 },
+                },
+                Flag::FieldOfView { area_cm2: 20.0 },
+            ])
+        },
+        0.0,
     );
 }
 
