@@ -61,9 +61,10 @@ pub(super) fn cut_area_cm2(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume
     }
     let least_step = STEP_SHARE * uptake;
     let part = Part::about(mesh, volume);
-    let empty = part.empty((EQUAL_SHARE * uptake) as f32);
-    let surface = Bvh::new(&mesh.vertices, &mesh.triangles);
-    let near = |point: &Vec3| {
+    // Both are made for the first step alone: most images have none.
+    let (mut empty, mut surface) = (None, None);
+    let mut near = |point: &Vec3| {
+        let surface = surface.get_or_insert_with(|| Bvh::new(&mesh.vertices, &mesh.triangles));
         let closest = surface.closest(point);
         closest.is_some_and(|closest| closest.squared_distance < REACH_MM * REACH_MM)
     };
@@ -75,9 +76,6 @@ pub(super) fn cut_area_cm2(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume
         }
         let place = part.place(index);
         for (axis, neighbour, way) in part.neighbours(index) {
-            if !empty[neighbour] {
-                continue;
-            }
             let beyond = part.values[neighbour];
             let beyond = if beyond.is_nan() { 0.0 } else { beyond };
             let ramp = Ramp {
@@ -85,7 +83,12 @@ pub(super) fn cut_area_cm2(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume
                 first: f64::from(*value),
                 inward: part.inward(index, axis, way),
             };
+            // The comparison, which hardly any voxel passes, before the search for regions.
             if !ramp.is_step(least_step) {
+                continue;
+            }
+            let empty = empty.get_or_insert_with(|| part.empty((EQUAL_SHARE * uptake) as f32));
+            if !empty[neighbour] {
                 continue;
             }
             let mut face = place;
