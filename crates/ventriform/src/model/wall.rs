@@ -495,15 +495,19 @@ pub struct HalfPlane {
 /// The height at which `mesh` begins in a half plane whose axis runs through `centre`, mm from there towards the
 /// apex: the most basal crossing of its edges with it. `None` without any.
 pub fn rim_height(mesh: &TriMesh, centre: &Vec3, plane: &HalfPlane) -> Option<f64> {
+    // Each vertex has six edges on average, and hardly any of them crosses the half plane.
+    let asides: Vec<f64> = (mesh.vertices.iter())
+        .map(|v| (v - centre).dot(&plane.aside))
+        .collect();
     let mut height = f64::INFINITY;
-    for triangle in 0..mesh.triangles.len() {
-        let corners = mesh.corners(triangle);
+    for triangle in &mesh.triangles {
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-            let (p, q) = (corners[a] - centre, corners[b] - centre);
-            let (from, to) = (p.dot(&plane.aside), q.dot(&plane.aside));
+            let ends = [triangle[a], triangle[b]].map(|v| v as usize);
+            let [from, to] = ends.map(|v| asides[v]);
             if from * to > 0.0 || from == to {
                 continue;
             }
+            let [p, q] = ends.map(|v| mesh.vertices[v] - centre);
             let crossing = p + (q - p) * (from / (from - to));
             if crossing.dot(&plane.outward) > 0.0 {
                 height = height.min(crossing.dot(&plane.axis));
