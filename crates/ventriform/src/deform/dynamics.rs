@@ -17,7 +17,7 @@
 //! is stable for any dt, so the motion ends at rest, where it stalls, or at the limit of steps
 //! ([`StopReason`]).
 
-use super::elastic::Elastic;
+use super::elastic::{Elastic, Turns};
 use super::sensors::{self, PER_TRIANGLE, SensorReading, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
@@ -136,10 +136,12 @@ pub fn run(
             mean.add(readings, settled);
         }
         let readings = mean.readings(&state.mesh);
-        let energy =
-            body.energy(&state.mesh.vertices) + sensor_energy(&readings) + state.kinetic_energy();
+        let turns = body.turns(&state.mesh.vertices);
+        let energy = body.energy_of(&state.mesh.vertices, &turns)
+            + sensor_energy(&readings)
+            + state.kinetic_energy();
         energies.push(energy);
-        let Some(farthest) = state.step(body, motion, &readings) else {
+        let Some(farthest) = state.step(body, &turns, motion, &readings) else {
             reason = StopReason::Diverged;
             break;
         };
@@ -281,14 +283,20 @@ impl MotionState {
 
     /// Makes one step and returns the greatest displacement of a node, mm; `None` where the motion
     /// diverged, in which case the positions stay as they were.
-    fn step(&mut self, body: &Elastic, motion: &Motion, readings: &[SensorReading]) -> Option<f64> {
+    fn step(
+        &mut self,
+        body: &Elastic,
+        turns: &Turns,
+        motion: &Motion,
+        readings: &[SensorReading],
+    ) -> Option<f64> {
         let dt = motion.time_step;
         let inertia = 1.0 / (dt * dt) + motion.damping / dt;
         let old = &self.mesh.vertices;
         let mut rhs: Vec<Vec3> = (0..old.len())
             .map(|i| (old[i] * inertia + self.velocity[i] / dt) * self.masses[i])
             .collect();
-        body.add_targets(old, &mut rhs);
+        body.add_targets(old, turns, &mut rhs);
         self.matrix.copy_from(&self.constant);
         let weights = sensors::barycentric();
         for (t, group) in readings.chunks_exact(PER_TRIANGLE).enumerate() {
@@ -332,6 +340,17 @@ mod tests {
         Elastic::new(mesh, &[], Stiffness::default())
     }
 
+    /// A step from where the body is.
+    fn step(
+        state: &mut MotionState,
+        body: &Elastic,
+        motion: &Motion,
+        readings: &[SensorReading],
+    ) -> Option<f64> {
+        let turns = body.turns(&state.mesh.vertices);
+        state.step(body, &turns, motion, readings)
+    }
+
     /// A body in flight, which nothing deforms, is slowed by the damping alone: implicitly,
     /// v' = v / (1 + g dt).
     #[test]
@@ -351,7 +370,7 @@ mod tests {
             let energy = 0.5 * 3.0 * velocity.norm_squared();
             assert!((state.kinetic_energy() / energy - 1.0).abs() < 1e-9);
             let slowed = velocity / (1.0 + 0.6 * time_step);
-            let farthest = state.step(&body, &motion, &[]).unwrap();
+            let farthest = step(&mut state, &body, &motion, &[]).unwrap();
             assert!((farthest - slowed.norm() * time_step).abs() < 1e-4);
             for ((p, q), v) in state
                 .mesh
@@ -397,7 +416,7 @@ mod tests {
             for r in &mut readings {
                 r.offset = r.normal.dot(&shift);
             }
-            state.step(&body, &motion, &readings).unwrap();
+            step(&mut state, &body, &motion, &readings).unwrap();
         }
         for (p, q) in state.mesh.vertices.iter().zip(&mesh.vertices) {
             assert!((p - q - shift).norm() < 1e-3, "{}", p - q);
@@ -414,9 +433,9 @@ mod tests {
         let mut state = MotionState::new(&mesh, &body, &motion);
         state.velocity = vec![Vec3::new(300.0, 0.0, 0.0); mesh.vertices.len()];
         // Damping halves it: 150 mm in the first step, more than 200 after the next one.
-        assert!(state.step(&body, &motion, &[]).is_some());
+        assert!(step(&mut state, &body, &motion, &[]).is_some());
         let before = state.mesh.vertices.clone();
-        assert!(state.step(&body, &motion, &[]).is_none());
+        assert!(step(&mut state, &body, &motion, &[]).is_none());
         assert_eq!(state.mesh.vertices, before);
     }
 

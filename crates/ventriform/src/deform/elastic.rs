@@ -102,6 +102,13 @@ struct Spring {
     length: f64,
 }
 
+/// The rotations of a body's edges from rest to some positions: R_i and R of the energies.
+#[derive(Debug, Clone)]
+pub struct Turns {
+    of_nodes: Vec<Matrix3<f64>>,
+    of_body: Matrix3<f64>,
+}
+
 /// The elastic body: edges, struts, supports and their rest state.
 #[derive(Debug, Clone)]
 pub struct Elastic {
@@ -161,11 +168,10 @@ impl Elastic {
         }
     }
 
-    /// Adds the pull of the targets that belong to `positions` to `rhs`.
-    pub fn add_targets(&self, positions: &[Vec3], rhs: &mut [Vec3]) {
+    /// Adds the pull of the targets that belong to `positions`, where the edges are turned by `turns`, to `rhs`.
+    pub fn add_targets(&self, positions: &[Vec3], turns: &Turns, rhs: &mut [Vec3]) {
         let k = self.stiffness;
-        let frames = self.frames(positions);
-        let body = self.body_frame(positions);
+        let (frames, body) = (&turns.of_nodes, &turns.of_body);
         for ([a, b], d) in self.edges.iter().zip(&self.directions) {
             let (i, j) = (*a as usize, *b as usize);
             let along = direction(positions, [*a, *b]);
@@ -185,9 +191,13 @@ impl Elastic {
 
     /// The elastic energy, mm².
     pub fn energy(&self, positions: &[Vec3]) -> f64 {
+        self.energy_of(positions, &self.turns(positions))
+    }
+
+    /// The elastic energy at `positions`, where the edges are turned by `turns`, mm².
+    pub fn energy_of(&self, positions: &[Vec3], turns: &Turns) -> f64 {
         let k = self.stiffness;
-        let frames = self.frames(positions);
-        let body = self.body_frame(positions);
+        let (frames, body) = (&turns.of_nodes, &turns.of_body);
         let mut energy = 0.0;
         for ([a, b], d) in self.edges.iter().zip(&self.directions) {
             let (i, j) = (*a as usize, *b as usize);
@@ -223,7 +233,7 @@ impl Elastic {
     pub fn forces(&self, positions: &[Vec3]) -> Vec<Vec3> {
         let k = self.stiffness;
         let mut forces = vec![Vec3::zeros(); self.nodes];
-        self.add_targets(positions, &mut forces);
+        self.add_targets(positions, &self.turns(positions), &mut forces);
         let mut between = |[a, b]: [u32; 2], weight: f64| {
             let pull = (positions[b as usize] - positions[a as usize]) * weight;
             forces[a as usize] += pull;
@@ -236,6 +246,14 @@ impl Elastic {
             between(spring.nodes, spring.weight);
         }
         forces
+    }
+
+    /// The rotations of the edges from rest to `positions`.
+    pub fn turns(&self, positions: &[Vec3]) -> Turns {
+        Turns {
+            of_nodes: self.frames(positions),
+            of_body: self.body_frame(positions),
+        }
     }
 
     /// The rotation of every node's edges from rest to now.
