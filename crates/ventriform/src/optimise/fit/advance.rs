@@ -5,16 +5,23 @@
 //! halvings dropped there. A triangle is damaged if its normal turns by a right angle or more,
 //! if its component turns inside out, or if it comes to intersect another triangle.
 
+use crate::geometry::bvh::Bvh;
 use crate::geometry::{Vec3, triangle};
-use crate::mesh::intersections::self_intersections;
+use crate::mesh::intersections::self_intersections_by;
 use crate::mesh::{FaceId, TriMesh, topology};
 
 /// Most halvings of a step before the vertices concerned stay in place.
 const MAX_HALVINGS: usize = 5;
 
 /// Adds `step` to `vertices`, or as much of it as turns no triangle over and no component inside
-/// out, and adds no pair of intersecting triangles. Returns whether the step was shortened.
-pub fn advance(vertices: &mut [Vec3], triangles: &[[u32; 3]], step: &[Vec3]) -> bool {
+/// out, and adds no pair of intersecting triangles. Returns whether the step was shortened. `tree` is one over as many
+/// triangles, and follows those of the step.
+pub fn advance(
+    vertices: &mut [Vec3],
+    triangles: &[[u32; 3]],
+    step: &[Vec3],
+    tree: &mut Bvh,
+) -> bool {
     let component = topology::components(vertices.len(), triangles);
     let mut share = vec![1.0; vertices.len()];
     let mut shortened = false;
@@ -27,7 +34,7 @@ pub fn advance(vertices: &mut [Vec3], triangles: &[[u32; 3]], step: &[Vec3]) -> 
             damaged = inside_out(vertices, &moved, triangles, &component);
         }
         if damaged.is_empty() {
-            damaged = newly_intersecting(vertices, &moved, triangles);
+            damaged = newly_intersecting(vertices, &moved, triangles, tree);
         }
         if damaged.is_empty() {
             vertices.copy_from_slice(&moved);
@@ -77,12 +84,19 @@ fn inside_out(
 }
 
 /// The triangles of pairs that intersect after the step but not before.
-fn newly_intersecting(before: &[Vec3], after: &[Vec3], triangles: &[[u32; 3]]) -> Vec<FaceId> {
-    let pairs = |vertices: &[Vec3]| {
-        self_intersections(&TriMesh {
+fn newly_intersecting(
+    before: &[Vec3],
+    after: &[Vec3],
+    triangles: &[[u32; 3]],
+    tree: &mut Bvh,
+) -> Vec<FaceId> {
+    let mut pairs = |vertices: &[Vec3]| {
+        tree.refit(vertices, triangles);
+        let mesh = TriMesh {
             vertices: vertices.to_vec(),
             triangles: triangles.to_vec(),
-        })
+        };
+        self_intersections_by(&mesh, tree)
     };
     let found = pairs(after);
     if found.is_empty() {
@@ -113,11 +127,17 @@ mod tests {
         for (v, s) in moved.iter_mut().zip(&step) {
             *v += s;
         }
+        let mut tree = Bvh::new(&mesh.vertices, &mesh.triangles);
         assert!(turned_over(&mesh.vertices, &moved, &mesh.triangles).is_empty());
-        assert!(newly_intersecting(&mesh.vertices, &moved, &mesh.triangles).is_empty());
+        assert!(newly_intersecting(&mesh.vertices, &moved, &mesh.triangles, &mut tree).is_empty());
         let volume = mesh.volume();
         assert!(volume > 0.0);
-        assert!(advance(&mut mesh.vertices, &mesh.triangles, &step));
+        assert!(advance(
+            &mut mesh.vertices,
+            &mesh.triangles,
+            &step,
+            &mut tree
+        ));
         assert!(mesh.volume() > 0.0 && mesh.volume() < volume);
     }
 }

@@ -117,7 +117,7 @@ pub fn fit(
         fairness: fairing::weight(parameters, &lengths, reference.noise),
         parameters,
     };
-    find_partners(&mut state);
+    let mut tree = find_partners(&mut state);
     let (mut flips, mut shortened) = (0, 0);
     let mut velocity = vec![Vec3::zeros(); start.len()];
     for round in 0..parameters.rounds {
@@ -131,7 +131,8 @@ pub fn fit(
         }
         velocity.copy_from_slice(&state.vertices);
         let triangles = state.half_edges.triangles();
-        shortened += usize::from(advance(&mut state.vertices, triangles, &step));
+        let was_shortened = advance(&mut state.vertices, triangles, &step, &mut tree);
+        shortened += usize::from(was_shortened);
         for (velocity, vertex) in velocity.iter_mut().zip(&state.vertices) {
             *velocity = vertex - *velocity;
         }
@@ -159,6 +160,7 @@ pub fn fit(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::bvh::Bvh;
     use crate::mesh::intersections::self_intersections;
     use crate::mesh::{HalfEdgeId, VertexId, shapes};
     use crate::surface::Surface;
@@ -346,7 +348,8 @@ mod tests {
         let mut step = vec![Vec3::zeros(); n];
         // The outer apex moves 20 mm up, through the floor of the cavity.
         step[0].z = 20.0;
-        assert!(advance(&mut vertices, &mesh.triangles, &step));
+        let mut tree = Bvh::new(&vertices, &mesh.triangles);
+        assert!(advance(&mut vertices, &mesh.triangles, &step, &mut tree));
         assert!(vertices[0].z - mesh.vertices[0].z < 4.0);
         let moved = TriMesh {
             vertices,

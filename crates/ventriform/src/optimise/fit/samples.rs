@@ -77,8 +77,9 @@ pub fn spread(reference: &Reference, count: usize) -> Vec<SurfaceSample> {
     samples
 }
 
-/// Finds the partner of every sample among all triangles of the model that face the same way.
-pub fn find_partners(state: &mut FitState) {
+/// Finds the partner of every sample among all triangles of the model that face the same way. Returns
+/// the tree over the model.
+pub fn find_partners(state: &mut FitState) -> Bvh {
     let (vertices, triangles) = (&state.vertices, state.half_edges.triangles());
     let bvh = Bvh::new(vertices, triangles);
     let normals: Vec<Vec3> = triangles
@@ -104,6 +105,7 @@ pub fn find_partners(state: &mut FitState) {
                 }
             }
         });
+    bvh
 }
 
 /// Updates the partner of every sample by a walk from its old triangle.
