@@ -300,9 +300,108 @@ impl<'a> Monitor<'a> {
     }
 }
 
+/// The progress of equal parts of a whole that are worked on at the same time: of each stage the whole has completed the mean
+/// of what its parts have.
+pub struct ConcurrentParts<'a> {
+    whole: &'a Monitor<'a>,
+    /// The completed fraction of every stage of [`Stage::ALL`], for each part.
+    done: Mutex<Vec<[f64; Stage::ALL.len()]>>,
+}
+
+/// The observer of one of [`ConcurrentParts`].
+pub struct ConcurrentPart<'a> {
+    parts: &'a ConcurrentParts<'a>,
+    index: usize,
+}
+
+impl<'a> ConcurrentParts<'a> {
+    /// `count` parts of the work of `whole`, of which nothing is completed.
+    pub fn new(whole: &'a Monitor<'a>, count: usize) -> Self {
+        Self {
+            whole,
+            done: Mutex::new(vec![[0.0; Stage::ALL.len()]; count]),
+        }
+    }
+
+    /// The observer of part `index`; a monitor of it needs [`ConcurrentPart::monitor`].
+    pub fn part(&'a self, index: usize) -> ConcurrentPart<'a> {
+        ConcurrentPart { parts: self, index }
+    }
+}
+
+impl ConcurrentPart<'_> {
+    /// A monitor of the part that is cancelled with the whole.
+    pub fn monitor(&self) -> Monitor<'_> {
+        Monitor::new(self, self.parts.whole.cancel.clone())
+    }
+}
+
+impl Observer for ConcurrentPart<'_> {
+    fn progress(&self, stage: Stage, fraction: f64) {
+        // A panic cannot leave the list half changed: its numbers are written one at a time.
+        let mut done = self
+            .parts
+            .done
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        let parts = done.len() as f64;
+        let mut sum = 0.0;
+        for (index, part) in done.iter_mut().enumerate() {
+            let part = &mut part[stage as usize];
+            if index == self.index {
+                *part = part.max(fraction);
+            }
+            sum += *part;
+        }
+        let whole = self.parts.whole;
+        let (before, own) = whole.span;
+        // Reported under the lock, so that the fraction of a stage never decreases.
+        whole.observer.progress(stage, before + own * sum / parts);
+    }
+
+    fn now_ms(&self) -> f64 {
+        self.parts.whole.now_ms()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two parts side by side: the whole has completed the mean of them, whoever reports first.
+    #[test]
+    fn concurrent_parts_add_up_to_the_whole() {
+        struct Kept(Mutex<Vec<(Stage, f64)>>);
+        impl Observer for Kept {
+            fn progress(&self, stage: Stage, fraction: f64) {
+                self.0.lock().unwrap().push((stage, fraction));
+            }
+            fn now_ms(&self) -> f64 {
+                7.0
+            }
+        }
+        let (kept, token) = (Kept(Mutex::default()), CancelToken::new());
+        let whole = Monitor::new(&kept, token.clone()).part(1, 2);
+        let parts = ConcurrentParts::new(&whole, 2);
+        let (first, second) = (parts.part(0), parts.part(1));
+        second.monitor().report(Stage::Align, 1.0).unwrap();
+        first.monitor().report(Stage::Align, 0.5).unwrap();
+        // A stage that is repeated takes nothing back.
+        second.monitor().report(Stage::Align, 0.0).unwrap();
+        first.monitor().report(Stage::Deform, 1.0).unwrap();
+        first.monitor().report(Stage::Align, 1.0).unwrap();
+        assert!(second.monitor().now_ms() == 7.0);
+        let expected = [
+            (Stage::Align, 0.75),
+            (Stage::Align, 0.875),
+            (Stage::Align, 0.875),
+            (Stage::Deform, 0.75),
+            (Stage::Align, 1.0),
+        ];
+        assert_eq!(*kept.0.lock().unwrap(), expected);
+        token.cancel();
+        assert_eq!(first.monitor().report(Stage::Deform, 1.0), Err(Cancelled));
+    }
 
     #[test]
     fn the_completed_fraction_grows_from_zero_to_one() {

@@ -9,8 +9,9 @@ use crate::judge::{Evidence, consensus};
 use crate::locate::LocateError;
 use crate::model::Template;
 use crate::parameters::ParameterError;
-use crate::progress::Monitor;
+use crate::progress::{ConcurrentParts, Monitor};
 use crate::volume::Volume;
+use rayon::prelude::*;
 
 /// The search for the organ in one volume: made for the first template, and again only for a
 /// template of another kind (a ventricle is searched by its cavity, other organs by their
@@ -192,16 +193,11 @@ pub fn try_all(
     let mut trials = Trials::default();
     let mut first = None;
     let mut wall_less = Vec::new();
-    for (index, named) in templates.iter().enumerate() {
-        let NamedTemplate {
-            name,
-            template,
-            built_in,
-        } = named;
-        let position = search.position(volume, template, parameters, monitor)?;
-        let monitor = monitor.part(index, templates.len());
+    let outcomes = fit_side_by_side(volume, templates, parameters, search, monitor)?;
+    for (named, outcome) in templates.iter().zip(outcomes) {
+        let NamedTemplate { name, built_in, .. } = named;
         let name = name.clone();
-        match fit_at(position, volume, template, parameters, &monitor) {
+        match outcome {
             Ok(fit) => {
                 if *built_in {
                     trials.built_in.push(Some(trials.fits.len()));
@@ -241,4 +237,36 @@ pub fn try_all(
         Some(error) if trials.fits.is_empty() => Err(error.into()),
         _ => Ok(trials),
     }
+}
+
+/// The fit of each template to the organ in `volume`, in the order of the templates, as many at once as there are threads.
+/// Each is the same as alone.
+///
+/// # Errors
+/// Where the organ is not found.
+fn fit_side_by_side(
+    volume: &Volume,
+    templates: &[NamedTemplate],
+    parameters: &DeformParameters,
+    search: &mut OrganSearch,
+    monitor: &Monitor,
+) -> Result<Vec<Result<Fit, DeformError>>, DeformError> {
+    let parts = ConcurrentParts::new(monitor, templates.len());
+    let mut fits = Vec::with_capacity(templates.len());
+    // Neighbours of one kind share one search.
+    for alike in templates.chunk_by(|a, b| a.template.cup.is_some() == b.template.cup.is_some()) {
+        let position = search.position(volume, &alike[0].template, parameters, monitor)?;
+        let before = fits.len();
+        fits.par_extend(alike.par_iter().enumerate().map(|(index, named)| {
+            let part = parts.part(before + index);
+            fit_at(
+                position,
+                volume,
+                &named.template,
+                parameters,
+                &part.monitor(),
+            )
+        }));
+    }
+    Ok(fits)
 }

@@ -22,6 +22,7 @@ use ventriform::model::struts::struts;
 use ventriform::model::{Organ, Template, TemplateError};
 use ventriform::optimise::Reference;
 use ventriform::progress::{CancelToken, Monitor, Silent};
+use ventriform::segmentation::{OrganSearch, fit_built_in};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
 use ventriform::volume::Volume;
 
@@ -570,4 +571,25 @@ fn a_cancelled_fit_ends() {
     let template = ventricle(cup(Vec3::zeros(), axis(), 1.0));
     let volume = picture(24, 0.0, |p| ball(p, &Vec3::zeros(), 20.0));
     assert!(fit(&volume, &template, &DeformParameters::default(), &monitor).is_err());
+}
+
+/// The hearts are fitted side by side: the thread that fits each of them changes nothing.
+#[test]
+fn the_built_in_hearts_fit_alike_on_any_number_of_threads() {
+    let volume = scan(&cup(Vec3::zeros(), axis(), 1.0), 56, |_| 1.0);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let fit = pool.install(|| {
+            let (parameters, mut search) = (DeformParameters::default(), OrganSearch::default());
+            fit_built_in(&volume, &parameters, &mut search, &Monitor::silent())
+        });
+        let Fit { model, judgement } = fit.unwrap();
+        (model.mesh, model.readings, judgement.confidence)
+    };
+    let one = on(1);
+    assert_eq!(one, on(2));
+    assert_eq!(one, on(8));
 }
