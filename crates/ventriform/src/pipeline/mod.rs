@@ -250,6 +250,19 @@ fn from_volume(
     read_ms: f64,
     monitor: &Monitor,
 ) -> Result<Model, PipelineError> {
+    // All steps on a thread of the pool: from another one, each of some hundred parallel steps would be handed over and
+    // waited for.
+    rayon::scope(|_| on_this_thread(volume, facts, parameters, told_apart, read_ms, monitor))
+}
+
+fn on_this_thread(
+    volume: &Volume,
+    facts: &VolumeFacts,
+    parameters: &ModelParameters,
+    told_apart: Option<i64>,
+    read_ms: f64,
+    monitor: &Monitor,
+) -> Result<Model, PipelineError> {
     let mut laps = Laps::new(read_ms, monitor);
     let mut extracted = parameters.surface.clone();
     if told_apart.is_some() {

@@ -108,7 +108,9 @@ pub fn from_files(
     check_reader(order)?;
     let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
     let (expert, mask) = expert.unzip();
-    let mut segmentation = segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor)?;
+    // On a thread of the pool: from another one, each parallel step would be handed over and waited for.
+    let mut segmentation =
+        rayon::scope(|_| segment(&reading.volume, &templates, &fit, mask.as_ref(), monitor))?;
     segmentation.refused.splice(0..0, refused);
     let judged = |limits| {
         let figures = heart_figures(&segmentation);
