@@ -44,6 +44,7 @@ mod quotas;
 mod refined;
 mod repulsion;
 mod sizing;
+mod split;
 mod surface_samples;
 pub mod tessellate;
 mod trace;
@@ -100,8 +101,9 @@ pub struct RetileParameters {
     /// Distances that repulsion uses ([`Method::Paper`]). Default [`Geodesics::Approximate`];
     /// exact ones are for validation.
     pub geodesics: Geodesics,
-    /// Largest number of rounds of relaxation ([`Method::Refined`]), 0..=1000. Default 50; 80 make triangles more
-    /// regular by .001 of 2r/R.
+    /// Largest number of rounds of relaxation ([`Method::Refined`]), 0..=1000; of 600 points and more, of the first
+    /// relaxation of fewer cells, after which those of more take three tenths of it each. Default 50; 80 make
+    /// triangles more regular by .001 of 2r/R.
     pub relaxation_iterations: usize,
     /// Number of the last rounds of relaxation that cut triangles between cells to find the cells' centroids;
     /// those before count whole samples. Default 20. Requests cannot set it; the built-in hearts were made

@@ -5,7 +5,8 @@
 //! 1. [`surface_samples`](super::surface_samples): the vertices of the surface, as many as N
 //!    cells need;
 //! 2. N of them at random, with the density that [`sizing`] asks for;
-//! 3. [`cells`](super::cells): relaxed until each site is at the centroid of its cell;
+//! 3. [`cells`](super::cells): relaxed until each site is at the centroid of its cell; where N is large, a quarter
+//!    of the cells first, which are then [split];
 //! 4. [`dual`]: one triangle where three cells meet;
 //! 5. each vertex is placed at the point of its cell's part of S closest to the cell's centroid.
 //!
@@ -19,7 +20,7 @@ use super::cells::Cells;
 use super::surface_samples::WeightedSamples;
 use super::{
     RetileError, RetileFacts, RetileParameters, Tiled, dual, orientation, paper, quotas, sizing,
-    too_few,
+    split, too_few,
 };
 use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
@@ -33,6 +34,13 @@ use rayon::prelude::*;
 /// Smallest mean number of samples per cell. It suffices to determine the neighbours of a cell:
 /// half or twice as many changed the final radius ratios by less than 0.001 on phantoms.
 const SAMPLES_PER_CELL: usize = 20;
+
+/// Number of points from which on relaxation begins with a quarter of them; at 150 and 300
+/// points triangles became no more regular, and the greatest distance grew.
+const COARSE_TO_FINE_FROM: usize = 600;
+
+/// Share of the rounds of relaxation on seeds from relaxed cells: they are regular at the start.
+const ROUNDS_SHARE_AFTER_SPLIT: f64 = 0.3;
 
 /// Rounds of relaxation after a repair.
 const SETTLING_ROUNDS: usize = 20;
@@ -181,13 +189,8 @@ impl<'a> RefinedRun<'a> {
         monitor: &Monitor,
     ) -> Result<Option<(TriMesh, Vec<f64>)>, RetileError> {
         monitor.check()?;
-        let seeds = self.seeds(start);
-        monitor.check()?;
-        let mut cells = Cells::grow(&self.samples, &seeds);
+        let mut cells = self.relaxed(start, facts, monitor)?;
         let exact = self.parameters.exact_rounds;
-        let rounds = (self.parameters.relaxation_iterations, exact);
-        monitor.report(Stage::Retile, 0.1)?;
-        facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
         let mut weights = self.weights.clone();
         let mut moved = Vec::new();
         for _ in 0..=repairs {
@@ -233,6 +236,83 @@ impl<'a> RefinedRun<'a> {
         Ok(None)
     }
 
+    /// The relaxed cells of a random start. Of many points a quarter is relaxed first, and of many of these a quarter
+    /// before them; their cells give the [seeds](split) of the next.
+    fn relaxed(
+        &self,
+        start: u64,
+        facts: &mut RetileFacts,
+        monitor: &Monitor,
+    ) -> Result<Cells, RetileError> {
+        let all = self.parameters.relaxation_iterations;
+        let exact = self.parameters.exact_rounds;
+        let share = ROUNDS_SHARE_AFTER_SPLIT;
+        let after_split = |rounds: usize| (rounds as f64 * share).ceil() as usize;
+        let mut numbers = self.coarse_to_fine();
+        let fewest = numbers.pop().unwrap_or(self.points);
+        let mut cells = Cells::grow(&self.samples, &self.seeds(start, fewest));
+        monitor.report(Stage::Retile, 0.1)?;
+        let rounds = if numbers.is_empty() {
+            (all, exact)
+        } else {
+            (all, 0)
+        };
+        facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
+        while let Some(points) = numbers.pop() {
+            let seeds = self.split_seeds(&cells, start, points);
+            cells = Cells::grow(&self.samples, &seeds);
+            let exact = if numbers.is_empty() {
+                after_split(exact)
+            } else {
+                0
+            };
+            let rounds = (after_split(all), exact);
+            facts.relaxation_rounds +=
+                cells.relax(&self.samples, &self.weights, rounds, monitor)?;
+        }
+        Ok(cells)
+    }
+
+    /// The numbers of cells to relax one after the other, the last one first: N, and where that is large quarters of it.
+    fn coarse_to_fine(&self) -> Vec<usize> {
+        let mut numbers = vec![self.points];
+        let mut points = self.points;
+        while points >= COARSE_TO_FINE_FROM && points / 4 >= self.least.iter().sum::<usize>() {
+            points /= 4;
+            numbers.push(points);
+        }
+        numbers
+    }
+
+    /// The seeds of `points` cells that the relaxed ones of fewer give, and random ones where those give too few.
+    fn split_seeds(&self, cells: &Cells, start: u64, points: usize) -> Vec<u32> {
+        let random = self.seeds(start, points);
+        let mut missing = vec![0usize; self.least.len()];
+        for &v in &random {
+            missing[self.components[v as usize] as usize] += 1;
+        }
+        let places = (self.components.as_slice(), self.spacing.as_slice());
+        let mut seeds = split::seeds(cells, &self.samples, places, &missing);
+        let mut taken = vec![false; self.samples.len()];
+        for &v in &seeds {
+            taken[v as usize] = true;
+            let missing = &mut missing[self.components[v as usize] as usize];
+            if *missing == 0 {
+                // A component had more cells when there were fewer in all.
+                return random;
+            }
+            *missing -= 1;
+        }
+        for v in random {
+            let missing = &mut missing[self.components[v as usize] as usize];
+            if *missing > 0 && !taken[v as usize] {
+                *missing -= 1;
+                seeds.push(v);
+            }
+        }
+        seeds
+    }
+
     /// Raises the density in the crowded cells and those around them, so that the sites that are
     /// moved there stay there.
     fn raise_density(&self, cells: &Cells, crowded: &[u32], weights: &mut [f64]) {
@@ -254,9 +334,9 @@ impl<'a> RefinedRun<'a> {
         }
     }
 
-    /// Distinct random samples; each component gets its share of them, and at least as many as its
+    /// As many distinct random samples as `points`; each component gets its share of them, and at least as many as its
     /// topology needs.
-    fn seeds(&self, start: u64) -> Vec<u32> {
+    fn seeds(&self, start: u64, points: usize) -> Vec<u32> {
         let mut random = stream(
             self.parameters.seed ^ start.rotate_left(32),
             Purpose::Placement,
@@ -267,8 +347,8 @@ impl<'a> RefinedRun<'a> {
             load.resize(load.len().max(c + 1), 0.0);
             load[c] += self.samples.area[v] / self.spacing[v].powi(2);
         }
-        let quotas = quotas::share(&self.surface.mesh, &load, self.points);
-        let mut seeds = Vec::with_capacity(self.points);
+        let quotas = quotas::share(&self.surface.mesh, &load, points);
+        let mut seeds = Vec::with_capacity(points);
         for (component, quota) in (0u32..).zip(quotas) {
             let mut members: Vec<u32> = (0..self.samples.len() as u32)
                 .filter(|&v| self.components[v as usize] == component)
@@ -445,16 +525,43 @@ mod tests {
         }
         let fair = 90.0 * load[1] / (load[0] + load[1]);
         for start in 0..3 {
-            let seeds = run.seeds(start);
+            let seeds = run.seeds(start, parameters.points);
             assert_eq!(seeds.iter().collect::<BTreeSet<_>>().len(), 90);
             let small = seeds
                 .iter()
                 .filter(|v| run.components[**v as usize] == 1)
                 .count();
             assert!((small as f64 - fair).abs() < 1.0, "{small} {fair}");
-            assert_eq!(seeds, run.seeds(start));
-            assert_ne!(seeds, run.seeds(start + 1));
+            assert_eq!(seeds, run.seeds(start, parameters.points));
+            assert_ne!(seeds, run.seeds(start + 1, parameters.points));
         }
+    }
+
+    /// As many distinct seeds as were asked for, each component's share of them, however few cells they come from.
+    #[test]
+    fn split_seeds_are_shared_out_as_random_ones() {
+        let (surface, parameters) = (two_balls(), even(640));
+        let run = RefinedRun::new(&surface, &parameters);
+        assert_eq!(run.coarse_to_fine(), [640, 160]);
+        let small = |seeds: &[u32]| {
+            let of_small = seeds.iter().filter(|v| run.components[**v as usize] == 1);
+            of_small.count()
+        };
+        for from in [20, 160, 620, 640] {
+            let mut cells = Cells::grow(&run.samples, &run.seeds(0, from));
+            let weights = &run.weights;
+            let silent = Monitor::silent();
+            cells
+                .relax(&run.samples, weights, (30, 0), &silent)
+                .unwrap();
+            let seeds = run.split_seeds(&cells, 0, 640);
+            assert_eq!(seeds.iter().collect::<BTreeSet<_>>().len(), 640);
+            assert_eq!(small(&seeds), small(&run.seeds(0, 640)), "{from}");
+        }
+        // Small numbers are relaxed at once.
+        let parameters = even(COARSE_TO_FINE_FROM - 1);
+        let run = RefinedRun::new(&surface, &parameters);
+        assert_eq!(run.coarse_to_fine(), [COARSE_TO_FINE_FROM - 1]);
     }
 
     /// Half the spacing is four times the density.
@@ -467,7 +574,9 @@ mod tests {
         for v in 0..run.samples.len() {
             run.spacing[v] = if is_upper(&run, v) { 1.0 } else { 2.0 };
         }
-        let drawn: Vec<u32> = (0..5).flat_map(|start| run.seeds(start)).collect();
+        let drawn: Vec<u32> = (0..5)
+            .flat_map(|start| run.seeds(start, parameters.points))
+            .collect();
         let upper = drawn
             .iter()
             .filter(|v| is_upper(&run, **v as usize))
@@ -480,7 +589,7 @@ mod tests {
     fn the_density_rises_in_crowded_cells_and_those_beside_them() {
         let (surface, parameters) = (two_balls(), even(60));
         let run = RefinedRun::new(&surface, &parameters);
-        let cells = Cells::grow(&run.samples, &run.seeds(0));
+        let cells = Cells::grow(&run.samples, &run.seeds(0, parameters.points));
         let crowded = [3, 17];
         let mut weights = run.weights.clone();
         run.raise_density(&cells, &crowded, &mut weights);
@@ -510,7 +619,7 @@ mod tests {
         for points in [12, 60] {
             let parameters = even(points);
             let run = RefinedRun::new(&surface, &parameters);
-            let cells = Cells::grow(&run.samples, &run.seeds(0));
+            let cells = Cells::grow(&run.samples, &run.seeds(0, parameters.points));
             // Cells of the small ball are the lightest.
             let weight = |v: usize| {
                 let share = if run.components[v] == 1 { 1e-3 } else { 1.0 };
@@ -560,7 +669,7 @@ mod tests {
         let surface = from_mesh(shapes::torus(20.0, 8.0, 24, 12), 1.0).unwrap();
         let parameters = even(40);
         let run = RefinedRun::new(&surface, &parameters);
-        let cells = Cells::grow(&run.samples, &run.seeds(1));
+        let cells = Cells::grow(&run.samples, &run.seeds(1, parameters.points));
         let positions = &run.samples.surface;
         let centroids = cells.centroids(positions, &run.weights);
         for (site, vertex) in (0u32..).zip(run.vertices(&cells)) {
@@ -581,7 +690,7 @@ mod tests {
         for (v, h) in run.spacing.iter_mut().enumerate() {
             *h = 1.0 + 0.5 * (v as f64).sin();
         }
-        let cells = Cells::grow(&run.samples, &run.seeds(0));
+        let cells = Cells::grow(&run.samples, &run.seeds(0, parameters.points));
         for (site, h) in (0u32..).zip(run.sizing(&cells)) {
             let members = (0..run.spacing.len()).filter(|v| cells.labels[*v] == site);
             let values: Vec<f64> = members.map(|v| run.spacing[v]).collect();
@@ -690,7 +799,7 @@ mod tests {
         let small = moved(shapes::tetrahedron(1.0), Vec3::repeat(30.0));
         let surface = from_mesh(together(&[ball, small]), 1.0).unwrap();
         let parameters = even(20);
-        let seeds = RefinedRun::new(&surface, &parameters).seeds(0);
+        let seeds = RefinedRun::new(&surface, &parameters).seeds(0, parameters.points);
         let on_small: BTreeSet<u32> = seeds.into_iter().filter(|v| *v >= first).collect();
         assert_eq!(on_small, (first..first + 4).collect());
     }
