@@ -61,9 +61,9 @@ struct FitState<'a> {
     vertices: Vec<Vec3>,
     half_edges: HalfEdges,
     samples: Vec<SurfaceSample>,
-    /// For the edge midpoints and the centre of each triangle, the triangle of S that was
-    /// closest in the previous round; the next search starts there.
-    near: Vec<[Option<u32>; 4]>,
+    /// For the edge midpoints and the centre of each triangle, the point of S that was
+    /// closest in the last search; the next one starts there.
+    near: Vec<[Option<terms::NearPoint>; 4]>,
     /// Wanted relative spacing at each vertex.
     sizing: &'a [f64],
     reference: &'a Reference,
@@ -123,7 +123,9 @@ pub fn fit(
     for round in 0..parameters.rounds {
         let fraction = round as f64 / (parameters.rounds + 1) as f64;
         monitor.report(Stage::Optimise, fraction)?;
-        let mut step = terms::displacement(&mut state, monitor)?;
+        let searches =
+            terms::searches_midpoints(round, parameters.rounds, state.half_edges.face_count());
+        let mut step = terms::displacement(&mut state, searches, monitor)?;
         if round + ROUNDS_WITHOUT_MOMENTUM < parameters.rounds {
             for (step, velocity) in step.iter_mut().zip(&velocity) {
                 *step += velocity * parameters.momentum;
@@ -210,6 +212,19 @@ mod tests {
             start,
             reference(jolted(shapes::cup(60.0, 30.0, 10.0, 90), 0.6)),
         )
+    }
+
+    /// Every round of a small model; of a large one every other round and the last.
+    #[test]
+    fn midpoints_are_searched_after_flips_and_at_the_end() {
+        let searched = |rounds: usize, faces: usize| -> Vec<usize> {
+            let searches = |round: &usize| terms::searches_midpoints(*round, rounds, faces);
+            (0..rounds).filter(searches).collect()
+        };
+        assert_eq!(searched(10, 296), (0..10).collect::<Vec<_>>());
+        assert_eq!(searched(10, 2000), [0, 2, 4, 6, 8, 9]);
+        assert_eq!(searched(5, 2000), [0, 2, 4]);
+        assert_eq!(searched(1, 2000), [0]);
     }
 
     #[test]

@@ -31,15 +31,29 @@ const HUBER_SHARE: f64 = 0.2;
 /// Largest number of rounds of conjugate gradients per round of the fit.
 const MAX_SOLVER_ROUNDS: usize = 200;
 
+/// Number of the model's triangles from which on every other round keeps the planes of the midpoints.
+const KEEPING_FROM_FACES: usize = 600;
+
 /// Smallest number of triangles per parallel task.
 const TRIANGLES_PER_TASK: usize = 16;
 
-/// The displacement of every vertex that solves this round's least-squares problem, mm.
+/// Whether the closest points of the midpoints are searched in a round of `rounds`, or the planes that the round before found
+/// are kept: edges are flipped after every second round, and nothing moves far between two. Small models take little time.
+pub fn searches_midpoints(round: usize, rounds: usize, faces: usize) -> bool {
+    round.is_multiple_of(2) || round + 1 >= rounds || faces < KEEPING_FROM_FACES
+}
+
+/// The displacement of every vertex that solves this round's least-squares problem, mm. `searches` as
+/// [`searches_midpoints`] says.
 ///
 /// # Errors
 /// [`Cancelled`].
-pub fn displacement(state: &mut FitState, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
-    let midpoints = Midpoints::new(state);
+pub fn displacement(
+    state: &mut FitState,
+    searches: bool,
+    monitor: &Monitor,
+) -> Result<Vec<Vec3>, Cancelled> {
+    let midpoints = Midpoints::new(state, searches);
     monitor.check()?;
     let distances = Distances::new(state);
     let shapes = Shapes::new(state);
@@ -118,6 +132,13 @@ impl<'a> Distances<'a> {
 /// A tangent plane of S: its unit normal and its distance from a point of the model, mm.
 type TangentPlane = (Vec3, f64);
 
+/// The triangle of S that was closest to a midpoint, and the closest point.
+#[derive(Debug, Clone, Copy)]
+pub struct NearPoint {
+    triangle: u32,
+    point: Vec3,
+}
+
 /// Pulls the midpoints of the model's edges and the centres of its triangles to S. The samples
 /// of S alone would not register a triangle that none of them has as its partner.
 struct Midpoints {
@@ -139,7 +160,7 @@ const SAMPLE_BARYCENTRICS: [[f64; 3]; 4] = [
 ];
 
 impl Midpoints {
-    fn new(state: &mut FitState) -> Self {
+    fn new(state: &mut FitState, searches: bool) -> Self {
         let FitState {
             half_edges,
             vertices,
@@ -172,10 +193,21 @@ impl Midpoints {
                     let place = a * SAMPLE_BARYCENTRICS[k][0]
                         + b * SAMPLE_BARYCENTRICS[k][1]
                         + c * SAMPLE_BARYCENTRICS[k][2];
-                    let found = reference.bvh.closest_from(&place, guesses[k], faces)?;
-                    guesses[k] = Some(found.triangle);
-                    let n = normals[found.triangle as usize];
-                    Some((n, n.dot(&(found.point - place))))
+                    let known = guesses[k].filter(|near| !searches && faces(near.triangle));
+                    let near = match known {
+                        Some(known) => known,
+                        None => {
+                            let guess = guesses[k].map(|near| near.triangle);
+                            let found = reference.bvh.closest_from(&place, guess, faces)?;
+                            NearPoint {
+                                triangle: found.triangle,
+                                point: found.point,
+                            }
+                        }
+                    };
+                    guesses[k] = Some(near);
+                    let n = normals[near.triangle as usize];
+                    Some((n, n.dot(&(near.point - place))))
                 })
             })
             .collect();
