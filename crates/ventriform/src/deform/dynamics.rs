@@ -11,14 +11,14 @@
 //! (M/dt² + g M/dt + K + J^T W J) x' = (M/dt² + g M/dt) x + M v/dt + targets
 //! ```
 //!
-//! Sensors are read before every step. Their reach falls step by step; when it has reached its
-//! least value, readings are averaged, sensors that hardly move keep the edge that they saw, and after 12 readings the
+//! Sensors are read before every step. Their reach falls step by step, and while it does a third of them is read; when it has
+//! reached its least value, readings are averaged, sensors that hardly move keep the edge that they saw, and after 12 readings the
 //! mean is fixed. The implicit step
 //! is stable for any dt, so the motion ends at rest, where it stalls, or at the limit of steps
 //! ([`StopReason`]).
 
 use super::elastic::{Elastic, Turns};
-use super::sensors::{self, PER_TRIANGLE, SensorReading, SensorSettings};
+use super::sensors::{self, Density, SensorReading, SensorSettings};
 use crate::geometry::Vec3;
 use crate::grid::field::Field;
 use crate::mesh::TriMesh;
@@ -128,12 +128,17 @@ pub fn run(
         let settled = reach <= motion.last_reach;
         if !mean.is_fixed() {
             let settings = SensorSettings { reach, ..*settings };
+            let density = if settled {
+                Density::Full
+            } else {
+                Density::Third
+            };
             let readings = if settled {
                 sensors::read_again(&state.mesh, field, &settings, &mut known, monitor)?
             } else {
-                sensors::read(&state.mesh, field, &settings, monitor)?
+                sensors::read_some(&state.mesh, field, &settings, density, monitor)?
             };
-            mean.add(readings, settled);
+            mean.add(readings, density, settled);
         }
         let readings = mean.readings(&state.mesh);
         let turns = body.turns(&state.mesh.vertices);
@@ -141,7 +146,7 @@ pub fn run(
             + sensor_energy(&readings)
             + state.kinetic_energy();
         energies.push(energy);
-        let Some(farthest) = state.step(body, &turns, motion, &readings) else {
+        let Some(farthest) = state.step(body, &turns, motion, (&readings, mean.density)) else {
             reason = StopReason::Diverged;
             break;
         };
@@ -159,10 +164,12 @@ pub fn run(
             break;
         }
     }
-    let readings = sensors::read(
+    // Where the motion has settled, most sensors have hardly moved since they were read.
+    let readings = sensors::read_again(
         &state.mesh,
         field,
         &SensorSettings { reach, ..*settings },
+        &mut known,
         monitor,
     )?;
     Ok(MotionResult {
@@ -184,6 +191,7 @@ struct SensorMean {
     last: Vec<SensorReading>,
     /// Mean edge point of each sensor.
     edges: Vec<Vec3>,
+    density: Density,
     count: usize,
 }
 
@@ -195,12 +203,20 @@ impl SensorMean {
         self.count >= SETTLED_READINGS
     }
 
-    fn add(&mut self, mut readings: Vec<SensorReading>, settled: bool) {
-        self.count = if settled { self.count + 1 } else { 1 };
+    /// Adds readings of sensors of this density. Those that are not `settled`, and those of another density than before,
+    /// are the mean by themselves.
+    fn add(&mut self, mut readings: Vec<SensorReading>, density: Density, settled: bool) {
+        let is_alike = !self.last.is_empty() && density == self.density;
+        self.count = if settled && is_alike {
+            self.count + 1
+        } else {
+            1
+        };
         let share = 1.0 / self.count as f64;
-        if self.last.is_empty() {
+        if !is_alike {
             self.last.clone_from(&readings);
             self.edges = vec![Vec3::zeros(); readings.len()];
+            self.density = density;
         }
         for (i, r) in readings.iter_mut().enumerate() {
             let edge = &mut self.edges[i];
@@ -213,10 +229,11 @@ impl SensorMean {
 
     /// The mean readings, relative to where the model is now.
     fn readings(&self, mesh: &TriMesh) -> Vec<SensorReading> {
-        let weights = sensors::barycentric();
+        let all = sensors::barycentric();
+        let weights = self.density.sensors(&all);
         let place = |i: usize| {
-            let corners = mesh.corners(i / PER_TRIANGLE);
-            let w = weights[i % PER_TRIANGLE];
+            let corners = mesh.corners(i / weights.len());
+            let w = weights[i % weights.len()];
             corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]
         };
         let seen = |(i, r): (usize, &SensorReading)| {
@@ -288,7 +305,7 @@ impl MotionState {
         body: &Elastic,
         turns: &Turns,
         motion: &Motion,
-        readings: &[SensorReading],
+        (readings, density): (&[SensorReading], Density),
     ) -> Option<f64> {
         let dt = motion.time_step;
         let inertia = 1.0 / (dt * dt) + motion.damping / dt;
@@ -298,10 +315,11 @@ impl MotionState {
             .collect();
         body.add_targets(old, turns, &mut rhs);
         self.matrix.copy_from(&self.constant);
-        let weights = sensors::barycentric();
-        for (t, group) in readings.chunks_exact(PER_TRIANGLE).enumerate() {
+        let all = sensors::barycentric();
+        let weights = density.sensors(&all);
+        for (t, group) in readings.chunks_exact(weights.len()).enumerate() {
             let triangle = self.mesh.triangles[t];
-            for (r, w) in group.iter().zip(&weights) {
+            for (r, w) in group.iter().zip(weights) {
                 let pull = r.share * r.weight;
                 let outer = r.normal * r.normal.transpose() * pull;
                 for slot in 0..9 {
@@ -340,7 +358,7 @@ mod tests {
         Elastic::new(mesh, &[], Stiffness::default())
     }
 
-    /// A step from where the body is.
+    /// A step by the readings of all sensors.
     fn step(
         state: &mut MotionState,
         body: &Elastic,
@@ -348,7 +366,7 @@ mod tests {
         readings: &[SensorReading],
     ) -> Option<f64> {
         let turns = body.turns(&state.mesh.vertices);
-        state.step(body, &turns, motion, readings)
+        state.step(body, &turns, motion, (readings, Density::Full))
     }
 
     /// A body in flight, which nothing deforms, is slowed by the damping alone: implicitly,
@@ -396,7 +414,7 @@ mod tests {
                     normal: mesh.area_normal(t).normalize(),
                     offset,
                     weight,
-                    share: 1.0 / (PER_TRIANGLE * mesh.triangles.len()) as f64,
+                    share: 1.0 / (sensors::PER_TRIANGLE * mesh.triangles.len()) as f64,
                 });
             }
         }
@@ -445,8 +463,8 @@ mod tests {
     fn readings_at_the_least_reach_are_averaged() {
         let mesh = shapes::icosphere(20.0, 1);
         let mut mean = SensorMean::default();
-        mean.add(readings(&mesh, 5.0, 0.9), false);
-        mean.add(readings(&mesh, 1.0, 0.2), true);
+        mean.add(readings(&mesh, 5.0, 0.9), Density::Full, false);
+        mean.add(readings(&mesh, 1.0, 0.2), Density::Full, true);
         let of = |mean: &SensorMean, mesh: &TriMesh| {
             let r = mean.readings(mesh)[17];
             (r.offset, r.weight)
@@ -456,19 +474,41 @@ mod tests {
         };
         // The first reading at the least reach is the second of all.
         near(of(&mean, &mesh), (3.0, 0.55));
-        mean.add(readings(&mesh, 3.0, 1.0), true);
+        mean.add(readings(&mesh, 3.0, 1.0), Density::Full, true);
         near(of(&mean, &mesh), (3.0, 0.7));
-        mean.add(readings(&mesh, 7.0, 0.7), true);
+        mean.add(readings(&mesh, 7.0, 0.7), Density::Full, true);
         near(of(&mean, &mesh), (4.0, 0.7));
         let mut moved = mesh.clone();
-        let normal = mesh.area_normal(17 / PER_TRIANGLE).normalize();
+        let normal = mesh.area_normal(17 / sensors::PER_TRIANGLE).normalize();
         moved.vertices.iter_mut().for_each(|p| *p += normal * 1.5);
         near(of(&mean, &moved), (2.5, 0.7));
         for _ in 0..SETTLED_READINGS - 5 {
-            mean.add(readings(&mesh, 4.0, 0.7), true);
+            mean.add(readings(&mesh, 4.0, 0.7), Density::Full, true);
             assert!(!mean.is_fixed());
         }
-        mean.add(readings(&mesh, 4.0, 0.7), true);
+        mean.add(readings(&mesh, 4.0, 0.7), Density::Full, true);
         assert!(mean.is_fixed());
+    }
+    /// The sensors that are read while the reach falls say nothing of the others: the first reading of all is the mean.
+    #[test]
+    fn readings_of_all_sensors_begin_the_mean_anew() {
+        let mesh = shapes::icosphere(20.0, 1);
+        let (all, count) = (sensors::PER_TRIANGLE, mesh.triangles.len());
+        let third: Vec<SensorReading> = (readings(&mesh, 5.0, 0.9).into_iter().enumerate())
+            .filter(|(n, _)| n % all >= 2 * all / 3)
+            .map(|(_, reading)| reading)
+            .collect();
+        let mut mean = SensorMean::default();
+        mean.add(third.clone(), Density::Third, false);
+        let seen = mean.readings(&mesh);
+        assert_eq!(seen.len(), all / 3 * count);
+        for (seen, read) in seen.iter().zip(&third) {
+            assert!((seen.place - read.place).norm() < 1e-9 && (seen.offset - 5.0).abs() < 1e-9);
+        }
+        mean.add(readings(&mesh, 1.0, 0.2), Density::Full, true);
+        let seen = mean.readings(&mesh);
+        assert_eq!(seen.len(), all * count);
+        let is_new = |r: &SensorReading| (r.offset - 1.0).abs() < 1e-9 && r.weight == 0.2;
+        assert!(seen.iter().all(is_new) && mean.count == 1);
     }
 }

@@ -78,16 +78,18 @@ fn centroid(a: usize, b: usize, shift: usize) -> [f64; 3] {
 }
 
 /// Which of its sensors each triangle has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Density {
     /// All of them.
+    #[default]
     Full,
-    /// A third, whose mean place is the triangle's centre: enough for a model that moves as a whole.
+    /// A third, whose mean place is the triangle's centre: enough for a model that is far off.
     Third,
 }
 
 impl Density {
-    fn sensors(self, all: &[[f64; 3]; PER_TRIANGLE]) -> &[[f64; 3]] {
+    /// The barycentric coordinates, of those of `all` sensors ([`barycentric`]), of the ones that are read.
+    pub fn sensors(self, all: &[[f64; 3]; PER_TRIANGLE]) -> &[[f64; 3]] {
         match self {
             Self::Full => all,
             Self::Third => &all[2 * PER_TRIANGLE / 3..],
