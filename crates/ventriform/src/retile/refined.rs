@@ -259,7 +259,9 @@ impl<'a> RefinedRun<'a> {
         };
         facts.relaxation_rounds += cells.relax(&self.samples, &self.weights, rounds, monitor)?;
         while let Some(points) = numbers.pop() {
+            monitor.check()?;
             let seeds = self.split_seeds(&cells, start, points);
+            monitor.check()?;
             cells = Cells::grow(&self.samples, &seeds);
             let exact = if numbers.is_empty() {
                 after_split(exact)

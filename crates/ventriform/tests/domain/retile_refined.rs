@@ -163,17 +163,21 @@ fn several_components_share_the_points() {
 #[test]
 fn results_depend_on_the_seed_but_not_on_the_number_of_threads() {
     let surface = surface(shapes::cup(60.0, 30.0, 11.0, 80));
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| refined(&surface, 400, 5).expect("400 points").mesh)
-    };
-    let one = on(1);
-    assert_eq!(one, on(2));
-    assert_eq!(one, on(16));
-    assert_ne!(one, refined(&surface, 400, 6).expect("400 points").mesh);
+    // The cells of 700 points are relaxed from coarse to fine.
+    for points in [400, 700] {
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads");
+            pool.install(|| refined(&surface, points, 5).expect("a mesh").mesh)
+        };
+        let one = on(1);
+        assert_eq!(one.vertices.len(), points);
+        assert_eq!(one, on(2));
+        assert_eq!(one, on(16));
+        assert_ne!(one, refined(&surface, points, 6).expect("a mesh").mesh);
+    }
 }
 
 #[test]
