@@ -71,10 +71,6 @@ pub(super) fn cut_area_cm2(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume
     let step = |axis: usize| volume.frame.linear().column(axis).into_owned();
     let mut area_mm2 = 0.0;
     for (index, value) in part.values.iter().enumerate() {
-        if empty[index] {
-            continue;
-        }
-        let place = part.place(index);
         for (axis, neighbour, way) in part.neighbours(index) {
             let beyond = part.values[neighbour];
             let beyond = if beyond.is_nan() { 0.0 } else { beyond };
@@ -88,10 +84,10 @@ pub(super) fn cut_area_cm2(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume
                 continue;
             }
             let empty = empty.get_or_insert_with(|| part.empty((EQUAL_SHARE * uptake) as f32));
-            if !empty[neighbour] {
+            if !empty[neighbour] || empty[index] {
                 continue;
             }
-            let mut face = place;
+            let mut face = part.place(index);
             face[axis] += way / 2.0;
             if near(&volume.frame.to_patient(&face)) {
                 area_mm2 += step((axis + 1) % 3).cross(&step((axis + 2) % 3)).norm();
