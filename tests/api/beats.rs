@@ -215,7 +215,9 @@ async fn a_gated_study_becomes_a_beat_whatever_its_format() {
     let service = Service::start(data.path(), &[]).await;
     let post = async |query: &str, accept: &str, body: Vec<u8>| -> Response {
         let request = service.post(&format!("/v1/beats{query}"));
-        let request = request.header("prefer", "wait=60").header(ACCEPT, accept);
+        let request = request
+            .header("prefer", super::helpers::UNTIL_DONE)
+            .header(ACCEPT, accept);
         request.body(body).send().await.unwrap()
     };
     let json = async |path: &str| -> Value {
@@ -343,7 +345,7 @@ async fn what_is_no_gated_study_is_refused_with_advice() {
     let post = async |query: &str, body: Vec<u8>| -> Response {
         let request = service.post(&format!("/v1/beats{query}"));
         request
-            .header("prefer", "wait=60")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .body(body)
             .send()
             .await
@@ -431,7 +433,9 @@ async fn files_of_one_gate_each_become_one_gated_volume() {
     let data = tempfile::tempdir().unwrap();
     let service = Service::start(data.path(), &[]).await;
     let post = async |path: &str, form: Form| -> Response {
-        let request = service.post(path).header("prefer", "wait=60");
+        let request = service
+            .post(path)
+            .header("prefer", super::helpers::UNTIL_DONE);
         request.multipart(form).send().await.unwrap()
     };
     let file = |gate: &Volume| nifti::write(gate, StoredType::Float32, true).unwrap();
@@ -510,7 +514,9 @@ async fn files_of_one_gate_each_become_one_gated_volume() {
     let answer = post("/v1/beats", numbered([4, 2, 5, 0, 1, 6, 3, 7])).await;
     assert_eq!(answer.status(), 200);
     let of_files: Value = answer.json().await.unwrap();
-    let request = service.post("/v1/beats").header("prefer", "wait=60");
+    let request = service
+        .post("/v1/beats")
+        .header("prefer", super::helpers::UNTIL_DONE);
     let answer = request
         .body(nifti_of(beating(), None))
         .send()

@@ -251,7 +251,9 @@ async fn segmentations_and_beats_stand_for_their_volumes_and_keys_for_one_job() 
     assert_eq!(first["id"], again["id"]);
     problem(file(false).await.unwrap(), 422, "idempotency-key-reused").await;
     let order = json!({"stress": fit["segmentation"], "rest": beat["id"]});
-    let waited = app.post("/v1/comparisons").header("prefer", "wait=30");
+    let waited = app
+        .post("/v1/comparisons")
+        .header("prefer", super::helpers::UNTIL_DONE);
     let waited = waited.header(ACCEPT, "application/json").json(&order);
     let waited = waited.send().await.unwrap();
     assert_eq!(waited.status(), StatusCode::OK);
@@ -261,7 +263,9 @@ async fn segmentations_and_beats_stand_for_their_volumes_and_keys_for_one_job() 
             .unwrap()
             .contains("cmp_")
     );
-    let other = app.post("/v1/comparisons").header("prefer", "wait=30");
+    let other = app
+        .post("/v1/comparisons")
+        .header("prefer", super::helpers::UNTIL_DONE);
     let other = other.header(ACCEPT, "model/stl").json(&order).send().await;
     problem(other.unwrap(), 406, "not-acceptable").await;
     // What was corrected of a fit is kept, each scan's own, unless the request says otherwise.

@@ -15,7 +15,7 @@ async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
     let service = Service::start(data.path(), &[]).await;
     let answer = service
         .post("/v1/models?points=110&seed=2")
-        .header("prefer", "wait=60")
+        .header("prefer", super::helpers::UNTIL_DONE)
         .header("accept", "application/json")
         .body(scan())
         .send()
@@ -81,7 +81,7 @@ async fn errors_name_the_problem_with_a_file_or_a_parameter() {
     let post = |path: &str, body: Vec<u8>| {
         service
             .post(path)
-            .header("prefer", "wait=60")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .body(body)
             .send()
     };
@@ -153,7 +153,7 @@ impl Segmenter {
         }
         self.0
             .post(&format!("/v1/segmentations?{query}"))
-            .header("prefer", "wait=60")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .header("accept", "application/json")
             .multipart(form)
             .send()
@@ -229,7 +229,11 @@ async fn a_scan_is_segmented_and_measured_against_an_expert() {
 
     // A model made by a job can be fitted by its id, and as a template by auto.
     let model = service.0.post("/v1/models?points=110").body(scan.clone());
-    let model = model.header("prefer", "wait=60").send().await.unwrap();
+    let model = model
+        .header("prefer", super::helpers::UNTIL_DONE)
+        .send()
+        .await
+        .unwrap();
     let model = model.headers()["location"].to_str().unwrap().to_owned();
     let id = model.rsplit('/').next().unwrap();
     let fitted = service
@@ -354,7 +358,11 @@ async fn a_scan_that_cannot_be_segmented_is_reported_with_the_reason() {
         .0
         .post("/v1/models?isolate=none")
         .body(solid.clone());
-    let model = model.header("prefer", "wait=60").send().await.unwrap();
+    let model = model
+        .header("prefer", super::helpers::UNTIL_DONE)
+        .send()
+        .await
+        .unwrap();
     assert_eq!(model.status(), 200);
     let model = model.headers()["location"].to_str().unwrap().to_owned();
     let id = model.rsplit('/').next().unwrap();
@@ -392,7 +400,7 @@ async fn a_fit_has_labels_and_parts_of_its_wall() {
     let service = Service::start(data.path(), &[]).await;
     let answer = service
         .post("/v1/segmentations?model=auto")
-        .header("prefer", "wait=60")
+        .header("prefer", super::helpers::UNTIL_DONE)
         .header("accept", "application/json")
         .body(scan())
         .send()

@@ -137,6 +137,7 @@ impl TestApp {
             shutdown_grace: "5s".parse().unwrap(),
             workers: "2".parse().unwrap(),
             threads: "1".parse().unwrap(),
+            wait_limit: WAIT_LIMIT.parse().unwrap(),
             ..Settings::default()
         };
         if std::env::var_os("VENTRIFORM_TEST_BLOBS").is_some_and(|place| place == "s3") {
@@ -687,6 +688,11 @@ pub fn send_signal(process: u32, name: &str) {
     assert!(sent.unwrap().success());
 }
 
+/// Asks to wait for a job that succeeds, on however busy a machine; services of tests allow it ([`WAIT_LIMIT`]).
+pub const UNTIL_DONE: &str = "wait=600";
+/// Limit of waiting of the services that tests start.
+const WAIT_LIMIT: &str = "10min";
+
 /// The real program in a separate process.
 pub struct Service {
     process: Child,
@@ -736,6 +742,7 @@ impl Service {
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
             .arg(data)
             .args(arguments)
+            .env("VENTRIFORM_WAIT_LIMIT", WAIT_LIMIT)
             .envs(variables.iter().map(|(name, value)| (*name, value)))
             .stdout(Stdio::piped())
             .stderr(log)

@@ -145,7 +145,7 @@ async fn an_expert_may_draw_a_mesh() {
     let centre = places.iter().sum::<Vec3>() / places.len() as f64;
     let mut ball = shapes::icosphere(45.0, 3);
     ball.vertices.iter_mut().for_each(|p| *p += centre);
-    let mask = voxelise(&ball, truth.shape, &truth.frame);
+    let mask = voxelise(&ball, truth.shape, &truth.frame, &Monitor::silent()).unwrap();
     let as_volume = Volume {
         voxels: mask
             .voxels
@@ -421,7 +421,7 @@ async fn a_single_slice_is_described_and_makes_no_model() {
         for kind in ["models", "segmentations"] {
             let answer = service
                 .post(&format!("/v1/{kind}"))
-                .header("prefer", "wait=60")
+                .header("prefer", super::helpers::UNTIL_DONE)
                 .body(slice.clone())
                 .send()
                 .await
@@ -432,7 +432,7 @@ async fn a_single_slice_is_described_and_makes_no_model() {
     }
     let whole = service
         .post("/v1/models?points=60")
-        .header("prefer", "wait=60")
+        .header("prefer", super::helpers::UNTIL_DONE)
         .body(scan());
     assert!(whole.send().await.unwrap().status().is_success());
 }

@@ -270,7 +270,7 @@ async fn a_waiting_request_is_answered_with_the_reason_of_the_failure() {
     let app = TestApp::start().await;
     let wait = |words: &str| {
         app.post("/v1/models")
-            .header("prefer", "wait=20")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .body(volume(words))
             .send()
     };

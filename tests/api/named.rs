@@ -162,7 +162,11 @@ async fn no_answer_to_a_key_that_reads_holds_what_a_nifti_file_says_of_a_patient
     for kind in ["models?points=100", "segmentations"] {
         let body = unpacked(&naming()[0].1);
         let made = service.post(&format!("/v1/{kind}")).bearer_auth(&submit);
-        let made = made.header("prefer", "wait=120").body(body).send().await;
+        let made = made
+            .header("prefer", super::helpers::UNTIL_DONE)
+            .body(body)
+            .send()
+            .await;
         let made = made.unwrap();
         let status = made.status();
         assert!(

@@ -113,7 +113,7 @@ async fn jobs_are_filed_followed_and_cancelled_at_any_process() {
         .send();
     let waiting = b
         .post("/v1/models")
-        .header("prefer", "wait=20")
+        .header("prefer", super::helpers::UNTIL_DONE)
         .body(volume("brief again"))
         .send();
     let (events, waited) = tokio::join!(events, waiting);

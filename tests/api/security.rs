@@ -592,7 +592,9 @@ async fn the_trail_holds_no_secret_and_no_text_of_a_client() {
 #[tokio::test]
 async fn what_a_request_that_fails_has_changed_is_in_the_trail() {
     let app = TestApp::start().await;
-    let request = app.post("/v1/models").header("prefer", "wait=30");
+    let request = app
+        .post("/v1/models")
+        .header("prefer", super::helpers::UNTIL_DONE);
     let failed = status(request.body(volume("fail"))).await;
     assert!(!failed.is_success(), "{failed}");
     let jobs = app.json("/v1/jobs").await;

@@ -45,7 +45,7 @@ async fn a_waiting_request_is_answered_in_the_format_of_accept() {
     ] {
         let answer = app
             .post("/v1/segmentations?model=auto&margin=1.5")
-            .header("prefer", "wait=20")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .header(ACCEPT, accept)
             .body(volume("sphere"))
             .send()
@@ -61,7 +61,7 @@ async fn a_waiting_request_is_answered_in_the_format_of_accept() {
     }
     let picture = app
         .post("/v1/segmentations")
-        .header("prefer", "wait=20")
+        .header("prefer", super::helpers::UNTIL_DONE)
         .header(ACCEPT, "text/plain")
         .body(volume("sphere"));
     problem(picture.send().await.unwrap(), 406, "not-acceptable").await;
@@ -293,7 +293,7 @@ async fn auto_gets_the_flagged_templates_and_those_that_are_named() {
     let seen = async |query: &str| {
         let answer = app
             .post(&format!("/v1/segmentations{query}"))
-            .header("prefer", "wait=20")
+            .header("prefer", super::helpers::UNTIL_DONE)
             .header(ACCEPT, "application/json")
             .body(volume("sphere"))
             .send();

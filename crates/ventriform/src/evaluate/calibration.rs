@@ -371,7 +371,7 @@ impl ReadCase {
         drawing: &ReaderDrawing,
         monitor: &Monitor<'_>,
     ) -> Result<CaseFigures, Cancelled> {
-        let (fit, _) = reader::drawn(self.fit.clone(), drawing, &self.image, monitor)?;
+        let fit = reader::drawn(self.fit.clone(), drawing, &self.image, monitor)?.model;
         let mask = voxelise(&fit.mesh, self.drawn.shape, &self.frame, monitor)?;
         let agreement = compare(&mask, &self.drawn, self.frame.spacing(), monitor).ok();
         monitor.check()?;

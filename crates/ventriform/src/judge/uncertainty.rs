@@ -21,6 +21,7 @@ use crate::deform::sensors::{PER_TRIANGLE, SensorReading};
 use crate::deform::{FittedModel, WallEdge};
 use crate::geometry::Vec3;
 use crate::mesh::TriMesh;
+use crate::mesh::subdivide::Midpoints;
 use crate::model::wall::{RAY_ROWS, VentricleWall};
 
 /// Figures of a node behind its uncertainty.
@@ -55,6 +56,18 @@ impl WallUncertainty {
             apparent: of_nodes(nodes, chance, WallEdge::Apparent),
             anatomical: of_nodes(nodes, chance, WallEdge::Anatomical),
         })
+    }
+
+    /// With the wall with this `edge` at the nodes of its finer surface too, which lie at `midpoints`.
+    #[must_use]
+    pub fn carried_to(&self, edge: WallEdge, midpoints: &Midpoints) -> Self {
+        let mut carried = self.clone();
+        let of_edge = match edge {
+            WallEdge::Apparent => &mut carried.apparent,
+            WallEdge::Anatomical => &mut carried.anatomical,
+        };
+        *of_edge = midpoints.at_vertices(of_edge);
+        carried
     }
 
     /// That of the wall with this `edge`.

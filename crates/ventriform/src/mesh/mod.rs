@@ -8,6 +8,7 @@
 //! - [`topology`]: whether it is a closed manifold, with how many components and handles;
 //! - [`intersections`]: which of its triangles intersect, decided exactly;
 //! - [`part`]: the parts of a ventricle's wall;
+//! - [`subdivide`]: the same surface with smaller triangles;
 //! - [`shapes`]: meshes with known properties, for tests and examples.
 
 mod defect;
@@ -16,6 +17,7 @@ pub mod ids;
 pub mod intersections;
 pub mod part;
 pub mod shapes;
+pub mod subdivide;
 pub mod topology;
 
 pub use ids::{FaceId, HalfEdgeId, VertexId};

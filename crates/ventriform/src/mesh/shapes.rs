@@ -3,10 +3,10 @@
 //! All are centred at or rotationally symmetric about the origin's z axis, in millimetres, with
 //! triangles that face outward.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::TriMesh;
+use super::subdivide::Subdivided;
 use crate::geometry::Vec3;
 
 /// A regular tetrahedron of edge length `edge` mm about the origin.
@@ -28,26 +28,18 @@ pub fn tetrahedron(edge: f64) -> TriMesh {
 /// A sphere about the origin: an icosahedron whose triangles are split in four `subdivisions`
 /// times, with all vertices on the sphere. It has 10·4^s + 2 vertices.
 pub fn icosphere(radius: f64, subdivisions: u32) -> TriMesh {
+    let mut sphere = Subdivided::not_yet(icosahedron());
+    for _ in 0..subdivisions {
+        let before = sphere.mesh.vertices.len();
+        sphere = sphere.once_more();
+        for middle in &mut sphere.mesh.vertices[before..] {
+            *middle = middle.normalize();
+        }
+    }
     let TriMesh {
         mut vertices,
-        mut triangles,
-    } = icosahedron();
-    for _ in 0..subdivisions {
-        let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();
-        let mut finer = Vec::with_capacity(4 * triangles.len());
-        for t in &triangles {
-            let [a, b, c]: [u32; 3] = *t;
-            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| {
-                *middles.entry((p.min(q), p.max(q))).or_insert_with(|| {
-                    let middle = vertices[p as usize] + vertices[q as usize];
-                    vertices.push(middle.normalize());
-                    vertices.len() as u32 - 1
-                })
-            });
-            finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
+        triangles,
+    } = sphere.mesh;
     for v in &mut vertices {
         *v *= radius;
     }

@@ -526,7 +526,7 @@ pub(crate) mod tests {
             *p = Vec3::new(p.x, p.z, -p.y);
         }
         let frame = VoxelToPatient::centred([50; 3], [3.0; 3], Vec3::new(0.0, -25.0, 0.0)).unwrap();
-        let mask = voxelise(&mesh, [50; 3], &frame);
+        let mask = voxelise(&mesh, [50; 3], &frame, &crate::progress::Monitor::silent()).unwrap();
         let voxels = (0..50 * 50 * 50)
             .map(|v| {
                 let index = Vec3::from([v % 50, v / 50 % 50, v / 2500].map(|x| x as f64));

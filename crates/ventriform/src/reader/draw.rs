@@ -1,6 +1,7 @@
 //! A fitted wall as a reader would draw it.
 //!
-//! By a level of the image, every node moves along its normal ([`super::level`]). By distances:
+//! By a level of the image, the surface gets smaller triangles, and every node moves along its normal ([`super::level`]);
+//! where the surface would intersect itself, the nodes about go less far. By distances:
 //!
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
@@ -14,67 +15,143 @@ use super::level::{self, WallImage};
 use super::profile::{ReaderDrawing, ReaderOffsets};
 use super::wall_edges::WallEdges;
 use crate::deform::{FittedModel, base_plane};
-use crate::mesh::TriMesh;
+use crate::geometry::Vec3;
 use crate::mesh::intersections::self_intersections;
+use crate::mesh::subdivide::{Midpoints, Subdivided};
+use crate::mesh::{FaceId, TriMesh};
 use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
 
-/// `fit` with the shown wall moved by `drawing`, and the share of it that was applied: 1, or less
-/// where the whole would make the surface intersect itself. `image` is read for a level. The two measured walls
-/// ([`FittedModel::surfaces`]) stay. Organs other than ventricles stay as they are.
+/// Rounds in which displacements about triangles that intersect are made shorter, and the share of them that stays in each.
+const MAX_SHORTENING_ROUNDS: usize = 20;
+const SHORTENED: f64 = 0.7;
+
+/// A fit whose shown wall is as a reader draws it.
+#[derive(Debug, Clone)]
+pub struct DrawnFit {
+    /// The fit. The two measured walls ([`FittedModel::surfaces`]) are as they were.
+    pub model: FittedModel,
+    /// The share of the drawing that was applied: 1, or less where the whole would make the surface intersect itself.
+    pub share: f64,
+    /// The nodes of the shown wall that its model lacks: a level is drawn with smaller triangles.
+    pub midpoints: Midpoints,
+}
+
+/// `model` with the shown wall moved by `drawing`. `image` is read for a level. Organs other than ventricles stay as they
+/// are.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn drawn(
-    fit: FittedModel,
+    model: FittedModel,
     drawing: &ReaderDrawing,
     image: &WallImage,
     monitor: &Monitor,
-) -> Result<(FittedModel, f64), Cancelled> {
-    let (Some(cup), Some(orientation), Some(wall)) = (fit.cup, fit.patient_orientation, &fit.wall)
+) -> Result<DrawnFit, Cancelled> {
+    let as_it_is = |model, share| DrawnFit {
+        model,
+        share,
+        midpoints: Midpoints::default(),
+    };
+    let (Some(cup), Some(orientation), Some(wall)) =
+        (model.cup, model.patient_orientation, &model.wall)
     else {
-        return Ok((fit, 0.0));
+        return Ok(as_it_is(model, 0.0));
     };
     if drawing.is_none() {
-        return Ok((fit, 1.0));
+        return Ok(as_it_is(model, 1.0));
     }
     let superior = &orientation.superior;
-    let displacements = match drawing {
-        ReaderDrawing::Edge(_) => Vec::new(),
-        ReaderDrawing::Level(level) => level::displacements(&fit.mesh, wall, image, *level),
-    };
-    let moved = |share: f64| match drawing {
-        ReaderDrawing::Edge(offsets) => {
-            let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
-            let mesh = with_surfaces_moved(&fit.mesh, wall, &offsets);
+    let moved = match drawing {
+        ReaderDrawing::Edge(offsets) => by_distances(&model.mesh, offsets, |offsets| {
+            let mesh = with_surfaces_moved(&model.mesh, wall, offsets);
             base_plane::extended(&mesh, &cup, superior, offsets.rim)
-        }
-        ReaderDrawing::Level(_) => {
-            let mut mesh = fit.mesh.clone();
-            for (node, by) in mesh.vertices.iter_mut().zip(&displacements) {
-                *node += by * share;
-            }
-            mesh
-        }
+        }),
+        ReaderDrawing::Level(level) => by_level(&model.mesh, wall, image, *level),
     };
-    // A fit that intersects itself already must not do so more often.
-    let before = self_intersections(&fit.mesh).len();
-    let unharmed = |mesh: &TriMesh| self_intersections(mesh).len() <= before;
-    let found = [1.0, 0.75, 0.5, 0.25]
-        .into_iter()
-        .map(|share| (share, moved(share)))
-        .find(|(_, mesh)| unharmed(mesh));
-    let Some((share, mesh)) = found else {
-        return Ok((fit, 0.0));
+    let Some((Subdivided { mesh, midpoints }, share)) = moved else {
+        return Ok(as_it_is(model, 0.0));
     };
     let wall = VentricleWall::new(&mesh, &cup, superior, monitor)?;
-    let fit = FittedModel {
+    let model = FittedModel {
         wall_ml: mesh.volume() / 1000.0,
         wall: Some(wall),
         mesh,
-        ..fit
+        ..model
     };
-    Ok((fit, share))
+    Ok(DrawnFit {
+        model,
+        share,
+        midpoints,
+    })
+}
+
+/// The greatest share of `offsets` by which `moved` does not make `mesh` intersect itself, and the mesh moved so.
+fn by_distances(
+    mesh: &TriMesh,
+    offsets: &ReaderOffsets,
+    moved: impl Fn(&ReaderOffsets) -> TriMesh,
+) -> Option<(Subdivided, f64)> {
+    // A fit that intersects itself already must not do so more often.
+    let before = self_intersections(mesh).len();
+    [1.0, 0.75, 0.5, 0.25].into_iter().find_map(|share| {
+        let offsets = ReaderOffsets::from_array(offsets.to_array().map(|o| share * o));
+        let mesh = moved(&offsets);
+        (self_intersections(&mesh).len() <= before).then(|| (Subdivided::not_yet(mesh), share))
+    })
+}
+
+/// The surface of `mesh`, whose wall is `wall`, drawn at `level`, and the share of the way that it went. Where it would
+/// intersect itself, its nodes go less far.
+fn by_level(
+    mesh: &TriMesh,
+    wall: &VentricleWall,
+    image: &WallImage,
+    level: f64,
+) -> Option<(Subdivided, f64)> {
+    let finer = level::subdivided(mesh.clone());
+    let before = self_intersections(&finer.mesh).len();
+    let wanted = level::displacements(&finer.mesh, wall, image, level);
+    let way = |displacements: &[Vec3]| displacements.iter().map(Vec3::norm).sum::<f64>();
+    let mut displacements = wanted.clone();
+    for _ in 0..MAX_SHORTENING_ROUNDS {
+        let mut moved = finer.mesh.clone();
+        for (node, by) in moved.vertices.iter_mut().zip(&displacements) {
+            *node += by;
+        }
+        let intersecting = self_intersections(&moved);
+        if intersecting.len() <= before {
+            let share = way(&displacements) / way(&wanted).max(1e-9);
+            let drawn = Subdivided {
+                mesh: moved,
+                midpoints: finer.midpoints,
+            };
+            return Some((drawn, share));
+        }
+        for node in nodes_about(&finer.mesh, intersecting.into_iter().flatten()) {
+            displacements[node] *= SHORTENED;
+        }
+    }
+    None
+}
+
+/// The nodes of `triangles` and of their neighbours.
+fn nodes_about(mesh: &TriMesh, triangles: impl Iterator<Item = FaceId>) -> Vec<usize> {
+    let mut inner = vec![false; mesh.vertices.len()];
+    for triangle in triangles {
+        for node in mesh.triangles[triangle.index()] {
+            inner[node as usize] = true;
+        }
+    }
+    let mut all = inner.clone();
+    for triangle in &mesh.triangles {
+        if triangle.iter().any(|node| inner[*node as usize]) {
+            for node in triangle {
+                all[*node as usize] = true;
+            }
+        }
+    }
+    (0..all.len()).filter(|node| all[*node]).collect()
 }
 
 /// `mesh`, whose wall is `wall`, with its inner and outer surface moved by `offsets`.
@@ -90,7 +167,6 @@ fn with_surfaces_moved(mesh: &TriMesh, wall: &VentricleWall, offsets: &ReaderOff
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
     use crate::locate::cup::Cup;
     use crate::mesh::shapes;
     use crate::model::wall::{RAY_COLUMNS, RAY_ROWS};

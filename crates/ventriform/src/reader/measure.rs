@@ -71,8 +71,8 @@ pub fn measure_level(
 ) -> Result<f64, Cancelled> {
     let agreement = |step: i32| {
         let level = f64::from(step) * FINE_LEVEL_STEP;
-        let (made, _) = super::drawn(fit.clone(), &ReaderDrawing::Level(level), image, monitor)?;
-        let mask = voxelise(&made.mesh, drawn.shape, frame, monitor)?;
+        let made = super::drawn(fit.clone(), &ReaderDrawing::Level(level), image, monitor)?;
+        let mask = voxelise(&made.model.mesh, drawn.shape, frame, monitor)?;
         Ok::<_, Cancelled>((step, jaccard(&mask, drawn, monitor)?))
     };
     let coarse = (COARSE_LEVEL_STEP / FINE_LEVEL_STEP).round() as i32;

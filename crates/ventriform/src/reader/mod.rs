@@ -12,8 +12,8 @@
 //! 3. [`profile`]: the profile as JSON, checked when it is read.
 //! 4. [`draw`]: a fitted wall, moved by the profile; [`level`]: where a level puts its nodes.
 //!
-//! Guaranteed: the same masks give the same profile; distances of zero leave a fit as it is, and
-//! the nodes and triangles stay those of the model. Not guaranteed: that the reader's next mask
+//! Guaranteed: the same masks give the same profile; distances of zero leave a fit as it is; drawn by distances, the wall keeps
+//! the nodes and triangles of the model, drawn by a level it has smaller ones. Not guaranteed: that the reader's next mask
 //! lies where the profile says; the spread over the masks is in the profile.
 
 pub mod draw;
@@ -23,7 +23,7 @@ pub mod measure;
 pub mod profile;
 mod wall_edges;
 
-pub use draw::drawn;
+pub use draw::{DrawnFit, drawn};
 pub use learn::{learn, learn_level};
 pub use level::WallImage;
 pub use measure::{measure, measure_level};

@@ -10,6 +10,7 @@ use crate::fit::Fit;
 use crate::geometry::Vec3;
 use crate::grid::agreement::{Agreement, compare};
 use crate::grid::voxelise::{Mask, voxelise};
+use crate::judge::Judgement;
 use crate::polar::{self, PolarMap, PolarParameters};
 use crate::progress::{Monitor, Stage};
 use crate::reader::{self, WallImage};
@@ -138,7 +139,15 @@ pub fn segment(
             let Fit { model, judgement } = fit;
             let reference = polar.as_ref().map_or(0.0, |map| map.reference);
             let image = WallImage::about(&model, volume, reference, monitor)?;
-            let (model, share) = reader::drawn(model, &reader.profile.drawing(), &image, monitor)?;
+            let drawn = reader::drawn(model, &reader.profile.drawing(), &image, monitor)?;
+            let uncertainty = judgement.uncertainty.as_ref();
+            let uncertainty =
+                uncertainty.map(|all| all.carried_to(parameters.deform.edge, &drawn.midpoints));
+            let judgement = Judgement {
+                uncertainty,
+                ..judgement
+            };
+            let (model, share) = (drawn.model, drawn.share);
             let reader = reader.clone();
             (
                 Fit { model, judgement },
