@@ -691,7 +691,7 @@ pub fn send_signal(process: u32, name: &str) {
 /// Asks to wait for a job that succeeds, on however busy a machine; services of tests allow it ([`WAIT_LIMIT`]).
 pub const UNTIL_DONE: &str = "wait=600";
 /// Limit of waiting of the services that tests start.
-const WAIT_LIMIT: &str = "10min";
+const WAIT_LIMIT: &str = "10m";
 
 /// The real program in a separate process.
 pub struct Service {
