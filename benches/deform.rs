@@ -56,7 +56,7 @@ fn benchmarks(criterion: &mut Criterion) {
     group.bench_function("localise 128³", |b| {
         b.iter(|| {
             let heart = locate::find(black_box(&volume), &settings.hints, &monitor);
-            heart.and_then(|heart| heart.localisation(&monitor))
+            heart.and_then(|heart| heart.localisation())
         });
     });
     group.bench_function("fit 150 points 128³", |b| {

@@ -57,8 +57,7 @@ impl OrganPosition {
         monitor.report(Stage::Localise, 0.0)?;
         let position = match template.cup {
             Some(_) => {
-                let found =
-                    locate::find(volume, &parameters.hints, monitor)?.localisation(monitor)?;
+                let found = locate::find(volume, &parameters.hints, monitor)?.localisation()?;
                 let (superior, cup) = (parameters.superior, &found.cup);
                 let stated = PatientOrientation::stated(superior, parameters.anterior, &cup.axis);
                 let orientation = match stated {

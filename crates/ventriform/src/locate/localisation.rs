@@ -32,7 +32,8 @@ pub struct Localisation {
     /// Uptake of the apical wall against the basal one, if the apical wall does not show (less than
     /// 0.42): place and length then come from the base.
     pub dark_apex: Option<f64>,
-    /// The best correlation at a place more than 25 mm away, if there was a candidate.
+    /// The best correlation at a place more than 25 mm away, if there was a candidate; none was looked for where rays and cup
+    /// agree on the heart.
     pub runner_up: Option<f64>,
     /// Whether an infarct left only a part of the wall to tell the place.
     pub infarcted: bool,
@@ -86,6 +87,15 @@ impl Cups {
             hints,
             found,
         })
+    }
+
+    /// The one cup `found` in `field`, where that is known to be the heart.
+    pub fn one(field: Field, hints: &Hints, found: ScoredCup) -> Self {
+        Self {
+            field,
+            hints: hints.clone(),
+            found: vec![found],
+        }
     }
 
     /// Adds the walls that infarcts leave ([`cup_search::infarcted`]).

@@ -81,7 +81,7 @@ pub struct Heart<'v> {
 /// The evidence that decided.
 enum Decision {
     /// Rays and the cup at their proposal agree.
-    Rays(Cavity),
+    Rays(Cavity, Box<Cups>),
     /// The best of the cups in the whole volume, LPS mm; none where all are doubtful.
     Cups(Box<Cups>, Option<Vec3>),
 }
@@ -99,8 +99,12 @@ pub fn find<'v>(
     let rays = RaySearch::new(volume, monitor)?;
     let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
     let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);
-    let decision = match proposal {
-        Some(cavity) if is_clear(volume, hints, &cavity, monitor)? => Decision::Rays(cavity),
+    let clear = match &proposal {
+        Some(cavity) => clear_cup(volume, hints, cavity, monitor)?,
+        None => None,
+    };
+    let decision = match (proposal, clear) {
+        (Some(cavity), Some(cup)) => Decision::Rays(cavity, Box::new(cup)),
         _ => {
             let mut cups = Cups::everywhere(volume, hints, monitor)?;
             let clear = |best: &ScoredCup| best.correlation >= CLEAR_CORRELATION;
@@ -123,13 +127,13 @@ pub fn find<'v>(
     })
 }
 
-/// Whether the cup that fits best about `cavity` shows a ventricle there.
-fn is_clear(
+/// The cup that fits best about `cavity`, if it shows a ventricle there.
+fn clear_cup(
     volume: &Volume,
     hints: &Hints,
     cavity: &Cavity,
     monitor: &Monitor,
-) -> Result<bool, Cancelled> {
+) -> Result<Option<Cups>, Cancelled> {
     let centre = to_patient(volume, &cavity.centre);
     let region = Aabb {
         min: centre - Vec3::repeat(SURROUNDINGS_MM),
@@ -139,7 +143,9 @@ fn is_clear(
     let found = CupSearch::new(&field, hints).around(centre);
     let open = found.cup.lid(&field, found.wall) <= not_a_heart::MAX_LID_SHARE;
     let near = (found.cup.centre - centre).norm() < SAME_HEART;
-    Ok(near && open && found.refusal().is_none() && found.correlation >= CLEAR_CORRELATION)
+    let is_clear =
+        near && open && found.refusal().is_none() && found.correlation >= CLEAR_CORRELATION;
+    Ok(is_clear.then(|| Cups::one(field, hints, found)))
 }
 
 impl Heart<'_> {
@@ -152,7 +158,7 @@ impl Heart<'_> {
     /// [`Cancelled`].
     pub fn cavity(&self, monitor: &Monitor) -> Result<Option<Cavity>, Cancelled> {
         let place = match &self.decision {
-            Decision::Rays(cavity) => return Ok(Some(cavity.clone())),
+            Decision::Rays(cavity, _) => return Ok(Some(cavity.clone())),
             Decision::Cups(_, place) => place,
         };
         let within = |reach: f64| {
@@ -176,17 +182,10 @@ impl Heart<'_> {
     ///
     /// # Errors
     /// [`LocateError::NoHeart`] where something speaks against every candidate and no hinted
-    /// centre overrules that; [`LocateError::Cancelled`].
-    pub fn localisation(&self, monitor: &Monitor) -> Result<Localisation, LocateError> {
-        match &self.decision {
-            Decision::Cups(cups, _) => Ok(cups.localisation(cups.best(|_| true)?)),
-            Decision::Rays(cavity) => {
-                let cups = Cups::everywhere(self.volume, &self.hints, monitor)?;
-                let place = to_patient(self.volume, &cavity.centre);
-                let best = cups.best(|centre| (centre - place).norm() < SAME_HEART)?;
-                Ok(cups.localisation(best))
-            }
-        }
+    /// centre overrules that.
+    pub fn localisation(&self) -> Result<Localisation, LocateError> {
+        let (Decision::Rays(_, cups) | Decision::Cups(cups, _)) = &self.decision;
+        Ok(cups.localisation(cups.best(|_| true)?))
     }
 }
 
@@ -220,7 +219,7 @@ mod tests {
         let monitor = Monitor::silent();
         let heart = find(volume, hints, &monitor).unwrap();
         let cavity = heart.cavity(&monitor).unwrap().unwrap();
-        let cup = heart.localisation(&monitor).unwrap().cup;
+        let cup = heart.localisation().unwrap().cup;
         (to_patient(volume, &cavity.centre), cup.centre)
     }
 
@@ -294,7 +293,7 @@ mod tests {
                 ..Hints::default()
             };
             let heart = find(&infarcted, &hints, &monitor).unwrap();
-            let found = heart.localisation(&monitor).unwrap();
+            let found = heart.localisation().unwrap();
             let off = (found.cup.centre - whole).norm();
             let cavity = 0.5 * small().width_mm - small().wall_mm;
             assert!(off < cavity, "{left:?}: {off:.1} mm");
