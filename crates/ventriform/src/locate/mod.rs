@@ -15,7 +15,7 @@
 //!    [`Heart::cavity`] is the best proposal of the rays, whatever its score.
 //!
 //! Other figures of the heart are computed when asked for: the cavity with the
-//! distances of its wall, or the cup with its length, its margin over the best structure elsewhere
+//! distances of its wall, or the cup with its length, where cups decided its margin over the best structure elsewhere,
 //! and, where the apex does not show ([`apex`]), its place by the base.
 //!
 //! All pictures are block means ([`crate::grid::blocks`]), in which values that are not finite
