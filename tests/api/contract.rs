@@ -719,7 +719,7 @@ async fn jobs_end_in_every_way(on: &Stores) {
     for (deleted, rows) in [(Deleted::Done, 1), (Deleted::Unknown, 1)] {
         let done = on.a.delete_job(&job.id, Some(&by), now()).await.unwrap();
         assert_eq!(done, deleted);
-        assert_eq!(rows_about(&*on.b, &job.id).await, rows);
+        assert_eq!(rows_about(&on.b, &job.id).await, rows);
     }
     assert!(on.b.erased_at(&tenant(), &job.id).await.unwrap().is_some());
     // Interrupted by the death of the service up to the limit.
@@ -1822,7 +1822,7 @@ async fn received_objects_become_volumes(on: &Stores) {
     assert_eq!(of_other.unwrap(), None);
     let removed = on.b.remove(&tenant(), &group, Some(&by), now()).await;
     assert_eq!(removed.unwrap().unwrap(), ["file-1-aa"]);
-    assert_eq!(rows_about(&*on.a, &group).await, 1);
+    assert_eq!(rows_about(&on.a, &group).await, 1);
     assert_eq!(on.b.waiting().await.unwrap(), (0, 0));
 }
 

@@ -652,9 +652,9 @@ mod tests {
         let ledger = Ledger::new(&MemoryBudget::new(100), Some(&tenant));
         let begun = ledger.scope(async {
             let work = Requester::current().scope(async { Requester::current() });
-            tokio::spawn(work)
+            tokio::spawn(work).await.unwrap()
         });
-        let requester = begun.await.await.unwrap();
+        let requester = begun.await;
         assert_eq!(requester.group(), &Group::Tenant(tenant));
         assert!(Requester::current().is_service());
     }

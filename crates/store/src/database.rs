@@ -8,17 +8,18 @@
 
 use super::postgres::{self, PgTransaction, PgWriter};
 use super::query::{DbRow, Query, Target, query};
+use super::shared::Shared;
 use super::space::DiskGauge;
 use super::sqlite;
 use super::writer::{Write, WriteTransaction, Writer};
 use sqlx::postgres::PgPool;
 use sqlx::sqlite::SqlitePool;
 use std::path::Path;
-use std::sync::Arc;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::places::{Place, Places};
+
 use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
@@ -35,38 +36,6 @@ impl<'a> From<&'a Readers> for Target<'a> {
             Readers::Sqlite(pool) => Target::SqlitePool(pool),
             Readers::Postgres(pool) => Target::PgPool(pool),
         }
-    }
-}
-
-/// Connections whose use is shared out in turn between tenants and their clients.
-pub(super) struct Shared<P> {
-    /// The connections.
-    pub pool: P,
-    places: Arc<Places>,
-    /// Longest time for which a place is waited for.
-    wait: Duration,
-}
-
-impl<P> Shared<P> {
-    /// Connections of which at most `places` are used at the same time, and for one of which nobody waits longer than `wait`.
-    pub fn new(pool: P, places: usize, wait: Duration) -> Self {
-        Self {
-            pool,
-            places: Places::new(places),
-            wait,
-        }
-    }
-
-    /// Waits for its turn to use a connection.
-    ///
-    /// # Errors
-    /// If that is not within the set time.
-    pub async fn turn(&self) -> StoreResult<Place> {
-        let place = tokio::time::timeout(self.wait, self.places.take()).await;
-        place.map_err(|_| StoreError::Database {
-            cause: StoreFault::Busy,
-            message: "other reads take too long".into(),
-        })
     }
 }
 

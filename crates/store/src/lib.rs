@@ -40,6 +40,7 @@ mod query;
 mod received;
 mod s3;
 mod schema;
+mod shared;
 mod space;
 mod sqlite;
 mod sqlite_repair;

@@ -23,10 +23,10 @@
 //! fail with [`StoreFault::Away`] until it is back; a connection that was lost is noticed before it is used,
 //! and a read whose connection breaks is done again.
 
-use super::database::Shared;
 use super::faults;
 use super::query::jitter;
 use super::schema;
+use super::shared::Shared;
 use sqlx::migrate::MigrateError;
 use sqlx::pool::PoolConnection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};

@@ -6,8 +6,8 @@
 //! of the engine's own driver; `sqlx::Any`, which would do the same, guesses the types of computed
 //! columns and knows neither the settings nor the error codes of an engine.
 
-use super::database::Shared;
 use super::faults;
+use super::shared::Shared;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow};
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};

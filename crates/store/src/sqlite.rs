@@ -1,7 +1,7 @@
 //! The database file: one connection for writing, a few for reading.
 
-use super::database::Shared;
 use super::schema;
+use super::shared::Shared;
 use super::writer::Writer;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,

@@ -54,7 +54,7 @@ use files::{make_folder, write_whole};
 use findings::findings;
 use fits::{FitRun, PatientFits};
 use leave_one_out::LeaveOneOut;
-use models::CohortModel;
+use models::{CohortModel, CohortModels};
 use rows::{FitRow, Gold, Variant};
 use std::path::Path;
 use table::Evaluation;
@@ -81,7 +81,7 @@ pub fn evaluate(
     make_folder(&models_folder)?;
     make_folder(&fits_folder)?;
     observer.progress(EvaluationStep::Models, 0.0);
-    let (models, problems) = models::build(cohort, parameters, monitor)?;
+    let CohortModels { models, problems } = models::build(cohort, parameters, monitor)?;
     if models.is_empty() {
         let reasons = problems.into_iter().map(|(_, reason)| reason).collect();
         return Err(EvaluateError::NoModel { reasons });

@@ -76,8 +76,15 @@ fn during<E: std::error::Error + Send + Sync + 'static>(
     }
 }
 
-/// Makes every model that `parameters` ask for. Returns the models and, for each that could not
-/// be made, the template and the reason.
+/// The models of a cohort's templates.
+pub struct CohortModels {
+    /// Those that were made.
+    pub models: Vec<CohortModel>,
+    /// For each that could not be made, the template and the reason.
+    pub problems: Vec<(String, String)>,
+}
+
+/// Makes every model that `parameters` ask for.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -85,7 +92,7 @@ pub fn build(
     cohort: &Cohort,
     parameters: &EvaluationParameters,
     monitor: &Monitor<'_>,
-) -> Result<(Vec<CohortModel>, Vec<(String, String)>), Cancelled> {
+) -> Result<CohortModels, Cancelled> {
     let made: Vec<Vec<Result<CohortModel, ModelError>>> = cohort
         .templates
         .par_iter()
@@ -105,7 +112,7 @@ pub fn build(
             }
         }
     }
-    Ok((models, problems))
+    Ok(CohortModels { models, problems })
 }
 
 fn of_template(

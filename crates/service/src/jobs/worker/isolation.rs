@@ -5,7 +5,7 @@
 //! apart, so the job is computed in a child process from then on. If the child dies while the
 //! service lives, the job is to blame; if both die, it is not.
 //!
-//! A job on a volume of more than [`IN_PROCESS_VOXELS`] is so from the start: how much memory it takes is not known
+//! A job on a volume of more than [`IN_PROCESS_VOXELS`](super::run::IN_PROCESS_VOXELS) is so from the start: how much memory it takes is not known
 //! before (where all is noise, the muscle's model takes a hundred bytes for each voxel), and the child that
 //! cannot get it ends alone.
 //!
@@ -42,10 +42,6 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
-
-/// Voxels of a volume up to which a job is computed on the threads of the service: 128 x 128 x 128, or 8 gates of
-/// 64 x 64 x 64.
-pub(super) const IN_PROCESS_VOXELS: u64 = 1 << 21;
 
 /// Longest time until the parent notices that the computation was cancelled.
 const CANCEL_POLL: Duration = Duration::from_millis(20);

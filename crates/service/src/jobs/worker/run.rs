@@ -8,7 +8,6 @@
 //! stops: a job of a living run is never without a worker.
 
 use super::WorkerSettings;
-use super::isolation::IN_PROCESS_VOXELS;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
 use crate::items::WorkOutput;
@@ -23,6 +22,10 @@ use std::time::Duration;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 use ventriform::progress::{CancelToken, Monitor};
+
+/// Voxels of a volume up to which a job is computed on the threads of the service: 128 x 128 x 128, or 8 gates of
+/// 64 x 64 x 64.
+pub(super) const IN_PROCESS_VOXELS: u64 = 1 << 21;
 
 /// Time for which a computation that was told to stop may go on before its job is ended anyway.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
