@@ -12,6 +12,11 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PLATFORM = "x86_64-unknown-linux-gnu"
 # Names of files with licences.
 NAMES = ("license", "licence", "copying", "unlicense", "notice", "copyright")
+# Works of third parties inside a crate whose licence its own file does not name.
+INSIDE = {
+    "noto-sans-mono-bitmap": "Its glyphs are drawn from the font Noto Sans Mono, copyright The Noto Project Authors, under the SIL Open Font License "
+    "1.1: https://openfontlicense.org"
+}
 # Licences whose texts are these, whoever holds the copyright.
 SHARED = {"Apache-2.0": "LICENSE-APACHE"}
 
@@ -51,6 +56,7 @@ def main():
     for package in needed(metadata(), sys.argv[1]):
         stated = package["license"] or "see the text"
         found = texts(package)
+        found += [INSIDE[package["name"]]] if package["name"] in INSIDE else []
         if not found:
             shared = next((file for licence, file in SHARED.items() if licence in stated), None)
             if shared is None:
