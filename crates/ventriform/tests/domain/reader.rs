@@ -379,7 +379,7 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
     }
     let offsets = [1.5, -0.5, 3.0];
     let made = segmented(&path, Some(profile(offsets)), &defaults).unwrap();
-    // A rim of few voxels is measured to half a millimetre; the mean of several scans is surer.
+    // A rim of few voxels of 4 mm is measured to .6 mm; the mean of several scans is surer.
     let mut moved = vec![moved_by(&without, &made)];
     for seed in [8, 9] {
         scan(&path, seed);
@@ -389,7 +389,7 @@ fn a_profile_moves_the_wall_by_its_millimetres_and_a_profile_of_zeros_does_not()
     for (which, wanted) in offsets.into_iter().enumerate() {
         let each = moved.iter().map(|found| found[which]);
         assert!(
-            each.clone().all(|found| (found - wanted).abs() < 0.5),
+            each.clone().all(|found| (found - wanted).abs() < 0.6),
             "{moved:?}"
         );
         let mean = each.sum::<f64>() / moved.len() as f64;
