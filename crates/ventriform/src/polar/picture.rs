@@ -382,14 +382,20 @@ fn label(
     VectorShape::Label {
         at: screen(share, turns),
         anchor: Anchor::Middle,
-        text: mean.map_or_else(
-            || "-".to_owned(),
-            |mean| format!("{:.decimals$}", mean + 0.0),
-        ),
+        text: mean.map_or_else(|| "-".to_owned(), |mean| written(mean, decimals)),
         weight: Weight::Bold,
         size: TEXT_HEIGHT_PX,
         ink: if bright { BLACK_RGB } else { WHITE_RGB },
         rim: Some(if bright { WHITE_RGB } else { BLACK_RGB }),
+    }
+}
+
+/// A figure with its decimals; without a sign where those are zeros.
+fn written(figure: f64, decimals: usize) -> String {
+    let text = format!("{figure:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zeros) if zeros.parse() == Ok(0.0) => zeros.to_owned(),
+        _ => text,
     }
 }
 
@@ -525,4 +531,16 @@ fn screen(share: f64, turns: f64) -> Point {
         MAP_CENTRE_PX + MAP_RADIUS_PX * share * cos,
         MAP_CENTRE_PX - MAP_RADIUS_PX * share * sin,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_zero_has_a_sign() {
+        let texts = [(-0.4, 0), (-0.0, 1), (-0.04, 1), (-0.6, 0), (12.3, 1)];
+        let texts = texts.map(|(figure, decimals)| written(figure, decimals));
+        assert_eq!(texts, ["0", "0.0", "0.0", "-1", "12.3"]);
+    }
 }
