@@ -33,7 +33,9 @@ def test_progress_never_decreases_and_ends_at_one(scan: pathlib.Path) -> None:
     vf.segment(scan, progress=progress)
     fractions = [fraction for _, fraction in told]
     assert fractions == sorted(fractions) and fractions[-1] == 1.0
-    assert {"localise", "export"} <= {stage for stage, _ in told}
+    # Stages shorter than the time between two calls are not told.
+    stages = [stage for stage, _ in told]
+    assert stages[-1] == "export" and len(set(stages)) > 1
     assert threads == {threading.get_ident()}
 
 
