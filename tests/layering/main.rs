@@ -74,7 +74,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
     ),
     (
         "surface",
-        &["geometry", "mesh", "progress", "grid", "locate"],
+        &["geometry", "numeric", "mesh", "progress", "grid", "locate"],
     ),
     ("retile", &["geometry", "mesh", "progress", "surface"]),
     (
@@ -113,7 +113,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
     (
         "reader",
         &[
-            "text", "geometry", "mesh", "progress", "grid", "model", "deform",
+            "text", "geometry", "numeric", "mesh", "progress", "grid", "model", "deform",
         ],
     ),
     (

@@ -88,7 +88,6 @@ impl Decoding {
         let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         Self {
             admission: Arc::new(Admission {
-                budget: settings.decoding_memory.0,
                 large: Places::new(1),
                 longest: settings.decoding_queue,
                 queue: Mutex::new(AdmissionQueue {
@@ -361,8 +360,6 @@ impl Observer for TurnTaker {
 
 /// Who may begin.
 struct Admission {
-    /// Memory of all work together, bytes.
-    budget: u64,
     /// The place for work that needs more than half of the budget.
     large: Arc<Places>,
     /// Most waiting pieces of work.
@@ -442,7 +439,7 @@ impl Admission {
         requester: Requester,
         memory: u64,
     ) -> Result<Admitted, ServiceError> {
-        let share = self.budget / 2;
+        let share = self.queue().share;
         let mut large = if memory > share {
             Some(self.enter_large(&requester).await?)
         } else {

@@ -60,14 +60,13 @@ impl WallUncertainty {
 
     /// With the wall with this `edge` at the nodes of its finer surface too, which lie at `midpoints`.
     #[must_use]
-    pub fn carried_to(&self, edge: WallEdge, midpoints: &Midpoints) -> Self {
-        let mut carried = self.clone();
+    pub fn carried_to(mut self, edge: WallEdge, midpoints: &Midpoints) -> Self {
         let of_edge = match edge {
-            WallEdge::Apparent => &mut carried.apparent,
-            WallEdge::Anatomical => &mut carried.anatomical,
+            WallEdge::Apparent => &mut self.apparent,
+            WallEdge::Anatomical => &mut self.anatomical,
         };
         *of_edge = midpoints.at_vertices(of_edge);
-        carried
+        self
     }
 
     /// That of the wall with this `edge`.

@@ -252,64 +252,55 @@ fn from_volume(
 ) -> Result<Model, PipelineError> {
     // All steps on a thread of the pool: from another one, each of some hundred parallel steps would be handed over and
     // waited for.
-    rayon::scope(|_| on_this_thread(volume, facts, parameters, told_apart, read_ms, monitor))
-}
-
-fn on_this_thread(
-    volume: &Volume,
-    facts: &VolumeFacts,
-    parameters: &ModelParameters,
-    told_apart: Option<i64>,
-    read_ms: f64,
-    monitor: &Monitor,
-) -> Result<Model, PipelineError> {
-    let mut laps = Laps::new(read_ms, monitor);
-    let mut extracted = parameters.surface.clone();
-    if told_apart.is_some() {
-        extracted.isolate = Isolate::Label(1);
-    }
-    let surface = surface::extract(volume, &extracted, monitor);
-    let mut surface = surface.map_err(PipelineError::Surface)?;
-    if let Some(label) = told_apart {
-        surface.facts.label = Some(label);
-        surface.facts.range = [facts.intensity.minimum, facts.intensity.maximum].map(f64::from);
-    }
-    laps.end(Stage::Surface);
-    // The two are independent.
-    let (tiled, reference) = rayon::join(
-        || starts::tile(&surface, parameters, monitor),
-        || Reference::new(&surface),
-    );
-    let tiled = tiled.map_err(PipelineError::Retile)?;
-    laps.end(Stage::Retile);
-    let made = starts::best(tiled, &reference, parameters, monitor, |stage| {
-        laps.end(stage)
-    })
-    .map_err(PipelineError::Optimise)?;
-    let mut report = ModelReport::new(ReportInput {
-        input: FileFacts::of(facts),
-        parameters: parameters.to_json(),
-        surface: &surface,
-        tiled: &made.tiled,
-        optimised: &made.optimised,
-        optimise_parameters: &parameters.optimise,
-        measures: made.measures,
-        starts: made.starts,
-        timings_ms: laps.times,
-    });
-    if !report.is_sound() {
-        return Err(PipelineError::Unsound {
-            flags: report.warnings,
+    rayon::scope(|_| {
+        let mut laps = Laps::new(read_ms, monitor);
+        let mut extracted = parameters.surface.clone();
+        if told_apart.is_some() {
+            extracted.isolate = Isolate::Label(1);
+        }
+        let surface = surface::extract(volume, &extracted, monitor);
+        let mut surface = surface.map_err(PipelineError::Surface)?;
+        if let Some(label) = told_apart {
+            surface.facts.label = Some(label);
+            surface.facts.range = [facts.intensity.minimum, facts.intensity.maximum].map(f64::from);
+        }
+        laps.end(Stage::Surface);
+        // The two are independent.
+        let (tiled, reference) = rayon::join(
+            || starts::tile(&surface, parameters, monitor),
+            || Reference::new(&surface),
+        );
+        let tiled = tiled.map_err(PipelineError::Retile)?;
+        laps.end(Stage::Retile);
+        let made = starts::best(tiled, &reference, parameters, monitor, |stage| {
+            laps.end(stage)
+        })
+        .map_err(PipelineError::Optimise)?;
+        let mut report = ModelReport::new(ReportInput {
+            input: FileFacts::of(facts),
+            parameters: parameters.to_json(),
+            surface: &surface,
+            tiled: &made.tiled,
+            optimised: &made.optimised,
+            optimise_parameters: &parameters.optimise,
+            measures: made.measures,
+            starts: made.starts,
+            timings_ms: laps.times,
         });
-    }
-    report.warnings.splice(0..0, facts.warnings.iter().cloned());
-    let mesh = made.optimised.mesh;
-    Ok(Model {
-        parts: parts(&mesh, parameters, facts, monitor)?,
-        mesh,
-        reference: surface.mesh,
-        report,
-        frame_of_reference_uid: None,
+        if !report.is_sound() {
+            return Err(PipelineError::Unsound {
+                flags: report.warnings,
+            });
+        }
+        report.warnings.splice(0..0, facts.warnings.iter().cloned());
+        let mesh = made.optimised.mesh;
+        Ok(Model {
+            parts: parts(&mesh, parameters, facts, monitor)?,
+            mesh,
+            reference: surface.mesh,
+            report,
+            frame_of_reference_uid: None,
+        })
     })
 }
 

@@ -23,6 +23,7 @@ use crate::grid::field::Field;
 use crate::mesh::TriMesh;
 use crate::mesh::subdivide::Subdivided;
 use crate::model::wall::VentricleWall;
+use crate::numeric::order::upper_median;
 use crate::progress::{Cancelled, Monitor};
 use rayon::prelude::*;
 
@@ -84,26 +85,17 @@ impl WallImage {
 pub(super) fn subdivided(mesh: TriMesh) -> Subdivided {
     let mut finer = Subdivided::not_yet(mesh);
     for _ in 0..MAX_SUBDIVISIONS {
-        if median_edge_mm(&finer.mesh) <= EDGE_MM {
+        // One edge of each triangle.
+        let edges = (0..finer.mesh.triangles.len()).map(|triangle| {
+            let [a, b, _] = finer.mesh.corners(triangle);
+            (b - a).norm()
+        });
+        if upper_median(edges) <= EDGE_MM {
             break;
         }
         finer = finer.once_more();
     }
     finer
-}
-
-fn median_edge_mm(mesh: &TriMesh) -> f64 {
-    let mut lengths: Vec<f64> = (0..mesh.triangles.len())
-        .map(|triangle| {
-            let [a, b, _] = mesh.corners(triangle);
-            (b - a).norm()
-        })
-        .collect();
-    let middle = lengths.len() / 2;
-    if lengths.is_empty() {
-        return 0.0;
-    }
-    *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Displacement of every node of `mesh`, whose wall is `wall`, that puts its surface at `level`, LPS mm.

@@ -85,15 +85,14 @@ fn pictures_and_figures(sheet: &ComparisonSheet<'_>) -> Block {
             }
         }
     }
+    facts.push(Block::Table(table));
     let Some(slices) = sheet.slices else {
-        facts.push(Block::Table(table));
         return Block::Columns(vec![(CONTENT_WIDTH_PX, facts)]);
     };
     let pictures = vec![
         Block::Pictures(vec![(slices.clone(), String::new())]),
         Block::Sentence(Tone::Soft, SLICES_HINT.to_owned()),
     ];
-    facts.push(Block::Table(table));
     let rest = CONTENT_WIDTH_PX.saturating_sub(slices.width + COLUMN_GAP_PX);
     Block::Columns(vec![(slices.width, pictures), (rest, facts)])
 }

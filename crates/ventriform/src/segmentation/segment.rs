@@ -140,11 +140,10 @@ pub fn segment(
             let reference = polar.as_ref().map_or(0.0, |map| map.reference);
             let image = WallImage::about(&model, volume, reference, monitor)?;
             let drawn = reader::drawn(model, &reader.profile.drawing(), &image, monitor)?;
-            let uncertainty = judgement.uncertainty.as_ref();
-            let uncertainty =
-                uncertainty.map(|all| all.carried_to(parameters.deform.edge, &drawn.midpoints));
+            let edge = parameters.deform.edge;
+            let uncertainty = judgement.uncertainty;
             let judgement = Judgement {
-                uncertainty,
+                uncertainty: uncertainty.map(|all| all.carried_to(edge, &drawn.midpoints)),
                 ..judgement
             };
             let (model, share) = (drawn.model, drawn.share);

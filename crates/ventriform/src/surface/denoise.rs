@@ -35,6 +35,7 @@ use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
 use crate::mesh::intersections::self_intersections_by;
 use crate::mesh::{TriMesh, vertex_normals};
+use crate::numeric::order::upper_median;
 use crate::progress::{Cancelled, Monitor};
 
 /// Length of the filter that separates noise from shape, voxels.
@@ -118,7 +119,7 @@ pub fn denoise(
     let bent = heights(&smooth, &again);
 
     let steepness = steepness(&smooth, &normals, &intensity, spacing);
-    let typical = median(steepness.iter().copied());
+    let typical = upper_median(steepness.iter().copied());
     if !(typical > 0.0) {
         return Ok(None);
     }
@@ -126,7 +127,7 @@ pub fn denoise(
         .map(|g| g.max(SMALLEST_STEEPNESS * typical))
         .collect();
     let spread = |heights: &[f64]| {
-        median(heights.iter().zip(&steepness).map(|(h, g)| h.abs() * g)) / MEDIAN_OF_GAUSSIAN
+        upper_median(heights.iter().zip(&steepness).map(|(h, g)| h.abs() * g)) / MEDIAN_OF_GAUSSIAN
     };
     let seen = (spread(&rest).powi(2) - (SHAPE_RATIO * spread(&bent)).powi(2)).max(0.0);
     let width = laplacian.width(&rest, &smooth, probe);
@@ -231,12 +232,6 @@ fn share_seen(width: f64, probe: f64) -> f64 {
                 * SPECTRUM_STEP
         })
         .sum()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A vector of single precision, with a fourth number so that it fills a register.
