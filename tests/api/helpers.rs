@@ -287,7 +287,7 @@ pub async fn rows_of(data: &Path) -> Arc<SqlStore> {
 
 /// Waits until the service asks for credentials.
 pub async fn closed(app: &TestApp) {
-    let deadline = Instant::now() + Duration::from_secs(1);
+    let deadline = Instant::now() + EVENT_PATIENCE;
     while app.get("/v1/volumes").send().await.unwrap().status() != StatusCode::UNAUTHORIZED {
         assert!(Instant::now() < deadline, "the service is still open");
         tokio::time::sleep(Duration::from_millis(20)).await;
