@@ -24,6 +24,8 @@ dist=$PWD/dist
 (cd "$dist" && sha256sum --quiet -c SHA256SUMS)
 command -v mmdebstrap >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends mmdebstrap; }
 if [ "$architecture" != "$(dpkg --print-architecture)" ]; then
+  # mmdebstrap asks it whether programs of that architecture run; it is among the packages that are only recommended.
+  command -v arch-test >/dev/null || { apt-get update -qq && apt-get install -y -qq --no-install-recommends arch-test; }
   [ -e /proc/sys/fs/binfmt_misc/register ] || mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc
   if [ ! -e "/proc/sys/fs/binfmt_misc/qemu-$machine" ]; then
     apt-get update -qq && apt-get install -y -qq --no-install-recommends qemu-user-static binfmt-support
