@@ -49,7 +49,7 @@ PLACEHOLDER = re.compile(r"\b(JOB|VOLUME|MODEL|SEGMENTATION|BEAT|COMPARISON|NORM
 MADE = """made() {
   curl -fsS -o /dev/null -D - --data-binary "@$2" -H 'Prefer: wait=60' "$U/v1/$1" | tr -d '\\r' | sed -n 's#^location: .*/##p'
 }"""
-COMMAND_SECONDS = 120
+COMMAND_SECONDS = 600
 SMALL = ["--size", "64", "--spacing", "6.4"]
 
 

@@ -82,7 +82,7 @@ class Archive:
     def start(self):
         log = open(self.folder / "log", "ab")
         self.process = subprocess.Popen(["Orthanc", self.folder / "orthanc.json"], stdout=log, stderr=log)
-        until("Orthanc", self.answers, 30)
+        until("Orthanc", self.answers)
 
     def answers(self):
         try:

@@ -22,7 +22,7 @@ import urllib.parse
 
 PROGRAM, FOLDER = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 # Long, for machines that do much else.
-PATIENCE = 60
+PATIENCE = 300
 # Refusals during uploads through nginx, in all.
 ROUNDS = 200
 # What nginx cannot hold in the buffers of its sockets.

@@ -18,7 +18,7 @@ port=$("$PYTHON" -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)
 moto=$!
 trap 'kill $moto' EXIT
 export VENTRIFORM_TEST_S3=http://127.0.0.1:$port
-for _ in $(seq 100); do
+for _ in $(seq 300); do
   if curl -fs -X PUT "$VENTRIFORM_TEST_S3/hearts" >/dev/null; then break; fi
   sleep 0.2
 done

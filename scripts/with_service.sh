@@ -15,7 +15,7 @@ target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$SERVICE_DATA/dat
   >"$SERVICE_DATA/log" 2>&1 &
 service=$!
 trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$SERVICE_DATA"' EXIT
-for _ in $(seq 100); do
+for _ in $(seq 600); do
   SERVICE_URL=$(grep -o 'http://127[0-9.:]*' "$SERVICE_DATA/log" | head -n 1 || true)
   [ -n "$SERVICE_URL" ] && break
   sleep 0.1

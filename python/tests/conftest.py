@@ -88,7 +88,7 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         process = subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=out, stderr=out)
     try:
         found = None
-        for _ in range(200):
+        for _ in range(600):
             found = re.search(r"http://127[0-9.:]*", log.read_text())
             if found or process.poll() is not None:
                 break

@@ -118,7 +118,7 @@ def test_a_wrong_key_is_refused(command: Command, tmp_path: pathlib.Path, scan: 
         arguments = ["serve", "--listen", "127.0.0.1:0", "--data-dir", str(tmp_path / "data")]
         process = subprocess.Popen([PROGRAM, *arguments], stdout=log, stderr=log)
     try:
-        for _ in range(200):
+        for _ in range(600):
             found = re.search(r"http://127[0-9.:]*", (tmp_path / "log").read_text())
             if found:
                 break
