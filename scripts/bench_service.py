@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Uploads and small requests per second, beside Orthanc in the same run.
+"""Uploads and small requests per second, beside Orthanc and an earlier version in the same run.
 
     target/test-tools/python/bin/python scripts/bench_service.py [--program target/release/ventriform] [--rounds 4]
+                                                                 [--before PROGRAM]
 
-Both listen on loopback, keep their files under the same temporary folder, sync them (Orthanc:
+All listen on loopback, keep their files under the same temporary folder, sync them (Orthanc:
 SyncStorageArea) and check credentials. They get the same DICOM NM files of 8 MiB and take turns, round by
-round, so that what else the machine does meets both. Prints the median of each and of the ratios.
+round, so that what else the machine does meets all. Prints the median of each and of the ratios.
 
 Needs the Debian packages orthanc and wrk, and the Python packages of scripts/requirements.txt.
 """
@@ -104,20 +105,27 @@ class Server:
         return float(re.search(r"Requests/sec:\s+([\d.]+)", printed).group(1))
 
 
-def compare(what, unit, rounds, ours, theirs):
-    pairs = [(ours(i), theirs(i)) for i in range(rounds)]
-    ratio = statistics.median(a / b for a, b in pairs)
-    a, b = (statistics.median(side) for side in zip(*pairs))
-    print(f"{what}: {a:.0f} {unit}, Orthanc {b:.0f}, ratio {ratio:.2f}", flush=True)
+def compare(what, unit, rounds, sides):
+    """`sides`: by name, the measurement of a round; the first is compared with each of the others."""
+    taken = {name: [] for name in sides}
+    for i in range(rounds):
+        for name, measure in sides.items():
+            taken[name].append(measure(i))
+    ours, *others = taken
+    text = f"{what}: {statistics.median(taken[ours]):.0f} {unit}"
+    for other in others:
+        ratio = statistics.median(a / b for a, b in zip(taken[ours], taken[other]))
+        text += f", {other} {statistics.median(taken[other]):.0f}, ratio {ratio:.2f}"
+    print(text, flush=True)
 
 
-def ventriform(program, folder):
-    data, port = folder / "ventriform", free_port()
+def ventriform(name, program, folder):
+    data, port = folder / name, free_port()
     made = [program, "keys", "create", "--name", "bench", "--scope", "submit", "--requests-per-minute", "1000000000",
             "--data-dir", str(data)]
     key = subprocess.run(made, capture_output=True, text=True, check=True).stdout.split()[-1]
     command = [program, "serve", "--listen", f"127.0.0.1:{port}", "--data-dir", str(data)]
-    return Server("ventriform", command, port, f"Bearer {key}", "/readyz", "/v1/volumes")
+    return Server(name, command, port, f"Bearer {key}", "/readyz", "/v1/volumes")
 
 
 def orthanc(folder):
@@ -136,6 +144,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default="target/release/ventriform")
     parser.add_argument("--rounds", type=int, default=4)
+    parser.add_argument("--before", metavar="PROGRAM", help="an earlier version, to compare with as well")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
@@ -146,38 +155,68 @@ def main():
             voxels = np.full((256, 256, 64), number, np.uint16)
             files.append(folder / f"{number}.dcm")
             nm(files[-1], voxels, np.diag([2.0, 2.0, 2.0, 1.0]), number)
-        ours, theirs = ventriform(options.program, folder), orthanc(folder)
+        servers = [ventriform("ventriform", options.program, folder)]
         try:
-            bench(ours, theirs, files, scan, options.rounds)
+            if options.before:
+                servers.append(ventriform("before", options.before, folder))
+            servers.append(orthanc(folder))
+            bench(servers, files, scan, options.rounds)
         finally:
-            for server in (ours, theirs):
+            for server in servers:
                 server.process.kill()
                 server.process.wait()
 
 
-def bench(ours, theirs, files, scan, rounds):
+def sides(servers, measure):
+    return {server.name: lambda i, server=server: measure(server, i) for server in servers}
+
+
+class Stored:
+    """A volume, a job and a model in a ventriform, and the work that keeps it busy."""
+
+    def __init__(self, server, scan):
+        self.server, self.scan = server, scan
+        self.volume = server.json("GET", "/v1/volumes?limit=1")["volumes"][0]["id"]
+        self.job = server.json("POST", "/v1/models?points=150", scan)["id"]
+        while (shown := server.json("GET", f"/v1/jobs/{self.job}"))["state"] != "succeeded":
+            time.sleep(0.1)
+        self.model = shown["model"]
+
+    def paths(self):
+        return ["/healthz", f"/v1/volumes/{self.volume}", f"/v1/jobs/{self.job}", f"/v1/models/{self.model}",
+                f"/v1/models/{self.model}/mesh.stl"]
+
+    def beside_its_work(self, measure):
+        """A measurement while all workers compute."""
+        for seed in range(20):
+            self.server.ask("POST", f"/v1/models?points=300&seed={time.time_ns() + seed}", self.scan)
+        taken = measure()
+        for state in ("queued", "running"):
+            for waiting in self.server.json("GET", f"/v1/jobs?state={state}&limit=100")["jobs"]:
+                self.server.ask("DELETE", f"/v1/jobs/{waiting['id']}")
+        while self.server.json("GET", "/v1/jobs?state=running&limit=1")["jobs"]:
+            time.sleep(0.02)
+        return taken
+
+
+def bench(servers, files, scan, rounds):
     for turn, clients in enumerate((1, 4)):
         part = lambda i: files[10 * (turn * rounds + i):][:10]
         compare(f"uploads of 8 MiB, {clients} at a time", "MiB/s", rounds,
-                lambda i: ours.upload(part(i), clients), lambda i: theirs.upload(part(i), clients))
-    volume = ours.json("GET", "/v1/volumes?limit=1")["volumes"][0]["id"]
-    job = ours.json("POST", "/v1/models?points=150", scan)["id"]
-    while (shown := ours.json("GET", f"/v1/jobs/{job}"))["state"] != "succeeded":
-        time.sleep(0.1)
+                sides(servers, lambda server, i: server.upload(part(i), clients)))
+    *versions, theirs = servers
+    stored = [Stored(server, scan) for server in versions]
     instance = theirs.json("GET", "/instances")[0]
-    paths = [("/healthz", "/system"), (f"/v1/volumes/{volume}", f"/instances/{instance}"),
-             (f"/v1/jobs/{job}", f"/instances/{instance}"), (f"/v1/models/{shown['model']}", f"/instances/{instance}"),
-             (f"/v1/models/{shown['model']}/mesh.stl", f"/instances/{instance}/simplified-tags")]
-    for state in ("idle", "all workers busy"):
-        for own, other in paths:
-            if state != "idle":
-                for seed in range(40):
-                    ours.ask("POST", f"/v1/models?points=300&seed={time.time_ns() + seed}", scan)
-            name = re.sub(r"/[a-z]{3}_\w+", "/ID", own)
-            compare(f"GET {name}, {state}", "1/s", rounds,
-                    lambda i: ours.requests(own), lambda i: theirs.requests(other))
-            for waiting in ours.json("GET", "/v1/jobs?state=queued&limit=100")["jobs"]:
-                ours.ask("DELETE", f"/v1/jobs/{waiting['id']}")
+    of_orthanc = ["/system", *[f"/instances/{instance}"] * 3, f"/instances/{instance}/simplified-tags"]
+    idle = lambda each, measure: measure()
+    for state, beside in (("idle", idle), ("all workers busy", Stored.beside_its_work)):
+        for number, other in enumerate(of_orthanc):
+            measured = {each.server.name: lambda i, each=each: beside(
+                each, lambda: each.server.requests(each.paths()[number])) for each in stored}
+            # Orthanc computes nothing: today's workers compete with it as with their own service.
+            measured[theirs.name] = lambda i: beside(stored[0], lambda: theirs.requests(other))
+            name = re.sub(r"/[a-z]{3}_\w+", "/ID", stored[0].paths()[number])
+            compare(f"GET {name}, {state}", "1/s", rounds, measured)
 
 
 if __name__ == "__main__":
