@@ -30,9 +30,6 @@ const LEAST_RATE: f64 = 1024.0;
 /// Bytes thrown away at once.
 const LINGER_PIECE: usize = 64 << 10;
 
-/// Stands for the number of a wait while no head is awaited.
-const NOT_AWAITED: u64 = u64::MAX;
-
 /// The head of a request did not come in time.
 #[derive(Debug, Clone, Copy, thiserror::Error)]
 #[error("no request came in time")]
@@ -71,8 +68,11 @@ pub struct WatchedStream<S> {
     stream: S,
     connection: Arc<OpenConnection>,
     limits: StreamLimits,
-    /// The wait for a head.
-    head: Option<HeadWait>,
+    /// Requests answered before the last head of which bytes have come, and when the first of them came.
+    begun: Option<(u64, TimerInstant)>,
+    /// Ends no later than the head that is awaited would be late. It is set anew only to end earlier and after its end:
+    /// two or three times for each request, that would take as long as writing the answer's head.
+    timer: Option<Pin<Box<Sleep>>>,
     /// The end, once it has begun.
     ending: Option<Ending>,
     /// When the current wait began, and the timer of its end.
@@ -80,15 +80,6 @@ pub struct WatchedStream<S> {
     /// Waits since the rate was last checked, and bytes taken meanwhile.
     waited: Duration,
     taken: u64,
-}
-
-/// A wait for a head.
-struct HeadWait {
-    /// Requests answered before.
-    number: u64,
-    /// Whether some of it has come.
-    begun: bool,
-    timer: Pin<Box<Sleep>>,
 }
 
 /// The end of a stream whose client may still send.
@@ -148,7 +139,8 @@ impl<S> WatchedStream<S> {
             stream,
             connection,
             limits,
-            head: None,
+            begun: None,
+            timer: None,
             ending: None,
             wait: None,
             waited: Duration::ZERO,
@@ -194,52 +186,49 @@ impl<S> WatchedStream<S> {
     /// Bytes came, perhaps those of a head.
     fn received(&mut self) {
         self.connection.received();
-        if let Some((number, _)) = self.connection.awaits_head() {
-            let end = TimerInstant::now() + self.limits.head;
-            let wait = self.head_wait(number, end);
-            if !wait.begun {
-                wait.begun = true;
-                wait.timer.as_mut().reset(end);
-            }
+        if let Some((number, _)) = self.connection.awaits_head()
+            && self.begun.is_none_or(|(of, _)| of != number)
+        {
+            self.begun = Some((number, TimerInstant::now()));
         }
+    }
+
+    /// When the head that is awaited is late, and whether until then nothing came after a request that was answered;
+    /// `None` while no head is awaited.
+    fn head_end(&self) -> Option<(TimerInstant, bool)> {
+        let (number, since) = self.connection.awaits_head()?;
+        let since = TimerInstant::from_std(since);
+        Some(match self.begun {
+            Some((of, begun)) if of == number => (begun + self.limits.head, false),
+            _ if number == 0 => (since + self.limits.head, false),
+            _ => (since + self.limits.idle, true),
+        })
     }
 
     /// No bytes came.
     fn await_head(&mut self, context: &mut Context<'_>) -> Poll<io::Error> {
         loop {
-            let awaited = self.connection.awaits_head();
-            let (number, end) = match awaited {
-                Some((0, since)) => (0, TimerInstant::from_std(since) + self.limits.head),
-                Some((number, since)) => (number, TimerInstant::from_std(since) + self.limits.idle),
+            let now = TimerInstant::now();
+            let end = match self.head_end() {
+                Some((end, idle)) if now >= end => {
+                    if !idle {
+                        self.connection.set_late();
+                    }
+                    return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, Late { idle }));
+                }
+                Some((end, _)) => end,
                 // The answer may end without another look at the stream, so this is looked at again
                 // before a head that is awaited from now on could be late.
-                None => (NOT_AWAITED, TimerInstant::now() + self.limits.idle),
+                None => now + self.limits.idle,
             };
-            let wait = self.head_wait(number, end);
-            ready!(wait.timer.as_mut().poll(context));
-            if awaited.is_some() {
-                let idle = number > 0 && !wait.begun;
-                if !idle {
-                    self.connection.set_late();
-                }
-                return Poll::Ready(io::Error::new(io::ErrorKind::TimedOut, Late { idle }));
+            let timer = self
+                .timer
+                .get_or_insert_with(|| Box::pin(tokio::time::sleep_until(end)));
+            if timer.is_elapsed() || timer.deadline() > end {
+                timer.as_mut().reset(end);
             }
-            self.head = None;
+            ready!(timer.as_mut().poll(context));
         }
-    }
-
-    /// The wait for the head after `number` answers; a new one ends at `end`.
-    fn head_wait(&mut self, number: u64, end: TimerInstant) -> &mut HeadWait {
-        let wait = self.head.get_or_insert_with(|| HeadWait {
-            number,
-            begun: false,
-            timer: Box::pin(tokio::time::sleep_until(end)),
-        });
-        if wait.number != number {
-            (wait.number, wait.begun) = (number, false);
-            wait.timer.as_mut().reset(end);
-        }
-        wait
     }
 }
 
