@@ -150,6 +150,7 @@ pub fn router(app: App) -> Router {
     } else {
         operations().split_for_parts().0
     };
+    let tls = app.service.settings.tls_cert.0.is_some();
     // A request passes the layers from top to bottom, its answer from bottom to top.
     let layers = ServiceBuilder::new()
         .layer(SetSensitiveRequestHeadersLayer::new([
@@ -166,10 +167,6 @@ pub fn router(app: App) -> Router {
             app.clone(),
             observe::measure,
         ))
-        .layer(middleware::from_fn_with_state(
-            app.clone(),
-            observe::continue_trace,
-        ))
         .layer(
             TraceLayer::new_for_http()
                 .make_span_with(observe::RequestSpan)
@@ -179,10 +176,7 @@ pub fn router(app: App) -> Router {
                 .on_failure(()),
         )
         .layer(CatchPanicLayer::custom(from_panic))
-        .layer(middleware::from_fn_with_state(
-            app.service.settings.tls_cert.0.is_some(),
-            pages::protect,
-        ))
+        .map_response(move |response| pages::protected(response, tls))
         .layer(middleware::from_fn_with_state(
             app.guard.hosts.clone(),
             hosts::check_host,

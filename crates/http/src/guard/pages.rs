@@ -2,9 +2,7 @@
 //! another site.
 
 use super::hosts::ANY_HOST;
-use axum::extract::{Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, header};
-use axum::middleware::Next;
 use axum::response::Response;
 use std::time::Duration;
 use tower_http::cors::{AllowOrigin, CorsLayer};
@@ -68,13 +66,16 @@ pub const EXPOSED_HEADERS: [&str; 19] = [
     "x-request-id",
 ];
 
+/// Headers of an answer that the layers add: here, its limits, its date and its id.
+const ADDED_HEADERS: usize = 12;
+
 /// Time for which browsers may remember the answer to a preflight.
 const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
-/// The layer that adds the headers; `tls` says whether the service speaks TLS.
-pub async fn protect(State(tls): State<bool>, request: Request, next: Next) -> Response {
-    let mut response = next.run(request).await;
+/// The answer with the headers; `tls` says whether the service speaks TLS.
+pub fn protected(mut response: Response, tls: bool) -> Response {
     let headers = response.headers_mut();
+    headers.reserve(ADDED_HEADERS);
     if !headers.contains_key(header::CONTENT_SECURITY_POLICY) {
         let media_type = headers.get(header::CONTENT_TYPE);
         let media_type = media_type.and_then(|value| value.to_str().ok());
