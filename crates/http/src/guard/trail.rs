@@ -32,7 +32,6 @@ pub struct Act {
     method: Method,
     route: String,
     object: Option<String>,
-    event: AuditEvent,
     agent: Agent,
 }
 
@@ -43,11 +42,10 @@ impl Act {
         let event = event(request, identity, address, Activity::Read);
         let (recorder, clock) = (app.service.recorder.clone(), app.service.clock().clone());
         Self {
-            agent: Agent::of(recorder, clock, event.clone()),
+            agent: Agent::of(recorder, clock, event),
             method: request.method.clone(),
             route: route.map_or_else(String::new, |route| route.as_str().to_owned()),
             object: item_of(request.uri.path()),
-            event,
         }
     }
 
@@ -58,13 +56,13 @@ impl Act {
 
     /// Records what was done and is not recorded yet, and returns the answer; instead of it 503 if an act that changed
     /// something could not be recorded.
-    pub async fn record(mut self, app: &App, response: Response) -> Response {
+    pub async fn record(self, app: &App, response: Response) -> Response {
         let status = response.status();
         if status == StatusCode::FORBIDDEN {
             // A handler found that the caller's scope does not suffice.
-            self.event.activity = Activity::AccessRefused;
-            self.event.object = self.object;
-            note_refusal(app, self.event).await;
+            let mut event = self.agent.event(Activity::AccessRefused, app.service.now());
+            event.object = self.object;
+            note_refusal(app, event).await;
             return response;
         }
         let done = status.is_success() || status == StatusCode::NOT_MODIFIED;
@@ -80,19 +78,17 @@ impl Act {
         let Some(activity) = self.activity(status) else {
             return response;
         };
-        self.event.recorded = app.service.now();
-        self.event.activity = activity;
-        self.event.object = match activity {
+        let mut event = self.agent.event(activity, app.service.now());
+        event.object = match activity {
             Activity::Create | Activity::Execute => location(&response).or(self.object),
             _ => self.object,
-        };
-        let place = || place_of(&self.route);
-        self.event.object = self.event.object.take().or_else(place);
+        }
+        .or_else(|| place_of(&self.route));
         if self.method.is_safe() {
-            app.service.recorder.note(self.event).await;
+            app.service.recorder.note(event).await;
             return response;
         }
-        match app.service.recorder.record(self.event).await {
+        match app.service.recorder.record(event).await {
             Ok(()) => response,
             Err(_) => not_recorded().into_response(),
         }

@@ -26,7 +26,7 @@ struct Rows {
 /// Who acts: a caller, a sender, a rule of the settings, a duty of the service. Clones are the same agent.
 #[derive(Clone)]
 pub struct Agent {
-    who: AuditEvent,
+    who: Arc<AuditEvent>,
     recorder: Arc<Recorder>,
     clock: Arc<dyn Clock>,
     rows: Arc<Rows>,
@@ -56,7 +56,7 @@ impl Agent {
     /// The agent of that event: its tenant, name, key, address and request.
     pub fn of(recorder: Arc<Recorder>, clock: Arc<dyn Clock>, who: AuditEvent) -> Self {
         Self {
-            who,
+            who: Arc::new(who),
             recorder,
             clock,
             rows: Arc::default(),
@@ -66,7 +66,7 @@ impl Agent {
     /// Sets the network address from which it acts.
     #[must_use]
     pub fn at(mut self, address: impl Into<String>) -> Self {
-        self.who.address = Some(address.into());
+        Arc::make_mut(&mut self.who).address = Some(address.into());
         self
     }
 
@@ -85,7 +85,7 @@ impl Agent {
         AuditEvent {
             activity,
             recorded: now,
-            ..self.who.clone()
+            ..AuditEvent::clone(&self.who)
         }
     }
 
