@@ -21,14 +21,14 @@ pub(super) fn surface(surface: &Surface) -> SurfaceReport {
     let (mesh, facts) = (&surface.mesh, &surface.facts);
     // `Surface` is always a closed manifold: 3F = 2E.
     let edges = 3 * mesh.triangles.len() / 2;
-    let components = topology::components(mesh.vertices.len(), &mesh.triangles);
+    let components = surface.components();
     SurfaceReport {
         iso_value: facts.iso_value,
         vertices: mesh.vertices.len(),
         triangles: mesh.triangles.len(),
         euler_characteristic: mesh.vertices.len() as i64 - edges as i64
             + mesh.triangles.len() as i64,
-        components: components.iter().max().map_or(0, |m| *m as usize + 1),
+        components: topology::component_count(&components),
         outward_components: outward_components(mesh, &components),
         volume_ml: mesh.volume() / 1000.0,
         area_mm2: mesh.area(),

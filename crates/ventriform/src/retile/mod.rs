@@ -277,7 +277,7 @@ fn too_few(
 ) -> RetileError {
     let points = parameters.points;
     let mut tried = points;
-    let mut needed = quotas::least_points(&surface.mesh).max(points + 1);
+    let mut needed = quotas::least_points(surface).max(points + 1);
     let most = MOST_POINTS.min(LEAST_TRIED.max(NEEDED_FACTOR * needed));
     while needed <= most {
         let larger = RetileParameters {

@@ -40,7 +40,7 @@ pub(super) fn retile(
     parameters: &RetileParameters,
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    let least = quotas::least_points(&surface.mesh);
+    let least = quotas::least_points(surface);
     let run = PaperRun::new(surface, parameters, monitor)?;
     if parameters.points < least {
         return Err(refusal(&run, None));

@@ -16,7 +16,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::topology::{component_count, components};
 
 /// Draws exactly `count` points with a density that corresponds to the relative `spacing` at
-/// every vertex. `count` must be at least [`quotas::least_points`] of `mesh`, which has the same
+/// every vertex. `count` must be at least the sum of [`quotas::least_of`] of `mesh`, which has the same
 /// connectivity as `domain`.
 pub(crate) fn place(
     mesh: &TriMesh,
@@ -38,9 +38,10 @@ pub(crate) fn place(
     let load: Vec<f64> = (running.iter())
         .map(|list| list.last().map_or(0.0, |l| l.0))
         .collect();
+    let least = quotas::least_of(&mesh.triangles, &component_of);
     let mut random = random::stream(seed, Purpose::Placement);
     let mut points = Vec::with_capacity(count);
-    for (list, n) in running.iter().zip(quotas::share(mesh, &load, count)) {
+    for (list, n) in running.iter().zip(quotas::share(&least, &load, count)) {
         let total = list.last().map_or(0.0, |l| l.0);
         for _ in 0..n {
             let drawn = random.random::<f64>() * total;

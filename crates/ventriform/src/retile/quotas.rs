@@ -6,17 +6,20 @@
 
 use std::cmp::Ordering;
 
-use crate::mesh::{TriMesh, topology};
+use crate::mesh::topology;
+use crate::surface::Surface;
 
 /// The smallest number of vertices of any mesh with the same components and handles.
-pub(super) fn least_points(mesh: &TriMesh) -> usize {
-    least_of_components(mesh).iter().sum()
+pub(super) fn least_points(surface: &Surface) -> usize {
+    least_of(&surface.mesh.triangles, &surface.components())
+        .iter()
+        .sum()
 }
 
-/// The same for each component, numbered as by [`topology::components`].
-pub(super) fn least_of_components(mesh: &TriMesh) -> Vec<usize> {
-    let component = topology::components(mesh.vertices.len(), &mesh.triangles);
-    let characteristics = topology::component_characteristics(&mesh.triangles, &component);
+/// The same for each component of a closed mesh, given the component of every vertex by
+/// [`topology::components`].
+pub(super) fn least_of(triangles: &[[u32; 3]], component: &[u32]) -> Vec<usize> {
+    let characteristics = topology::component_characteristics(triangles, component);
     characteristics.into_iter().map(least_vertices).collect()
 }
 
@@ -31,9 +34,8 @@ pub(super) fn least_vertices(euler: i64) -> usize {
 }
 
 /// Divides `points` among the components in proportion to `load`, giving each at least what its
-/// topology needs. The sum is `points`, which must be at least [`least_points`].
-pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
-    let least = least_of_components(mesh);
+/// topology needs: `least`, by [`least_of`]. The sum is `points`, which must be at least that of `least`.
+pub(super) fn share(least: &[usize], load: &[f64], points: usize) -> Vec<usize> {
     let total: f64 = load.iter().sum();
     let fair: Vec<f64> = load.iter().map(|l| l / total * points as f64).collect();
     let mut quotas: Vec<usize> = (least.iter().zip(&fair))
@@ -64,21 +66,40 @@ pub(super) fn share(mesh: &TriMesh, load: &[f64], points: usize) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::mesh::{TriMesh, shapes};
     use crate::retile::tessellate::test_surfaces::together;
+    use crate::surface::from_mesh;
 
-    fn with_torus(mesh: TriMesh) -> TriMesh {
-        together(&[mesh, shapes::torus(90.0, 30.0, 12, 7)])
+    fn with_torus(mesh: TriMesh) -> Surface {
+        let mesh = together(&[mesh, shapes::torus(90.0, 30.0, 12, 7)]);
+        Surface::exact(mesh, 1.0)
     }
 
     #[test]
     fn every_component_gets_its_share_and_what_it_needs() {
-        let mesh = with_torus(shapes::icosphere(1.0, 0));
-        assert_eq!(least_points(&mesh), 4 + 7);
-        assert_eq!(share(&mesh, &[3.0, 1.0], 40), vec![30, 10]);
-        assert_eq!(share(&mesh, &[3.0, 1.0], 16), vec![9, 7]);
-        assert_eq!(share(&mesh, &[0.001, 1000.0], 50), vec![4, 46]);
-        assert_eq!(share(&mesh, &[1.0, 1.0], 11), vec![4, 7]);
+        let surface = with_torus(shapes::icosphere(1.0, 0));
+        assert_eq!(least_points(&surface), 4 + 7);
+        let least = least_of(&surface.mesh.triangles, &surface.components());
+        assert_eq!(share(&least, &[3.0, 1.0], 40), vec![30, 10]);
+        assert_eq!(share(&least, &[3.0, 1.0], 16), vec![9, 7]);
+        assert_eq!(share(&least, &[0.001, 1000.0], 50), vec![4, 46]);
+        assert_eq!(share(&least, &[1.0, 1.0], 11), vec![4, 7]);
+    }
+
+    #[test]
+    fn a_surface_with_its_census_needs_as_many_points_as_one_without() {
+        for mesh in [
+            shapes::icosphere(1.0, 1),
+            shapes::torus(3.0, 1.0, 12, 7),
+            with_torus(shapes::icosphere(1.0, 0)).mesh,
+        ] {
+            let (counted, carried) = (
+                Surface::exact(mesh.clone(), 1.0),
+                from_mesh(mesh, 1.0).unwrap(),
+            );
+            assert_eq!(carried.components(), counted.components());
+            assert_eq!(least_points(&carried), least_points(&counted));
+        }
     }
 
     /// Of V vertices every two may be joined once, and a triangulation has 3 (V - χ) edges. Genus 2 is the one
@@ -96,10 +117,11 @@ mod tests {
 
     #[test]
     fn shares_add_up_and_differ_from_the_fair_ones_by_less_than_one_point() {
-        let mesh = with_torus(shapes::icosphere(1.0, 0));
+        let surface = with_torus(shapes::icosphere(1.0, 0));
+        let least = least_of(&surface.mesh.triangles, &surface.components());
         for points in 12..120 {
             for part in [0.01, 0.2, 0.37, 0.5, 0.9, 0.999] {
-                let found = share(&mesh, &[part * 7.0, (1.0 - part) * 7.0], points);
+                let found = share(&least, &[part * 7.0, (1.0 - part) * 7.0], points);
                 assert_eq!(found.iter().sum::<usize>(), points);
                 let fair = part * points as f64;
                 match found[..] {

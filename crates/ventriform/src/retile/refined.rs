@@ -77,7 +77,7 @@ pub(super) fn retile(
     parameters: &RetileParameters,
     monitor: &Monitor,
 ) -> Result<Tiled, RetileError> {
-    if parameters.points < quotas::least_points(&surface.mesh) {
+    if parameters.points < quotas::least_points(surface) {
         return Err(refusal(surface, parameters, monitor));
     }
     let run = RefinedRun::new(surface, parameters);
@@ -131,7 +131,6 @@ fn by_repulsion(
 
 /// Input that all random starts share.
 struct RefinedRun<'a> {
-    surface: &'a Surface,
     parameters: &'a RetileParameters,
     points: usize,
     samples: WeightedSamples,
@@ -149,7 +148,7 @@ struct RefinedRun<'a> {
 }
 
 impl<'a> RefinedRun<'a> {
-    fn new(surface: &'a Surface, parameters: &'a RetileParameters) -> Self {
+    fn new(surface: &Surface, parameters: &'a RetileParameters) -> Self {
         let points = parameters.points;
         let samples = WeightedSamples::new(
             &surface.mesh.vertices,
@@ -161,9 +160,13 @@ impl<'a> RefinedRun<'a> {
         let weights = (samples.area.iter().zip(&spacing))
             .map(|(area, h)| area * h.powi(-4))
             .collect();
-        let components = topology::components(samples.len(), &samples.triangles);
+        let least = quotas::least_of(&surface.mesh.triangles, &surface.components());
+        // Points on the edges of one component belong to it.
+        let components = match least.len() {
+            1 => vec![0; samples.len()],
+            _ => topology::components(samples.len(), &samples.triangles),
+        };
         Self {
-            surface,
             parameters,
             points,
             volumes: topology::component_volumes(
@@ -172,7 +175,7 @@ impl<'a> RefinedRun<'a> {
                 &components,
             ),
             components,
-            least: quotas::least_of_components(&surface.mesh),
+            least,
             samples,
             spacing,
             weights,
@@ -349,7 +352,7 @@ impl<'a> RefinedRun<'a> {
             load.resize(load.len().max(c + 1), 0.0);
             load[c] += self.samples.area[v] / self.spacing[v].powi(2);
         }
-        let quotas = quotas::share(&self.surface.mesh, &load, points);
+        let quotas = quotas::share(&self.least, &load, points);
         let mut seeds = Vec::with_capacity(points);
         for (component, quota) in (0u32..).zip(quotas) {
             let mut members: Vec<u32> = (0..self.samples.len() as u32)

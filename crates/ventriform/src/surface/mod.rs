@@ -81,6 +81,15 @@ impl Surface {
             facts: SurfaceFacts::default(),
         }
     }
+
+    /// The component of every vertex, as [`topology::components`] numbers them. They are searched for unless the
+    /// census of the surface, which `facts` carries, counted one.
+    pub(crate) fn components(&self) -> Vec<u32> {
+        match self.facts.components {
+            1 => vec![0; self.mesh.vertices.len()],
+            _ => topology::components(self.mesh.vertices.len(), &self.mesh.triangles),
+        }
+    }
 }
 
 /// Passes of Taubin's smoothing that make the working surface.
