@@ -47,7 +47,7 @@ ASSIGNMENT = re.compile(r"[A-Z_]+=")
 PLACEHOLDER = re.compile(r"\b(JOB|VOLUME|MODEL|SEGMENTATION|BEAT|COMPARISON|NORMALS|TEMPLATE|READER)\b")
 # For words that stand for the result of a certain scan: `made PATH FILE` uploads the file and prints the id of what comes of it.
 MADE = """made() {
-  curl -fsS -o /dev/null -D - --data-binary "@$2" -H 'Prefer: wait=60' "$U/v1/$1" | tr -d '\\r' | sed -n 's#^location: .*/##p'
+  curl -fsS -o /dev/null -D - --data-binary "@$2" -H 'Prefer: wait=600' "$U/v1/$1" | tr -d '\\r' | sed -n 's#^location: .*/##p'
 }"""
 COMMAND_SECONDS = 600
 SMALL = ["--size", "64", "--spacing", "6.4"]
@@ -207,6 +207,7 @@ class Page:
         self.environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
         for name in [name for name in self.environment if name.startswith(("VENTRIFORM_", "AWS_"))]:
             del self.environment[name]
+        self.environment["VENTRIFORM_WAIT_LIMIT"] = f"{COMMAND_SECONDS}s"
         self.environment.update(settings.get("environment", {}))
         for text in settings.get("before", []):
             fault = self.run(Command(page, 0, 0, text))
@@ -232,6 +233,8 @@ class Page:
             self.start("ventriform serve --data-dir data")
         if self.address:
             text = text.replace("http://127.0.0.1:8080", self.address)
+            # Pages ask to wait as long as proxies allow, which a job outlasts on a busy machine.
+            text = re.sub(r"\bPrefer: wait=\d+", f"Prefer: wait={COMMAND_SECONDS}", text)
             try:
                 text = PLACEHOLDER.sub(lambda found: self.newest(found[1]), text)
             except LookupError as error:

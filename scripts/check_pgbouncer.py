@@ -127,14 +127,14 @@ class Service:
         self.url = f"http://127.0.0.1:{self.port}"
         self.log = folder + "/service.log"
         command = [program, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", folder + "/data", "--workers", "1",
-                   "--database", url, "--database-wait", "60s", "--min-free", "0B"]
+                   "--database", url, "--database-wait", "60s", "--min-free", "0B", "--wait-limit", "10m"]
         self.started = time.time()
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=open(self.log, "wb"))
 
     def ask(self, method, path, body=None, headers=None):
         request = urllib.request.Request(self.url + path, data=body, method=method, headers=headers or {})
         try:
-            with urllib.request.urlopen(request, timeout=90) as answer:
+            with urllib.request.urlopen(request, timeout=660) as answer:
                 return answer.status, answer.read()
         except urllib.error.HTTPError as answer:
             return answer.code, answer.read()
@@ -165,7 +165,7 @@ def session_mode(program, folder, postgres, scan):
     service = Service(program, folder, pooler.url())
     try:
         check(until(service.is_ready, "the service"), "session mode: the service starts", open(service.log).read()[-600:])
-        made = service.ask("POST", "/v1/models?points=100", scan, {"Prefer": "wait=45"})[0]
+        made = service.ask("POST", "/v1/models?points=100", scan, {"Prefer": "wait=600"})[0]
         check(made in (200, 201, 303), "session mode: a model is made", made)
         statuses = {service.ask("GET", "/v1/jobs")[0] for _ in range(100)}
         check(statuses == {200}, "session mode: a hundred lists", statuses)

@@ -175,7 +175,7 @@ if wait "${running[install]}"; then
   start geodesics scripts/check_geodesics.sh
   start codecs scripts/check_codecs.sh
   start api scripts/check_api.sh
-  start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
+  start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
   start clients scripts/check_clients.sh
   start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dicom scripts/check_dicom.sh
