@@ -3,22 +3,22 @@
 //! In: an event of `tracing` and the spans around it. Out: the line that `tracing_subscriber` writes: time, level, spans
 //! with their fields, target, fields.
 //!
-//! Its own formatter takes every word through the machinery of `Debug` and makes the date anew for every line, which took
-//! a tenth of the time of a small request. Here, texts of printable ASCII are copied, and a thread makes a date once a
-//! second.
+//! The formatter of `tracing_subscriber` takes every word through the machinery of `Debug` and makes the date anew for
+//! every line, which took a tenth of the instructions of a small request. Here, texts of printable ASCII are copied, and
+//! a thread makes a date once a second.
 //!
 //! Guaranteed: the same text, but for the time itself. Not guaranteed: years before 1970 (the time is then 1970).
 
 use std::cell::{Cell, RefCell};
 use std::fmt::{self, Debug};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
-use time::OffsetDateTime;
+use std::time::{SystemTime, UNIX_EPOCH};
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::field::RecordFields;
 use tracing_subscriber::fmt::format::{Format, FormatEvent, FormatFields, Full, Writer};
 use tracing_subscriber::fmt::{FmtContext, FormattedFields};
 use tracing_subscriber::registry::LookupSpan;
+use ventriform_service::records::rfc3339;
 
 /// The target under which events of the crate `log` arrive; their own is among their fields.
 const TARGET_OF_LOG: &str = "log";
@@ -167,7 +167,7 @@ fn write_time(writer: &mut Writer<'_>) -> fmt::Result {
     LAST_SECOND.with_borrow_mut(|last| {
         let second = since.as_secs();
         if last.as_ref().is_none_or(|(of, _)| *of != second) {
-            *last = Some((second, to_the_second(since)));
+            *last = Some((second, to_the_second(second)));
         }
         match last {
             Some((_, text)) => writer.write_str(text),
@@ -183,13 +183,11 @@ fn write_time(writer: &mut Writer<'_>) -> fmt::Result {
     writer.write_str(str::from_utf8(&digits).unwrap_or_default())
 }
 
-/// Date and time of day, `since` 1970.
-fn to_the_second(since: Duration) -> String {
-    let at = OffsetDateTime::UNIX_EPOCH + since;
-    let (year, month, day) = at.to_calendar_date();
-    let (hour, minute, second) = at.to_hms();
-    let month = u8::from(month);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}")
+/// Date and time of day of a `second` since 1970.
+fn to_the_second(second: u64) -> String {
+    let mut text = rfc3339(second.saturating_mul(1000).cast_signed());
+    text.truncate("1970-01-01T00:00:00".len());
+    text
 }
 
 #[cfg(test)]
@@ -197,6 +195,8 @@ mod tests {
     use super::*;
     use std::io;
     use std::sync::{Arc, Mutex};
+    use std::time::Duration;
+    use time::OffsetDateTime;
     use tracing_subscriber::field::MakeExt;
     use tracing_subscriber::fmt::format::debug_fn;
 
@@ -296,7 +296,7 @@ mod tests {
             (951_782_399, "2000-02-28T23:59:59"),
             (951_782_400, "2000-02-29T00:00:00"),
         ] {
-            assert_eq!(to_the_second(Duration::from_secs(seconds)), wanted);
+            assert_eq!(to_the_second(seconds), wanted);
         }
     }
 }

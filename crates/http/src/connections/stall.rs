@@ -70,8 +70,8 @@ pub struct WatchedStream<S> {
     limits: StreamLimits,
     /// Requests answered before the last head of which bytes have come, and when the first of them came.
     begun: Option<(u64, TimerInstant)>,
-    /// Ends no later than the head that is awaited would be late. It is set anew only to end earlier and after its end:
-    /// two or three times for each request, that would take as long as writing the answer's head.
+    /// Ends no later than the head that is awaited would be late. It is set anew only to end earlier and after its end,
+    /// not for each request: that takes the lock of all timers.
     timer: Option<Pin<Box<Sleep>>>,
     /// The end, once it has begun.
     ending: Option<Ending>,

@@ -214,6 +214,7 @@ fn count(app: &App, identity: &Identity, address: &str) -> Option<Allowance> {
     let accounts: Vec<(String, u64)> = own.into_iter().chain(shared).collect();
     let now = Instant::now();
     if let [(account, quota)] = &accounts[..] {
+        // Nobody else is to be asked before it counts.
         return Some(guard.requests.count(account, *quota, now));
     }
     let look = |(account, quota): &(String, u64)| guard.requests.look(account, *quota, now);
