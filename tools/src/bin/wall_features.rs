@@ -8,6 +8,9 @@
 //!
 //! - `rims.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it, and of
 //!   the true rim, mm from the cup's centre towards the apex;
+//! - `signal_ends.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it and of
+//!   the true rim, and the distances basal of the former at which the signal ends, at half of the heart's and of the
+//!   direction's own, mm;
 //! - `rays.csv`, a row for every [`RAY_STRIDE`]th ray through the apparent wall that meets the true one: the numbers
 //!   that describe it, as far as they are not functions of others, and the distances by which the true surfaces lie
 //!   farther out, mm;
@@ -40,6 +43,7 @@ const NODE_STRIDE: usize = 11;
 #[derive(Default)]
 struct CaseRows {
     rims: String,
+    signal_ends: String,
     rays: String,
     nodes: String,
 }
@@ -63,6 +67,12 @@ fn main() -> Result<()> {
         "rims.csv",
         format!("set,case,length_mm,true_length_mm{heights}"),
         rows.iter().map(|r| &*r.rims).collect(),
+    )?;
+    let ends = ["sensed", "true", "heart", "direction"].map(each).concat();
+    table(
+        "signal_ends.csv",
+        format!("set,case,length_mm{ends}"),
+        rows.iter().map(|r| &*r.signal_ends).collect(),
     )?;
     table(
         "rays.csv",
@@ -90,6 +100,7 @@ fn rows(set: &str, case: &Path) -> Result<CaseRows> {
     let name = format!("{set},{}", name_of(case));
     Ok(CaseRows {
         rims: rims(&name, &apparent, &truth)?,
+        signal_ends: signal_ends(&name, &apparent, &truth)?,
         rays: rays(&name, &apparent, &truth)?,
         nodes: nodes(&name, [&apparent, &anatomical], case, &truth)?,
     })
@@ -118,6 +129,27 @@ fn rims(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
     let lengths = [length(model.apparent_mesh(), sensed), length(truth, real)];
     let mut row = name.to_owned();
     for figure in lengths.iter().chain(sensed).chain(real) {
+        write!(row, ",{figure:.1}")?;
+    }
+    Ok(row + "\n")
+}
+
+/// The row of the ends of the signal; empty without a rim or a signal in every direction.
+fn signal_ends(name: &str, made: &SegmentedVolume, truth: &TriMesh) -> Result<String> {
+    let model = &made.segmentation.fit.model;
+    let (Some(cup), Some(orientation)) = (&model.cup, &model.patient_orientation) else {
+        return Ok(String::new());
+    };
+    let real = rim_heights(truth, cup, &orientation.superior);
+    let (Some(sensed), Some(evidence), Some(real)) =
+        (&model.sensed_rim_mm, &model.rim_evidence, &real)
+    else {
+        return Ok(String::new());
+    };
+    let mut row = format!("{name},{:.1}", evidence.length_mm);
+    let ends = &evidence.ends;
+    let [of_heart, of_direction] = [&ends.of_heart, &ends.of_direction];
+    for figure in [&sensed[..], real, of_heart, of_direction].concat() {
         write!(row, ",{figure:.1}")?;
     }
     Ok(row + "\n")

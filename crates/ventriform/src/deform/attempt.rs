@@ -6,6 +6,7 @@ use super::dynamics::{self, MotionResult};
 use super::elastic::Elastic;
 use super::fitted_model::{FittedModel, WallSurface, WallSurfaces};
 use super::parameters::DeformParameters;
+use super::rim_model::RimEvidence;
 use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
 use crate::locate::cup::Cup;
@@ -112,7 +113,19 @@ impl Attempt {
         let sensed_wall = wall_of(&self.moved.mesh)?;
         let sensed_rim_mm =
             cup.and_then(|cup| rim_heights(&self.moved.mesh, &cup, &orientation.superior));
-        let settled = cup.and_then(|cup| settled(&self.moved.mesh, &cup, &orientation, parameters));
+        let rim_evidence = cup.zip(sensed_wall.as_ref()).and_then(|(cup, wall)| {
+            base_plane::rim_evidence(
+                &self.moved.mesh,
+                &cup,
+                &orientation.superior,
+                wall,
+                &setup.field,
+            )
+        });
+        let settled = cup.and_then(|cup| {
+            let evidence = rim_evidence.as_ref();
+            settled(&self.moved.mesh, &cup, &orientation, evidence, parameters)
+        });
         let (mesh, wall) = match settled {
             Some(mesh) => {
                 let wall = wall_of(&mesh)?;
@@ -155,6 +168,7 @@ impl Attempt {
             surfaces,
             sensed_wall,
             sensed_rim_mm,
+            rim_evidence,
             smoothness_mm: setup.smoothness_mm,
             readings: self.moved.readings,
             scale: setup.pose.scale(),
@@ -178,13 +192,14 @@ fn settled(
     mesh: &TriMesh,
     cup: &Cup,
     orientation: &PatientOrientation,
+    evidence: Option<&RimEvidence>,
     parameters: &DeformParameters,
 ) -> Option<TriMesh> {
     let superior = &orientation.superior;
     match &parameters.base {
         Some(base) => base_plane::put(mesh, cup, superior, base),
         None if orientation.source == OrientationSource::Unknown => None,
-        None => base_plane::settled(mesh, cup, superior),
+        None => base_plane::settled(mesh, cup, superior, evidence),
     }
 }
 

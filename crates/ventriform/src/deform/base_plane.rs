@@ -9,30 +9,40 @@
 //!    fitted to them, robustly: a short stretch far from the rest hardly pulls it.
 //! 3. The distance from that shape is the sum of what is true of this heart and what the signal took away
 //!    or added. A piecewise linear function ([`RIM_CORRECTION`]) says how much of it to take back.
-//! 4. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the
+//! 4. Where the signal ends in the image ([`signal_end`](super::signal_end)) corrects that: the heart's expected rim,
+//!    given the heart's length, the distance by which step 3 moves the rim and the ends of the signal
+//!    ([`RIM_REGRESSION`]).
+//! 5. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the
 //!    wall is stretched or compressed there.
 //!
-//! Shape and function are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
-//! estimates them again. On hearts that were
-//! left out, the rms error of the rim's height falls from 3.8 to 3.2 mm, and the largest error of six
-//! isolated basal infarcts from 13 to 9 mm in the mean (two of them hardly change). Not guaranteed: an
+//! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
+//! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
+//! by shape and 2.6 with the ends of the signal (docs/evaluation.md). Not guaranteed: an
 //! infarct over half of the base moves the shape itself. A model whose orientation is unknown keeps its rim.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration::{RIM_CORRECTION, RIM_SHAPE};
-use super::rim_model::RIM_TERMS;
+use super::calibration::{RIM_CORRECTION, RIM_REGRESSION, RIM_SHAPE};
+use super::rim_model::{RIM_TERMS, RimEvidence};
+use super::signal_end::SignalEnds;
 use crate::geometry::Vec3;
+use crate::grid::field::Field;
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{HalfPlane, anterior, rim_height};
+use crate::model::wall::{HalfPlane, VentricleWall, anterior, rim_height};
 use crate::numeric::order;
 
 /// Directions about the axis: from lateral over anterior, septal and inferior.
 pub const RIM_DIRECTIONS: usize = 30;
+
+/// Angle of the middle of a direction, from lateral over anterior.
+pub(super) fn rim_angle(direction: usize) -> f64 {
+    TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64
+}
+
 /// Distance from the shape at which a direction counts half, mm.
 const OUTLIER_DISTANCE_MM: f64 = 4.0;
 /// Neighbouring directions are not independent: as many of them count as one.
@@ -43,21 +53,78 @@ const REWEIGHTING_ROUNDS: usize = 30;
 /// Length of wall next to the rim that is stretched, mm.
 pub const STRETCHED_LENGTH_MM: f64 = 25.0;
 
-/// `mesh` with its rim where anatomy and image together put it. `None` without a rim in every direction, and
-/// where the moved surface would intersect itself: then the mesh stays.
-pub fn settled(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<TriMesh> {
-    let frame = RimFrame::of(cup, superior);
-    let rim = frame.heights(mesh)?;
-    let apex = mesh.vertices.iter().map(|p| frame.along(p));
-    let length = apex.fold(f64::MIN, f64::max) - median(&rim);
-    let shape = expected(&rim, length)?;
-    let shifts: Vec<f64> = rim
-        .iter()
-        .zip(&shape)
-        .map(|(h, e)| RIM_CORRECTION.of(h - e))
-        .collect();
-    let moved = frame.stretched(mesh, &rim, &shifts);
+/// `mesh` with its rim where anatomy and image together put it; where there is no `evidence` of the image, where its
+/// shape puts it. `None` without a rim in every direction, and where the moved surface would intersect itself: then the
+/// mesh stays.
+pub fn settled(
+    mesh: &TriMesh,
+    cup: &Cup,
+    superior: &Vec3,
+    evidence: Option<&RimEvidence>,
+) -> Option<TriMesh> {
+    let rim = Rim::of(mesh, cup, superior)?;
+    let shifts = match evidence {
+        Some(evidence) => RIM_REGRESSION.shifts(evidence),
+        None => rim.shifts_by_shape()?,
+    };
+    let moved = rim.frame.stretched(mesh, &rim.heights, &shifts);
     self_intersections(&moved).is_empty().then_some(moved)
+}
+
+/// What tells where the rim of `mesh` is, whose wall is `wall`, in the image `field` about it. `None` without a rim or a signal in every direction.
+pub fn rim_evidence(
+    mesh: &TriMesh,
+    cup: &Cup,
+    superior: &Vec3,
+    wall: &VentricleWall,
+    field: &Field,
+) -> Option<RimEvidence> {
+    let rim = Rim::of(mesh, cup, superior)?;
+    rim.evidence(&rim.shifts_by_shape()?, wall, field)
+}
+
+/// The rim of a mesh.
+struct Rim {
+    frame: RimFrame,
+    /// Height in each direction, mm.
+    heights: Vec<f64>,
+    /// From the middle rim to the apex, mm.
+    length: f64,
+}
+
+impl Rim {
+    fn of(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<Self> {
+        let frame = RimFrame::of(cup, superior);
+        let heights = frame.heights(mesh)?;
+        let apex = mesh.vertices.iter().map(|p| frame.along(p));
+        let length = apex.fold(f64::MIN, f64::max) - median(&heights);
+        Some(Self {
+            frame,
+            heights,
+            length,
+        })
+    }
+
+    /// Distances by which the rim's shape moves it towards the base, mm.
+    fn shifts_by_shape(&self) -> Option<Vec<f64>> {
+        let shape = expected(&self.heights, self.length)?;
+        let off = self.heights.iter().zip(&shape).map(|(h, e)| h - e);
+        Some(off.map(|distance| RIM_CORRECTION.of(distance)).collect())
+    }
+
+    fn evidence(
+        &self,
+        by_shape: &[f64],
+        wall: &VentricleWall,
+        field: &Field,
+    ) -> Option<RimEvidence> {
+        let ends = SignalEnds::of(&self.frame, &self.heights, wall, field)?;
+        Some(RimEvidence {
+            length_mm: self.length,
+            by_shape_mm: by_shape.to_vec(),
+            ends,
+        })
+    }
 }
 
 /// The height at which `mesh` begins in each of [`RIM_DIRECTIONS`] directions about the axis, mm from the cup's
@@ -97,7 +164,7 @@ const RIM_SHIFT_RANGE_MM: [f64; 2] = [-20.0, 40.0];
 /// The shape of a rim with these heights, mm, of a heart of this length.
 fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
     let basis = DMatrix::from_fn(RIM_DIRECTIONS, RIM_TERMS + 1, |direction, term| {
-        let angle = TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64;
+        let angle = rim_angle(direction);
         let times = term.div_ceil(2) as f64;
         match term {
             0 => 1.0,
@@ -135,15 +202,15 @@ fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
 }
 
 /// The long axis, and the directions about it.
-struct RimFrame {
-    centre: Vec3,
-    axis: Vec3,
+pub(super) struct RimFrame {
+    pub(super) centre: Vec3,
+    pub(super) axis: Vec3,
     lateral: Vec3,
     anterior: Vec3,
 }
 
 impl RimFrame {
-    fn of(cup: &Cup, superior: &Vec3) -> Self {
+    pub(super) fn of(cup: &Cup, superior: &Vec3) -> Self {
         let anterior = anterior(&cup.axis, superior);
         Self {
             centre: cup.centre,
@@ -153,7 +220,8 @@ impl RimFrame {
         }
     }
 
-    fn along(&self, p: &Vec3) -> f64 {
+    /// Height of a point, mm from the cup's centre towards the apex.
+    pub(super) fn along(&self, p: &Vec3) -> f64 {
         (p - self.centre).dot(&self.axis)
     }
 
@@ -162,6 +230,12 @@ impl RimFrame {
         let r = p - self.centre;
         let angle = r.dot(&self.anterior).atan2(r.dot(&self.lateral));
         (angle / TAU * RIM_DIRECTIONS as f64 - 0.5).rem_euclid(RIM_DIRECTIONS as f64)
+    }
+
+    /// Unit vector across the axis in the middle of a direction.
+    pub(super) fn outward(&self, direction: usize) -> Vec3 {
+        let (sin, cos) = rim_angle(direction).sin_cos();
+        self.lateral * cos + self.anterior * sin
     }
 
     /// `mesh` with its rim, which has these heights, moved towards the base by `shifts` mm.
@@ -181,10 +255,10 @@ impl RimFrame {
     fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
         (0..RIM_DIRECTIONS)
             .map(|direction| {
-                let (sin, cos) = (TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64).sin_cos();
+                let (sin, cos) = rim_angle(direction).sin_cos();
                 let plane = HalfPlane {
                     axis: self.axis,
-                    outward: self.lateral * cos + self.anterior * sin,
+                    outward: self.outward(direction),
                     aside: self.anterior * cos - self.lateral * sin,
                 };
                 rim_height(mesh, &self.centre, &plane)
@@ -251,7 +325,7 @@ mod tests {
         let (whole, cup) = heart(0.0);
         let (cut, _) = heart(12.0);
         let anterior = RIM_DIRECTIONS / 4;
-        let settled = settled(&cut, &cup, &Vec3::y()).unwrap();
+        let settled = settled(&cut, &cup, &Vec3::y(), None).unwrap();
         let heights = [&whole, &cut, &settled].map(|m| rim(m, &cup)[anterior]);
         let [whole, cut, settled] = heights;
         assert!(cut > whole + 9.0, "{heights:?}");
@@ -283,7 +357,7 @@ mod tests {
     #[test]
     fn a_usual_rim_stays_within_two_millimetres() {
         let (whole, cup) = heart(0.0);
-        let settled = settled(&whole, &cup, &Vec3::y()).unwrap();
+        let settled = settled(&whole, &cup, &Vec3::y(), None).unwrap();
         for (before, after) in rim(&whole, &cup).iter().zip(rim(&settled, &cup)) {
             assert!((before - after).abs() < 2.0, "{before} {after}");
         }

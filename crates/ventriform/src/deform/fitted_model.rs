@@ -3,6 +3,7 @@
 use super::anatomical::{BlurredImage, anatomical_mesh};
 use super::dynamics::StopReason;
 use super::parameters::WallEdge;
+use super::rim_model::RimEvidence;
 use super::sensors::SensorReading;
 use crate::geometry::Vec3;
 use crate::locate::cup::Cup;
@@ -92,6 +93,8 @@ pub struct FittedModel {
     /// Height of its rim in each of [`RIM_DIRECTIONS`](super::base_plane::RIM_DIRECTIONS) directions, mm from the
     /// cup's centre towards the apex; `None` without a rim in every direction.
     pub sensed_rim_mm: Option<Vec<f64>>,
+    /// What told where its rim is; `None` for other organs and where the image has no signal at the rim.
+    pub rim_evidence: Option<RimEvidence>,
     /// The smoothness of the image about it, mm; ventricles only.
     pub smoothness_mm: Option<f64>,
     /// The sensors' readings when the motion ended, [`PER_TRIANGLE`](super::sensors::PER_TRIANGLE) of each triangle.

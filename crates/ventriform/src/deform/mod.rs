@@ -42,9 +42,10 @@ pub mod fitted_model;
 pub mod organ_position;
 pub mod parameters;
 pub mod ray_terms;
-mod rim_model;
+pub mod rim_model;
 pub mod sensors;
 pub mod setup;
+pub mod signal_end;
 
 pub use error::DeformError;
 pub use fitted_model::{FittedModel, WallSurface, WallSurfaces};
