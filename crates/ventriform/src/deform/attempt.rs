@@ -6,10 +6,8 @@ use super::dynamics::{self, MotionResult};
 use super::elastic::Elastic;
 use super::fitted_model::{FittedModel, WallSurface, WallSurfaces};
 use super::parameters::DeformParameters;
-use super::rim_model::RimEvidence;
 use super::sensors::{SensorReading, SensorSettings};
 use super::setup::FitSetup;
-use crate::locate::cup::Cup;
 use crate::locate::patient_orientation::{OrientationSource, PatientOrientation};
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
@@ -113,18 +111,19 @@ impl Attempt {
         let sensed_wall = wall_of(&self.moved.mesh)?;
         let sensed_rim_mm =
             cup.and_then(|cup| rim_heights(&self.moved.mesh, &cup, &orientation.superior));
-        let rim_evidence = cup.zip(sensed_wall.as_ref()).and_then(|(cup, wall)| {
-            base_plane::rim_evidence(
-                &self.moved.mesh,
-                &cup,
-                &orientation.superior,
-                wall,
-                &setup.field,
-            )
+        let settles = settles_rim(&orientation, parameters);
+        let seen = cup.zip(sensed_wall.as_ref()).filter(|_| settles);
+        let rim_evidence = seen.and_then(|(cup, wall)| {
+            let (mesh, field) = (&self.moved.mesh, &setup.field);
+            base_plane::rim_evidence(mesh, &cup, &orientation.superior, wall, field)
         });
         let settled = cup.and_then(|cup| {
-            let evidence = rim_evidence.as_ref();
-            settled(&self.moved.mesh, &cup, &orientation, evidence, parameters)
+            let (mesh, superior) = (&self.moved.mesh, &orientation.superior);
+            match &parameters.base {
+                Some(base) => base_plane::put(mesh, &cup, superior, base),
+                None if settles => base_plane::settled(mesh, &cup, superior, rim_evidence.as_ref()),
+                None => None,
+            }
         });
         let (mesh, wall) = match settled {
             Some(mesh) => {
@@ -186,21 +185,9 @@ impl Attempt {
     }
 }
 
-/// `mesh` of a ventricle with its base plane put: through the point that was given, or where anatomy and image
-/// together put it; `None` where it stays.
-fn settled(
-    mesh: &TriMesh,
-    cup: &Cup,
-    orientation: &PatientOrientation,
-    evidence: Option<&RimEvidence>,
-    parameters: &DeformParameters,
-) -> Option<TriMesh> {
-    let superior = &orientation.superior;
-    match &parameters.base {
-        Some(base) => base_plane::put(mesh, cup, superior, base),
-        None if orientation.source == OrientationSource::Unknown => None,
-        None => base_plane::settled(mesh, cup, superior, evidence),
-    }
+/// Whether anatomy and image together put a ventricle's rim: where nobody has given its base, and its sides are known.
+fn settles_rim(orientation: &PatientOrientation, parameters: &DeformParameters) -> bool {
+    parameters.base.is_none() && orientation.source != OrientationSource::Unknown
 }
 
 /// The share of area whose sensors see an edge, and the weighted rms distance to the edges, mm;

@@ -93,7 +93,8 @@ pub struct FittedModel {
     /// Height of its rim in each of [`RIM_DIRECTIONS`](super::base_plane::RIM_DIRECTIONS) directions, mm from the
     /// cup's centre towards the apex; `None` without a rim in every direction.
     pub sensed_rim_mm: Option<Vec<f64>>,
-    /// What told where its rim is; `None` for other organs and where the image has no signal at the rim.
+    /// What told where the rim is; `None` for other organs, where the image has no signal at the rim, where the
+    /// patient's orientation is unknown and where the base was given.
     pub rim_evidence: Option<RimEvidence>,
     /// The smoothness of the image about it, mm; ventricles only.
     pub smoothness_mm: Option<f64>,

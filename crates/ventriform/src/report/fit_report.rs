@@ -73,6 +73,9 @@ pub struct FitReport {
     pub turned_triangles: usize,
     /// The ventricle's long axis.
     pub long_axis: Option<LongAxis>,
+    /// Standard deviation of the height of the ventricle's rim, mm; where anatomy and image together put it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rim_uncertainty_mm: Option<f64>,
     /// Size relative to the model.
     pub scale: f64,
     /// Rotation of the model; row by row.
@@ -260,6 +263,10 @@ impl FitReport {
             self_intersections: fit.self_intersections,
             turned_triangles: fit.turned_triangles,
             long_axis: fit.cup.as_ref().map(LongAxis::of),
+            rim_uncertainty_mm: fit
+                .rim_evidence
+                .as_ref()
+                .map(|evidence| round(evidence.deviation_mm())),
             scale: round(fit.scale),
             rotation: [0, 1, 2].map(row),
             displacement_mm: fit.displacements.iter().map(|d| round(d.norm())).collect(),
