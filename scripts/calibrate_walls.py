@@ -77,6 +77,7 @@ WAVES = 7  # mean, cosine and sine of one to three times the angle
 RIDGE = 60.0
 REGRESSION_FIELDS = ["by_shape", "of_heart", "of_direction"]
 REGRESSION_RANGE_MM = [-12.0, 20.0]
+DARK_ENDS_MM = [-9.0, -3.0]  # as in rim_model.rs; chosen
 CORRECTION_FIELDS = ["intercept_mm", "slope", "bend_mm", "short_slope", "long_slope"]
 
 ANGLES = 2 * np.pi * (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS
@@ -237,11 +238,12 @@ def waves(distances):
 
 
 def rim_evidence(tables, constants):
-    """Rows of signal_ends.csv, what tells where their rims are, and the distances from the sensed to the true rims."""
+    """Rows of signal_ends.csv, what tells where their rims are, the distances from the sensed to the true rims, and what limits
+    their moves: the shifts by shape and the ends of the signal."""
     rows = [row for row in table(tables / "signal_ends.csv", END_SETS) if not row["case"].startswith("motion")]
     by_shape = corrected(from_shape(rows, constants["RIM_SHAPE"]), constants["RIM_CORRECTION"])
     x = np.column_stack([column(rows, "length_mm"), *(waves(d) for d in (by_shape, heights(rows, "heart"), heights(rows, "direction")))])
-    return rows, x, heights(rows, "sensed") - heights(rows, "true"), by_shape
+    return rows, x, heights(rows, "sensed") - heights(rows, "true"), (by_shape, heights(rows, "heart"))
 
 
 def ridge(x, y):
@@ -252,11 +254,13 @@ def ridge(x, y):
     return np.vstack([y.mean(axis=0) - mean @ slopes, slopes])
 
 
-def regressed(x, regression):
-    """Distances by which the rims move."""
+def regressed(x, regression, limits):
+    """Distances by which the rims move: not towards the apex of where the shape puts them where the base is dark."""
     low, high = regression["length_range_mm"]
     x = np.column_stack([np.ones(len(x)), x[:, 0].clip(low, high), x[:, 1:]])
-    return (x @ regression["terms"].T @ BASIS.T).clip(*regression["range_mm"])
+    moved = (x @ regression["terms"].T @ BASIS.T).clip(*regression["range_mm"])
+    (by_shape, ends), (dark, bright) = limits, DARK_ENDS_MM
+    return np.where(moved < by_shape, by_shape + (moved - by_shape) * ((ends - dark) / (bright - dark)).clip(0, 1), moved)
 
 
 def rim_regression(x, distance):
@@ -264,12 +268,12 @@ def rim_regression(x, distance):
     return dict(terms=ridge(x, waves(distance)).T, length_range_mm=lengths, range_mm=REGRESSION_RANGE_MM)
 
 
-def left_out(x, distance, parts=10):
+def left_out(x, distance, limits, parts=10):
     """Distances of each tenth of the hearts, by the regression of the others."""
     made = np.zeros_like(distance)
     for part in range(parts):
         out = np.arange(len(x)) % parts == part
-        made[out] = regressed(x[out], rim_regression(x[~out], distance[~out]))
+        made[out] = regressed(x[out], rim_regression(x[~out], distance[~out]), [of[out] for of in limits])
     return made
 
 
@@ -416,9 +420,9 @@ def estimate(tables, chosen, names=()):
         made[name] = dict(zip(NODE_FIELDS, quantile_regression(x, np.log(distance), SHARE)))
     made["MEDIAN_SPREAD_MM"] = float(np.median(column(rows, "spread_mm")))
     used = chosen if names else made  # the regression stands on the other two
-    rows, x, distance, _ = rim_evidence(tables, chosen | {name: used[name] for name in ("RIM_SHAPE", "RIM_CORRECTION")})
+    rows, x, distance, limits = rim_evidence(tables, chosen | {name: used[name] for name in ("RIM_SHAPE", "RIM_CORRECTION")})
     made["RIM_REGRESSION"] = rim_regression(x, distance)
-    made["RIM_DEVIATION"] = rim_deviation(rows, distance - left_out(x, distance))
+    made["RIM_DEVIATION"] = rim_deviation(rows, distance - left_out(x, distance, limits))
     if names:
         made = chosen | {name: made[name] for name in names if name in made}
     # Of what the others leave, as they will stand beside it.
@@ -461,11 +465,12 @@ def compare(tables, before, after):
             print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} left by committed, "
                   f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm (rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
                   f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n")
-    rows, x, distance, by_shape = rim_evidence(tables, before)
-    print(f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone {of_rims(distance - by_shape)}; "
-          f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION']))}; each tenth left out {of_rims(distance - left_out(x, distance))}\n")
+    rows, x, distance, limits = rim_evidence(tables, before)
+    error = distance - left_out(x, distance, limits)
+    print(f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone {of_rims(distance - limits[0])}; "
+          f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION'], limits))}; each tenth left out {of_rims(error)}\n")
     show("RIM_DEVIATION", before["RIM_DEVIATION"], after["RIM_DEVIATION"])
-    share = np.abs(distance - left_out(x, distance)) / np.hypot(before["RIM_DEVIATION"]["least_mm"], before["RIM_DEVIATION"]["per_scatter"] * scatter(rows))[:, None]
+    share = np.abs(error) / np.hypot(before["RIM_DEVIATION"]["least_mm"], before["RIM_DEVIATION"]["per_scatter"] * scatter(rows))[:, None]
     quarters = np.array_split(share[np.argsort(scatter(rows))], 4)
     print("  left out, within one / two standard deviations: " + ", ".join(f"{np.mean(part <= 1):.0%} / {np.mean(part <= 2):.0%}" for part in [share, *quarters])
           + " (all; quarters by scatter)\n")

@@ -103,8 +103,8 @@ pub const RIM_REGRESSION: RimRegression = RimRegression {
 
 /// Standard deviation of the height of a rim.
 pub const RIM_DEVIATION: RimDeviation = RimDeviation {
-    least_mm: 1.876,
-    per_scatter: 0.603,
+    least_mm: 1.663,
+    per_scatter: 0.787,
 };
 
 /// Distance by which the inner surface moves outward, mm.

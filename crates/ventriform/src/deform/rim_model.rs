@@ -16,6 +16,10 @@ pub const RIM_TERMS: usize = 2 * RIM_HARMONICS;
 /// Coefficients of a distance in every direction: its mean, and those of [`RIM_TERMS`].
 const WAVES: usize = RIM_TERMS + 1;
 
+/// Ends of the signal, at half of the heart's, from which on a wall counts as dark at its base, and up to which it counts
+/// as partly so, mm basal of the rim.
+const DARK_ENDS_MM: [f64; 2] = [-9.0, -3.0];
+
 /// Coefficients of one harmonic of the rim's height towards the apex, shares of the heart's length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RimHarmonic {
@@ -144,7 +148,8 @@ pub struct RimRegression {
 }
 
 impl RimRegression {
-    /// Distances towards the base by which the rim moves in every direction, mm.
+    /// Distances towards the base by which the rim moves in every direction, mm. Where the wall is dark at its base, the
+    /// rim does not lie apical of where its shape puts it.
     pub fn shifts(&self, evidence: &RimEvidence) -> Vec<f64> {
         let [shortest, longest] = self.length_range_mm;
         let length = evidence.length_mm.clamp(shortest, longest);
@@ -165,9 +170,22 @@ impl RimRegression {
         });
         let [least, greatest] = self.range_mm;
         (0..RIM_DIRECTIONS)
-            .map(|direction| product(&waves, &waves_at(direction)).clamp(least, greatest))
+            .map(|direction| {
+                let shift = product(&waves, &waves_at(direction)).clamp(least, greatest);
+                let by_shape = evidence.by_shape_mm[direction];
+                let trusted = trusted(ends.of_heart[direction]);
+                by_shape + (shift - by_shape) * if shift < by_shape { trusted } else { 1.0 }
+            })
             .collect()
     }
+}
+
+/// How far a signal that ends at `end` moves the rim towards the apex of where its shape puts it, 0 to 1.
+///
+/// A wall that is dark at its base, a defect, looks like a shorter wall. Taken for one, the defect would be cut off.
+fn trusted(end: f64) -> f64 {
+    let [dark, bright] = DARK_ENDS_MM;
+    ((end - dark) / (bright - dark)).clamp(0.0, 1.0)
 }
 
 /// Values in a direction of 1, and of cosine and sine of one to three times its angle.
@@ -258,6 +276,40 @@ mod tests {
         };
         assert!((at(80.0) - 8.0).abs() < 1e-9 && (at(20.0) - 5.0).abs() < 1e-9);
         assert!((at(500.0) - 12.0).abs() < 1e-9);
+    }
+
+    /// Ends of a third of the directions lie 12 mm apical: the rim moves by what the others tell, and there not towards the
+    /// apex. Where signal goes on, it moves towards the base.
+    #[test]
+    fn a_dark_base_is_not_cut_off() {
+        let dark = |direction: usize| direction < RIM_DIRECTIONS / 3;
+        let of: [f64; RIM_DIRECTIONS] = std::array::from_fn(|d| if dark(d) { -12.0 } else { 6.0 });
+        let mut regression = identity();
+        for terms in &mut regression.terms {
+            (terms.of_heart, terms.by_shape) = (terms.by_shape, [0.0; WAVES]);
+        }
+        let shifts = regression.shifts(&RimEvidence {
+            length_mm: 80.0,
+            by_shape_mm: vec![1.5; RIM_DIRECTIONS],
+            ends: SignalEnds {
+                of_heart: of,
+                of_direction: of,
+            },
+        });
+        for (direction, shift) in shifts.iter().enumerate() {
+            let alone = product(&waves_of(&of), &waves_at(direction));
+            assert!(
+                (shift - alone.max(1.5)).abs() < 1e-9 || !dark(direction),
+                "{direction}: {shift}"
+            );
+        }
+        assert!(
+            (shifts[RIM_DIRECTIONS / 6] - 1.5).abs() < 1e-9,
+            "{shifts:?}"
+        );
+        assert!(shifts[RIM_DIRECTIONS * 2 / 3] > 4.0, "{shifts:?}");
+        // At an end between the two, by a share.
+        assert!((trusted(-6.0) - 0.5).abs() < 1e-12 && trusted(-2.0) >= 1.0);
     }
 
     /// Ends that scatter by 5 mm make the rim less certain; where they all are does not matter.
