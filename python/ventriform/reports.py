@@ -540,6 +540,8 @@ class Fit(Document):
     """Why the motion ended."""
     residual_mm: float
     """Distance to the edges, weighted root mean square."""
+    rim_uncertainty_mm: float | None = None
+    """Standard deviation of the height of the ventricle's rim, mm; where anatomy and image together put it."""
     rotation: list[list[float]]
     """Rotation of the model; row by row."""
     runs: int

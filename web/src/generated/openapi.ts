@@ -1663,6 +1663,11 @@ export interface components {
              * @description Distance to the edges, weighted root mean square.
              */
             residual_mm: number;
+            /**
+             * Format: double
+             * @description Standard deviation of the height of the ventricle's rim, mm; where anatomy and image together put it.
+             */
+            rim_uncertainty_mm?: number | null;
             /** @description Rotation of the model; row by row. */
             rotation: number[][];
             /**

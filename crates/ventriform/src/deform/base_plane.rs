@@ -11,14 +11,15 @@
 //!    or added. A piecewise linear function ([`RIM_CORRECTION`]) says how much of it to take back.
 //! 4. Where the signal ends in the image ([`signal_end`](super::signal_end)) corrects that: the heart's expected rim,
 //!    given the heart's length, the distance by which step 3 moves the rim and the ends of the signal
-//!    ([`RIM_REGRESSION`]).
+//!    ([`RIM_REGRESSION`]). Where the base is dark, it moves the rim towards the base only.
 //! 5. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the
 //!    wall is stretched or compressed there.
 //!
 //! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
 //! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
-//! by shape and 2.6 with the ends of the signal (docs/evaluation.md). Not guaranteed: an
-//! infarct over half of the base moves the shape itself. A model whose orientation is unknown keeps its rim.
+//! by shape and 2.9 with the ends of the signal (docs/evaluation.md). Not guaranteed: an infarct over half of the base
+//! moves the shape itself; a wall that is short where its base is dark stays too long. A model whose orientation is unknown
+//! keeps its rim.
 
 use std::f64::consts::TAU;
 

@@ -75,9 +75,9 @@ fn a_defect_of_the_base_is_seen_in_its_segment_and_in_no_other() {
                 assert!(mean > 70.0 && found.extent_percent < 20.0, "{found:?}");
             }
         }
-        // One basal segment is a 20th to a 15th of the wall.
+        // One basal segment is a 45th to an 18th of the wall (36 phantoms), and two fifths of it or more are dark.
         assert!(
-            (2.0..9.0).contains(&map.extent_percent),
+            (0.9..9.0).contains(&map.extent_percent),
             "{}",
             map.extent_percent
         );
