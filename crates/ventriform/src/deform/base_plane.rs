@@ -12,8 +12,8 @@
 //! 4. Where the signal ends in the image ([`signal_end`](super::signal_end)) corrects that: the heart's expected rim,
 //!    given the heart's length, the distance by which step 3 moves the rim and the ends of the signal
 //!    ([`RIM_REGRESSION`]). Where the base is dark, it moves the rim towards the base only.
-//! 5. Nodes within [`STRETCHED_LENGTH_MM`] of the rim move along the axis, those at the rim by the whole, so that the
-//!    wall is stretched or compressed there.
+//! 5. Nodes within [`STRETCHED_LENGTH_MM`](super::rim_frame::STRETCHED_LENGTH_MM) of the rim move along the axis, those
+//!    at the rim by the whole, so that the wall is stretched or compressed there.
 //!
 //! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
 //! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
@@ -21,11 +21,10 @@
 //! moves the shape itself; a wall that is short where its base is dark stays too long. A model whose orientation is unknown
 //! keeps its rim.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{DMatrix, DVector};
 
-use super::calibration::{RIM_CORRECTION, RIM_REGRESSION, RIM_SHAPE};
+use super::calibration::{RIM_CORRECTION, RIM_DEVIATION, RIM_REGRESSION, RIM_SHAPE};
+use super::rim_frame::{RIM_DIRECTIONS, RimFrame, rim_angle};
 use super::rim_model::{RIM_TERMS, RimEvidence};
 use super::signal_end::SignalEnds;
 use crate::geometry::Vec3;
@@ -33,16 +32,8 @@ use crate::grid::field::Field;
 use crate::locate::cup::Cup;
 use crate::mesh::TriMesh;
 use crate::mesh::intersections::self_intersections;
-use crate::model::wall::{HalfPlane, VentricleWall, anterior, rim_height};
+use crate::model::wall::VentricleWall;
 use crate::numeric::order;
-
-/// Directions about the axis: from lateral over anterior, septal and inferior.
-pub const RIM_DIRECTIONS: usize = 30;
-
-/// Angle of the middle of a direction, from lateral over anterior.
-pub(super) fn rim_angle(direction: usize) -> f64 {
-    TAU * (direction as f64 + 0.5) / RIM_DIRECTIONS as f64
-}
 
 /// Distance from the shape at which a direction counts half, mm.
 const OUTLIER_DISTANCE_MM: f64 = 4.0;
@@ -50,9 +41,6 @@ const OUTLIER_DISTANCE_MM: f64 = 4.0;
 const CORRELATED_DIRECTIONS: f64 = 3.0;
 /// Rounds of reweighting.
 const REWEIGHTING_ROUNDS: usize = 30;
-
-/// Length of wall next to the rim that is stretched, mm.
-pub const STRETCHED_LENGTH_MM: f64 = 25.0;
 
 /// `mesh` with its rim where anatomy and image together put it; where there is no `evidence` of the image, where its
 /// shape puts it. `None` without a rim in every direction, and where the moved surface would intersect itself: then the
@@ -72,7 +60,8 @@ pub fn settled(
     self_intersections(&moved).is_empty().then_some(moved)
 }
 
-/// What tells where the rim of `mesh` is, whose wall is `wall`, in the image `field` about it. `None` without a rim or a signal in every direction.
+/// What tells where the rim of `mesh` is, whose wall is `wall`, in the image `field` about it. `None` without a rim or a
+/// signal in every direction.
 pub fn rim_evidence(
     mesh: &TriMesh,
     cup: &Cup,
@@ -82,6 +71,11 @@ pub fn rim_evidence(
 ) -> Option<RimEvidence> {
     let rim = Rim::of(mesh, cup, superior)?;
     rim.evidence(&rim.shifts_by_shape()?, wall, field)
+}
+
+/// Standard deviation of the height of the rim that this `evidence` puts, mm.
+pub fn rim_deviation_mm(evidence: &RimEvidence) -> f64 {
+    RIM_DEVIATION.of(evidence)
 }
 
 /// The rim of a mesh.
@@ -159,7 +153,7 @@ pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<Tr
 }
 
 /// Range of the distance by which a rim is moved, mm towards the base. Towards the apex, wall of the length
-/// [`STRETCHED_LENGTH_MM`] is pushed together, so it must stay below that.
+/// [`STRETCHED_LENGTH_MM`](super::rim_frame::STRETCHED_LENGTH_MM) is pushed together, so it must stay below that.
 const RIM_SHIFT_RANGE_MM: [f64; 2] = [-20.0, 40.0];
 
 /// The shape of a rim with these heights, mm, of a heart of this length.
@@ -202,79 +196,6 @@ fn expected(rim: &[f64], length: f64) -> Option<Vec<f64>> {
     Some(shape.iter().copied().collect())
 }
 
-/// The long axis, and the directions about it.
-pub(super) struct RimFrame {
-    pub(super) centre: Vec3,
-    pub(super) axis: Vec3,
-    lateral: Vec3,
-    anterior: Vec3,
-}
-
-impl RimFrame {
-    pub(super) fn of(cup: &Cup, superior: &Vec3) -> Self {
-        let anterior = anterior(&cup.axis, superior);
-        Self {
-            centre: cup.centre,
-            axis: cup.axis,
-            lateral: anterior.cross(&cup.axis),
-            anterior,
-        }
-    }
-
-    /// Height of a point, mm from the cup's centre towards the apex.
-    pub(super) fn along(&self, p: &Vec3) -> f64 {
-        (p - self.centre).dot(&self.axis)
-    }
-
-    /// 0..[`RIM_DIRECTIONS`]; direction n lies at n.
-    fn direction(&self, p: &Vec3) -> f64 {
-        let r = p - self.centre;
-        let angle = r.dot(&self.anterior).atan2(r.dot(&self.lateral));
-        (angle / TAU * RIM_DIRECTIONS as f64 - 0.5).rem_euclid(RIM_DIRECTIONS as f64)
-    }
-
-    /// Unit vector across the axis in the middle of a direction.
-    pub(super) fn outward(&self, direction: usize) -> Vec3 {
-        let (sin, cos) = rim_angle(direction).sin_cos();
-        self.lateral * cos + self.anterior * sin
-    }
-
-    /// `mesh` with its rim, which has these heights, moved towards the base by `shifts` mm.
-    fn stretched(&self, mesh: &TriMesh, rim: &[f64], shifts: &[f64]) -> TriMesh {
-        let mut moved = mesh.clone();
-        for p in &mut moved.vertices {
-            let direction = self.direction(p);
-            let above = self.along(p) - between(rim, direction);
-            let share = (1.0 - above / STRETCHED_LENGTH_MM).clamp(0.0, 1.0);
-            *p -= self.axis * (share * between(shifts, direction));
-        }
-        moved
-    }
-
-    /// The height at which the mesh begins in each direction, mm from the cup's centre towards the apex. `None` if
-    /// there is a direction without any.
-    fn heights(&self, mesh: &TriMesh) -> Option<Vec<f64>> {
-        (0..RIM_DIRECTIONS)
-            .map(|direction| {
-                let (sin, cos) = rim_angle(direction).sin_cos();
-                let plane = HalfPlane {
-                    axis: self.axis,
-                    outward: self.outward(direction),
-                    aside: self.anterior * cos - self.lateral * sin,
-                };
-                rim_height(mesh, &self.centre, &plane)
-            })
-            .collect()
-    }
-}
-
-/// The value at a direction, linear between the given ones.
-fn between(values: &[f64], direction: f64) -> f64 {
-    let (low, share) = (direction.floor(), direction.fract());
-    let at = |n: usize| values[n % RIM_DIRECTIONS];
-    at(low as usize) * (1.0 - share) + at(low as usize + 1) * share
-}
-
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -285,6 +206,7 @@ fn median(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
+    use std::f64::consts::TAU;
 
     /// A cup whose axis points down, with the rim of the mean heart, and cut short by `notch` mm where the
     /// angle from lateral lies within 30 degrees of 90.
@@ -448,21 +370,5 @@ mod tests {
             assert!((slope(within) - 0.95).abs() < 1e-9);
         }
         assert!(slope(6.0) > 2.0 && slope(7.0) > 2.0 && slope(-6.0) < 0.95 && slope(-6.0) > 0.5);
-    }
-
-    #[test]
-    fn values_between_directions_are_linear_and_go_round() {
-        let mut values = [1.0; RIM_DIRECTIONS];
-        (values[0], values[RIM_DIRECTIONS - 1], values[7]) = (5.0, 3.0, 2.0);
-        let last = (RIM_DIRECTIONS - 1) as f64;
-        for (at, value) in [
-            (0.0, 5.0),
-            (0.25, 4.0),
-            (last, 3.0),
-            (last + 0.75, 4.5),
-            (6.5, 1.5),
-        ] {
-            assert!((between(&values, at) - value).abs() < 1e-12, "{at}");
-        }
     }
 }

@@ -90,7 +90,7 @@ pub struct FittedModel {
     pub surfaces: Option<WallSurfaces>,
     /// The wall as the sensors left it, before the base plane was put; ventricles only.
     pub sensed_wall: Option<VentricleWall>,
-    /// Height of its rim in each of [`RIM_DIRECTIONS`](super::base_plane::RIM_DIRECTIONS) directions, mm from the
+    /// Height of its rim in each of [`RIM_DIRECTIONS`](super::rim_frame::RIM_DIRECTIONS) directions, mm from the
     /// cup's centre towards the apex; `None` without a rim in every direction.
     pub sensed_rim_mm: Option<Vec<f64>>,
     /// What told where the rim is; `None` for other organs, where the image has no signal at the rim, where the

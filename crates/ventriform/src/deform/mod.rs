@@ -42,6 +42,7 @@ pub mod fitted_model;
 pub mod organ_position;
 pub mod parameters;
 pub mod ray_terms;
+pub mod rim_frame;
 pub mod rim_model;
 pub mod sensors;
 pub mod setup;

@@ -4,8 +4,7 @@
 //! In: angles about the long axis, and a distance of the rim from its shape. Out: heights and the distance by which
 //! the rim moves. The constants are in [`calibration`](super::calibration).
 
-use super::base_plane::{RIM_DIRECTIONS, rim_angle};
-use super::calibration::RIM_DEVIATION;
+use super::rim_frame::{RIM_DIRECTIONS, rim_angle};
 use super::signal_end::SignalEnds;
 
 /// Harmonics of the rim's shape: the cosines and sines of one to three times the angle.
@@ -90,13 +89,6 @@ pub struct RimEvidence {
     pub by_shape_mm: Vec<f64>,
     /// Where the image's signal ends.
     pub ends: SignalEnds,
-}
-
-impl RimEvidence {
-    /// Standard deviation of the height of the rim that it gives, mm.
-    pub fn deviation_mm(&self) -> f64 {
-        RIM_DEVIATION.of(self)
-    }
 }
 
 /// How far the rim of a fit may be off: the standard deviation of its height, about the same in every direction.
@@ -217,7 +209,7 @@ fn product(a: &[f64; WAVES], b: &[f64; WAVES]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deform::calibration::RIM_REGRESSION;
+    use crate::deform::calibration::{RIM_DEVIATION, RIM_REGRESSION};
 
     fn evidence(distance: impl Fn(usize) -> f64) -> RimEvidence {
         let of: [f64; RIM_DIRECTIONS] = std::array::from_fn(distance);
@@ -315,10 +307,10 @@ mod tests {
     /// Ends that scatter by 5 mm make the rim less certain; where they all are does not matter.
     #[test]
     fn a_rim_is_as_sure_as_its_ends_agree() {
-        let level = |end: f64| evidence(|_| end).deviation_mm();
+        let level = |end: f64| RIM_DEVIATION.of(&evidence(|_| end));
         assert!((level(0.0) - RIM_DEVIATION.least_mm).abs() < 1e-9);
         assert!((level(9.0) - level(0.0)).abs() < 1e-9);
-        let apart = evidence(|d| if d % 2 == 0 { 5.0 } else { -5.0 }).deviation_mm();
+        let apart = RIM_DEVIATION.of(&evidence(|d| if d % 2 == 0 { 5.0 } else { -5.0 }));
         assert!((1.5..3.0).contains(&(apart / level(0.0))), "{apart}");
     }
 

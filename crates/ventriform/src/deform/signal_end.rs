@@ -9,7 +9,7 @@
 //! half way from the direction's own signal to what lies basal of it is not deceived by a direction that is faint as a
 //! whole or lies before a bright neighbour.
 
-use super::base_plane::{RIM_DIRECTIONS, RimFrame};
+use super::rim_frame::{RIM_DIRECTIONS, RimFrame};
 use crate::grid::field::Field;
 use crate::model::wall::{RAY_COLUMNS, VentricleWall};
 use crate::numeric::order;
@@ -163,7 +163,7 @@ fn end(profile: &[f64], level: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deform::base_plane::rim_angle;
+    use crate::deform::rim_frame::rim_angle;
     use crate::geometry::Vec3;
     use crate::geometry::frame::VoxelToPatient;
     use crate::grid::Volume;

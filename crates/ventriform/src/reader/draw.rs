@@ -6,8 +6,9 @@
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
 //!    wall would get thinner than [`MIN_THICKNESS_MM`](super::wall_edges::MIN_THICKNESS_MM), both move less.
-//! 2. The rim moves along the long axis; nodes up to [`base_plane::STRETCHED_LENGTH_MM`] from it move
-//!    less and less, so that the wall is stretched there.
+//! 2. The rim moves along the long axis; nodes up to
+//!    [`STRETCHED_LENGTH_MM`](crate::deform::rim_frame::STRETCHED_LENGTH_MM) from it move less and less, so that the
+//!    wall is stretched there.
 //!
 //! On a wall that is perpendicular to its rays, the surfaces move by exactly these distances.
 

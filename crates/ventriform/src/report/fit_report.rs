@@ -2,6 +2,7 @@
 
 use super::json_number::{not_stated, or_nan, point, round};
 use crate::deform::FittedModel;
+use crate::deform::base_plane::rim_deviation_mm;
 use crate::geometry::Vec3;
 use crate::judge::{Evidence, Judgement, confidence, consensus};
 use crate::locate::cup::Cup;
@@ -266,7 +267,7 @@ impl FitReport {
             rim_uncertainty_mm: fit
                 .rim_evidence
                 .as_ref()
-                .map(|evidence| round(evidence.deviation_mm())),
+                .map(|evidence| round(rim_deviation_mm(evidence))),
             scale: round(fit.scale),
             rotation: [0, 1, 2].map(row),
             displacement_mm: fit.displacements.iter().map(|d| round(d.norm())).collect(),
