@@ -279,13 +279,16 @@ class Page:
         """The id that a word of a page stands for. What is not there yet is waited for while a job may make it."""
         kind = "normals" if word == "NORMALS" else f"{word.lower()}s"
         for _ in range(10 * COMMAND_SECONDS):
+            # Jobs first: one that ends between the two questions has made what the second asks for.
+            working = any(self.get(f"/v1/jobs?state={state}&limit=1")["jobs"] for state in ("queued", "running"))
             items = self.get(f"/v1/{kind}?limit=1")[kind]
             if items:
                 return items[0]["id"]
-            if not any(self.get(f"/v1/jobs?state={state}&limit=1")["jobs"] for state in ("queued", "running")):
+            if not working:
                 break
             time.sleep(0.1)
-        raise LookupError(f"there is no {word} in the service")
+        jobs = [(job["state"], job.get("error")) for job in self.get("/v1/jobs?limit=5")["jobs"]]
+        raise LookupError(f"there is no {word} in the service, whose last jobs are {jobs}")
 
 
 def unknown_flags(program, text):
