@@ -9,6 +9,8 @@
 //! index is returned, so results do not depend on the shape of the tree or the number of threads.
 //! Building takes O(n log n), a closest-point query on a smooth surface O(log n).
 
+use std::convert::Infallible;
+
 use super::{Vec3, triangle};
 
 /// Number of children of a node.
@@ -229,6 +231,23 @@ impl Bvh {
     /// # Panics
     /// If an index is out of range.
     pub fn new(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let always = || Ok::<(), Infallible>(());
+        let Ok(tree) = Self::new_while(vertices, triangles, always);
+        tree
+    }
+
+    /// [`Bvh::new`] over so many triangles that it takes long: ends soon after `go_on` returns an error, with that.
+    ///
+    /// # Errors
+    /// The error of `go_on`.
+    ///
+    /// # Panics
+    /// If an index is out of range.
+    pub fn new_while<E: Send>(
+        vertices: &[Vec3],
+        triangles: &[[u32; 3]],
+        go_on: impl Fn() -> Result<(), E> + Sync,
+    ) -> Result<Self, E> {
         let corners: Vec<[Vec3; 3]> = triangles
             .iter()
             .map(|t| t.map(|v| vertices[v as usize]))
@@ -245,7 +264,7 @@ impl Bvh {
             .collect();
         let mut nodes = Vec::with_capacity(triangles.len() / 2 + 1);
         if !items.is_empty() {
-            build(&mut nodes, &mut items, 0, &corners);
+            build(&mut nodes, &mut items, 0, &corners, &go_on)?;
         }
         let order: Vec<u32> = items.iter().map(|item| item.triangle).collect();
         let corners = order.iter().map(|&t| corners[t as usize]).collect();
@@ -253,12 +272,12 @@ impl Bvh {
         for (slot, &t) in (0..).zip(&order) {
             slots[t as usize] = slot;
         }
-        Self {
+        Ok(Self {
             nodes,
             order,
             slots,
             corners,
-        }
+        })
     }
 
     /// Moves the tree to other `vertices` and `triangles`, as many as before, in a fraction of the time of
@@ -527,10 +546,19 @@ fn halves(items: &mut [Item]) -> (&mut [Item], &mut [Item]) {
 
 /// Appends the subtree over `items`, whose first one has the place `offset` in the whole, and returns its
 /// box.
-fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[Vec3; 3]]) -> Aabb {
+fn build<E: Send>(
+    nodes: &mut Vec<Node>,
+    items: &mut [Item],
+    offset: usize,
+    corners: &[[Vec3; 3]],
+    go_on: &(impl Fn() -> Result<(), E> + Sync),
+) -> Result<Aabb, E> {
     let index = nodes.len();
     nodes.push(Node::empty());
     let count = items.len();
+    if count >= PARALLEL_SIZE {
+        go_on()?;
+    }
     let quarters: [&mut [Item]; CHILDREN_PER_NODE] = if count <= CHILDREN_PER_NODE {
         let mut rest = items;
         std::array::from_fn(|k| {
@@ -561,20 +589,21 @@ fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[V
     if count >= CHILDREN_PER_NODE * PARALLEL_SIZE {
         let apart = |(first, items): (usize, &mut [Item])| {
             let mut nodes = Vec::new();
-            let aabb = build(&mut nodes, items, first, corners);
-            (nodes, aabb)
+            let aabb = build(&mut nodes, items, first, corners, go_on)?;
+            Ok::<_, E>((nodes, aabb))
         };
         let [a, b, c, d] = parts;
         let ((a, b), (c, d)) = rayon::join(
             || rayon::join(|| apart(a), || apart(b)),
             || rayon::join(|| apart(c), || apart(d)),
         );
-        for (k, (subtree, aabb)) in [a, b, c, d].into_iter().enumerate() {
+        for (k, built) in [a, b, c, d].into_iter().enumerate() {
+            let (subtree, aabb) = built?;
             let child = nodes.len() as u32;
             append(nodes, subtree);
             set(nodes, k, child, aabb);
         }
-        return whole;
+        return Ok(whole);
     }
     for (k, (first, items)) in parts.into_iter().enumerate() {
         match items {
@@ -585,12 +614,12 @@ fn build(nodes: &mut Vec<Node>, items: &mut [Item], offset: usize, corners: &[[V
             }
             items => {
                 let child = nodes.len() as u32;
-                let aabb = build(nodes, items, first, corners);
+                let aabb = build(nodes, items, first, corners, go_on)?;
                 set(nodes, k, child, aabb);
             }
         }
     }
-    whole
+    Ok(whole)
 }
 
 /// Appends a subtree that was built separately.

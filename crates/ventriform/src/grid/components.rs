@@ -6,6 +6,7 @@
 
 use crate::grid::labels::Labels;
 use crate::numeric::disjoint_sets::{set_numbers, singletons, unite};
+use crate::progress::{Cancelled, Monitor};
 
 /// A stretch of voxels of one row, border included in the coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -26,22 +27,29 @@ pub struct Components {
 
 impl Components {
     /// The 6-connected components of the inside.
-    pub fn of_inside(labels: &Labels) -> Self {
-        Self::build(labels, true)
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of_inside(labels: &Labels, monitor: &Monitor) -> Result<Self, Cancelled> {
+        Self::build(labels, true, monitor)
     }
 
     /// The 26-connected components of the outside, border layer included: number 0 is the
     /// surroundings, all others are cavities.
-    pub fn of_outside(labels: &Labels) -> Self {
-        Self::build(labels, false)
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn of_outside(labels: &Labels, monitor: &Monitor) -> Result<Self, Cancelled> {
+        Self::build(labels, false, monitor)
     }
 
-    fn build(labels: &Labels, inside: bool) -> Self {
+    fn build(labels: &Labels, inside: bool, monitor: &Monitor) -> Result<Self, Cancelled> {
         let [rows, planes] = labels.rows();
         let width = labels.extent[0] + 2;
         let mut runs: Vec<Run> = Vec::new();
         let mut first = Vec::with_capacity(rows * planes + 1);
         for k in 0..planes {
+            monitor.check()?;
             for j in 0..rows {
                 first.push(runs.len());
                 push_runs(labels.row(j, k), width, inside, j + rows * k, &mut runs);
@@ -51,6 +59,7 @@ impl Components {
         let mut parent = singletons(runs.len());
         let reach = usize::from(!inside);
         for k in 0..planes {
+            monitor.check()?;
             for j in 0..rows {
                 let here = j + rows * k;
                 let mut earlier = [None; 4];
@@ -69,15 +78,16 @@ impl Components {
         let component: Vec<usize> = (set_numbers(&mut parent).into_iter())
             .map(|label| label as usize)
             .collect();
+        monitor.check()?;
         let mut sizes = vec![0; component.iter().max().map_or(0, |c| c + 1)];
         for (run, &c) in runs.iter().zip(&component) {
             sizes[c] += run.end - run.start;
         }
-        Self {
+        Ok(Self {
             runs,
             component,
             sizes,
-        }
+        })
     }
 
     /// The component of the most voxels; of equals the first in array order.
@@ -102,15 +112,28 @@ impl Components {
     }
 
     /// Sets the voxels of every chosen component to `inside`.
-    pub fn paint(&self, labels: &mut Labels, inside: bool, choose: impl Fn(usize) -> bool) {
+    ///
+    /// # Errors
+    /// [`Cancelled`], with some of the voxels set.
+    pub fn paint(
+        &self,
+        labels: &mut Labels,
+        inside: bool,
+        choose: impl Fn(usize) -> bool,
+        monitor: &Monitor,
+    ) -> Result<(), Cancelled> {
         let rows = labels.rows()[0];
-        for (run, &component) in self.runs.iter().zip(&self.component) {
+        for (n, (run, &component)) in self.runs.iter().zip(&self.component).enumerate() {
+            if n.is_multiple_of(1 << 16) {
+                monitor.check()?;
+            }
             if choose(component) {
                 for i in run.start..run.end {
                     labels.set([i - 1, run.row % rows - 1, run.row / rows - 1], inside);
                 }
             }
         }
+        Ok(())
     }
 }
 
@@ -219,13 +242,16 @@ mod tests {
                 ];
                 labels.set(p, random.random_bool(density));
             }
-            let inside = Components::of_inside(&labels);
-            let outside = Components::of_outside(&labels);
+            let monitor = Monitor::silent();
+            let inside = Components::of_inside(&labels, &monitor).unwrap();
+            let outside = Components::of_outside(&labels, &monitor).unwrap();
             assert_eq!(inside.sizes, flood(&labels, true));
             assert_eq!(outside.sizes, flood(&labels, false));
             if let Some(c) = inside.largest() {
                 let mut one = labels.clone();
-                inside.paint(&mut one, false, |other| other != c);
+                inside
+                    .paint(&mut one, false, |other| other != c, &monitor)
+                    .unwrap();
                 assert_eq!(one.count(), inside.sizes[c]);
                 let p = one.voxels().next().unwrap();
                 assert_eq!(inside.containing(&labels, p), Some(c));

@@ -287,11 +287,20 @@ pub fn objects(
 
 /// Otsu's threshold of the values in `rows` (IEEE SMC 1979), 256 bins between minimum and
 /// maximum.
-pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn otsu(
+    rows: &[&[f32]],
+    minimum: f32,
+    maximum: f32,
+    monitor: &Monitor,
+) -> Result<f32, Cancelled> {
     const HISTOGRAM_BINS: usize = 256;
     let (low, width) = (f64::from(minimum), f64::from(maximum) - f64::from(minimum));
     let scale = HISTOGRAM_BINS as f64 / width;
     let counted = |rows: &[&[f32]]| {
+        monitor.check()?;
         let mut histogram = [0u64; HISTOGRAM_BINS];
         for v in rows.iter().flat_map(|row| row.iter()) {
             if v.is_finite() {
@@ -299,12 +308,12 @@ pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
                 histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
             }
         }
-        histogram
+        Ok(histogram)
     };
-    let histogram = rows.par_chunks(256).map(counted).reduce(
+    let histogram = rows.par_chunks(256).map(counted).try_reduce(
         || [0; HISTOGRAM_BINS],
-        |a, b| std::array::from_fn(|bin| a[bin] + b[bin]),
-    );
+        |a, b| Ok(std::array::from_fn(|bin| a[bin] + b[bin])),
+    )?;
     let total = histogram.iter().sum::<u64>() as f64;
     let weighted = |(bin, n): (usize, &u64)| bin as f64 * *n as f64;
     let all: f64 = histogram.iter().enumerate().map(weighted).sum();
@@ -321,7 +330,7 @@ pub fn otsu(rows: &[&[f32]], minimum: f32, maximum: f32) -> f32 {
             }
         }
     }
-    (low + (best.1 as f64 + 1.0) / HISTOGRAM_BINS as f64 * width) as f32
+    Ok((low + (best.1 as f64 + 1.0) / HISTOGRAM_BINS as f64 * width) as f32)
 }
 
 #[cfg(test)]
@@ -440,7 +449,7 @@ mod tests {
             .map(|n| if n % 4 == 0 { 9.0 } else { 1.0 } + (n % 10) as f32 * 0.05)
             .collect();
         let rows: Vec<&[f32]> = values.chunks(100).collect();
-        let level = otsu(&rows, 1.0, 9.45);
+        let level = otsu(&rows, 1.0, 9.45, &Monitor::silent()).unwrap();
         assert!((1.45..=9.0).contains(&level), "{level}");
     }
 }

@@ -69,6 +69,7 @@ pub fn places(
     let mut maxima: Vec<(f32, Vec3)> = Vec::new();
     for k in 0..nz {
         for j in 0..ny {
+            monitor.check()?;
             for i in 0..nx {
                 let own = scores[i + nx * (j + ny * k)];
                 if own > f32::NEG_INFINITY && is_maximum(&scores, [nx, ny, nz], [i, j, k], stride) {

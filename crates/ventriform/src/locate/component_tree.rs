@@ -51,7 +51,7 @@ pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancel
     if !(blocks.maximum > 0.0) {
         return Ok(Vec::new());
     }
-    let (order, ends) = sort_by_level(blocks);
+    let (order, ends) = sort_by_level(blocks, monitor)?;
     let [nx, ny, nz] = blocks.shape;
     // The place in `order` of every voxel that the threshold has passed.
     let mut rank = vec![u32::MAX; blocks.values.len()];
@@ -62,8 +62,8 @@ pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancel
     let voxel = blocks.spacing.iter().product::<f64>();
     let mut begin = 0;
     for (level, &end) in ends.iter().enumerate() {
-        monitor.check()?;
         for here in begin..end {
+            monitor.check()?;
             let at = order[here] as usize;
             let (i, j, k) = (at % nx, at / nx % ny, at / (nx * ny));
             let position = blocks.position([i, j, k]);
@@ -126,7 +126,10 @@ pub fn parts(blocks: &GreyBlocks, monitor: &Monitor) -> Result<Vec<Part>, Cancel
 }
 
 /// Voxels in order of falling level, and where each level ends.
-fn sort_by_level(blocks: &GreyBlocks) -> (Vec<u32>, Vec<usize>) {
+fn sort_by_level(
+    blocks: &GreyBlocks,
+    monitor: &Monitor,
+) -> Result<(Vec<u32>, Vec<usize>), Cancelled> {
     // A fine linear table instead of a logarithm for each voxel.
     const BISECTION_STEPS: usize = 2048;
     let scale = BISECTION_STEPS as f32 / blocks.maximum;
@@ -147,11 +150,13 @@ fn sort_by_level(blocks: &GreyBlocks) -> (Vec<u32>, Vec<usize>) {
         BISECTION_STEPS,
         step_of,
         (MOST_ABOVE / voxel) as usize,
-    ));
+        monitor,
+    )?);
     let floor_value = floor as f32 / scale;
     let mut counts = vec![0; LEVEL_COUNT + 1];
     let mut passed: Vec<(u32, u8)> = Vec::new();
     for (at, &v) in blocks.values.iter().enumerate() {
+        monitor.check()?;
         if v >= floor_value {
             let level = table[step_of(v)].min(LEVEL_COUNT as u8 - 1);
             counts[level as usize + 1] += 1;
@@ -164,11 +169,12 @@ fn sort_by_level(blocks: &GreyBlocks) -> (Vec<u32>, Vec<usize>) {
     let ends = counts[1..].to_vec();
     let mut order = vec![0; passed.len()];
     for (at, level) in passed {
+        monitor.check()?;
         let place = &mut counts[level as usize];
         order[*place] = at;
         *place += 1;
     }
-    (order, ends)
+    Ok((order, ends))
 }
 
 /// The lowest step that no more than `most` voxels reach.
@@ -177,19 +183,21 @@ fn lowest_step(
     steps: usize,
     step_of: impl Fn(f32) -> usize,
     most: usize,
-) -> usize {
+    monitor: &Monitor,
+) -> Result<usize, Cancelled> {
     let mut histogram = vec![0usize; steps + 1];
     for &v in blocks.values.iter().filter(|v| **v > 0.0) {
+        monitor.check()?;
         histogram[step_of(v)] += 1;
     }
     let mut above = 0;
     for step in (0..=steps).rev() {
         above += histogram[step];
         if above > most {
-            return (step + 1).min(steps);
+            return Ok((step + 1).min(steps));
         }
     }
-    0
+    Ok(0)
 }
 
 fn unite(parent: &mut [u32], sums: &mut [Sums], a: u32, b: u32) {

@@ -220,7 +220,7 @@ impl PatientOrientation {
         let mut field = Field::coarse(volume, None, COARSE_VOXEL_MM, monitor)?;
         monitor.check()?;
         field.blur(OUTLINE_BLUR_MM, monitor)?;
-        let Some(body) = Torso::around(&field, heart) else {
+        let Some(body) = Torso::around(&field, heart, monitor)? else {
             return Ok(Self::FRAME);
         };
         monitor.check()?;
@@ -251,7 +251,7 @@ struct Torso {
 }
 
 impl Torso {
-    fn around(field: &Field, heart: &Vec3) -> Option<Self> {
+    fn around(field: &Field, heart: &Vec3, monitor: &Monitor) -> Result<Option<Self>, Cancelled> {
         let shape = field.shape();
         let [nx, ny, _] = shape;
         let index = |v: usize| [v % nx, v / nx % ny, v / (nx * ny)];
@@ -263,31 +263,34 @@ impl Torso {
         let mut values: Vec<f32> = near.iter().map(|v| field.values()[*v]).collect();
         let middle = values.len() / 2;
         if values.is_empty() {
-            return None;
+            return Ok(None);
         }
         let (_, median, _) = values.select_nth_unstable_by(middle, f32::total_cmp);
         let level = BODY_BORDER_SHARE as f32 * *median;
         if !(level > 0.0) {
-            return None;
+            return Ok(None);
         }
         let mut labels = Labels::threshold(field.values(), shape, [0; 3], shape, level);
-        let parts = Components::of_inside(&labels);
+        let parts = Components::of_inside(&labels, monitor)?;
         let brightest = near
             .iter()
-            .max_by(|a, b| field.values()[**a].total_cmp(&field.values()[**b]))?;
-        let own = parts.containing(&labels, index(*brightest))?;
-        parts.paint(&mut labels, false, |part| part != own);
+            .max_by(|a, b| field.values()[**a].total_cmp(&field.values()[**b]));
+        let Some(own) = brightest.and_then(|v| parts.containing(&labels, index(*v))) else {
+            return Ok(None);
+        };
+        parts.paint(&mut labels, false, |part| part != own, monitor)?;
         // Number 0 is the air around.
-        Components::of_outside(&labels).paint(&mut labels, true, |part| part != 0);
+        let outside = Components::of_outside(&labels, monitor)?;
+        outside.paint(&mut labels, true, |part| part != 0, monitor)?;
         let mut mask = vec![0.0; field.values().len()];
         for [i, j, k] in labels.voxels() {
             mask[i + nx * (j + ny * k)] = 1.0;
         }
         let voxel = field.spacing().iter().product::<f64>();
-        Some(Self {
+        Ok(Some(Self {
             mask,
             litres: labels.count() as f64 * voxel / 1e6,
-        })
+        }))
     }
 }
 

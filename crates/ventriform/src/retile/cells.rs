@@ -86,13 +86,16 @@ impl Cells {
         let area: f64 = samples.area.iter().sum();
         let settled = SETTLED_SPACINGS * (area / self.sites.len() as f64).sqrt();
         let patches = Patches::new(samples, weights);
+        monitor.check()?;
         let mut border = Border::new(samples, &self.labels);
+        monitor.check()?;
         let mut means = Means::new(self, samples, weights);
         let mut velocities = vec![Vec3::zeros(); self.sites.len()];
         let mut moved = f64::INFINITY;
         for round in 0..rounds {
             monitor.check()?;
             border.reassign(self, samples, |v, from, to| means.change(v, from, to));
+            monitor.check()?;
             let exact = round + exact_rounds >= rounds || moved < settled;
             let mut centroids = if exact {
                 patches.centroids(&self.labels, &self.sites)

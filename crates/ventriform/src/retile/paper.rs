@@ -168,7 +168,7 @@ impl<'a> PaperRun<'a> {
             parameters,
             monitor,
             domain,
-            spacing: sizing::spacing(&samples, parameters, parameters.points),
+            spacing: sizing::spacing(&samples, parameters, parameters.points, monitor)?,
         })
     }
 }

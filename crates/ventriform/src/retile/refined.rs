@@ -26,7 +26,7 @@ use crate::geometry::random::{Purpose, stream};
 use crate::geometry::{Vec3, triangle};
 use crate::mesh::intersections::self_intersections;
 use crate::mesh::{FaceId, TriMesh, topology};
-use crate::progress::{Monitor, Stage};
+use crate::progress::{Cancelled, Monitor, Stage};
 use crate::surface::Surface;
 use rand::RngExt;
 use rayon::prelude::*;
@@ -80,7 +80,7 @@ pub(super) fn retile(
     if parameters.points < quotas::least_points(surface) {
         return Err(refusal(surface, parameters, monitor));
     }
-    let run = RefinedRun::new(surface, parameters);
+    let run = RefinedRun::new(surface, parameters, monitor)?;
     let mut facts = RetileFacts::default();
     for start in 0..RANDOM_STARTS {
         if let Some((mesh, sizing)) = run.attempt(start, MAX_REPAIRS, &mut facts, monitor)? {
@@ -109,7 +109,7 @@ fn refusal(surface: &Surface, parameters: &RetileParameters, monitor: &Monitor) 
         if by_repulsion(surface, larger, 1, monitor)?.is_some() {
             return Ok(true);
         }
-        let run = RefinedRun::new(surface, larger);
+        let run = RefinedRun::new(surface, larger, monitor)?;
         let mut ignored = RetileFacts::default();
         let made = run.attempt(0, HURRIED_REPAIRS, &mut ignored, monitor)?;
         Ok(made.is_some())
@@ -148,7 +148,11 @@ struct RefinedRun<'a> {
 }
 
 impl<'a> RefinedRun<'a> {
-    fn new(surface: &Surface, parameters: &'a RetileParameters) -> Self {
+    fn new(
+        surface: &Surface,
+        parameters: &'a RetileParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let points = parameters.points;
         let samples = WeightedSamples::new(
             &surface.mesh.vertices,
@@ -156,17 +160,21 @@ impl<'a> RefinedRun<'a> {
             &surface.mesh.triangles,
             points * SAMPLES_PER_CELL,
         );
-        let spacing = sizing::spacing(&samples, parameters, points);
+        monitor.check()?;
+        let spacing = sizing::spacing(&samples, parameters, points, monitor)?;
+        monitor.check()?;
         let weights = (samples.area.iter().zip(&spacing))
             .map(|(area, h)| area * h.powi(-4))
             .collect();
         let least = quotas::least_of(&surface.mesh.triangles, &surface.components());
+        monitor.check()?;
         // Points on the edges of one component belong to it.
         let components = match least.len() {
             1 => vec![0; samples.len()],
             _ => topology::components(samples.len(), &samples.triangles),
         };
-        Self {
+        monitor.check()?;
+        Ok(Self {
             parameters,
             points,
             volumes: topology::component_volumes(
@@ -179,7 +187,7 @@ impl<'a> RefinedRun<'a> {
             samples,
             spacing,
             weights,
-        }
+        })
     }
 
     /// One random start with its repairs. Returns the mesh and the relative spacing at each
@@ -200,9 +208,11 @@ impl<'a> RefinedRun<'a> {
             facts.attempts += 1;
             monitor.report(Stage::Retile, 0.8)?;
             cells.tidy(&self.samples);
+            monitor.check()?;
             let crowded = match dual::triangulate(&self.samples, &cells.labels, self.points) {
                 Err(invalid) => invalid.sites,
                 Ok(triangles) => {
+                    monitor.check()?;
                     let mut mesh = TriMesh {
                         vertices: self.vertices(&cells),
                         triangles,
@@ -224,11 +234,13 @@ impl<'a> RefinedRun<'a> {
                 return Ok(None);
             }
             self.raise_density(&cells, &crowded, &mut weights);
+            monitor.check()?;
             for &site in crowded.iter().take(MAX_TRANSPLANTS) {
                 let Some(light) = self.least_loaded(&cells, &weights, &crowded, site, &moved)
                 else {
                     return Ok(None);
                 };
+                monitor.check()?;
                 moved.push(light);
                 cells.transplant(&self.samples, light, site);
             }
@@ -521,7 +533,7 @@ mod tests {
     #[test]
     fn every_component_gets_seeds_by_its_area_and_spacing() {
         let (surface, parameters) = (two_balls(), even(90));
-        let mut run = RefinedRun::new(&surface, &parameters);
+        let mut run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         let mut load = [0.0; 2];
         for v in 0..run.samples.len() {
             let c = run.components[v] as usize;
@@ -546,7 +558,7 @@ mod tests {
     #[test]
     fn split_seeds_are_shared_out_as_random_ones() {
         let (surface, parameters) = (two_balls(), even(640));
-        let run = RefinedRun::new(&surface, &parameters);
+        let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         assert_eq!(run.coarse_to_fine(), [640, 160]);
         let small = |seeds: &[u32]| {
             let of_small = seeds.iter().filter(|v| run.components[**v as usize] == 1);
@@ -565,7 +577,7 @@ mod tests {
         }
         // Small numbers are relaxed at once.
         let parameters = even(COARSE_TO_FINE_FROM - 1);
-        let run = RefinedRun::new(&surface, &parameters);
+        let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         assert_eq!(run.coarse_to_fine(), [COARSE_TO_FINE_FROM - 1]);
     }
 
@@ -574,7 +586,7 @@ mod tests {
     fn seeds_are_as_dense_as_the_spacing_asks_for() {
         let surface = from_mesh(shapes::icosphere(10.0, 3), 1.0).unwrap();
         let parameters = even(400);
-        let mut run = RefinedRun::new(&surface, &parameters);
+        let mut run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         let is_upper = |run: &RefinedRun, v: usize| run.samples.working[v].z > 0.0;
         for v in 0..run.samples.len() {
             run.spacing[v] = if is_upper(&run, v) { 1.0 } else { 2.0 };
@@ -593,7 +605,7 @@ mod tests {
     #[test]
     fn the_density_rises_in_crowded_cells_and_those_beside_them() {
         let (surface, parameters) = (two_balls(), even(60));
-        let run = RefinedRun::new(&surface, &parameters);
+        let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         let cells = Cells::grow(&run.samples, &run.seeds(0, parameters.points));
         let crowded = [3, 17];
         let mut weights = run.weights.clone();
@@ -623,7 +635,7 @@ mod tests {
         let mut from_small = [0; 2];
         for points in [12, 60] {
             let parameters = even(points);
-            let run = RefinedRun::new(&surface, &parameters);
+            let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
             let cells = Cells::grow(&run.samples, &run.seeds(0, parameters.points));
             // Cells of the small ball are the lightest.
             let weight = |v: usize| {
@@ -673,7 +685,7 @@ mod tests {
     fn vertices_lie_in_their_cells_as_near_to_the_centroids_as_possible() {
         let surface = from_mesh(shapes::torus(20.0, 8.0, 24, 12), 1.0).unwrap();
         let parameters = even(40);
-        let run = RefinedRun::new(&surface, &parameters);
+        let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         let cells = Cells::grow(&run.samples, &run.seeds(1, parameters.points));
         let positions = &run.samples.surface;
         let centroids = cells.centroids(positions, &run.weights);
@@ -691,7 +703,7 @@ mod tests {
     #[test]
     fn the_sizing_of_a_vertex_is_the_mean_over_its_cell() {
         let (surface, parameters) = (two_balls(), even(50));
-        let mut run = RefinedRun::new(&surface, &parameters);
+        let mut run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         for (v, h) in run.spacing.iter_mut().enumerate() {
             *h = 1.0 + 0.5 * (v as f64).sin();
         }
@@ -712,7 +724,7 @@ mod tests {
             adaptive_from: 0.0,
             ..even(30)
         };
-        let run = RefinedRun::new(&surface, &parameters);
+        let run = RefinedRun::new(&surface, &parameters, &Monitor::silent()).unwrap();
         assert!(run.samples.len() >= 30 * SAMPLES_PER_CELL);
         assert!(run.spacing.iter().any(|h| *h > 1.01));
         for (v, weight) in run.weights.iter().enumerate() {
@@ -804,7 +816,9 @@ mod tests {
         let small = moved(shapes::tetrahedron(1.0), Vec3::repeat(30.0));
         let surface = from_mesh(together(&[ball, small]), 1.0).unwrap();
         let parameters = even(20);
-        let seeds = RefinedRun::new(&surface, &parameters).seeds(0, parameters.points);
+        let seeds = RefinedRun::new(&surface, &parameters, &Monitor::silent())
+            .unwrap()
+            .seeds(0, parameters.points);
         let on_small: BTreeSet<u32> = seeds.into_iter().filter(|v| *v >= first).collect();
         assert_eq!(on_small, (first..first + 4).collect());
     }

@@ -14,6 +14,7 @@
 use super::RetileParameters;
 use super::surface_samples::WeightedSamples;
 use crate::mesh::vertex_normals;
+use crate::progress::{Cancelled, Monitor};
 
 /// Largest ratio of two spacings.
 const LARGEST_RATIO: f64 = 2.5;
@@ -22,14 +23,18 @@ const LARGEST_RATIO: f64 = 2.5;
 const SMOOTHING_ROUNDS: usize = 10;
 
 /// The relative spacing at every sample: 1 on average; 1 everywhere for γ = 0.
+///
+/// # Errors
+/// [`Cancelled`].
 pub(super) fn spacing(
     samples: &WeightedSamples,
     parameters: &RetileParameters,
     points: usize,
-) -> Vec<f64> {
+    monitor: &Monitor,
+) -> Result<Vec<f64>, Cancelled> {
     let gamma = parameters.adaptive;
     if gamma == 0.0 {
-        return vec![1.0; samples.len()];
+        return Ok(vec![1.0; samples.len()]);
     }
     let area: f64 = samples.area.iter().sum();
     // Edge length of evenly spaced points: each has two equilateral triangles.
@@ -39,6 +44,7 @@ pub(super) fn spacing(
     let resolved = 8.0 * rise / (edge * edge);
     let mut curvature = curvedness(samples);
     for _ in 0..SMOOTHING_ROUNDS {
+        monitor.check()?;
         curvature = (0..samples.len())
             .map(|v| {
                 let around = samples.around(v);
@@ -49,10 +55,11 @@ pub(super) fn spacing(
     }
     let mut sorted = curvature.clone();
     sorted.sort_by(f64::total_cmp);
+    monitor.check()?;
     let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share) as usize];
     let (low, high) = (at(0.05).max(resolved), at(0.97));
     if !(low > 0.0) {
-        return vec![1.0; samples.len()];
+        return Ok(vec![1.0; samples.len()]);
     }
     let high = high.clamp(low, low * LARGEST_RATIO.powf(1.0 / gamma));
     let mut spacing: Vec<f64> = curvature
@@ -65,7 +72,7 @@ pub(super) fn spacing(
         .sum();
     let scale = (needed / area).sqrt();
     spacing.iter_mut().for_each(|h| *h *= scale);
-    spacing
+    Ok(spacing)
 }
 
 /// The curvedness κ at every sample of W, 1/mm.
@@ -114,7 +121,7 @@ mod tests {
             adaptive_from,
             ..RetileParameters::default()
         };
-        let h = spacing(&samples, &with(0.5, 0.0), 100);
+        let h = spacing(&samples, &with(0.5, 0.0), 100, &Monitor::silent()).unwrap();
         let density: f64 = (0..samples.len())
             .map(|v| samples.area[v] / h[v].powi(2))
             .sum();
@@ -122,7 +129,7 @@ mod tests {
         assert!(h.iter().any(|h| *h > 1.01) && h.iter().any(|h| *h < 0.99));
         // Without adaptation, or if the curvature is too low for it, spacing is even.
         for (parameters, points) in [(with(0.0, 0.0), 100), (with(0.5, 1.0), 10_000)] {
-            let h = spacing(&samples, &parameters, points);
+            let h = spacing(&samples, &parameters, points, &Monitor::silent()).unwrap();
             assert!(h.iter().all(|h| (h - 1.0).abs() < 1e-12));
         }
     }
@@ -156,7 +163,7 @@ mod tests {
     fn spacing_falls_with_the_power_of_the_curvedness() {
         let samples = on(&shapes::torus(30.0, 15.0, 120, 60));
         for gamma in [0.25, 0.5, 1.0] {
-            let h = spacing(&samples, &adapted(gamma, 0.0), 100);
+            let h = spacing(&samples, &adapted(gamma, 0.0), 100, &Monitor::silent()).unwrap();
             let (least, most) = extent(&h);
             let product = |v: usize| h[v] * exact(&samples.working[v], 30.0, 15.0).powf(gamma);
             let within = (0..h.len()).filter(|v| h[*v] > least * 1.001 && h[*v] < most / 1.001);
@@ -180,7 +187,7 @@ mod tests {
             triangles: mesh.triangles,
         };
         let samples = on(&mesh);
-        let h = spacing(&samples, &adapted(0.5, 0.0), 100);
+        let h = spacing(&samples, &adapted(0.5, 0.0), 100, &Monitor::silent()).unwrap();
         let (least, most) = extent(&h);
         assert!(most / least < LARGEST_RATIO);
         let share = |limit: f64| {
@@ -197,7 +204,8 @@ mod tests {
         let fat = shapes::torus(500.0, 200.0, 40, 20);
         let samples = on(&together(&[fat, shapes::torus(5.0, 2.0, 40, 20)]));
         for gamma in [0.3, 1.0] {
-            let (least, most) = extent(&spacing(&samples, &adapted(gamma, 0.0), 100));
+            let (least, most) =
+                extent(&spacing(&samples, &adapted(gamma, 0.0), 100, &Monitor::silent()).unwrap());
             assert!((most / least / LARGEST_RATIO - 1.0).abs() < 1e-9, "{gamma}");
         }
     }
@@ -220,7 +228,7 @@ mod tests {
             let triangle = mesh.area() / (2 * points) as f64;
             let squared_edge = triangle * 4.0 / 3f64.sqrt();
             let percent = 100.0 * limit * squared_edge / 8.0 / mesh.area().sqrt();
-            let h = spacing(&samples, &adapted(0.5, percent), points);
+            let h = spacing(&samples, &adapted(0.5, percent), points, &Monitor::silent()).unwrap();
             let (_, most) = extent(&h);
             let mut seen = [0; 2];
             for (v, h) in h.iter().enumerate() {
@@ -245,7 +253,7 @@ mod tests {
         let samples = on(&mesh);
         let raw = curvedness(&samples)[1000] * 20.0;
         assert!(raw > 2.0, "{raw}");
-        let h = spacing(&samples, &adapted(1.0, 0.0), 100);
+        let h = spacing(&samples, &adapted(1.0, 0.0), 100, &Monitor::silent()).unwrap();
         let (least, most) = extent(&h);
         assert!(most / least < 1.3, "{least} {most}");
     }

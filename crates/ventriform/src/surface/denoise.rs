@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::Bvh;
-use crate::mesh::intersections::self_intersections_by;
+use crate::mesh::intersections::self_intersections_while;
 use crate::mesh::{TriMesh, vertex_normals};
 use crate::numeric::order::upper_median;
 use crate::progress::{Cancelled, Monitor};
@@ -106,6 +106,7 @@ pub fn denoise(
         return Ok(None);
     }
     let laplacian = Laplacian::new(even, &mesh.triangles);
+    monitor.check()?;
     let probe = PROBE_LENGTH_VOXELS * spacing;
     let uniform = |length: f64| vec![length; even.len()];
     let [smooth, again] = laplacian.filter(&mesh.vertices, &uniform(probe), [1, 2], monitor)?;
@@ -115,10 +116,12 @@ pub fn denoise(
             .map(|((p, q), n)| (p - q).dot(n))
             .collect()
     };
+    monitor.check()?;
     let rest = heights(&mesh.vertices, &smooth);
     let bent = heights(&smooth, &again);
 
     let steepness = steepness(&smooth, &normals, &intensity, spacing);
+    monitor.check()?;
     let typical = upper_median(steepness.iter().copied());
     if !(typical > 0.0) {
         return Ok(None);
@@ -186,8 +189,9 @@ fn take_back_intersections(
     loop {
         monitor.check()?;
         let mut back = false;
-        let tree = Bvh::new(&mesh.vertices, &mesh.triangles);
-        for triangle in (self_intersections_by(mesh, &tree).into_iter()).flatten() {
+        let tree = Bvh::new_while(&mesh.vertices, &mesh.triangles, || monitor.check())?;
+        let pairs = self_intersections_while(mesh, &tree, || monitor.check())?;
+        for triangle in pairs.into_iter().flatten() {
             for v in mesh.triangles[triangle.index()] {
                 let (vertex, from) = (&mut mesh.vertices[v as usize], original[v as usize]);
                 back |= *vertex != from;
@@ -524,7 +528,7 @@ mod tests {
     }
 
     fn denoised(mesh: &mut TriMesh) -> SurfaceNoise {
-        let even = taubin(&mesh.vertices, &mesh.triangles, 15);
+        let even = taubin(&mesh.vertices, &mesh.triangles, 15, &Monitor::silent()).unwrap();
         let image = |p: &Vec3| STEEPNESS_PER_MM * (2.0 * RADIUS_MM - p.norm());
         let silent = Monitor::silent();
         denoise(mesh, &even, image, 2.0, &silent)

@@ -36,20 +36,25 @@ pub(super) fn select<'a>(
         Isolate::Box(first, last) => (first, [0, 1, 2].map(|r| last[r] - first[r] + 1)),
         _ => ([0; 3], volume.shape),
     };
-    let reference = iso_value::reference_in_box(volume, origin, extent, survey);
+    let reference = iso_value::reference_in_box(volume, origin, extent, survey, monitor)?;
     let iso = iso_value::choose(parameters.iso, reference, survey)?;
     iso_value::note(facts, iso, reference);
     facts.otsu = Some(f64::from(iso_value::otsu_in_box(
-        volume, origin, extent, survey,
-    )));
+        volume, origin, extent, survey, monitor,
+    )?));
     let mut labels = Labels::threshold(&volume.voxels, volume.shape, origin, extent, iso);
     if labels.count() == 0 {
         return Err(iso_value::no_surface(iso, survey));
     }
+    if !matches!(
+        parameters.isolate,
+        Isolate::Auto | Isolate::Largest | Isolate::Seed(_)
+    ) {
+        return Ok(Object::whole(volume, labels, iso));
+    }
+    let components = Components::of_inside(&labels, monitor)?;
     let one = match parameters.isolate {
-        Isolate::Auto | Isolate::Largest => Components::of_inside(&labels).largest(),
         Isolate::Seed(seed) => {
-            let components = Components::of_inside(&labels);
             let chosen = components.containing(&labels, seed);
             if chosen.is_none() {
                 return Err(SurfaceError::SeedOutside {
@@ -60,10 +65,10 @@ pub(super) fn select<'a>(
             }
             chosen
         }
-        _ => None,
+        _ => components.largest(),
     };
     if let Some(one) = one {
-        Components::of_inside(&labels).paint(&mut labels, false, |c| c != one);
+        components.paint(&mut labels, false, |c| c != one, monitor)?;
     }
     Ok(Object::whole(volume, labels, iso))
 }
@@ -96,7 +101,7 @@ fn find_ventricle(
             cavity.score
         ));
     }
-    let wall = WallShell::new(volume, &cavity);
+    let wall = WallShell::new(volume, &cavity, monitor)?;
     let asked = iso_value::choose(parameters.iso, wall.reference, survey)?;
     let Some(region) = wall.region(asked, monitor)? else {
         return Err(iso_value::no_surface(asked, survey));
@@ -112,7 +117,8 @@ fn find_ventricle(
         region.labels.origin,
         region.labels.extent,
         survey,
-    )));
+        monitor,
+    )?));
     facts.neighbour_voxels_cut = region.cut_voxels;
     facts.neighbour_cut_mm2 = region.cut_area;
     if region.cut_voxels > 0 {

@@ -10,7 +10,7 @@
 use super::{IsoLevel, SurfaceError, SurfaceFacts, region};
 use crate::grid::Volume;
 use crate::grid::survey::{self, Survey};
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 
 /// Volume of enclosed voids above which the cavity counts as closed, ml.
 const CLOSED_ML: f64 = 2.0;
@@ -58,11 +58,14 @@ pub(super) fn move_from(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<(f32, region::Region), SurfaceError> {
-    let enclosed_ml =
-        |r: &region::Region| r.enclosed_voxels() as f64 * volume.frame.voxel_volume() / 1000.0;
+    let voxel_ml = volume.frame.voxel_volume() / 1000.0;
+    let enclosed_ml = |r: &region::Region| {
+        let voxels = r.enclosed_voxels(monitor)?;
+        Ok::<f64, Cancelled>(voxels as f64 * voxel_ml)
+    };
     let (fractions, why): (&[f32], _) = if region.is_torn() {
         (&[0.45, 0.4, 0.35], "the wall falls into pieces")
-    } else if enclosed_ml(&region) > CLOSED_ML {
+    } else if enclosed_ml(&region)? > CLOSED_ML {
         (&[0.55, 0.6], "the cavity closes at the base")
     } else {
         return Ok((iso, region));
@@ -71,7 +74,7 @@ pub(super) fn move_from(
         let level = fraction * wall.reference;
         if let Some(moved) = wall.region(level, monitor)?
             && !moved.is_torn()
-            && enclosed_ml(&moved) <= CLOSED_ML
+            && enclosed_ml(&moved)? <= CLOSED_ML
         {
             facts.warnings.push(format!(
                 "at half the reference intensity {why}; the iso-value was moved to {fraction} of it"
@@ -86,16 +89,25 @@ pub(super) fn move_from(
 }
 
 /// 98th percentile of the voxels above 0.3 of the box's maximum.
+///
+/// # Errors
+/// [`Cancelled`].
 pub(super) fn reference_in_box(
     volume: &Volume,
     origin: [usize; 3],
     extent: [usize; 3],
     survey: &Survey,
-) -> f32 {
-    let values = || rows_in_box(volume, origin, extent).flatten().copied();
-    let highest = values()
-        .filter(|v| v.is_finite())
-        .fold(survey.minimum, f32::max);
+    monitor: &Monitor,
+) -> Result<f32, Cancelled> {
+    let mut highest = survey.minimum;
+    for row in rows_in_box(volume, origin, extent) {
+        monitor.check()?;
+        highest = row
+            .iter()
+            .copied()
+            .filter(|v| v.is_finite())
+            .fold(highest, f32::max);
+    }
     let floor = if highest > 0.0 {
         0.3 * highest
     } else {
@@ -105,22 +117,26 @@ pub(super) fn reference_in_box(
     const HISTOGRAM_BINS: usize = 4096;
     let width = f64::from(highest) - f64::from(floor);
     if !(width > 0.0) {
-        return highest;
+        return Ok(highest);
     }
     let mut histogram = vec![0u64; HISTOGRAM_BINS];
-    for v in values().filter(|v| v.is_finite() && *v > floor) {
-        let bin = ((f64::from(v) - f64::from(floor)) / width * HISTOGRAM_BINS as f64) as usize;
-        histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
+    for row in rows_in_box(volume, origin, extent) {
+        monitor.check()?;
+        for v in row.iter().filter(|v| v.is_finite() && **v > floor) {
+            let bin = ((f64::from(*v) - f64::from(floor)) / width * HISTOGRAM_BINS as f64) as usize;
+            histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
+        }
     }
     let total: u64 = histogram.iter().sum();
     let mut below = 0;
     for (bin, n) in histogram.iter().enumerate() {
         below += n;
         if 100 * below >= 98 * total {
-            return (f64::from(floor) + (bin as f64 + 0.5) / HISTOGRAM_BINS as f64 * width) as f32;
+            let share = (bin as f64 + 0.5) / HISTOGRAM_BINS as f64;
+            return Ok((f64::from(floor) + share * width) as f32);
         }
     }
-    highest
+    Ok(highest)
 }
 
 pub(super) fn otsu_in_box(
@@ -128,9 +144,10 @@ pub(super) fn otsu_in_box(
     origin: [usize; 3],
     extent: [usize; 3],
     survey: &Survey,
-) -> f32 {
+    monitor: &Monitor,
+) -> Result<f32, Cancelled> {
     let rows: Vec<&[f32]> = rows_in_box(volume, origin, extent).collect();
-    survey::otsu(&rows, survey.minimum, survey.maximum)
+    survey::otsu(&rows, survey.minimum, survey.maximum, monitor)
 }
 
 fn rows_in_box(

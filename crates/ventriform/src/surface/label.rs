@@ -9,7 +9,7 @@ use crate::geometry::frame::VoxelToPatient;
 use crate::grid::Volume;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 
 /// Selects the voxels of `label`, smoothed so that their surface has no staircase.
 ///
@@ -33,13 +33,13 @@ pub(super) fn select<'a>(
     let ball = parameters.topology == TopologyMode::Genus0;
     let mut count = given.count();
     let (mut mask, mut joined) = if ball {
-        masks::joined(&given)
+        masks::joined(&given, monitor)?
     } else {
         (given.clone(), 0)
     };
     let mut smoothed = masks::smooth(&mask, count, asked, &volume.frame, monitor)?;
     let mut dropped = [0; 2];
-    if ball && let Some((kept, parts)) = masks::largest_part(&mask, &smoothed) {
+    if ball && let Some((kept, parts)) = masks::largest_part(&mask, &smoothed, monitor)? {
         // The level has to suit the volume of what remains of the label, without what joined its parts.
         let remaining = given.voxels().filter(|&p| kept.get(p)).count();
         dropped = [parts, count - remaining];
@@ -55,7 +55,9 @@ pub(super) fn select<'a>(
         ));
     }
     let level = match parameters.iso {
-        IsoLevel::Auto if ball && !is_ball(&masks::at_level(&smoothed, smoothed.level)) => {
+        IsoLevel::Auto
+            if ball && !is_ball(&masks::at_level(&smoothed, smoothed.level), monitor)? =>
+        {
             masks::level_as_ball(&smoothed, count, &volume.frame, monitor)?
         }
         IsoLevel::Auto => smoothed.level,
@@ -98,10 +100,10 @@ pub(super) fn select<'a>(
 
 /// `true` for one component without cavities and handles. The Euler characteristic alone does not tell: it
 /// is 1 for a handle and a cavity, too.
-fn is_ball(labels: &Labels) -> bool {
-    labels.euler_characteristic() == 1
-        && Components::of_inside(labels).sizes.len() == 1
-        && Components::of_outside(labels).sizes.len() == 1
+fn is_ball(labels: &Labels, monitor: &Monitor) -> Result<bool, Cancelled> {
+    Ok(labels.euler_characteristic() == 1
+        && Components::of_inside(labels, monitor)?.sizes.len() == 1
+        && Components::of_outside(labels, monitor)?.sizes.len() == 1)
 }
 
 /// The voxels that carry `label`, in the smallest box that holds them.
@@ -202,7 +204,7 @@ mod tests {
         let holed = label_map(|p| solid(p) && !hollow(p));
         let labels = mask_of(&holed, 1);
         assert_eq!(labels.euler_characteristic(), 1);
-        assert!(!is_ball(&labels));
+        assert!(!is_ball(&labels, &Monitor::silent()).unwrap());
         let (share, facts) = volume_share(&holed, labels.count());
         assert_eq!((facts.handles_before, facts.cavities_before), (1, 1));
         assert!((share - 1.0).abs() < 0.02, "{share}");

@@ -24,7 +24,7 @@ use crate::grid::blur::{Kernel, blur};
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
 use crate::mesh::TriMesh;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 
 /// Multiple of sigma at which the Gaussian is cut off.
 const KERNEL_SIGMAS: f64 = 4.0;
@@ -68,7 +68,7 @@ pub fn smooth(
     frame: &VoxelToPatient,
     monitor: &Monitor,
 ) -> Result<Smoothed, MarchingCubesError> {
-    let wanted = parts(mask);
+    let wanted = parts(mask, monitor)?;
     let mut used = sigma;
     while used > 0.1 {
         let candidate = levelled(with_sigma(mask, used, frame), count, frame, monitor)?;
@@ -78,7 +78,7 @@ pub fn smooth(
             .voxels()
             .filter(|p| labels.get([0, 1, 2].map(|r| p[r] + margin[r])))
             .count();
-        if parts(&labels) == wanted && 10 * kept >= 9 * mask.count() {
+        if parts(&labels, monitor)? == wanted && 10 * kept >= 9 * mask.count() {
             return Ok(candidate);
         }
         used /= 2.0;
@@ -88,16 +88,22 @@ pub fn smooth(
 
 /// `mask` with the voxels that join its 6-connected parts face to face where they touch along edges, and at
 /// corners where they do only that; and the number of voxels added.
-pub fn joined(mask: &Labels) -> (Labels, usize) {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn joined(mask: &Labels, monitor: &Monitor) -> Result<(Labels, usize), Cancelled> {
     let mut joined = mask.clone();
     let mut axes = 2;
     while axes <= 3 {
-        let parts = Components::of_inside(&joined);
+        let parts = Components::of_inside(&joined, monitor)?;
         if parts.sizes.len() < 2 {
             break;
         }
         let mut added = Vec::new();
-        for (p, part) in joined.voxels().zip(parts.of_voxels()) {
+        for (n, (p, part)) in joined.voxels().zip(parts.of_voxels()).enumerate() {
+            if n.is_multiple_of(1 << 14) {
+                monitor.check()?;
+            }
             for q in touching(p, axes, joined.extent) {
                 if joined.get(q) && parts.containing(&joined, q) != Some(part) {
                     added.extend(path(&joined, p, q));
@@ -111,7 +117,7 @@ pub fn joined(mask: &Labels) -> (Labels, usize) {
         }
     }
     let added = joined.count() - mask.count();
-    (joined, added)
+    Ok((joined, added))
 }
 
 /// The voxels of a box of `extent` that differ from `p` by one step along each of exactly `axes` axes, after
@@ -165,15 +171,21 @@ fn neighbours(mask: &Labels, p: [usize; 3]) -> usize {
 
 /// `mask` without the parts that smoothing leaves apart from the largest, and their number. What smoothing
 /// joins to the largest part stays.
-pub fn largest_part(mask: &Labels, smoothed: &Smoothed) -> Option<(Labels, usize)> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn largest_part(
+    mask: &Labels,
+    smoothed: &Smoothed,
+    monitor: &Monitor,
+) -> Result<Option<(Labels, usize)>, Cancelled> {
     let mut labels = at_level(smoothed, smoothed.level);
-    let joined = Components::of_inside(&labels);
-    if joined.sizes.len() < 2 {
-        return None;
-    }
-    let largest = joined.largest()?;
-    joined.paint(&mut labels, false, |c| c != largest);
-    let own = Components::of_inside(mask);
+    let joined = Components::of_inside(&labels, monitor)?;
+    let (2.., Some(largest)) = (joined.sizes.len(), joined.largest()) else {
+        return Ok(None);
+    };
+    joined.paint(&mut labels, false, |c| c != largest, monitor)?;
+    let own = Components::of_inside(mask, monitor)?;
     let margin = margin(mask, smoothed);
     let mut stays = vec![false; own.sizes.len()];
     for (p, part) in mask.voxels().zip(own.of_voxels()) {
@@ -181,8 +193,8 @@ pub fn largest_part(mask: &Labels, smoothed: &Smoothed) -> Option<(Labels, usize
     }
     let parts = stays.iter().filter(|stays| !**stays).count();
     let mut kept = mask.clone();
-    own.paint(&mut kept, false, |part| !stays[part]);
-    (parts > 0 && kept.count() > 0).then_some((kept, parts))
+    own.paint(&mut kept, false, |part| !stays[part], monitor)?;
+    Ok((parts > 0 && kept.count() > 0).then_some((kept, parts)))
 }
 
 /// The surface of `labels` at `level` of the values of a mask, with `passes` of Taubin's smoothing.
@@ -203,7 +215,7 @@ pub fn surface_of(
         beyond: 0.0,
     };
     let mut mesh = marching_cubes(labels, &samples, level, frame, monitor)?;
-    mesh.vertices = smoothing::taubin(&mesh.vertices, &mesh.triangles, passes);
+    mesh.vertices = smoothing::taubin(&mesh.vertices, &mesh.triangles, passes, monitor)?;
     Ok(mesh)
 }
 
@@ -219,10 +231,10 @@ fn margin(mask: &Labels, smoothed: &Smoothed) -> [usize; 3] {
 }
 
 /// Number of components that hold at least a hundredth of the voxels.
-fn parts(labels: &Labels) -> usize {
-    let sizes = Components::of_inside(labels).sizes;
+fn parts(labels: &Labels, monitor: &Monitor) -> Result<usize, Cancelled> {
+    let sizes = Components::of_inside(labels, monitor)?.sizes;
     let all: usize = sizes.iter().sum();
-    sizes.iter().filter(|&&size| 100 * size >= all).count()
+    Ok(sizes.iter().filter(|&&size| 100 * size >= all).count())
 }
 
 fn with_sigma(mask: &Labels, sigma: f64, frame: &VoxelToPatient) -> Smoothed {
@@ -515,8 +527,9 @@ mod tests {
 
     /// Against the definition: after it no two parts touch along an edge or at a corner, and nothing is lost.
     fn is_joined(mask: &Labels) -> bool {
-        let (whole, added) = joined(mask);
-        let parts = Components::of_inside(&whole);
+        let monitor = Monitor::silent();
+        let (whole, added) = joined(mask, &monitor).unwrap();
+        let parts = Components::of_inside(&whole, &monitor).unwrap();
         let mut apart = true;
         for (p, part) in whole.voxels().zip(parts.of_voxels()) {
             for axes in [2, 3] {
@@ -540,7 +553,8 @@ mod tests {
     #[test]
     fn parts_that_do_not_touch_stay_apart() {
         let mask = Labels::of_shape([7, 3, 3], |p| p[0] < 3 || p[0] > 4);
-        assert_eq!(joined(&mask), (mask, 0));
+        let (whole, added) = joined(&mask, &Monitor::silent()).unwrap();
+        assert_eq!((whole, added), (mask, 0));
     }
 
     #[test]
@@ -576,7 +590,9 @@ mod tests {
             &Monitor::silent(),
         )
         .unwrap();
-        let (kept, parts) = largest_part(&object, &smoothed).unwrap();
+        let monitor = Monitor::silent();
+        let found = largest_part(&object, &smoothed, &monitor).unwrap();
+        let (kept, parts) = found.unwrap();
         assert!(parts >= 1, "{parts}");
         assert!(object.count() - kept.count() >= 8, "{}", kept.count());
         assert!(kept.get([3, 3, 3]) && !kept.get([18, 0, 0]));

@@ -42,7 +42,7 @@ use crate::geometry::bvh::Bvh;
 use crate::grid::Volume;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Census};
-use crate::progress::{Monitor, Stage};
+use crate::progress::{Cancelled, Monitor, Stage};
 
 use crate::grid::components::Components;
 use crate::grid::survey::Survey;
@@ -142,8 +142,11 @@ pub fn extract(
         .spacing()
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    let (census, working) = rayon::join(|| topology::check(&mesh), || working_surface(&mesh));
-    let census = census?;
+    let (census, working) = rayon::join(
+        || topology::check(&mesh),
+        || working_surface(&mesh, monitor),
+    );
+    let (census, working) = (census?, working?);
     let mut tree = None;
     if parameters.denoise == Denoise::Auto && object.mask.is_none() {
         let intensity = |p: &Vec3| object.at(p);
@@ -225,12 +228,12 @@ pub fn from_mesh(mesh: TriMesh, spacing: f64) -> Result<Surface, SurfaceError> {
         region_ml: mesh.volume() / 1000.0,
         ..SurfaceFacts::default()
     };
-    let working = working_surface(&mesh);
+    let working = working_surface(&mesh, &Monitor::silent())?;
     Ok(finish(mesh, working, census, spacing, facts))
 }
 
-fn working_surface(mesh: &TriMesh) -> Vec<Vec3> {
-    smoothing::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES)
+fn working_surface(mesh: &TriMesh, monitor: &Monitor) -> Result<Vec<Vec3>, Cancelled> {
+    smoothing::taubin(&mesh.vertices, &mesh.triangles, WORKING_PASSES, monitor)
 }
 
 fn finish(
@@ -272,8 +275,9 @@ fn control_topology(
     facts: &mut SurfaceFacts,
     monitor: &Monitor,
 ) -> Result<(), SurfaceError> {
-    let parts = Components::of_inside(&object.labels);
-    let cavities = Components::of_outside(&object.labels).sizes.len() - 1;
+    let parts = Components::of_inside(&object.labels, monitor)?;
+    let outside = Components::of_outside(&object.labels, monitor)?;
+    let cavities = outside.sizes.len() - 1;
     let chi = object.labels.euler_characteristic();
     let [parts_before, voxels_before] = object.mask.map_or([0; 2], |mask| mask.dropped);
     facts.components_before = parts.sizes.len() + parts_before;

@@ -65,8 +65,12 @@ impl Region {
     }
 
     /// Voxels of the cavities that the region encloses.
-    pub fn enclosed_voxels(&self) -> usize {
-        Components::of_outside(&self.labels).sizes[1..].iter().sum()
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn enclosed_voxels(&self, monitor: &Monitor) -> Result<usize, Cancelled> {
+        let outside = Components::of_outside(&self.labels, monitor)?;
+        Ok(outside.sizes[1..].iter().sum())
     }
 }
 
@@ -80,7 +84,14 @@ enum Zone {
 
 impl<'a> WallShell<'a> {
     /// Measures the wall's intensity.
-    pub fn new(volume: &'a Volume, cavity: &'a Cavity) -> Self {
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn new(
+        volume: &'a Volume,
+        cavity: &'a Cavity,
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let spacing = volume.frame.spacing();
         let reach = cavity.distances.iter().copied().fold(0.0, f64::max) + MAX_OUTWARD_MM + 6.0;
         let mut origin = [0; 3];
@@ -100,8 +111,8 @@ impl<'a> WallShell<'a> {
             extent,
             reference: 0.0,
         };
-        wall.reference = wall.measure();
-        wall
+        wall.reference = wall.measure(monitor)?;
+        Ok(wall)
     }
 
     fn value(&self, p: [usize; 3]) -> f32 {
@@ -130,26 +141,29 @@ impl<'a> WallShell<'a> {
         }
     }
 
-    fn measure(&self) -> f32 {
+    fn measure(&self, monitor: &Monitor) -> Result<f32, Cancelled> {
         let level = self.cavity.level as f32 * 0.5;
         let values = &self.volume.voxels;
         let bright = Labels::threshold(values, self.volume.shape, self.origin, self.extent, level);
         let mut wall: Vec<f32> = bright
             .par_voxels()
-            .filter(|&p| {
+            .filter_map(|p| {
+                if let Err(cancelled) = monitor.check() {
+                    return Some(Err(cancelled));
+                }
                 let (depth, seen) = self.depth(p);
-                seen && depth.abs() <= REFERENCE_DISTANCE_MM
+                let value = self.value(p);
+                let of_wall = seen && depth.abs() <= REFERENCE_DISTANCE_MM && value.is_finite();
+                of_wall.then_some(Ok(value))
             })
-            .map(|p| self.value(p))
-            .filter(|v| v.is_finite())
-            .collect();
+            .collect::<Result<_, Cancelled>>()?;
         let maximum = wall.iter().copied().fold(0.0, f32::max);
         wall.retain(|&v| v > 0.3 * maximum);
         if wall.is_empty() {
-            return maximum;
+            return Ok(maximum);
         }
         let place = (wall.len() - 1) * 98 / 100;
-        *wall.select_nth_unstable_by(place, f32::total_cmp).1
+        Ok(*wall.select_nth_unstable_by(place, f32::total_cmp).1)
     }
 
     /// The region at `iso`; `None` where no voxel of the wall reaches it.
@@ -160,10 +174,13 @@ impl<'a> WallShell<'a> {
         let values = &self.volume.voxels;
         let mut labels =
             Labels::threshold(values, self.volume.shape, self.origin, self.extent, iso);
-        let components = Components::of_inside(&labels);
-        monitor.check()?;
+        let components = Components::of_inside(&labels, monitor)?;
+        let zone = |p| {
+            monitor.check()?;
+            Ok((p, self.zone(p)))
+        };
         let zones: Vec<([usize; 3], Zone)> =
-            labels.par_voxels().map(|p| (p, self.zone(p))).collect();
+            (labels.par_voxels().map(zone)).collect::<Result<_, Cancelled>>()?;
         let mut core = vec![0usize; components.sizes.len()];
         let mut beyond = vec![0usize; components.sizes.len()];
         for (&(_, zone), c) in zones.iter().zip(components.of_voxels()) {
@@ -180,7 +197,7 @@ impl<'a> WallShell<'a> {
             return Ok(None);
         }
         let core_voxels = core.iter().sum::<usize>();
-        components.paint(&mut labels, false, |c| c != chosen);
+        components.paint(&mut labels, false, |c| c != chosen, monitor)?;
         let mut region = Region {
             labels,
             cut_voxels: 0,
@@ -189,18 +206,22 @@ impl<'a> WallShell<'a> {
             loose_voxels: core_voxels - core[chosen],
         };
         if beyond[chosen] > 0 {
-            self.cut(&mut region, &zones);
-            monitor.check()?;
-            let parts = Components::of_inside(&region.labels);
+            self.cut(&mut region, &zones, monitor)?;
+            let parts = Components::of_inside(&region.labels, monitor)?;
             if let Some(largest) = parts.largest() {
-                parts.paint(&mut region.labels, false, |c| c != largest);
+                parts.paint(&mut region.labels, false, |c| c != largest, monitor)?;
             }
         }
         Ok(Some(region))
     }
 
     /// Watershed between the wall's core and everything beyond it.
-    fn cut(&self, region: &mut Region, zones: &[([usize; 3], Zone)]) {
+    fn cut(
+        &self,
+        region: &mut Region,
+        zones: &[([usize; 3], Zone)],
+        monitor: &Monitor,
+    ) -> Result<(), Cancelled> {
         const FREE_VOXEL: u8 = 0;
         const VENTRICLE_VOXEL: u8 = 1;
         const NEIGHBOUR_VOXEL: u8 = 2;
@@ -221,6 +242,7 @@ impl<'a> WallShell<'a> {
             })
         };
         for &(p, zone) in zones {
+            monitor.check()?;
             let mark = match zone {
                 Zone::Core => VENTRICLE_VOXEL,
                 Zone::Beyond => NEIGHBOUR_VOXEL,
@@ -232,6 +254,7 @@ impl<'a> WallShell<'a> {
             }
         }
         while let Some((_, std::cmp::Reverse(at))) = heap.pop() {
+            monitor.check()?;
             let p = [at % nx, at / nx % ny, at / (nx * ny)];
             for q in neighbours(p) {
                 if region.labels.get(q) && owner[index(q)] == FREE_VOXEL {
@@ -242,6 +265,7 @@ impl<'a> WallShell<'a> {
         }
         let spacing = self.spacing;
         for &(p, _) in zones {
+            monitor.check()?;
             if owner[index(p)] != NEIGHBOUR_VOXEL {
                 continue;
             }
@@ -254,6 +278,7 @@ impl<'a> WallShell<'a> {
                 }
             }
         }
+        Ok(())
     }
 }
 

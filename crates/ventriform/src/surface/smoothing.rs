@@ -4,6 +4,7 @@
 //! and the noise without shrinking the surface.
 
 use crate::geometry::Vec3;
+use crate::progress::{Cancelled, Monitor};
 
 /// Weight of the shrinking step.
 const SHRINKING_WEIGHT: f64 = 0.5;
@@ -11,7 +12,15 @@ const SHRINKING_WEIGHT: f64 = 0.5;
 const GROWING_WEIGHT: f64 = -0.53;
 
 /// Smooths the vertices of a closed mesh by `passes` pairs of steps.
-pub fn taubin(vertices: &[Vec3], triangles: &[[u32; 3]], passes: usize) -> Vec<Vec3> {
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn taubin(
+    vertices: &[Vec3],
+    triangles: &[[u32; 3]],
+    passes: usize,
+    monitor: &Monitor,
+) -> Result<Vec<Vec3>, Cancelled> {
     let mut current = vertices.to_vec();
     // In a closed, oriented mesh every neighbour of a vertex follows it in exactly one
     // triangle: the umbrella's sum and count need no adjacency.
@@ -21,6 +30,7 @@ pub fn taubin(vertices: &[Vec3], triangles: &[[u32; 3]], passes: usize) -> Vec<V
     }
     let mut sums = vec![Vec3::zeros(); vertices.len()];
     for pass in 0..2 * passes {
+        monitor.check()?;
         let weight = if pass % 2 == 0 {
             SHRINKING_WEIGHT
         } else {
@@ -40,7 +50,7 @@ pub fn taubin(vertices: &[Vec3], triangles: &[[u32; 3]], passes: usize) -> Vec<V
             }
         }
     }
-    current
+    Ok(current)
 }
 
 #[cfg(test)]
@@ -60,7 +70,7 @@ mod tests {
             (sum / vertices.len() as f64).sqrt()
         };
         let before = spread(&mesh.vertices);
-        mesh.vertices = taubin(&mesh.vertices, &mesh.triangles, 15);
+        mesh.vertices = taubin(&mesh.vertices, &mesh.triangles, 15, &Monitor::silent()).unwrap();
         assert!(spread(&mesh.vertices) < 0.4 * before);
         assert!((mesh.volume() / exact - 1.0).abs() < 0.01);
     }

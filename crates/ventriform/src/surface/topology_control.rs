@@ -43,15 +43,15 @@ pub fn make_ball(
     monitor: &Monitor,
 ) -> Result<Changes, Cancelled> {
     let mut changes = Changes::default();
-    let components = Components::of_inside(labels);
+    let components = Components::of_inside(labels, monitor)?;
     if components.sizes.len() > 1
         && let Some(largest) = components.largest()
     {
-        components.paint(labels, false, |c| c != largest);
+        components.paint(labels, false, |c| c != largest, monitor)?;
     }
-    let outside = Components::of_outside(labels);
+    let outside = Components::of_outside(labels, monitor)?;
     changes.filled += outside.sizes[1..].iter().sum::<usize>();
-    outside.paint(labels, true, |c| c > 0);
+    outside.paint(labels, true, |c| c > 0, monitor)?;
     if labels.euler_characteristic() == 1 {
         return Ok(changes);
     }
@@ -82,12 +82,14 @@ fn grow(
     value: &impl Fn([usize; 3]) -> f32,
     monitor: &Monitor,
 ) -> Result<Labels, Cancelled> {
-    let mut ball = Grid::new(object, low, extent);
-    let start = object
-        .voxels()
-        .max_by_key(|&p| (ordered(value(p)), std::cmp::Reverse(p)));
+    let mut ball = Grid::new(object, low, extent, monitor)?;
+    let mut start = None;
+    for p in object.voxels() {
+        monitor.check()?;
+        start = start.max(Some((ordered(value(p)), std::cmp::Reverse(p))));
+    }
     let mut front = Front::default();
-    if let Some(p) = start {
+    if let Some((_, std::cmp::Reverse(p))) = start {
         // The first voxel is no neighbour of anything, hence not simple.
         let at = ball.index(p);
         ball.cells[at] |= INSIDE_BALL;
@@ -98,12 +100,8 @@ fn grow(
             |p| ordered(value(p)),
         );
     }
-    let mut steps = 0u32;
     while let Some(at) = front.pop(&mut ball) {
-        steps += 1;
-        if steps.is_multiple_of(1 << 16) {
-            monitor.check()?;
-        }
+        monitor.check()?;
         if ball.cells[at] & INSIDE_BALL != 0 || !is_simple(ball.around(at)) {
             continue;
         }
@@ -116,7 +114,7 @@ fn grow(
             |p| ordered(value(p)),
         );
     }
-    Ok(ball.into_labels(object))
+    ball.into_labels(object, monitor)
 }
 
 /// Shrinks the box around `object` to a ball that still holds it.
@@ -127,9 +125,10 @@ fn shrink(
     value: &impl Fn([usize; 3]) -> f32,
     monitor: &Monitor,
 ) -> Result<Labels, Cancelled> {
-    let mut ball = Grid::new(object, low, extent);
+    let mut ball = Grid::new(object, low, extent, monitor)?;
     let mut front = Front::default();
     for at in 0..ball.cells.len() {
+        monitor.check()?;
         let Some(p) = ball.voxel(at) else {
             continue;
         };
@@ -139,12 +138,8 @@ fn shrink(
             front.push(&mut ball, at, !ordered(value(p)));
         }
     }
-    let mut steps = 0u32;
     while let Some(at) = front.pop(&mut ball) {
-        steps += 1;
-        if steps.is_multiple_of(1 << 16) {
-            monitor.check()?;
-        }
+        monitor.check()?;
         if ball.cells[at] & INSIDE_BALL == 0 || !is_simple(ball.around(at)) {
             continue;
         }
@@ -157,7 +152,7 @@ fn shrink(
             |p| !ordered(value(p)),
         );
     }
-    Ok(ball.into_labels(object))
+    ball.into_labels(object, monitor)
 }
 
 /// Queue of voxels by falling key, of equals the first in array order. A voxel is queued once: a
@@ -194,7 +189,12 @@ struct Grid {
 
 impl Grid {
     /// The box with the object in it and an empty ball.
-    fn new(object: &Labels, low: [usize; 3], extent: [usize; 3]) -> Self {
+    fn new(
+        object: &Labels,
+        low: [usize; 3],
+        extent: [usize; 3],
+        monitor: &Monitor,
+    ) -> Result<Self, Cancelled> {
         let size = extent.map(|e| e + 2);
         let mut grid = Self {
             low,
@@ -202,10 +202,11 @@ impl Grid {
             cells: vec![0; size.iter().product()],
         };
         for p in object.voxels() {
+            monitor.check()?;
             let at = grid.index(p);
             grid.cells[at] = INSIDE_OBJECT;
         }
-        grid
+        Ok(grid)
     }
 
     fn index(&self, p: [usize; 3]) -> usize {
@@ -260,14 +261,15 @@ impl Grid {
         }
     }
 
-    fn into_labels(self, like: &Labels) -> Labels {
+    fn into_labels(self, like: &Labels, monitor: &Monitor) -> Result<Labels, Cancelled> {
         let mut labels = Labels::empty(like.origin, like.extent);
         for at in (0..self.cells.len()).filter(|&at| self.cells[at] & INSIDE_BALL != 0) {
+            monitor.check()?;
             if let Some(p) = self.voxel(at) {
                 labels.set(p, true);
             }
         }
-        labels
+        Ok(labels)
     }
 }
 
@@ -332,8 +334,11 @@ mod tests {
 
     fn assert_ball(labels: &Labels) {
         assert_eq!(labels.euler_characteristic(), 1);
-        assert_eq!(Components::of_inside(labels).sizes.len(), 1);
-        assert_eq!(Components::of_outside(labels).sizes.len(), 1);
+        let monitor = Monitor::silent();
+        let inside = Components::of_inside(labels, &monitor).unwrap();
+        assert_eq!(inside.sizes.len(), 1);
+        let outside = Components::of_outside(labels, &monitor).unwrap();
+        assert_eq!(outside.sizes.len(), 1);
     }
 
     /// Simple by its consequences: neither the object's nor the background's components nor
@@ -351,7 +356,8 @@ mod tests {
                 // The Euler characteristic and the components within the neighbourhood: the
                 // object's that touch the middle's faces, the background's that touch it.
                 let chi = labels.euler_characteristic();
-                (chi, Components::of_inside(labels).sizes.len())
+                let inside = Components::of_inside(labels, &Monitor::silent()).unwrap();
+                (chi, inside.sizes.len())
             };
             let with = facts(true, &mut labels);
             let without = facts(false, &mut labels);
@@ -372,7 +378,8 @@ mod tests {
 
     /// The oracle: shrinking that tests a voxel again after every change of a neighbour.
     fn shrink_plainly(object: &Labels, value: impl Fn([usize; 3]) -> f32) -> Labels {
-        let mut ball = Grid::new(object, [0; 3], object.extent);
+        let monitor = Monitor::silent();
+        let mut ball = Grid::new(object, [0; 3], object.extent, &monitor).unwrap();
         let mut front = BinaryHeap::new();
         for at in 0..ball.cells.len() {
             if let Some(p) = ball.voxel(at) {
@@ -394,7 +401,7 @@ mod tests {
                 }
             }
         }
-        ball.into_labels(object)
+        ball.into_labels(object, &monitor).unwrap()
     }
 
     #[test]

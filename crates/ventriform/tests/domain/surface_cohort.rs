@@ -112,7 +112,8 @@ fn every_patients_ventricle_is_found() {
         let iso = surface.facts.iso_value as f32;
         let heart = locate::find(&volume, &locate::Hints::default(), &Monitor::silent()).unwrap();
         let found = heart.cavity(&Monitor::silent()).unwrap().unwrap();
-        let region = region::WallShell::new(&volume, &found)
+        let region = region::WallShell::new(&volume, &found, &Monitor::silent())
+            .unwrap()
             .region(iso, &Monitor::silent())
             .unwrap()
             .unwrap();

@@ -13,6 +13,8 @@ mod fans;
 mod index;
 mod pair;
 
+use std::convert::Infallible;
+
 use rayon::prelude::*;
 
 use super::{FaceId, TriMesh};
@@ -35,11 +37,27 @@ pub fn self_intersections(mesh: &TriMesh) -> Vec<[FaceId; 2]> {
 
 /// [`self_intersections`] with the tree over the triangles of `mesh`.
 pub fn self_intersections_by(mesh: &TriMesh, tree: &Bvh) -> Vec<[FaceId; 2]> {
+    let Ok(pairs) = self_intersections_while(mesh, tree, || Ok::<(), Infallible>(()));
+    pairs
+}
+
+/// [`self_intersections_by`] of a mesh so large that the search takes long: ends soon after `go_on` returns an
+/// error, with that.
+///
+/// # Errors
+/// The error of `go_on`.
+pub fn self_intersections_while<E: Send>(
+    mesh: &TriMesh,
+    tree: &Bvh,
+    go_on: impl Fn() -> Result<(), E> + Sync,
+) -> Result<Vec<[FaceId; 2]>, E> {
+    go_on()?;
     let embedded = fans::embedded_fans(mesh);
     let corners = |t: FaceId| (mesh.corner_ids(t), mesh.corners(t.index()));
-    let mut found: Vec<[FaceId; 2]> = (tree.leaves().into_par_iter())
+    let found: Result<Vec<_>, E> = (tree.leaves().into_par_iter())
         .with_min_len(LEAVES_PER_TASK)
-        .flat_map_iter(|leaf| {
+        .map(|leaf| {
+            go_on()?;
             let mut found = Vec::new();
             tree.for_each_pair_from(leaf, |s, t| {
                 let [of_s, of_t] = [s, t].map(|t| mesh.triangles[t as usize]);
@@ -52,11 +70,12 @@ pub fn self_intersections_by(mesh: &TriMesh, tree: &Bvh) -> Vec<[FaceId; 2]> {
                     found.push([s, t]);
                 }
             });
-            found
+            Ok(found)
         })
         .collect();
+    let mut found = found?.concat();
     found.sort_unstable();
-    found
+    Ok(found)
 }
 
 #[cfg(test)]
