@@ -32,8 +32,13 @@ count() {
 # check NAME COMMAND...: runs the command and counts it.
 check() {
   say "$1"
-  "${@:2}"
+  timed "$@"
   count "$1" $?
+}
+# timed NAME COMMAND...: runs the command, and prints how long it took.
+timed() {
+  local TIMEFORMAT="($1: %0R s, %0U + %0S s of processor time)"
+  time "${@:2}"
 }
 
 # Checks in parallel. `start ID COMMAND...` runs a check in the background, as soon as fewer than AT_ONCE run: with all
@@ -45,12 +50,6 @@ start() {
   while [ "$(jobs -rp | wc -l)" -ge $AT_ONCE ]; do sleep 0.2; done
   timed "$@" >"$tools/$1.log" 2>&1 &
   running[$1]=$!
-}
-timed() {
-  local begun=$SECONDS status=0
-  "${@:2}" || status=$?
-  echo "($1: $((SECONDS - begun)) s)"
-  return $status
 }
 collect() {
   wait "${running[$1]}"
