@@ -59,45 +59,45 @@ pub const HEART_FITTED: Logistic = Logistic {
 
 /// A good fit of the apparent wall, by the fits of several models, without projections.
 pub const GOOD_SET_APPARENT: Logistic = Logistic {
-    intercept: -0.355,
+    intercept: 0.297,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 1.045),
-        Term::new("ln cavity / 55 ml", 0.0, 1.0, -0.769),
-        Term::new("its square", 0.0, 1.0, 0.142),
+        Term::new("mean log odds", 0.0, 1.0, 1.072),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -0.146),
+        Term::new("its square", 0.0, 1.0, 0.126),
     ],
 };
 
 /// A good fit of the anatomical wall, likewise.
 pub const GOOD_SET_ANATOMICAL: Logistic = Logistic {
-    intercept: -0.096,
+    intercept: 0.43,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 1.002),
-        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.13),
-        Term::new("its square", 0.0, 1.0, -0.359),
+        Term::new("mean log odds", 0.0, 1.0, 0.986),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -0.909),
+        Term::new("its square", 0.0, 1.0, -0.157),
     ],
 };
 
 /// A good fit of the apparent wall, by the fits of several models and the projections.
 pub const GOOD_SET_APPARENT_BY_PROJECTIONS: Logistic = Logistic {
-    intercept: -6.279,
+    intercept: -4.506,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 0.792),
-        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.269),
-        Term::new("its square", 0.0, 1.0, -0.634),
-        Term::new("dark", 0.0, 1.0, -3.564),
-        Term::new("ln gain", 0.0, 1.0, -2.177),
+        Term::new("mean log odds", 0.0, 1.0, 0.82),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -0.478),
+        Term::new("its square", 0.0, 1.0, -0.408),
+        Term::new("dark", 0.0, 1.0, -4.826),
+        Term::new("ln gain", 0.0, 1.0, -1.764),
     ],
 };
 
 /// A good fit of the anatomical wall, likewise.
 pub const GOOD_SET_ANATOMICAL_BY_PROJECTIONS: Logistic = Logistic {
-    intercept: -4.387,
+    intercept: -3.78,
     terms: &[
-        Term::new("mean log odds", 0.0, 1.0, 0.756),
-        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.428),
-        Term::new("its square", 0.0, 1.0, -0.893),
-        Term::new("dark", 0.0, 1.0, -5.264),
-        Term::new("ln gain", 0.0, 1.0, -1.553),
+        Term::new("mean log odds", 0.0, 1.0, 0.82),
+        Term::new("ln cavity / 55 ml", 0.0, 1.0, -1.217),
+        Term::new("its square", 0.0, 1.0, -0.494),
+        Term::new("dark", 0.0, 1.0, -4.167),
+        Term::new("ln gain", 0.0, 1.0, -1.386),
     ],
 };
 
