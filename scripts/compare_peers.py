@@ -1,5 +1,6 @@
 """Times ventriform against other tools. Run by scripts/compare_peers.sh."""
 import argparse
+import functools
 import json
 import math
 import os
@@ -20,6 +21,34 @@ POINTS = 150
 SIDES = [64, 96, 128, 192, 256, 384, 512]
 COUNTS = [100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000]
 COUNTS_SIDE = 256
+
+
+# Of the comparison with CGAL: side of the volume in voxels, their size in mm, number of points.
+SIZES = [(64, 4.0, 150), (256, 1.0, 150), (128, 2.0, 300), (128, 2.0, 1000), (128, 2.0, 5000), (128, 2.0, 20_000)]
+
+
+def heart_alone(folder, spacing):
+    """The voxels of a simulated scan, and the image without everything but the heart.
+
+    The peers cannot find the heart. They get a volume in which everything else was set to 0, and that step is not
+    timed. ventriform gets the whole volume."""
+    import others
+    voxels = numpy.asarray(nibabel.load(folder / "spect.nii.gz").dataobj, dtype=numpy.float32)
+    near = numpy.asarray(nibabel.load(folder / "lv_truth.nii.gz").dataobj) > 0
+    for _ in range(round(8 / spacing)):
+        near = dilated(near)
+    return voxels, others.image(numpy.where(near, voxels, 0).astype(numpy.float32), [spacing] * 3)
+
+
+def edge_for(cgal, others, data, iso, points):
+    """The edge length at which CGAL makes about so many points. The search is not timed."""
+    if cgal is None:
+        return None
+    surface = others.flying_edges(data, iso)
+    edge = math.sqrt(4 / math.sqrt(3) * others.area(surface) / (2 * points))
+    for _ in range(8):
+        edge *= math.sqrt(cgal(surface, edge) / points)
+    return edge
 
 
 class Bench:
@@ -70,8 +99,7 @@ class Bench:
             ours = Ours(self.stopwatch)
             ours.ask("read", folder / "spect.nii.gz")
             iso = ours.ask("model", POINTS, 1)["iso_value"]
-            loaded = nibabel.load(folder / "spect.nii.gz")
-            voxels = numpy.asarray(loaded.dataobj, dtype=numpy.float32)
+            voxels, alone = heart_alone(folder, spacing)
             whole = others.image(voxels, [spacing] * 3)
             name = f"Marching Cubes, 128^3 voxels of {spacing} mm"
             result[name] = in_turn({
@@ -79,14 +107,7 @@ class Bench:
                 "vtkFlyingEdges3D": timed(lambda: others.flying_edges(whole, iso)),
             }, 3 * self.a.rounds)
             show(name, result[name])
-            # The peers cannot find the heart. They get a volume in which everything else was set to
-            # 0, and that step is not timed. ventriform gets the whole volume.
-            heart = nibabel.load(folder / "lv_truth.nii.gz")
-            near = numpy.asarray(heart.dataobj) > 0
-            for _ in range(round(8 / spacing)):
-                near = dilated(near)
-            alone = others.image(numpy.where(near, voxels, 0).astype(numpy.float32), [spacing] * 3)
-            edge = self.edge_for(remeshers.get("cgal"), others, alone, iso)
+            edge = edge_for(remeshers.get("cgal"), others, alone, iso, POINTS)
 
             def then(remesh, target):
                 return timed(lambda: remesh(others.flying_edges(alone, iso), target))
@@ -121,15 +142,37 @@ class Bench:
         self.unpin()
         self.keep("speed", result)
 
-    def edge_for(self, cgal, others, data, iso):
-        """The edge length at which CGAL makes about POINTS points. The search is not timed."""
-        if cgal is None:
-            return None
-        surface = others.flying_edges(data, iso)
-        edge = math.sqrt(4 / math.sqrt(3) * others.area(surface) / (2 * POINTS))
-        for _ in range(8):
-            edge *= math.sqrt(cgal(surface, edge) / POINTS)
-        return edge
+    def sizes(self):
+        """ventriform and CGAL against the number of points and the size of the volume."""
+        import others
+        library = self.work / "cgal.so"
+        if not library.exists():
+            print("skipped: CGAL does not build here")
+            return
+        self.pin()
+        cgal = others.Remesher(str(library))
+        result = {}
+        for side, spacing, points in SIZES:
+            folder = self.phantom(side, spacing)
+            ours = Ours(self.stopwatch)
+            ours.ask("read", folder / "spect.nii.gz")
+            iso = ours.ask("model", points, 1)["iso_value"]
+            alone = heart_alone(folder, spacing)[1]
+            made = others.flying_edges(alone, iso)
+            edge = edge_for(cgal, others, alone, iso, points)
+            turn = functools.partial(ours.turn, "model", points, lambda number: number)
+            name = f"{points} points, {side}^3 voxels of {spacing} mm"
+            result[name] = in_turn({
+                "ventriform with its report": turn(),
+                "ventriform": turn(without=["report"]),
+                "vtkFlyingEdges3D + CGAL": timed(lambda: cgal(others.flying_edges(alone, iso), edge)),
+                "ventriform from the surface": turn(without=["surface", "report"]),
+                "CGAL from the surface": timed(lambda: cgal(made, edge)),
+            }, self.a.rounds if points <= POINTS else max(3, self.a.rounds // 3))
+            show(name, result[name])
+            ours.close()
+        self.unpin()
+        self.keep("sizes", result)
 
     def reading(self):
         """Reading a compressed volume from the page cache to float32 in memory."""
@@ -237,7 +280,7 @@ def growth(before, row, key):
 
 
 def main():
-    parts = ["speed", "reading", "threads", "memory", "scaling"]
+    parts = ["speed", "sizes", "reading", "threads", "memory", "scaling"]
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*", metavar="PART", help=" ".join(parts))
     parser.add_argument("--work", type=pathlib.Path, required=True)

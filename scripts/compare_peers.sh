@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Times ventriform against other tools for the same jobs, in turns on one core.
 #
-#   scripts/compare_peers.sh [PART...]     PART: speed reading threads memory scaling (default: all)
+#   scripts/compare_peers.sh [PART...]     PART: speed sizes reading threads memory scaling (default: all)
 #
 # Prints tables and writes target/compare-peers/PART.json; `scaling` also writes docs/scaling-*.svg.
 # Installs the peers' Python packages under target/compare-peers and builds the C++ peers whose headers
@@ -9,6 +9,8 @@
 #
 # PYTHON: an interpreter that has the packages. ROUNDS: turns of each program (15).
 # CORE: the core to run on (the last one).
+# NATIVE=1: ventriform and the C++ peers use all that this machine's processor has; otherwise what every x86-64 has, as published
+# binaries and the wheels of the other peers do. Results then go to target/compare-peers/native.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 work=$PWD/target/compare-peers
@@ -22,11 +24,18 @@ if [ -z "${PYTHON:-}" ]; then
             numpy nibabel vtk pyvista pyacvd geogram
 fi
 
+march=()
+if [ -n "${NATIVE:-}" ]; then
+    work=$work/native march=(-march=native)
+    mkdir -p "$work"
+    export CARGO_TARGET_DIR=$work/target RUSTFLAGS="-C target-cpu=native ${RUSTFLAGS:-}"
+fi
+
 cpp() { # cpp NAME FLAGS...: builds scripts/peers/NAME.cpp if it can
     local name=$1
     shift
     [ "$work/$name.so" -nt "scripts/peers/$name.cpp" ] && return
-    g++ -O3 -march=native -DNDEBUG -std=c++17 -fPIC -shared "scripts/peers/$name.cpp" \
+    g++ -O3 "${march[@]}" -DNDEBUG -std=c++17 -fPIC -shared "scripts/peers/$name.cpp" \
         -o "$work/$name.so" "$@" -Wl,--no-undefined 2>"$work/$name.log" ||
         echo "skipping $name: it does not build here (see $work/$name.log)"
 }
