@@ -4,6 +4,7 @@
     calibrate.py --check                    compare an estimate from the table with the constants as committed
     calibrate.py --write [MODEL...]         write the file with the constants estimated from the table
     calibrate.py --reliability              how often fits are good, by the chance that constants from other scans give them
+    calibrate.py --held-out --table TABLE   the same by the committed constants, of scans that those do not come from
     calibrate.py --layout                   write the file again with the constants as they are
 
 The table (scripts/calibration/features.csv, --table for another one) has one row for each scan. It is made by
@@ -266,24 +267,30 @@ def compare(table):
 FOLDS = 10
 
 
-def left_out(model, table):
-    """Chance of each scan by constants estimated from the others, a tenth of them left out at a time; its target; whether the patient moved."""
-    chance = {}
+def chances(model, constants, table):
+    """Chance of each scan by `constants`; its target; whether the patient moved."""
+    for row in table:
+        x, y = selected(model, [row])
+        if len(y):
+            yield 1 / (1 + math.exp(-log_odds(model, constants, x)[0])), y[0], row["motion_mm"] > 0
+
+
+def left_out(name, table):
+    """`chances` by constants estimated from the other scans, a tenth of them left out at a time."""
     for fold in range(FOLDS):
-        constants, _ = estimate(model, [row for n, row in enumerate(table) if n % FOLDS != fold])
-        for row in table[fold::FOLDS]:
-            x, y = selected(model, [row])
-            if len(y):
-                odds = log_odds(model, constants, x)[0]
-                chance[row["set"], row["case"]] = 1 / (1 + math.exp(-odds)), y[0], row["motion_mm"] > 0
-    return [np.array(column) for column in zip(*chance.values())]
+        constants, _ = estimate(MODELS[name], [row for n, row in enumerate(table) if n % FOLDS != fold])
+        yield from chances(MODELS[name], constants, table[fold::FOLDS])
 
 
-def reliability(table):
-    """Prints how often fits are good, by the tenth of the chance that constants from other scans give them."""
+def held_out(name, table):
+    """`chances` by the committed constants, of scans of any set: none of them may be in the table that those come from."""
+    return chances({**MODELS[name], "sets": {row["set"] for row in table}}, committed()[name], table)
+
+
+def reliability(table, chances_of):
+    """Prints how often fits are good, by the tenth of the chance that `chances_of` gives them."""
     for name in ("GOOD_SET_APPARENT_BY_PROJECTIONS", "GOOD_SET_ANATOMICAL_BY_PROJECTIONS"):
-        p, y, moved = left_out(MODELS[name], table)
-        moved = moved.astype(bool)
+        p, y, moved = (np.array(column) for column in zip(*chances_of(name, table)))
         print(f"{name}: {len(y)} scans, {int((1 - y).sum())} of them bad; area under the curve {auc(p, y):.3f}, of the "
               f"{int((~moved).sum())} without motion ({int((1 - y[~moved]).sum())} bad) {auc(p[~moved], y[~moved]):.3f}; "
               f"Brier score {np.mean((p - y) ** 2):.3f}")
@@ -303,14 +310,15 @@ def main():
     action.add_argument("--check", action="store_true", help="compare the estimate with the constants as committed; 1 if the file is not laid out as --layout would")
     action.add_argument("--write", nargs="*", choices=MODELS, metavar="MODEL", help="write the estimated constants of all models or of these")
     action.add_argument("--reliability", action="store_true", help="how often fits are good that have a chance, each tenth of the scans left out in turn")
+    action.add_argument("--held-out", action="store_true", help="the same by the committed constants, of scans (--table) that those do not come from")
     action.add_argument("--layout", action="store_true", help="write the committed constants again")
     a = parser.parse_args()
     if a.layout:
         OUTPUT.write_text(layout(committed()))
         return 0
     table = list(rows(a.table))
-    if a.reliability:
-        reliability(table)
+    if a.reliability or a.held_out:
+        reliability(table, left_out if a.reliability else held_out)
         return 0
     if a.write is not None:
         chosen, before = a.write or MODELS, committed()

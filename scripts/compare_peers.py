@@ -21,8 +21,6 @@ POINTS = 150
 SIDES = [64, 96, 128, 192, 256, 384, 512]
 COUNTS = [100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000]
 COUNTS_SIDE = 256
-
-
 # Of the comparison with CGAL: side of the volume in voxels, their size in mm, number of points.
 SIZES = [(64, 4.0, 150), (256, 1.0, 150), (128, 2.0, 300), (128, 2.0, 1000), (128, 2.0, 5000), (128, 2.0, 20_000)]
 
