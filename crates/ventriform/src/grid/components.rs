@@ -123,10 +123,8 @@ impl Components {
         monitor: &Monitor,
     ) -> Result<(), Cancelled> {
         let rows = labels.rows()[0];
-        for (n, (run, &component)) in self.runs.iter().zip(&self.component).enumerate() {
-            if n.is_multiple_of(1 << 16) {
-                monitor.check()?;
-            }
+        for (run, &component) in self.runs.iter().zip(&self.component) {
+            monitor.check()?;
             if choose(component) {
                 for i in run.start..run.end {
                     labels.set([i - 1, run.row % rows - 1, run.row / rows - 1], inside);

@@ -100,10 +100,8 @@ pub fn joined(mask: &Labels, monitor: &Monitor) -> Result<(Labels, usize), Cance
             break;
         }
         let mut added = Vec::new();
-        for (n, (p, part)) in joined.voxels().zip(parts.of_voxels()).enumerate() {
-            if n.is_multiple_of(1 << 14) {
-                monitor.check()?;
-            }
+        for (p, part) in joined.voxels().zip(parts.of_voxels()) {
+            monitor.check()?;
             for q in touching(p, axes, joined.extent) {
                 if joined.get(q) && parts.containing(&joined, q) != Some(part) {
                     added.extend(path(&joined, p, q));
