@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, UtcOffset};
+use ventriform::advice::Explain;
 use ventriform::export::dicom::{
     Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
 };
@@ -13,7 +14,6 @@ use ventriform::rest_stress::ComparedHeart;
 use ventriform::segmentation::SegmentedVolume;
 use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
-use ventriform_service::work::problems::Explain;
 
 /// Whether to write DICOM objects, and for whom.
 #[derive(Debug, Args)]

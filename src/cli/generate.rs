@@ -7,6 +7,7 @@ use super::{Bar, ModelArgs, UnusableArgument};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::advice::Explain;
 use ventriform::export::open_part::open_part;
 use ventriform::export::{self, Format, Part};
 use ventriform::pipeline::{self, Model};
@@ -14,7 +15,6 @@ use ventriform::progress::{CancelToken, Monitor};
 use ventriform::report::{MeasuredSurface, ModelReport};
 use ventriform::volume::Provenance;
 use ventriform::volume::{self, ReadOptions};
-use ventriform_service::work::problems::Explain;
 
 /// Make a surface model from a volume
 #[derive(Debug, Args)]

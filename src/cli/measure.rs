@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use ventriform::advice::Explain;
 use ventriform::mesh_files::{MeshFileError, MeshStatement};
 use ventriform::progress::Monitor;
 use ventriform::report::AgreementReport;
@@ -14,7 +15,6 @@ use ventriform::volume::given_mask::{
     GivenMask, GivenMaskError, MaskAgreement, MaskAgreementError, MaskChoice, MaskLabel, read_mask,
 };
 use ventriform::volume::{VolumeError, VolumeFile};
-use ventriform_service::work::problems::Explain;
 
 /// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
 #[derive(Debug, Args)]

@@ -5,11 +5,11 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::io::Read as _;
 use std::path::Path;
+use ventriform::advice::Explain;
 use ventriform::mesh::TriMesh;
 use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
 use ventriform::progress::Monitor;
 use ventriform::volume::ReadLimits;
-use ventriform_service::work::problems::Explain;
 
 /// Statements about meshes.
 #[derive(Debug, Clone, Copy, Default, Args)]

@@ -11,6 +11,7 @@ use super::{Bar, FitArgs, UnusableArgument};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use ventriform::advice::Explain;
 use ventriform::export::{Format, Part};
 use ventriform::mesh_files::MeshStatement;
 use ventriform::parameters::FitParameters;
@@ -19,7 +20,6 @@ use ventriform::reader::ReaderProfile;
 use ventriform::segmentation::Segmentation;
 use ventriform::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
 use ventriform::volume::{ReadLimits, VolumeFile};
-use ventriform_service::work::problems::Explain;
 
 /// Fit a model to the left ventricle (or another organ) in a volume
 #[derive(Debug, Args)]

@@ -2,9 +2,8 @@
 
 use pyo3::prelude::*;
 use std::fmt::Display;
+use ventriform::advice::{Explain, Failure, Fault};
 use ventriform::progress::Cancelled;
-use ventriform_service::records::{Failure, Fault};
-use ventriform_service::work::problems::Explain;
 
 /// Why work ended without a result.
 #[derive(Debug)]

@@ -5,6 +5,7 @@ use crate::models::NativeModel;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
+use ventriform::advice::advice;
 use ventriform::mesh_files::{self, MeshFileError, MeshStatement};
 use ventriform::normals::NormalLimits;
 use ventriform::parameters::FitParameters;
@@ -12,7 +13,6 @@ use ventriform::progress::Monitor;
 use ventriform::reader::ReaderProfile;
 use ventriform::segmentation::{NamedMesh, NamedReader};
 use ventriform::volume::{ReadLimits, VolumeFile};
-use ventriform_service::work::problems::advice;
 
 /// A model to fit: `auto`, the path of a mesh, or a model with its name.
 #[derive(FromPyObject)]

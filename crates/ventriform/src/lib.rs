@@ -140,6 +140,8 @@ pub mod rest_stress;
 
 pub mod evaluate;
 
+pub mod advice;
+
 mod front;
 
 pub use export::{Format, Metadata, encode};

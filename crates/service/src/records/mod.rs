@@ -21,7 +21,6 @@ mod catalogue;
 mod clock;
 mod custody;
 mod erasure;
-mod failure;
 mod figures;
 mod ids;
 mod item_record;
@@ -48,7 +47,6 @@ pub use erasure::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expired,
     Receipt,
 };
-pub use failure::{Failure, Fault};
 pub use figures::{FigureStore, QueueFigures};
 pub use ids::{content_id, hex, random_id, random_key, volume_id};
 pub use item_record::ItemRecord;
@@ -65,4 +63,5 @@ pub use resource::Resource;
 pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};
+pub use ventriform::advice::{Failure, Fault};
 pub use volume::{FileRecord, StoredVolume};

@@ -1,15 +1,16 @@
 //! Jobs of kind `beat`: [`ventriform::gated::from_files`] over a stored volume with gates and stored models.
 
+use super::failures::{unwritten, work_error};
 use super::files::volume_files;
 use super::limits;
 use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
-use super::problems::{Explain, unwritten, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::export::Format;
 use ventriform::gated::{GatedOrder, from_files};
 use ventriform::parameters::{BeatChoice, GatedParameters};

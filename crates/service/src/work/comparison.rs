@@ -1,16 +1,17 @@
 //! Jobs of kind `comparison`: [`ventriform::rest_stress::from_files`] over two stored volumes, that of the job at
 //! stress and that of its parameter `rest` at rest.
 
+use super::failures::{unwritten, volume_missing, work_error};
 use super::files::volume_files;
 use super::limits;
 use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
-use super::problems::{Explain, unwritten, volume_missing, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Fault, Resource};
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::export::Format;
 use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
 use ventriform::progress::{Monitor, Plan};

@@ -1,9 +1,10 @@
 //! Normal limits: as they are uploaded, and as jobs need them.
 
-use super::problems::{Explain, normals_missing, unreadable_model, work_error};
+use super::failures::{normals_missing, unreadable_model, work_error};
 use crate::items::{OutputFile, WorkOutput};
 use crate::jobs::{WorkError, WorkInput};
 use crate::records::Failure;
+use ventriform::advice::Explain;
 use ventriform::normals::NormalLimits;
 use ventriform::report::{NormalsSummary, object};
 

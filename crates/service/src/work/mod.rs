@@ -14,7 +14,7 @@
 //! | `upload` | validating and previewing an uploaded volume |
 //! | [`dicom`] | DICOM objects of a stored result |
 //! | `page` | the HTML page of a stored result |
-//! | `problems` | errors of the domain to failures with status class, code, field and advice |
+//! | `failures` | why jobs and requests end: what the library explains, and what only a service meets |
 //!
 //! Everything here is synchronous and runs on the threads of a worker or of a blocking pool. It
 //! reads local files and returns bytes; it neither stores anything nor sees the queue.
@@ -22,6 +22,7 @@
 mod beat;
 mod comparison;
 pub mod dicom;
+mod failures;
 mod files;
 mod limits;
 mod model;
@@ -30,7 +31,6 @@ mod normals;
 mod page;
 mod parameters;
 pub mod part;
-pub mod problems;
 mod profile;
 mod segmentation;
 mod template;

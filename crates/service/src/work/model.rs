@@ -1,13 +1,14 @@
 //! Jobs of kind `model`: [`ventriform::pipeline::generate`], from a volume's files to every download.
 
+use super::failures::{not_exportable, work_error};
 use super::files::{json_file, mesh_file, volume_files};
 use super::page;
 use super::parameters;
-use super::problems::{Explain, not_exportable, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::export::Format;
 use ventriform::parameters::ModelParameters;
 use ventriform::pipeline::{self, Model};

@@ -1,6 +1,6 @@
 //! The models that jobs fit: named by the parameter `model`, or flagged for every `auto`.
 
-use super::problems::{mesh_missing, unreadable_model, work_error};
+use super::failures::{mesh_missing, unreadable_model, work_error};
 use crate::items::StoredItem;
 use crate::jobs::{WorkError, WorkInput};
 use serde_json::{Map, Value};

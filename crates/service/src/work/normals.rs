@@ -1,13 +1,14 @@
 //! Jobs of kind `normals`: [`ventriform::evaluate::normals::of_scans`] over stored volumes. The parameter `cases` is the
 //! cohort's table; each of its rows names a volume. The job's own volume is that of the first row.
 
+use super::failures::volume_missing;
 use super::limits;
-use super::problems::{Explain, volume_missing};
 use crate::items::{NotAdded, WorkOutput, check_name};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Fault, Resource};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
+use ventriform::advice::Explain;
 use ventriform::evaluate::normals::{BuildError, CohortRow, CohortScan, NormalsOptions, of_scans};
 use ventriform::parameters::{CohortCase, NormalsParameters};
 use ventriform::progress::{Monitor, Plan};

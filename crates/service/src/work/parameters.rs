@@ -1,9 +1,9 @@
 //! Validating the parameters of a job, the same way for every kind of work.
 
-use super::problems::Explain;
 use crate::jobs::GivenParameters;
 use crate::records::Failure;
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::parameters::{BesideFit, ParameterError, Parameters, WithFit};
 
 /// Validates `given` as parameters of type `P` and writes every default out.

@@ -3,7 +3,7 @@
 //! In: the `.json` file of a mesh. Out: the triangles of one part of the wall in any format, with what that file
 //! says of them.
 
-use super::problems::{broken_result, not_exportable};
+use super::failures::{broken_result, not_exportable};
 use crate::items::{OutputFile, StoredItem};
 use crate::records::Failure;
 use ventriform::export::open_part::open_part;

@@ -1,9 +1,9 @@
 //! From a reader's profile as it was uploaded to one that is stored.
 
-use super::problems::Explain;
 use super::segmentation::PROFILE_FILE;
 use crate::items::{OutputFile, WorkOutput};
 use crate::records::Failure;
+use ventriform::advice::Explain;
 use ventriform::reader::ReaderProfile;
 use ventriform::report::{ReaderSummary, object};
 

@@ -1,15 +1,16 @@
 //! Jobs of kind `segmentation`: [`ventriform::segmentation::from_files`] over stored models.
 
+use super::failures::{profile_missing, unreadable_model, unwritten, work_error};
 use super::files::volume_files;
 use super::limits;
 use super::models::{MESH_FILE, name_of, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
-use super::problems::{Explain, profile_missing, unreadable_model, unwritten, work_error};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::export::Format;
 use ventriform::parameters::{FitParameters, Parameters};
 use ventriform::progress::{Monitor, Plan};

@@ -2,10 +2,11 @@
 //!
 //! The mesh may be in any format that [`mesh_files`] reads; it is stored as our own JSON, LPS mm, and in every format.
 
+use super::failures::{unknown_organ, unsuitable_mesh};
 use super::files::mesh_file;
-use super::problems::{Explain, unknown_organ, unsuitable_mesh};
 use crate::items::{OutputFile, WorkOutput};
 use crate::records::Failure;
+use ventriform::advice::Explain;
 use ventriform::export::{Format, Metadata};
 use ventriform::mesh_files::{self, MeshStatement};
 use ventriform::model::{Organ, Template, wall_parts};

@@ -1,12 +1,12 @@
 //! Validating uploads: volumes by [`ventriform::volume`], templates by [`ventriform::deform`].
 
 use super::files::volume_files;
-use super::problems::Explain;
 use super::{limits, profile, template};
 use crate::items::WorkOutput;
 use crate::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use ventriform::advice::Explain;
 use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::Monitor;
 use ventriform::volume::given_mask::{MaskChoice, read_mask};

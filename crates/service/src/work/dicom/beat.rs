@@ -3,11 +3,12 @@
 //! The walls at both ends are the stored labels of their gates, and each end refers to the frames of its gate in the
 //! kept upload.
 
-use super::super::problems::{Explain, broken_result};
+use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
 use crate::items::{StoredItem, StoredResult};
 use crate::records::{Failure, Product};
+use ventriform::advice::Explain;
 use ventriform::export::dicom::{BeatEnd, BeatObject, DicomBeat, EndWall, Structure};
 use ventriform::gated::{end_mesh, gate_labels};
 use ventriform::report::{BeatReport, BeatSummary};

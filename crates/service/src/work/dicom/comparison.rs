@@ -1,10 +1,11 @@
 //! DICOM objects of a stored comparison: of the study of the scan at stress.
 
-use super::super::problems::{Explain, broken_result};
+use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
 use crate::items::{StoredResult, StoredSource};
 use crate::records::Failure;
+use ventriform::advice::Explain;
 use ventriform::export::dicom::{ComparisonObject, DicomComparison, Structure};
 use ventriform::report::ComparisonReport;
 use ventriform::volume::ReadLimits;

@@ -1,14 +1,15 @@
 //! Whose scan a result is of, and which images or frames it was made of.
 
-use super::super::files::volume_files;
-use super::super::problems::{
-    Explain, broken_result, identity_needed, malformed_identity, unknown_identity,
+use super::super::failures::{
+    broken_result, identity_needed, malformed_identity, unknown_identity,
 };
+use super::super::files::volume_files;
 use super::super::upload::UploadFacts;
 use crate::items::StoredSource;
 use crate::records::{Failure, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use nalgebra::Matrix3;
 use serde_json::{Map, Value};
+use ventriform::advice::Explain;
 use ventriform::export::dicom::{
     Deidentification, DicomError, Moment, SourceScan, StatedIdentity, identity,
 };

@@ -1,11 +1,12 @@
 //! DICOM objects of a stored segmentation or model.
 
-use super::super::problems::{Explain, broken_result};
+use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
 use crate::items::{StoredItem, StoredResult};
 use crate::records::{Failure, Resource};
 use serde_json::Value;
+use ventriform::advice::Explain;
 use ventriform::export::dicom::{DicomObject, DicomResults, Structure};
 use ventriform::grid::voxelise::voxelise;
 use ventriform::progress::Monitor;

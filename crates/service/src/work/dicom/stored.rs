@@ -1,10 +1,11 @@
 //! The stored files of a result.
 
-use super::super::problems::{Explain, broken_result, not_exportable};
+use super::super::failures::{broken_result, not_exportable};
 use crate::items::StoredItem;
 use crate::records::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use ventriform::advice::Explain;
 use ventriform::export::read_json;
 use ventriform::grid::voxelise::Mask;
 use ventriform::mesh::TriMesh;

@@ -1,17 +1,16 @@
-//! Why a request was rejected or a job failed, in a form that is stored with the job.
+//! Why work failed or was refused, in a form that can be stored.
 
 use serde::{Deserialize, Serialize};
 
-/// A reason with advice. It is stored with a failed job and becomes a problem object over HTTP.
+/// A reason with advice.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{detail}")]
 pub struct Failure {
     /// A stable identifier for programs: `no-surface`, `job-time-limit` ...
     pub code: String,
-    /// Where the cause lies; this decides the HTTP status.
+    /// Where the cause lies.
     pub fault: Fault,
-    /// The cause, with the values involved, as a sentence. Contains neither patient data nor
-    /// internals of the service.
+    /// The cause, with the values involved, as a sentence. Contains no patient data.
     pub detail: String,
     /// The parameter, or the field of the file, that caused it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -27,11 +26,11 @@ pub struct Failure {
 pub enum Fault {
     /// In the request: a parameter, or the form of the call.
     Request,
-    /// In the uploaded file or its content.
+    /// In the file or its content.
     Content,
-    /// The file exceeds a limit set by the operator.
+    /// The file exceeds a limit.
     TooLarge,
-    /// In the service.
+    /// In the machine or the program that does the work.
     Service,
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
+use ventriform::advice::advice;
 use ventriform::geometry::Vec3;
 use ventriform::geometry::frame::VoxelToPatient;
 use ventriform::parameters::ModelParameters;
@@ -9,7 +10,6 @@ use ventriform::pipeline::{PipelineError, generate_from};
 use ventriform::progress::Monitor;
 use ventriform::retile::RetileError;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
-use ventriform_service::work::problems::advice;
 
 /// A ball of ones among zeros, or of other values.
 fn ball(inside: f32, outside: f32) -> Volume {

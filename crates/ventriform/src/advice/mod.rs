@@ -1,35 +1,37 @@
-//! Errors of the domain as failures for clients.
+//! Errors of the domain as failures for callers.
 //!
-//! Errors of the domain state facts. This is the one place that decides, for each of them, where
-//! the fault lies (which becomes the HTTP status), the stable code, the parameter or file field
-//! concerned, and the advice. The command line and HTTP both use it; the advice names parameters
-//! by their common names and fits both.
+//! Errors of the domain state facts. This is the one place that decides, for each of them, where the fault lies, the
+//! stable code, the parameter or file field concerned, and the advice. The command line, the service and the Python
+//! package use it; the advice names parameters by their common names and fits all of them.
+//!
+//! 1. An error [`Explain`]s itself as a [`Failure`].
+//! 2. [`advice`] is what the caller can do; [`Explain::with_advice`] is both as one line.
 
-use super::page::PageError;
-use crate::jobs::WorkError;
-use crate::records::{Failure, Fault};
+mod failure;
+
+pub use failure::{Failure, Fault};
+
+use crate::beat::BeatError;
+use crate::comparison::WhichScan;
+use crate::deform::DeformError;
+use crate::evaluate::normals::BuildError;
+use crate::export::dicom::{DicomError, StatedIdentity};
+use crate::export::read_json::ReadMeshError;
+use crate::gated::GatedError;
+use crate::locate::LocateError;
+use crate::mesh_files::MeshFileError;
+use crate::model::TemplateError;
+use crate::normals::NormalsError;
+use crate::parameters::ParameterError;
+use crate::pipeline::PipelineError;
+use crate::reader::ProfileError;
+use crate::rest_stress::ComparisonError;
+use crate::retile::RetileError;
+use crate::segmentation::SegmentationError;
+use crate::surface::SurfaceError;
+use crate::volume::VolumeError;
+use crate::volume::given_mask::GivenMaskError;
 use std::error::Error;
-use std::fmt::Display;
-use ventriform::beat::BeatError;
-use ventriform::comparison::WhichScan;
-use ventriform::deform::DeformError;
-use ventriform::evaluate::normals::BuildError;
-use ventriform::export::dicom::{DicomError, StatedIdentity};
-use ventriform::export::read_json::ReadMeshError;
-use ventriform::gated::GatedError;
-use ventriform::locate::LocateError;
-use ventriform::mesh_files::MeshFileError;
-use ventriform::model::{Organ, TemplateError};
-use ventriform::normals::NormalsError;
-use ventriform::parameters::ParameterError;
-use ventriform::pipeline::PipelineError;
-use ventriform::reader::ProfileError;
-use ventriform::rest_stress::ComparisonError;
-use ventriform::retile::RetileError;
-use ventriform::segmentation::{SegmentationError, SegmentationFilesError};
-use ventriform::surface::SurfaceError;
-use ventriform::volume::VolumeError;
-use ventriform::volume::given_mask::GivenMaskError;
 
 /// Advice for work that was cancelled.
 const START_AGAIN: &str = "Start again if the result is still needed.";
@@ -59,15 +61,6 @@ pub trait Explain: Error {
 /// The advice of [`Explain::explain`]; empty if there is none.
 pub fn advice(error: &impl Explain) -> String {
     error.explain().fix.unwrap_or_default()
-}
-
-/// The failure of a job that met `error`.
-pub(super) fn work_error(error: &impl Explain) -> WorkError {
-    if error.is_cancelled() {
-        WorkError::Cancelled
-    } else {
-        WorkError::Failed(error.explain())
-    }
 }
 
 impl Explain for ParameterError {
@@ -653,47 +646,13 @@ impl Explain for DicomError {
     }
 }
 
-impl Explain for PageError {
-    fn explain(&self) -> Failure {
-        failure(
-            (Fault::Service, "unreadable"),
-            self,
-            None,
-            "Use report.json, which contains the same figures.".into(),
-        )
-    }
-}
-
-/// A mesh that was uploaded as a template and cannot be fitted.
-const UNSUITABLE_MODEL: (Fault, &str) = (Fault::Content, "unsuitable-model");
+/// A mesh that was given as a template and cannot be fitted.
+pub const UNSUITABLE_MODEL: (Fault, &str) = (Fault::Content, "unsuitable-model");
 
 /// A model that was chosen for a segmentation and cannot be fitted.
 const UNSUITABLE_CHOICE: (Fault, &str) = (Fault::Request, "unsuitable-model");
 
 const GIVE_MESH_JSON: &str = "Give a JSON mesh as `generate` writes it (mesh.json).";
-
-/// A mesh that no file format can represent, or not one of them.
-pub(super) fn not_exportable(error: &dyn Error) -> Failure {
-    Failure::new(Fault::Content, "not-exportable", sentence(error))
-}
-
-/// Why a result's files are not written.
-pub(super) fn unwritten(error: SegmentationFilesError) -> WorkError {
-    match error {
-        SegmentationFilesError::Cancelled(cancelled) => cancelled.into(),
-        error => WorkError::Failed(not_exportable(&error)),
-    }
-}
-
-/// A stored result whose files do not fit together, or cannot be read.
-pub(super) fn broken_result(error: &dyn Display) -> Failure {
-    Failure::new(
-        Fault::Service,
-        "unreadable",
-        format!("The stored result cannot be used: {error}."),
-    )
-    .fix("Start the same job again, which stores the result anew.")
-}
 
 /// Advice about a field of a scan that cannot be decoded.
 fn undecoded_advice(field: &str) -> String {
@@ -708,111 +667,6 @@ fn undecoded_advice(field: &str) -> String {
     } else {
         format!("Ask for de-identified objects, or {correct}.")
     }
-}
-
-/// Nobody knows of which patient and study the volume with that id is.
-pub(super) fn identity_needed(error: &DicomError, volume: &str) -> Failure {
-    let path = format!("/v1/volumes/{volume}/identity");
-    error.explain().fix(format!(
-        "DICOM objects belong to a patient and a study: state both by PUT {path} with \
-         `patient_id` and `study_uid`, or upload the scan as the DICOM file that it came from."
-    ))
-}
-
-/// A statement about a scan has a field that is not known.
-pub(super) fn unknown_identity(name: &str) -> Failure {
-    let name: String = name.chars().take(80).collect();
-    let known = StatedIdentity::FIELD_NAMES.join(", ");
-    Failure::new(
-        Fault::Request,
-        "invalid-field",
-        format!("There is no field `{name}`."),
-    )
-    .at(&name)
-    .fix(format!("Give one of {known}."))
-}
-
-/// A statement about a scan has a field that is no text.
-pub(super) fn malformed_identity(name: &str) -> Failure {
-    let detail = format!("`{name}` must be a string.");
-    Failure::new(Fault::Request, "invalid-field", detail)
-        .at(name)
-        .fix("Give a JSON string.")
-}
-
-/// A template that cannot be written in every format.
-pub(super) fn unsuitable_mesh(error: &dyn Error) -> Failure {
-    failure(
-        UNSUITABLE_MODEL,
-        error,
-        None,
-        "Give a mesh without coincident vertices.".into(),
-    )
-}
-
-/// A word that names no organ.
-pub(super) fn unknown_organ(organ: &str) -> Failure {
-    let words = Organ::ALL.map(Organ::as_str).join(", ");
-    Failure::new(
-        Fault::Request,
-        "invalid-parameter",
-        format!("There is no organ `{organ}`."),
-    )
-    .at("organ")
-    .fix(format!("Give one of {words}."))
-}
-
-/// A model that was chosen for a segmentation and has no mesh.
-pub(super) fn mesh_missing(id: &str) -> Failure {
-    Failure::new(
-        Fault::Request,
-        "invalid-field",
-        format!("The model `{id}` has no mesh any more."),
-    )
-    .at("model")
-    .fix("Choose another model; GET /v1/models and /v1/templates list them.")
-}
-
-/// A reader's profile that was chosen for a segmentation and has no file any more.
-pub(super) fn profile_missing(id: &str) -> Failure {
-    Failure::new(
-        Fault::Request,
-        "invalid-field",
-        format!("The reader `{id}` has no profile any more."),
-    )
-    .at("reader")
-    .fix("Choose another reader; GET /v1/readers lists them.")
-}
-
-/// Normal limits that were chosen for a job and have no file any more.
-pub(super) fn normals_missing(id: &str) -> Failure {
-    Failure::new(
-        Fault::Request,
-        "invalid-field",
-        format!("The normal limits `{id}` have no file any more."),
-    )
-    .at("normals")
-    .fix("Choose other limits; GET /v1/normals lists them.")
-}
-
-/// A volume that a job needs beside its own and that is not there any more.
-pub(super) fn volume_missing(field: &str) -> Failure {
-    Failure::new(
-        Fault::Request,
-        "invalid-field",
-        "The volume does not exist any more.",
-    )
-    .at(field)
-    .fix("Upload the volume again, then start the job again.")
-}
-
-/// A stored model whose file cannot be read.
-pub(super) fn unreadable_model(error: &std::io::Error) -> Failure {
-    Failure::new(
-        Fault::Service,
-        "unreadable",
-        format!("A stored model cannot be read: {error}."),
-    )
 }
 
 fn volume_advice(error: &VolumeError) -> String {
@@ -940,7 +794,8 @@ fn template_advice(error: &TemplateError) -> String {
     }
 }
 
-fn failure(
+/// The failure that `error` is, with its text as a sentence.
+pub fn failure(
     (fault, code): (Fault, &str),
     error: &dyn Error,
     field: Option<&str>,
@@ -954,7 +809,7 @@ fn failure(
 }
 
 /// An error's message as a sentence. A file's name, with which many begin, stays as it is.
-fn sentence(error: &dyn Error) -> String {
+pub fn sentence(error: &dyn Error) -> String {
     let text = error.to_string();
     let is_name = text.split_whitespace().next().is_some_and(|word| {
         word.trim_end_matches([':', ',', '.'])
