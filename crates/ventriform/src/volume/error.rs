@@ -223,6 +223,28 @@ pub enum VolumeError {
 }
 
 impl VolumeError {
+    /// The name of the file that it is about.
+    pub(super) fn file_mut(&mut self) -> Option<&mut String> {
+        match self {
+            Self::Empty { file }
+            | Self::Unsupported { file, .. }
+            | Self::NotVolume { file, .. }
+            | Self::NotSlices { file, .. }
+            | Self::Unrecognised { file, .. }
+            | Self::Field { file, .. }
+            | Self::Truncated { file, .. }
+            | Self::Corrupt { file, .. }
+            | Self::TooLarge { file, .. }
+            | Self::NotGated { file }
+            | Self::ImageMissing { file }
+            | Self::Overflow { file, .. }
+            | Self::NoFiniteVoxel { file }
+            | Self::Mesh { file, .. }
+            | Self::Io { file, .. } => Some(file),
+            _ => None,
+        }
+    }
+
     /// The header field or request parameter that the error is about.
     pub fn field(&self) -> Option<&'static str> {
         match self {

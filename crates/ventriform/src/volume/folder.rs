@@ -29,7 +29,7 @@ impl VolumeFile {
             } else if paths.len() == 1 {
                 files.extend(Self::with_other_half(path));
             } else {
-                files.push(Self::at(path));
+                files.push(Self::at(path).by_path());
             }
         }
         Ok(files)
@@ -91,5 +91,5 @@ pub(super) fn files_in(folder: &Path, limits: &ReadLimits) -> Result<Vec<VolumeF
         inside.to_string_lossy().into_owned()
     };
     let files = paths.iter().map(|path| VolumeFile::named(name(path), path));
-    Ok(files.map(VolumeFile::found).collect())
+    Ok(files.map(|file| file.found().by_path()).collect())
 }

@@ -43,7 +43,8 @@ fn read_with_timings(
     monitor: &Monitor,
 ) -> Result<(Reading, Vec<GateTiming>), VolumeError> {
     let mut opened = open(files, limits, monitor)?;
-    let mut reading = open::read(&mut *opened.file, *options, monitor)?;
+    let reading = open::read(&mut *opened.file, *options, monitor);
+    let mut reading = reading.map_err(|error| error.with_path(files))?;
     reading.facts.warnings.extend(opened.notes);
     let intensity = &reading.facts.intensity;
     if intensity.labels.is_some() && is_rounded(intensity, reading.facts.data_type) {
@@ -112,7 +113,8 @@ pub fn read_gates(
     let timings = opened.file.gate_timings();
     let one = |frame: usize| {
         let options = ReadOptions { frame: Some(frame) };
-        open::read(&mut *opened.file, options, &monitor.part(frame, frames))
+        let read = open::read(&mut *opened.file, options, &monitor.part(frame, frames));
+        read.map_err(|error| error.with_path(files))
     };
     let mut readings: Vec<Reading> = (0..frames).map(one).collect::<Result<_, _>>()?;
     readings[0].facts.warnings.append(&mut opened.notes);
@@ -352,7 +354,8 @@ pub fn inspect(
         notes.replace(opened.notes);
         Ok(opened.file)
     };
-    let mut facts = open::inspect(again, monitor)?;
+    let facts = open::inspect(again, monitor);
+    let mut facts = facts.map_err(|error| error.with_path(files))?;
     facts.warnings.extend(notes.take());
     Ok(facts)
 }
@@ -388,6 +391,15 @@ fn open(
 
 /// As [`open()`], with what the caller states of a mesh.
 fn open_as(
+    files: &[VolumeFile],
+    stated: &MeshStatement,
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Opened, VolumeError> {
+    open_named(files, stated, limits, monitor).map_err(|error| error.with_path(files))
+}
+
+fn open_named(
     files: &[VolumeFile],
     stated: &MeshStatement,
     limits: &ReadLimits,

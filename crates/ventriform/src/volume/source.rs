@@ -28,6 +28,8 @@ pub struct VolumeFile {
     content: Content,
     /// Whether it was found in an archive or a folder, and not named by a person.
     found: bool,
+    /// Whether errors state its whole path, because the caller named it by that.
+    by_path: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -69,6 +71,7 @@ impl VolumeFile {
             name: shown(name.into()),
             content: Content::Path(path.as_ref().to_path_buf()),
             found: false,
+            by_path: false,
         }
     }
 
@@ -78,6 +81,7 @@ impl VolumeFile {
             name: shown(name.into()),
             content: Content::Memory(bytes.into()),
             found: false,
+            by_path: false,
         }
     }
 
@@ -87,6 +91,7 @@ impl VolumeFile {
             name: shown(name.into()),
             content: Content::Arrays(volumes.into()),
             found: false,
+            by_path: false,
         }
     }
 
@@ -117,6 +122,7 @@ impl VolumeFile {
             name: shown(name.into()),
             content: Content::Entry(Arc::new(entry)),
             found: true,
+            by_path: false,
         }
     }
 
@@ -155,6 +161,22 @@ impl VolumeFile {
         }
     }
 
+    /// The file, marked as one that the caller named by its path: errors state the whole of it.
+    pub(super) fn by_path(self) -> Self {
+        Self {
+            by_path: true,
+            ..self
+        }
+    }
+
+    /// What errors call the file: its whole path, if the caller named it by that; otherwise its name.
+    pub(super) fn whole_name(&self) -> String {
+        match self.path() {
+            Some(path) if self.by_path => shown(path.display().to_string()),
+            _ => self.name.clone(),
+        }
+    }
+
     /// Whether the file was found in an archive or a folder, and not named by a person.
     pub(super) fn was_found(&self) -> bool {
         self.found
@@ -164,7 +186,8 @@ impl VolumeFile {
     /// that is in the same folder. Either may be gzipped.
     pub fn with_other_half(path: impl AsRef<Path>) -> Vec<Self> {
         let path = path.as_ref();
-        let mut files = vec![Self::at(path)];
+        let at = |path: &Path| Self::at(path).by_path();
+        let mut files = vec![at(path)];
         let name = path.to_string_lossy();
         let bare = name.strip_suffix(".gz").unwrap_or(&name);
         for (this, other) in [(".hdr", ".img"), (".img", ".hdr")] {
@@ -172,7 +195,8 @@ impl VolumeFile {
                 continue;
             };
             let others = [format!("{stem}{other}"), format!("{stem}{other}.gz")];
-            files.extend(others.iter().find(|o| Path::new(o).is_file()).map(Self::at));
+            let other = others.iter().map(Path::new).find(|o| o.is_file());
+            files.extend(other.map(at));
         }
         files
     }
@@ -231,6 +255,22 @@ impl VolumeFile {
     /// The name used in messages.
     pub fn name(&self) -> &str {
         &self.name
+    }
+}
+
+impl VolumeError {
+    /// The error with the whole path in place of the name of that one of `files` which it is about, where the caller named
+    /// it by its path: many folders hold files of one name.
+    #[must_use]
+    pub(super) fn with_path(mut self, files: &[VolumeFile]) -> Self {
+        if let Some(named) = self.file_mut() {
+            let whole = files.iter().filter(|file| file.name() == named);
+            let whole: Vec<String> = whole.map(VolumeFile::whole_name).collect();
+            if !whole.is_empty() {
+                *named = whole.join(" or ");
+            }
+        }
+        self
     }
 }
 
