@@ -5,15 +5,10 @@ use clap::Args;
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, UtcOffset};
 use ventriform::advice::Explain;
-use ventriform::export::dicom::{
-    Deidentification, Moment, SourceScan, StatedIdentity, identity, legible,
-};
-use ventriform::gated::GatedHeart;
+use ventriform::export::dicom::{Deidentification, Moment, StatedIdentity};
+use ventriform::objects::{self, ObjectChoice, ObjectError, ObjectOrder};
 use ventriform::progress::Monitor;
-use ventriform::rest_stress::ComparedHeart;
-use ventriform::segmentation::SegmentedVolume;
-use ventriform::volume::Provenance;
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform::volume::{Provenance, ReadLimits, VolumeError, VolumeFile};
 
 /// Whether to write DICOM objects, and for whom.
 #[derive(Debug, Args)]
@@ -66,13 +61,6 @@ pub struct DicomArgs {
     made_at: Option<String>,
 }
 
-/// DICOM output whose identity is known.
-pub(super) struct DicomOrder {
-    identity: Provenance,
-    made: Moment,
-    deidentify: Option<(Deidentification, StatedIdentity)>,
-}
-
 impl DicomArgs {
     /// The objects that are to be written of `files`; `None` without `--dicom`.
     ///
@@ -83,43 +71,8 @@ impl DicomArgs {
         files: &[VolumeFile],
         frame: Option<usize>,
         limits: &ReadLimits,
-    ) -> Result<Option<DicomOrder>> {
-        if !self.dicom {
-            return Ok(None);
-        }
-        let stated = self.stated();
-        let found = volume::provenance(files, &ReadOptions { frame }, limits, &Monitor::silent())
-            .map_err(|error| anyhow!(error.with_advice()))?;
-        // The new identity of a DICOM scan is not meant to be the one in its file.
-        let known = if self.deidentify && found.is_some() {
-            (stated.check()).and_then(|()| identity(found.as_ref(), &Default::default()))
-        } else {
-            identity(found.as_ref(), &stated)
-        };
-        let known = known.and_then(|known| {
-            if self.deidentify {
-                Ok(known)
-            } else {
-                legible(&known).map(|()| known)
-            }
-        });
-        let identity = known.map_err(|error| anyhow!(error.with_advice()))?;
-        let secret = || {
-            let given = self.deidentify_secret.clone();
-            let given = given.or_else(|| std::env::var("VENTRIFORM_DEIDENTIFY_SECRET").ok());
-            match given {
-                Some(text) => text.into_bytes(),
-                None => uuid::Uuid::new_v4().as_bytes().to_vec(),
-            }
-        };
-        Ok(Some(DicomOrder {
-            identity,
-            made: self.moment()?,
-            deidentify: self.deidentify.then(|| {
-                let how = Deidentification { secret: secret() };
-                (how, stated)
-            }),
-        }))
+    ) -> Result<Option<ObjectOrder>> {
+        self.ordered(|choice| choice.order(files, frame, limits, &Monitor::silent()))
     }
 
     /// As [`DicomArgs::order`], of the gates of one beat: one file with all, or one for each.
@@ -130,16 +83,11 @@ impl DicomArgs {
         &self,
         files: &[VolumeFile],
         limits: &ReadLimits,
-    ) -> Result<Option<DicomOrder>> {
-        // Files of one gate each are not one volume; whose scan they are says the first.
-        let one = || self.order(&files[..files.len().min(1)], Some(0), limits);
-        match self.order(files, Some(0), limits) {
-            Err(error) if files.len() > 1 => one().map_err(|_| error),
-            order => order,
-        }
+    ) -> Result<Option<ObjectOrder>> {
+        self.ordered(|choice| choice.order_of_gates(files, limits, &Monitor::silent()))
     }
 
-    /// As [`DicomArgs::order`], of two scans of one patient, gated or not. Both are freed of the identity by one secret.
+    /// As [`DicomArgs::order`], of two scans of one patient, gated or not.
     ///
     /// # Errors
     /// As there.
@@ -147,50 +95,34 @@ impl DicomArgs {
         &self,
         scans: [&[VolumeFile]; 2],
         limits: &ReadLimits,
-    ) -> Result<Option<[DicomOrder; 2]>> {
-        let of = |files: &[VolumeFile]| {
-            let gates = || self.order_of_gates(files, limits);
-            self.order(files, None, limits)
-                .or_else(|error| gates().map_err(|_| error))
-        };
-        let [first, second] = scans.map(of);
-        let (Some(first), Some(mut second)) = (first?, second?) else {
+    ) -> Result<Option<[ObjectOrder; 2]>> {
+        self.ordered(|choice| choice.order_of_pair(scans, limits, &Monitor::silent()))
+    }
+
+    fn ordered<T>(
+        &self,
+        order: impl FnOnce(&ObjectChoice) -> Result<T, ObjectError>,
+    ) -> Result<Option<T>> {
+        if !self.dicom {
             return Ok(None);
-        };
-        if let (Some((how, _)), Some((own, _))) = (&first.deidentify, &mut second.deidentify) {
-            own.clone_from(how);
         }
-        Ok(Some([first, second]))
+        let choice = ObjectChoice {
+            stated: self.stated(),
+            deidentify: self.deidentify.then(|| Deidentification {
+                secret: self.secret(),
+            }),
+            made: self.moment()?,
+        };
+        let made = order(&choice).map_err(|error| anyhow!(error.with_advice()))?;
+        Ok(Some(made))
     }
 
-    /// As [`DicomArgs::whose`], of a scan that may be gated.
-    ///
-    /// # Errors
-    /// As there.
-    pub(super) fn whose_of_either(
-        &self,
-        files: &[VolumeFile],
-        limits: &ReadLimits,
-    ) -> Result<Option<Provenance>> {
-        let gates = || self.whose_of_gates(files, limits);
-        self.whose(files, None, limits)
-            .or_else(|error| gates().map_err(|_| error))
-    }
-
-    /// As [`DicomArgs::whose`], of the gates of one beat.
-    ///
-    /// # Errors
-    /// As there.
-    pub(super) fn whose_of_gates(
-        &self,
-        files: &[VolumeFile],
-        limits: &ReadLimits,
-    ) -> Result<Option<Provenance>> {
-        match self.whose(files, Some(0), limits) {
-            Err(error) if files.len() > 1 => {
-                self.whose(&files[..1], Some(0), limits).map_err(|_| error)
-            }
-            whose => whose,
+    fn secret(&self) -> Vec<u8> {
+        let given = self.deidentify_secret.clone();
+        let given = given.or_else(|| std::env::var("VENTRIFORM_DEIDENTIFY_SECRET").ok());
+        match given {
+            Some(text) => text.into_bytes(),
+            None => uuid::Uuid::new_v4().as_bytes().to_vec(),
         }
     }
 
@@ -205,14 +137,41 @@ impl DicomArgs {
         frame: Option<usize>,
         limits: &ReadLimits,
     ) -> Result<Option<Provenance>> {
+        self.named(|stated| objects::whose(files, frame, stated, limits, &Monitor::silent()))
+    }
+
+    /// As [`DicomArgs::whose`], of the gates of one beat.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn whose_of_gates(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<Provenance>> {
+        self.named(|stated| objects::whose_gates(files, stated, limits, &Monitor::silent()))
+    }
+
+    /// As [`DicomArgs::whose`], of a scan that may be gated.
+    ///
+    /// # Errors
+    /// As there.
+    pub(super) fn whose_of_either(
+        &self,
+        files: &[VolumeFile],
+        limits: &ReadLimits,
+    ) -> Result<Option<Provenance>> {
+        self.named(|stated| objects::whose_either(files, stated, limits, &Monitor::silent()))
+    }
+
+    fn named(
+        &self,
+        whose: impl FnOnce(&StatedIdentity) -> Result<Option<Provenance>, VolumeError>,
+    ) -> Result<Option<Provenance>> {
         if self.deidentify {
             return Ok(None);
         }
-        let options = ReadOptions { frame };
-        let found = volume::provenance(files, &options, limits, &Monitor::silent())
-            .map_err(|error| anyhow!(error.with_advice()))?;
-        let stated = self.stated();
-        Ok(identity(found.as_ref(), &stated).ok().or(found))
+        whose(&self.stated()).map_err(|error| anyhow!(error.with_advice()))
     }
 
     fn stated(&self) -> StatedIdentity {
@@ -249,33 +208,5 @@ impl DicomArgs {
             ),
             time: format!("{hour:02}{minute:02}{second:02}"),
         })
-    }
-}
-
-impl DicomOrder {
-    /// The scan that the objects of `made` belong to.
-    pub(super) fn of(self, made: &SegmentedVolume) -> SourceScan {
-        let scan = made.scan(self.identity, self.made);
-        Self::anonymous(scan, self.deidentify.as_ref())
-    }
-
-    /// End diastole and end systole as the scans that the objects of `made` belong to.
-    pub(super) fn of_beat(self, made: &GatedHeart) -> [SourceScan; 2] {
-        let scans = made.scans(&self.identity, &self.made);
-        scans.map(|scan| Self::anonymous(scan, self.deidentify.as_ref()))
-    }
-
-    /// The scan that the objects of `heart` belong to.
-    pub(super) fn of_compared(self, heart: &ComparedHeart) -> SourceScan {
-        let scan = heart.scan(self.identity, self.made);
-        Self::anonymous(scan, self.deidentify.as_ref())
-    }
-
-    /// The scan, without the patient's identity if that is asked for.
-    fn anonymous(scan: SourceScan, how: Option<&(Deidentification, StatedIdentity)>) -> SourceScan {
-        match how {
-            Some((how, stated)) => scan.deidentified(how, stated),
-            None => scan,
-        }
     }
 }

@@ -285,6 +285,17 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "objects",
+        &[
+            "progress",
+            "volume",
+            "export",
+            "segmentation",
+            "gated",
+            "rest_stress",
+        ],
+    ),
+    (
         "advice",
         &[
             "mesh_files",
@@ -305,6 +316,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
             "gated",
             "rest_stress",
             "evaluate",
+            "objects",
         ],
     ),
     (

@@ -140,6 +140,8 @@ pub mod rest_stress;
 
 pub mod evaluate;
 
+pub mod objects;
+
 pub mod advice;
 
 mod front;

@@ -22,6 +22,7 @@ use crate::locate::LocateError;
 use crate::mesh_files::MeshFileError;
 use crate::model::TemplateError;
 use crate::normals::NormalsError;
+use crate::objects::ObjectError;
 use crate::parameters::ParameterError;
 use crate::pipeline::PipelineError;
 use crate::reader::ProfileError;
@@ -598,6 +599,19 @@ impl Explain for TemplateError {
 
     fn is_cancelled(&self) -> bool {
         matches!(self, TemplateError::Cancelled(_))
+    }
+}
+
+impl Explain for ObjectError {
+    fn explain(&self) -> Failure {
+        match self {
+            Self::Volume(error) => error.explain(),
+            Self::Identity(error) => error.explain(),
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        matches!(self, Self::Volume(error) if error.is_cancelled())
     }
 }
 
