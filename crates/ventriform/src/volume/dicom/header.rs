@@ -83,17 +83,18 @@ pub fn read_header(
     })
 }
 
-/// A UID that the object must have.
+/// A UID that the object must have. Zeros before a number are accepted: objects are told apart by them all the
+/// same, and what is made of such an object does not name it.
 fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
     let text = a.text(attribute).ok_or_else(|| a.missing(attribute))?;
-    let formed = |b: u8| b.is_ascii_digit() || b == b'.';
-    if text.len() <= LONGEST_UID && text.bytes().all(formed) {
+    let number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    if text.len() <= LONGEST_UID && text.split('.').all(number) {
         Ok(text)
     } else {
         Err(a.wrong(
             attribute.name,
             &text,
-            format!("a UID has at most {LONGEST_UID} digits and dots"),
+            format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
         ))
     }
 }
