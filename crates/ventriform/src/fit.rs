@@ -63,7 +63,8 @@ pub fn fit_at(
             fit = other;
         }
     }
-    refusal::require_heart(&fit.model, &fit.judgement, &parameters.hints)?;
+    refusal::require_heart(&fit.model, &fit.judgement, &parameters.hints)
+        .map_err(|error| error.about(volume))?;
     monitor.report(Stage::Deform, 1.0)?;
     Ok(fit)
 }

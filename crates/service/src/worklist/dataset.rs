@@ -1,10 +1,12 @@
 //! A data set as DICOM JSON (PS3.18 annex F): tags of eight hexadecimal digits, each with a value
 //! representation and values.
 //!
-//! A work item is answered as it was sent, so its elements stay JSON. `dicom-json` 0.9, tried on 18 elements, changes 8 of
+//! A work item is answered as it was sent, so its elements stay JSON; those of unknown representation become what the
+//! standard makes them (`unknown`). `dicom-json` 0.9, tried on 18 elements, changes 8 of
 //! them when it reads and writes them (all parts of a person's name become the alphabetic one, a `BulkDataURI` is
 //! lost, an empty `Value` becomes an empty text, numbers become texts) and refuses a `null` item, which annex F allows.
 
+use super::unknown;
 use serde_json::{Map, Value, json};
 
 /// Most nested sequences.
@@ -38,9 +40,11 @@ impl DataSetJson {
     /// The first element that is none.
     pub fn of(object: Map<String, Value>) -> Result<Self, Malformed> {
         check(&object, 0)?;
-        let elements = object
-            .into_iter()
-            .map(|(tag, element)| (tag.to_ascii_uppercase(), element));
+        let elements = object.into_iter().map(|(tag, element)| {
+            let tag = tag.to_ascii_uppercase();
+            let element = settled(&tag, element, MAX_SEQUENCE_DEPTH);
+            (tag, element)
+        });
         Ok(Self(elements.collect()))
     }
 
@@ -108,6 +112,26 @@ pub(super) fn values(element: &Value) -> &[Value] {
         .map_or(&[], Vec::as_slice)
 }
 
+/// An element with everything of unknown representation in it as the standard has it.
+fn settled(tag: &str, element: Value, depth: usize) -> Value {
+    let Value::Object(mut fields) = element else {
+        return element;
+    };
+    if fields.get("vr").and_then(Value::as_str) == Some("UN")
+        && let Some(known) = unknown::known(tag, &fields, depth)
+    {
+        return known;
+    }
+    if let Some(Value::Array(items)) = fields.get_mut("Value") {
+        for item in items.iter_mut().filter_map(Value::as_object_mut) {
+            for (tag, element) in item.iter_mut() {
+                *element = settled(tag, element.take(), depth.saturating_sub(1));
+            }
+        }
+    }
+    Value::Object(fields)
+}
+
 fn check(object: &Map<String, Value>, depth: usize) -> Result<(), Malformed> {
     for (tag, element) in object {
         let wrong = |reason| {
@@ -130,7 +154,9 @@ fn check(object: &Map<String, Value>, depth: usize) -> Result<(), Malformed> {
         if fields.get("Value").is_some_and(|values| !values.is_array()) {
             return wrong("`Value` must be an array");
         }
-        if vr != Some("SQ") {
+        // An element of unknown representation may be a sequence.
+        let holds_items = || values(element).iter().any(Value::is_object);
+        if vr != Some("SQ") && !(vr == Some("UN") && holds_items()) {
             continue;
         }
         if depth == MAX_SEQUENCE_DEPTH {

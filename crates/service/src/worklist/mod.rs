@@ -24,6 +24,7 @@ mod procedure;
 mod query;
 mod storage;
 mod time;
+mod unknown;
 mod workitem;
 
 pub use dataset::{DataSetJson, Malformed};

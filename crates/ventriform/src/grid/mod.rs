@@ -5,6 +5,7 @@
 //! - [`blocks`]: means over blocks of voxels, a volume at low resolution;
 //! - [`mod@blur`]: separable Gaussian blur;
 //! - [`field`]: a blurred volume as a smooth function of position;
+//! - [`size`]: whether the field is that of a scan of a chest;
 //! - [`smoothness`]: the length over which an image's values change;
 //! - [`labels`], [`components`]: sets of voxels, their topology and connected parts;
 //! - [`voxelise`]: from a closed mesh to the mask of the voxels inside it;
@@ -18,6 +19,7 @@ pub mod components;
 pub mod field;
 pub mod gates;
 pub mod labels;
+pub mod size;
 pub mod smoothness;
 pub mod survey;
 pub mod volume;

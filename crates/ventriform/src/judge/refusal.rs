@@ -46,6 +46,7 @@ pub fn require_heart(
             centre: found.cup.centre.into(),
             correlation: found.correlation,
             reason,
+            size: None,
         }),
         _ => Ok(()),
     }

@@ -1,6 +1,8 @@
 //! Why no ventricle was found.
 
 use super::not_a_heart::NotAHeart;
+use crate::grid::Volume;
+use crate::grid::size::OddSize;
 use crate::progress::Cancelled;
 
 /// Why no ventricle was found.
@@ -10,7 +12,7 @@ pub enum LocateError {
     #[error("the volume shows nothing: it holds no positive values that differ")]
     Blank,
     /// No place looks like a ventricle.
-    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}")]
+    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}{}", .size.map(|size| size.to_string()).unwrap_or_default())]
     NoHeart {
         /// Best candidate's centre, LPS mm.
         centre: [f64; 3],
@@ -18,6 +20,8 @@ pub enum LocateError {
         correlation: f64,
         /// Why it is not a heart.
         reason: NotAHeart,
+        /// The size of the volume, if it is not that of a scan of a chest.
+        size: Option<OddSize>,
     },
     /// No place in the volume meets the hints.
     #[error("the hinted centre or region lies outside the volume")]
@@ -25,4 +29,15 @@ pub enum LocateError {
     /// The caller cancelled the search.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl LocateError {
+    /// The error about `volume`: where no heart was found, with the size of an odd one.
+    #[must_use]
+    pub(crate) fn about(mut self, volume: &Volume) -> Self {
+        if let Self::NoHeart { size, .. } = &mut self {
+            *size = OddSize::of(volume);
+        }
+        self
+    }
 }

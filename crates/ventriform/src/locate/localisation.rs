@@ -132,6 +132,7 @@ impl Cups {
             centre: candidate.cup.centre.into(),
             correlation: candidate.correlation,
             reason,
+            size: None,
         })
     }
 

@@ -185,7 +185,8 @@ impl Heart<'_> {
     /// centre overrules that.
     pub fn localisation(&self) -> Result<Localisation, LocateError> {
         let (Decision::Rays(_, cups) | Decision::Cups(cups, _)) = &self.decision;
-        Ok(cups.localisation(cups.best(|_| true)?))
+        let best = cups.best(|_| true);
+        Ok(cups.localisation(best.map_err(|error| error.about(self.volume))?))
     }
 }
 

@@ -10,6 +10,7 @@ use super::{IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, is
 use crate::grid::Volume;
 use crate::grid::components::Components;
 use crate::grid::labels::Labels;
+use crate::grid::size::OddSize;
 use crate::grid::survey::Survey;
 use crate::locate::rays::{PLAUSIBLE_SCORE, UNCERTAIN_SCORE};
 use crate::locate::{self, LocateError};
@@ -89,9 +90,10 @@ fn find_ventricle(
         Err(_) => None,
     };
     let Some(cavity) = found.filter(|c| c.score >= PLAUSIBLE_SCORE) else {
-        facts.warnings.push(
-            "no left ventricle was recognised; the largest connected part was taken instead".into(),
-        );
+        let size = OddSize::of(volume).map_or_else(String::new, |size| size.to_string());
+        facts.warnings.push(format!(
+            "no left ventricle was recognised; the largest connected part was taken instead{size}"
+        ));
         return Ok(None);
     };
     facts.ventricle_score = Some(cavity.score);

@@ -122,6 +122,8 @@ pub(super) struct VoxelReader<'a> {
 struct Decoder {
     format: VoxelFormat,
     figures: Figures,
+    /// A stored number that says something and that a slope of 0 loses.
+    lost: Option<f64>,
 }
 
 /// Running figures over decoded voxels.
@@ -193,7 +195,11 @@ impl<'a> VoxelReader<'a> {
         source: &'a mut Source,
     ) -> Self {
         Self {
-            decoder: Decoder { format, figures },
+            decoder: Decoder {
+                format,
+                figures,
+                lost: None,
+            },
             source,
             buffer: Vec::new(),
         }
@@ -202,6 +208,12 @@ impl<'a> VoxelReader<'a> {
     /// The figures over all voxels so far.
     pub(super) fn into_figures(self) -> Figures {
         self.decoder.figures
+    }
+
+    /// A stored number other than 0, and than the least of its type, among those that were read with a slope of
+    /// 0: their slice is not empty.
+    pub(super) fn stored_without_slope(&self) -> Option<f64> {
+        self.decoder.lost
     }
 
     /// Appends the `count` voxels from byte `begin` on to `voxels`. `begin` must not lie before the
@@ -388,6 +400,9 @@ impl Decoder {
         first: usize,
         out: &mut Vec<f32>,
     ) -> Result<(), VolumeError> {
+        if self.lost.is_none() && matches!(self.format.scaling, Some((0.0, _))) {
+            self.lost = telling_number(bytes, &self.format);
+        }
         let start = out.len();
         let padded = decode(bytes, &self.format, out);
         if padded > 0
@@ -591,6 +606,25 @@ fn decode(bytes: &[u8], format: &VoxelFormat, voxels: &mut Vec<f32>) -> u64 {
         }
     });
     padded.get()
+}
+
+/// The first stored number in `bytes` that is no padding, not 0 and not the least of its type: writers that scale
+/// each slice put one of these where a slice is empty.
+fn telling_number(bytes: &[u8], format: &VoxelFormat) -> Option<f64> {
+    let mut stored: Vec<f64> = Vec::with_capacity(bytes.len() / format.data_type.size());
+    let unused = format.unused_bits;
+    with_type!(format.data_type, T => {
+        T::each(bytes, format.byte_order, &mut stored, |v| v.trim(unused).double());
+    });
+    let bits = 8 * format.data_type.size() as u32 - unused;
+    let least = if format.data_type.is_signed() {
+        -2_f64.powi(bits as i32 - 1)
+    } else {
+        0.0
+    };
+    let is_padding = |number| format.padding.is_some_and(|p| p.covers(number));
+    let mut numbers = stored.into_iter();
+    numbers.find(|number| *number != 0.0 && *number != least && !is_padding(*number))
 }
 
 /// Appends the whole numbers in `bytes`, slope and intercept applied, to `labels`.

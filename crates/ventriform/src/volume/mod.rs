@@ -55,6 +55,7 @@ pub mod dicom;
 pub mod error;
 pub mod facts;
 mod folder;
+mod foreign;
 mod gate_files;
 mod gate_timing;
 pub mod gates;
@@ -72,6 +73,7 @@ mod source;
 mod summary;
 mod surface_file;
 mod unpack;
+mod values;
 
 pub use crate::grid::Volume;
 pub use error::VolumeError;
@@ -94,3 +96,4 @@ pub use read::{
 pub use segment::{Segment, SegmentCode};
 pub use source::VolumeFile;
 pub use summary::summarise;
+pub use values::{is_date, is_uid};

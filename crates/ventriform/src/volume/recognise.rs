@@ -2,6 +2,7 @@
 //!
 //! File names can be wrong and can get lost during an upload, so only the magic numbers count.
 
+use super::foreign::{self, is_analyze};
 use super::limits::ReadLimits;
 use super::source::{Source, VolumeFile};
 use super::{VolumeError, dicom, nifti, surface_file};
@@ -122,15 +123,22 @@ impl<'a> Sorted<'a> {
                     return Ok(Recognised::Mesh(mesh));
                 }
                 let analyze = others.iter().find(|(_, start)| is_analyze(start));
-                Err(match (analyze, others, inside) {
-                    (Some((file, start)), ..) => refuse(file, start),
-                    (None, [(file, start)], None) if self.empty.is_empty() => refuse(file, start),
-                    (_, _, Some(name)) => VolumeError::Unsupported {
+                if let Some((file, start)) = analyze {
+                    return Err(foreign::refuse(file, start, limits));
+                }
+                if let Some(error) = foreign::refuse_all(others, inside, limits) {
+                    return Err(error);
+                }
+                Err(match (others, inside) {
+                    ([(file, start)], None) if self.empty.is_empty() => {
+                        foreign::refuse(file, start, limits)
+                    }
+                    (_, Some(name)) => VolumeError::Unsupported {
                         file: name.into(),
                         format: "an archive or folder without DICOM or NIfTI files".into(),
                         fix: "Give the files of one DICOM series, or one NIfTI file.",
                     },
-                    (_, [], None) => VolumeError::NoFile,
+                    ([], None) => VolumeError::NoFile,
                     _ => self.not_one(inside),
                 })
             }
@@ -285,65 +293,3 @@ fn look(file: &VolumeFile, limits: &ReadLimits) -> Result<(FileKind, Vec<u8>), V
     };
     Ok((kind, start))
 }
-
-/// Whether a file without NIfTI magic is an Analyze 7.5 header, which has the same length field.
-fn is_analyze(start: &[u8]) -> bool {
-    let length = [348_i32.to_le_bytes(), 348_i32.to_be_bytes()];
-    start.len() >= 348 && length.iter().any(|l| start.starts_with(l))
-}
-
-/// The error for a file that is not supported, with the name of its format if `start` shows it.
-fn refuse(file: &VolumeFile, start: &[u8]) -> VolumeError {
-    const CONVERT_ADVICE: &str = "Convert it to NIfTI (.nii.gz).";
-    const ANALYZE_ADVICE: &str =
-        "Convert it to NIfTI: Analyze files do not state which side is left.";
-    let known: &[(usize, &[u8], &'static str)] = &[
-        (0, b"CDF\x01", "a MINC 1 (netCDF) file"),
-        (0, b"CDF\x02", "a MINC 1 (netCDF) file"),
-        (0, b"\x89HDF\r\n", "an HDF5 file (for example MINC 2)"),
-        (0, b"NRRD", "an NRRD file"),
-        (0, b"ObjectType", "a MetaImage header"),
-        (0, b"NDims", "a MetaImage header"),
-        (0, b"!INTERFILE", "an Interfile header"),
-        (0, b"!interfile", "an Interfile header"),
-        (0, b"MATRIX", "an ECAT 7 file"),
-        (0, b"\x89PNG", "a PNG image"),
-        (0, b"\xff\xd8\xff", "a JPEG image"),
-        (0, b"GIF8", "a GIF image"),
-        (0, b"II*\0", "a TIFF image"),
-        (0, b"MM\0*", "a TIFF image"),
-        (0, b"%PDF", "a PDF document"),
-        (0, b"PK\x03\x04", "a ZIP archive in an archive"),
-        (0, b"BZh", "a bzip2 file"),
-        (0, b"\xfd7zXZ", "an xz file"),
-        (0, b"\x28\xb5\x2f\xfd", "a Zstandard file"),
-        (0, GZIP_AGAIN, "gzipped twice"),
-        (257, b"ustar", "a tar archive"),
-        (0, b"<?xml", "an XML document"),
-        (0, b"<!DOCTYPE", "an HTML page"),
-        (0, b"{", "a JSON document"),
-    ];
-    let name = file.name().to_owned();
-    if is_analyze(start) {
-        return VolumeError::Unsupported {
-            file: name,
-            format: "an Analyze 7.5 header (it has no NIfTI magic)".into(),
-            fix: ANALYZE_ADVICE,
-        };
-    }
-    for (at, magic, format) in known {
-        if start.get(*at..).is_some_and(|rest| rest.starts_with(magic)) {
-            return VolumeError::Unsupported {
-                file: name,
-                format: (*format).into(),
-                fix: CONVERT_ADVICE,
-            };
-        }
-    }
-    VolumeError::Unrecognised {
-        file: name,
-        start: start[..start.len().min(16)].escape_ascii().to_string(),
-    }
-}
-
-const GZIP_AGAIN: &[u8] = &[0x1f, 0x8b, 0x08];

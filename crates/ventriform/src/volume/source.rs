@@ -289,6 +289,8 @@ pub(super) struct Source {
     cut_off: bool,
     /// Whether unpacking at once was tried.
     prepared: bool,
+    /// Bytes that were read and not yet given out.
+    ahead: Vec<u8>,
 }
 
 enum Body {
@@ -362,6 +364,7 @@ impl Source {
             gzip: false,
             cut_off: false,
             prepared: false,
+            ahead: Vec::new(),
         }
     }
 
@@ -407,6 +410,9 @@ impl Source {
         let Body::Gzip(members) = &mut self.body else {
             return Ok(());
         };
+        if !self.ahead.is_empty() {
+            return Ok(());
+        }
         let Some(mut packed) = members.take_first() else {
             return Ok(());
         };
@@ -429,6 +435,9 @@ impl Source {
         let Body::Unpacked(unpacked) = &self.body else {
             return None;
         };
+        if !self.ahead.is_empty() {
+            return None;
+        }
         let begin = usize::try_from(self.position).ok()?;
         let lent = unpacked.bytes().get(begin..begin.checked_add(length)?)?;
         self.position += length as u64;
@@ -442,6 +451,9 @@ impl Source {
             return None;
         };
         let begin = usize::try_from(self.position).ok()?;
+        if !self.ahead.is_empty() {
+            return None;
+        }
         if begin > length || begin.checked_add(length) != Some(unpacked.bytes().len()) {
             return None;
         }
@@ -454,7 +466,9 @@ impl Source {
     /// # Errors
     /// [`VolumeError`] if the file is damaged, unreadable or larger than the limit.
     pub(super) fn fill(&mut self, buffer: &mut [u8]) -> Result<usize, VolumeError> {
-        let mut filled = 0;
+        let mut filled = self.ahead.len().min(buffer.len());
+        buffer[..filled].copy_from_slice(&self.ahead[..filled]);
+        self.ahead.drain(..filled);
         while filled < buffer.len() {
             let part = &mut buffer[filled..];
             let got = match &mut self.body {
@@ -486,6 +500,29 @@ impl Source {
         }
     }
 
+    /// The next `length` bytes, fewer at the end of the file, which stay to be read.
+    ///
+    /// # Errors
+    /// As [`Source::fill`].
+    pub(super) fn peek(&mut self, length: usize) -> Result<&[u8], VolumeError> {
+        let left = self.limit.saturating_sub(self.position);
+        let length = length.min(usize::try_from(left).unwrap_or(length));
+        let missing = length.saturating_sub(self.ahead.len());
+        if missing > 0 {
+            let position = self.position;
+            let mut held = std::mem::take(&mut self.ahead);
+            let mut more = vec![0; missing];
+            // The bytes held are no part of the position, and those read now become none.
+            self.position += held.len() as u64;
+            let got = self.fill(&mut more);
+            self.position = position;
+            held.extend_from_slice(&more[..*got.as_ref().unwrap_or(&0)]);
+            self.ahead = held;
+            got?;
+        }
+        Ok(&self.ahead[..length.min(self.ahead.len())])
+    }
+
     /// Fills `buffer` completely. `needed` is the size of the file that the header implies, for the
     /// error if the file ends before.
     pub(super) fn fill_all(&mut self, buffer: &mut [u8], needed: u64) -> Result<(), VolumeError> {
@@ -502,6 +539,10 @@ impl Source {
         if target > self.limit {
             return Err(self.beyond_limit(target));
         }
+        let known = target.saturating_sub(self.position);
+        let known = self.ahead.len().min(known as usize);
+        self.ahead.drain(..known);
+        self.position += known as u64;
         if let Body::Plain(reader) = &mut self.body {
             // Keeps the buffer if the target is inside it.
             if let Err(e) = reader.seek_relative((target - self.position) as i64) {

@@ -44,12 +44,12 @@ mod uid;
 #[cfg(test)]
 mod tests;
 
+pub use crate::volume::is_uid;
 pub use beat::{BeatEnd, BeatObject, DicomBeat, EndWall};
 pub use codes::{LabelSegment, Structure};
 pub use comparison::{ComparisonObject, DicomComparison};
 pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
-pub use uid::is_uid;
 
 use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
 use self::data_set::DataSet;

@@ -3,10 +3,10 @@
 use super::DicomError;
 use super::codes::SOURCE_FOR_PROCESSING;
 use super::data_set::{DataSet, reference};
-use super::uid::{derived, is_uid};
+use super::uid::derived;
 use crate::geometry::frame::VoxelToPatient;
 use crate::text::is_printable;
-use crate::volume::Provenance;
+use crate::volume::{Provenance, is_date, is_uid};
 use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
 
@@ -223,6 +223,8 @@ pub fn identity(
 ) -> Result<Provenance, DicomError> {
     stated.check()?;
     let mut whole = file.cloned().unwrap_or_default();
+    // Records of older versions hold what the file said.
+    whole.put_right();
     let mut undecoded = std::mem::take(&mut whole.undecoded);
     for (field, stated, known) in stated.beside(&mut whole) {
         let Some(value) = stated else { continue };
@@ -245,16 +247,6 @@ pub fn identity(
 }
 
 fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
-    let date = |value: &str| {
-        let parts = [0..4, 4..6, 6..8].map(|range| value.get(range)?.parse().ok());
-        let [Some(_), Some(month), Some(day)]: [Option<u32>; 3] = parts else {
-            return false;
-        };
-        value.len() == 8
-            && value.bytes().all(|b| b.is_ascii_digit())
-            && (1..=12).contains(&month)
-            && (1..=31).contains(&day)
-    };
     let plain = |longest: usize| {
         let length = value.chars().count();
         (1..=longest).contains(&length) && value.chars().all(|c| is_printable(c) && c != '\\')
@@ -264,7 +256,7 @@ fn check(field: &'static str, value: &str) -> Result<(), DicomError> {
             is_uid(value),
             "a UID: numbers separated by dots, at most 64 characters",
         ),
-        "patient_birth_date" | "study_date" => (date(value), "a date as YYYYMMDD"),
+        "patient_birth_date" | "study_date" => (is_date(value), "a date as YYYYMMDD"),
         "patient_sex" => (["M", "F", "O"].contains(&value), "M, F or O"),
         "study_id" | "accession_number" => (
             plain(16),
@@ -287,12 +279,14 @@ impl SourceScan {
     /// that position is known: objects of a scan whose position is assumed do not claim the
     /// scan's Frame of Reference.
     pub fn new(
-        provenance: Provenance,
+        mut provenance: Provenance,
         frame: VoxelToPatient,
         shape: [usize; 3],
         placed: bool,
         made: Moment,
     ) -> Self {
+        // Where a scan comes from does not matter: an object states nothing that is no value of its VR.
+        provenance.put_right();
         Self {
             provenance,
             frame,

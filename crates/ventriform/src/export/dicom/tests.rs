@@ -1,6 +1,5 @@
 //! The objects, read back with `dicom-object`.
 
-use super::uid::is_uid;
 use super::*;
 use crate::draw::Image;
 use crate::geometry::Vec3;
@@ -17,6 +16,7 @@ use crate::report::{
     TerritoryScore, Thickness, Thicknesses, VolumeIntervalsReport, WallVolumes,
 };
 use crate::volume::Provenance;
+use crate::volume::is_uid;
 use dicom_core::Tag;
 use dicom_object::{DefaultDicomObject, InMemDicomObject, from_reader};
 use nalgebra::Matrix3;

@@ -3,11 +3,11 @@
 use super::super::VolumeError;
 use super::super::facts::ByteOrder;
 use super::characters::{CharacterSets, Division};
+use super::real_world::{MAPPING_SEQUENCE, Mappings, UNITS_SEQUENCE};
+use super::representation::standard;
 use crate::text::escaped;
-use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
-use dicom_dictionary_std::StandardDataDictionary;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Most values that are kept of one data set. Enough for 20,000 frames with a dozen each.
 const MOST_VALUES: usize = 1 << 18;
@@ -20,8 +20,8 @@ const MOST_BYTES: usize = 16 << 20;
 pub(super) struct Attribute {
     /// The sequences, from the outermost, whose first items hold the attribute. [`PER_FRAME_GROUPS`] stands for
     /// the functional groups of a frame or of all frames.
-    path: &'static [Tag],
-    tag: Tag,
+    pub(super) path: &'static [Tag],
+    pub(super) tag: Tag,
     /// Name and tag for error messages.
     pub name: &'static str,
 }
@@ -34,7 +34,7 @@ macro_rules! attributes {
             name: $name,
         };)*
         /// Every attribute above.
-        const WANTED_ATTRIBUTES: &[Attribute] = &[$($id),*];
+        pub(super) const WANTED_ATTRIBUTES: &[Attribute] = &[$($id),*];
     };
 }
 
@@ -47,7 +47,6 @@ const PER_FRAME_GROUPS: Tag = Tag(0x5200, 0x9230);
 const SEGMENT_SEQUENCE: Tag = Tag(0x0062, 0x0002);
 
 const DETECTOR_PATH: &[Tag] = &[Tag(0x0054, 0x0022)];
-const REAL_WORLD: &[Tag] = &[Tag(0x0040, 0x9096)];
 /// Gated Information Sequence.
 const GATED_INFORMATION: Tag = Tag(0x0054, 0x0062);
 /// Data Information Sequence, with an item for each R-R interval.
@@ -65,7 +64,6 @@ const FRAME_POSITION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9113)];
 const FRAME_ORIENTATION_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9116)];
 const FRAME_MEASURES: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0028, 0x9110)];
 const FRAME_RESCALE: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0028, 0x9145)];
-const FRAME_REAL_WORLD: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0040, 0x9096)];
 const FRAME_CONTENT: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0020, 0x9111)];
 const FRAME_SEGMENT_PATH: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0062, 0x000a)];
 const FRAME_CARDIAC: &[Tag] = &[PER_FRAME_GROUPS, Tag(0x0018, 0x9118)];
@@ -193,8 +191,6 @@ attributes! {
     MAXIMUM_FRACTION = &[], 0x0062, 0x000e, "Maximum Fractional Value (0062,000E)";
     DETECTOR_POSITION = DETECTOR_PATH, 0x0020, 0x0032, "Image Position (Patient) (0020,0032)";
     DETECTOR_ORIENTATION = DETECTOR_PATH, 0x0020, 0x0037, "Image Orientation (Patient) (0020,0037)";
-    REAL_WORLD_INTERCEPT = REAL_WORLD, 0x0040, 0x9224, "Real World Value Intercept (0040,9224)";
-    REAL_WORLD_SLOPE = REAL_WORLD, 0x0040, 0x9225, "Real World Value Slope (0040,9225)";
     PHARMACEUTICAL_NAME = PHARMACEUTICAL_PATH, 0x0018, 0x0031, "Radiopharmaceutical (0018,0031)";
     SCAN_ARC = ROTATION_PATH, 0x0018, 0x1143, "Scan Arc (0018,1143)";
     INJECTED_DOSE = PHARMACEUTICAL_PATH, 0x0018, 0x1074, "Radionuclide Total Dose (0018,1074)";
@@ -214,10 +210,6 @@ attributes! {
     FRAME_PIXEL_SPACING = FRAME_MEASURES, 0x0028, 0x0030, "Pixel Spacing (0028,0030)";
     FRAME_RESCALE_INTERCEPT = FRAME_RESCALE, 0x0028, 0x1052, "Rescale Intercept (0028,1052)";
     FRAME_RESCALE_SLOPE = FRAME_RESCALE, 0x0028, 0x1053, "Rescale Slope (0028,1053)";
-    FRAME_REAL_WORLD_INTERCEPT = FRAME_REAL_WORLD, 0x0040, 0x9224,
-        "Real World Value Intercept (0040,9224)";
-    FRAME_REAL_WORLD_SLOPE = FRAME_REAL_WORLD, 0x0040, 0x9225,
-        "Real World Value Slope (0040,9225)";
     FRAME_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9074, "Frame Acquisition DateTime (0018,9074)";
     FRAME_TEMPORAL_INDEX = FRAME_CONTENT, 0x0020, 0x9128, "Temporal Position Index (0020,9128)";
     FRAME_REFERENCE_DATE_TIME = FRAME_CONTENT, 0x0018, 0x9151,
@@ -263,6 +255,13 @@ attributes! {
     SEGMENT_REGION_VALUE = SEGMENT_REGION_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
     SEGMENT_REGION_MEANING = SEGMENT_REGION_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
+}
+
+/// Whether `tag` is a sequence that holds a needed attribute.
+pub(super) fn is_path(tag: Tag) -> bool {
+    let mut of_attributes = WANTED_ATTRIBUTES.iter().flat_map(|a| a.path);
+    [SHARED_GROUPS, MAPPING_SEQUENCE, UNITS_SEQUENCE].contains(&tag)
+        || of_attributes.any(|sequence| *sequence == tag)
 }
 
 impl Attribute {
@@ -336,6 +335,10 @@ pub(super) struct Attributes {
     pub byte_order: ByteOrder,
     /// Media Storage SOP Class UID (0002,0002), which stands in for a missing SOP Class UID.
     pub media_class: Option<String>,
+    /// The items of the Real World Value Mapping.
+    pub mappings: Mappings,
+    /// What was put right, for people to read.
+    notes: BTreeSet<String>,
     values: BTreeMap<Key, Vec<u8>>,
     bytes: usize,
 }
@@ -347,6 +350,8 @@ impl Attributes {
             file: file.into(),
             byte_order,
             media_class: None,
+            mappings: Mappings::default(),
+            notes: BTreeSet::new(),
             values: BTreeMap::new(),
             bytes: 0,
         }
@@ -362,6 +367,25 @@ impl Attributes {
         self.bytes += value.len();
         let key = (attribute.path, attribute.tag, frame);
         self.values.insert(key, value);
+    }
+
+    /// Notes that a value of `attribute` was stated in another representation than the standard's.
+    pub(super) fn put_right(&mut self, attribute: Attribute, stated: VR) {
+        self.note(format!(
+            "{} has the value representation {stated} in place of {}: its value was converted.",
+            attribute.name,
+            standard(attribute.tag)
+        ));
+    }
+
+    /// Notes what was put right.
+    pub(super) fn note(&mut self, note: String) {
+        self.notes.insert(note);
+    }
+
+    /// What was put right, for people to read.
+    pub(super) fn notes(&self) -> impl Iterator<Item = String> {
+        self.notes.iter().cloned()
     }
 
     /// The error for an invalid value of `field`. Long values are cut.
@@ -398,6 +422,18 @@ impl Attributes {
             Some(_) => value(frame).or_else(|| value(None)),
             None => value(None),
         }
+    }
+
+    /// The stored bytes of `attribute`, of whatever frame.
+    #[cfg(test)]
+    pub(super) fn raw(&self, attribute: Attribute) -> Option<Vec<u8>> {
+        let stated = |((path, tag, _), _): &(&Key, &Vec<u8>)| {
+            (*path, *tag) == (attribute.path, attribute.tag)
+        };
+        self.values
+            .iter()
+            .find(stated)
+            .map(|(_, value)| value.clone())
     }
 
     /// Number of frames that the functional groups describe by attributes that are kept.
@@ -483,8 +519,7 @@ impl Attributes {
                 bytes.len()
             ));
         }
-        let entry = StandardDataDictionary.by_tag(attribute.tag);
-        let representation = entry.map_or(VR::UN, |entry| entry.vr().relaxed());
+        let representation = standard(attribute.tag);
         let sets = self.character_sets(attribute.path);
         let text = sets.decode(bytes, Division::of(representation))?;
         Ok((!text.is_empty()).then_some(text))

@@ -94,7 +94,7 @@ pub(super) fn open(
         monitor.check()?;
         let scanned = ScannedFile::open(file, limits, monitor)?;
         let kind = scanned.scan.kind;
-        if !matches!(kind, Kind::Nuclear { .. } | Kind::Enhanced) {
+        if !matches!(kind, Kind::Nuclear { .. } | Kind::Enhanced) || scanned.is_one_slice() {
             return Ok(None);
         }
         places.push(Place::of(&scanned.scan.attributes, kind));

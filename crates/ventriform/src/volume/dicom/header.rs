@@ -5,7 +5,7 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::VolumeFile;
 use super::attributes::{
-    Attribute, Attributes, IMAGE_TYPE, MODALITY, SERIES_UID, SOP_CLASS, SOP_INSTANCE,
+    Attribute, Attributes, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES, SERIES_UID, SOP_CLASS, SOP_INSTANCE,
     STUDY_DESCRIPTION, STUDY_UID,
 };
 use super::kind::Kind;
@@ -69,9 +69,13 @@ pub fn read_header(
     let mut source = syntax.open(file, longest)?;
     let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
     let sop_class = uid(&a, SOP_CLASS)?;
-    let is_gate = Kind::of(&a).is_ok_and(|kind| timing::is_one_gate(&a, kind));
+    let is_part = Kind::of(&a).is_ok_and(|kind| {
+        let frames = a.decimals::<1>(NUMBER_OF_FRAMES).ok().flatten();
+        let is_slice = matches!(kind, Kind::Nuclear { .. }) && frames == Some([1.0]);
+        is_slice || timing::is_one_gate(&a, kind)
+    });
     Ok(DicomHeader {
-        is_part: kind::is_slice_class(&sop_class) || is_gate,
+        is_part: kind::is_slice_class(&sop_class) || is_part,
         sop_class,
         sop_instance: uid(&a, SOP_INSTANCE)?,
         study: uid(&a, STUDY_UID)?,
@@ -83,17 +87,18 @@ pub fn read_header(
     })
 }
 
-/// A UID that the object must have.
+/// A UID that the object must have. Zeros before a number are accepted: objects are told apart by them all the
+/// same, and what is made of such an object does not name it.
 fn uid(a: &Attributes, attribute: Attribute) -> Result<String, VolumeError> {
     let text = a.text(attribute).ok_or_else(|| a.missing(attribute))?;
-    let formed = |b: u8| b.is_ascii_digit() || b == b'.';
-    if text.len() <= LONGEST_UID && text.bytes().all(formed) {
+    let number = |part: &str| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
+    if text.len() <= LONGEST_UID && text.split('.').all(number) {
         Ok(text)
     } else {
         Err(a.wrong(
             attribute.name,
             &text,
-            format!("a UID has at most {LONGEST_UID} digits and dots"),
+            format!("a UID is numbers separated by dots, at most {LONGEST_UID} characters"),
         ))
     }
 }

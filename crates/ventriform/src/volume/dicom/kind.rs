@@ -28,7 +28,9 @@ pub(super) enum Kind {
 }
 
 /// SOP classes of the objects that hold slices, after their common prefix.
-const READ_CLASSES: [(&str, Kind); 12] = [
+const READ_CLASSES: [(&str, Kind); 13] = [
+    // Retired; its images state what those of the class after it do.
+    ("5", Kind::Nuclear { gated: false }),
     ("20", Kind::Nuclear { gated: false }),
     ("2", Kind::Slice),
     ("4", Kind::Slice),
@@ -61,12 +63,22 @@ pub(super) fn is_slice_class(class: &str) -> bool {
 
 /// Whether the object is a CT image.
 pub(super) fn is_ct(attributes: &Attributes) -> bool {
+    is_of(attributes, &["2", "2.1", "2.2"])
+}
+
+/// Whether the object is a Nuclear Medicine image.
+pub(super) fn is_nuclear(attributes: &Attributes) -> bool {
+    is_of(attributes, &["20", "5"])
+}
+
+/// Whether the object is of one of these classes, after their common prefix.
+fn is_of(attributes: &Attributes, suffixes: &[&str]) -> bool {
     let class = attributes.text(SOP_CLASS);
     let class = class.or_else(|| attributes.media_class.clone());
     let suffix = class
         .as_deref()
         .and_then(|class| class.strip_prefix(STORAGE_UID_PREFIX));
-    matches!(suffix, Some("2" | "2.1" | "2.2"))
+    suffix.is_some_and(|suffix| suffixes.contains(&suffix))
 }
 
 /// Why an object holds no volume, by the beginning of its SOP class after [`STORAGE_UID_PREFIX`]; the first entry
@@ -173,10 +185,41 @@ impl Kind {
         )
     }
 
+    /// What an object of this kind is called.
+    pub(super) fn noun(self) -> &'static str {
+        match self {
+            Self::Nuclear { .. } => "a Nuclear Medicine image",
+            Self::Slice => "a slice of a PET, CT or MR series",
+            Self::Enhanced => "an Enhanced image",
+            Self::Segmentation => "a Segmentation",
+        }
+    }
+
     /// Whether each file holds one slice.
     pub(super) fn is_single_slice(self) -> bool {
         self == Self::Slice
     }
+}
+
+/// The values of an Image Type that were written as one text: a list with brackets, quotes or commas as programming
+/// languages print it. `None` for anything else.
+pub(super) fn unlisted(image_type: &str) -> Option<String> {
+    const FIRST_VALUES: [&str; 2] = ["ORIGINAL", "DERIVED"];
+    let text = image_type.trim_matches(['\0', ' ']);
+    if text.contains('\\') {
+        return None;
+    }
+    let inner = text.trim_matches(['[', ']', '(', ')', '{', '}']);
+    let separators = [',', ';', '|', '/'];
+    let separator = separators.into_iter().find(|c| inner.contains(*c))?;
+    let values = inner.split(separator);
+    let values: Vec<&str> = values
+        .map(|value| value.trim_matches(['\'', '"', '`', ' ', '[', ']']))
+        .collect();
+    let known = values
+        .first()
+        .is_some_and(|first| FIRST_VALUES.contains(first));
+    known.then(|| values.join("\\"))
 }
 
 /// Refuses PET, CT and MR images that hold something else than slices of the scan.

@@ -6,7 +6,8 @@
 //! 1. `syntax`: finds the data set, its encoding and the compression of its pixels.
 //! 2. `scan`: one pass over the data set collects the needed `attributes` and finds the pixels. It
 //!    follows at most 32 nested sequences and rejects lengths beyond the size of the file. `unknown`:
-//!    sequences that a program wrote without knowing them.
+//!    elements that a program wrote without knowing them. `representation`: values in another representation
+//!    than the standard's.
 //! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
@@ -20,7 +21,7 @@
 //! compressed frame is an error, even if a decoder panics.
 //!
 //! Not read: pixels in colour, JPEG with more than 8 bits that is not lossless, High-Throughput
-//! JPEG 2000, JPEG XL, video, and values that are mapped by a table.
+//! JPEG 2000, JPEG XL, video, and values that are mapped by a table or in ranges (`real_world`).
 
 mod attributes;
 mod characters;
@@ -35,6 +36,8 @@ mod header;
 mod kind;
 mod pixels;
 mod provenance;
+mod real_world;
+mod representation;
 mod scan;
 mod segments;
 mod stack;
@@ -51,8 +54,8 @@ pub(super) use syntax::is_dicom;
 
 use self::attributes::{
     Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
-    NUMBER_OF_SLICES, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER,
-    SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE, TIME_SLICES, TIME_SLOT_VECTOR, TIME_SLOTS, clip,
+    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS,
+    SOP_INSTANCE, TIME_SLICES, TIME_SLOTS, clip,
 };
 use self::frames::FrameOrder;
 use self::kind::Kind;
@@ -68,6 +71,7 @@ use super::limits::ReadLimits;
 use super::open::{Decoded, HeaderFacts, OpenVolume, Placement};
 use super::source::VolumeFile;
 use super::summary::Tally;
+use super::values::is_uid;
 use super::{Provenance, Segment, VolumeError};
 use crate::progress::{Monitor, Stage};
 use std::collections::BTreeMap;
@@ -148,6 +152,11 @@ impl ScannedFile {
         let pixels = Pixels::of(&scan, file, syntax, limits)?;
         Ok(Self { scan, pixels })
     }
+
+    /// Whether it is a Nuclear Medicine image of one frame: a slice, if others of its series lie beside it.
+    fn is_one_slice(&self) -> bool {
+        matches!(self.scan.kind, Kind::Nuclear { .. }) && self.pixels.frames == 1
+    }
 }
 
 impl DicomFile {
@@ -192,7 +201,7 @@ impl DicomFile {
             Kind::Nuclear { gated } => {
                 let order = FrameOrder::of(a, pixels.frames, gated, &mut warnings)?;
                 let (slices, volumes) = (order.slices(), order.gates());
-                check_numbers(a, slices, volumes, &mut warnings)?;
+                check_numbers(a, &order, &mut warnings)?;
                 if slices == 1 {
                     warnings.push(stack::one_slice());
                 }
@@ -302,25 +311,24 @@ impl DicomFile {
         let mut whole = Vec::new();
         for file in files {
             monitor.check()?;
-            let ScannedFile { scan, pixels } = ScannedFile::open(file, limits, monitor)?;
+            let scanned = ScannedFile::open(file, limits, monitor)?;
+            let is_slice = scanned.scan.kind.is_single_slice() || scanned.is_one_slice();
+            let ScannedFile { scan, pixels } = scanned;
             series.name(&scan.attributes);
-            if !scan.kind.is_single_slice() {
-                whole.push(file.name());
+            if !is_slice {
+                whole.push((file.name(), scan.kind));
             } else if let Some(reason) = series.add(&scan.attributes, pixels)? {
                 return refuse(reason);
             }
         }
-        whole.sort_unstable();
-        if let Some(name) = whole.first() {
-            return refuse(format!(
-                "{name} is a volume of its own and not a slice of a series; {}",
-                series.listed()
-            ));
+        whole.sort_unstable_by_key(|(name, _)| *name);
+        if !whole.is_empty() {
+            return refuse(series.beside(&whole, files.len()));
         }
         if let Some(reason) = series.contradiction() {
             return refuse(reason);
         }
-        let Some(first) = series.first.take() else {
+        let Some(mut first) = series.first.take() else {
             return Err(VolumeError::NoFile);
         };
         let extent = series.parts[0].extent;
@@ -353,7 +361,16 @@ impl DicomFile {
                 limit: limits.voxels,
             });
         }
-        let (parts, instances) = series.in_order(&stack.order);
+        let (parts, mut instances) = series.in_order(&stack.order);
+        let nameless = instances.iter().filter(|uid| !is_uid(uid)).count();
+        if nameless > 0 {
+            warnings.push(format!(
+                "{} of {nameless} files is no UID; no DICOM object made of them refers to the files.",
+                SOP_INSTANCE.name
+            ));
+            instances.clear();
+            first.provenance.sop_instance_uid = None;
+        }
         let stored = (0..parts.len()).map(|part| StoredSlice {
             part,
             frame: 0,
@@ -455,10 +472,10 @@ impl DicomFile {
 /// are not above those that its vectors count.
 fn check_numbers(
     a: &Attributes,
-    slices: usize,
-    gates: usize,
+    order: &FrameOrder,
     warnings: &mut Vec<String>,
 ) -> Result<(), VolumeError> {
+    let (slices, gates) = (order.slices(), order.gates());
     let stated = |attribute| a.shorts(attribute).first().map(|n| usize::from(*n));
     if let Some(stated) = stated(NUMBER_OF_SLICES) {
         if stated > slices {
@@ -472,12 +489,12 @@ fn check_numbers(
             ));
         }
     }
-    let counted = |vector| a.shorts(vector).into_iter().max().map(usize::from);
-    for (number, vector, what) in [
-        (TIME_SLOTS, TIME_SLOT_VECTOR, "time slots"),
-        (RR_INTERVALS, RR_INTERVAL_VECTOR, "R-R intervals"),
+    let [intervals, slots] = order.gating();
+    for (number, held, what) in [
+        (TIME_SLOTS, slots, "time slots"),
+        (RR_INTERVALS, intervals, "R-R intervals"),
     ] {
-        let (stated, held) = (stated(number).unwrap_or(1), counted(vector).unwrap_or(1));
+        let stated = stated(number).unwrap_or(1);
         if stated > held {
             let reason =
                 format!("the frames hold {held} {what} ({gates} gates); gates are missing");
@@ -659,6 +676,34 @@ impl Series {
             self.names.len(),
             list.join(", ")
         )
+    }
+
+    /// Why files of which `whole` are volumes of their own are not one volume, and what to send.
+    fn beside(&self, whole: &[(&str, Kind)], files: usize) -> String {
+        let (name, kind) = whole[0];
+        let what = kind.noun();
+        if self.names.len() > 1 {
+            return format!(
+                "{name} is {what}, a volume of its own and not a slice of a series; {}",
+                self.listed()
+            );
+        }
+        match (whole, files - whole.len()) {
+            ([_], slices) => format!(
+                "{name} is {what}, a volume of its own, and {slices} other files are slices, although all have \
+                 one Series Instance UID (0020,000E); send {name} alone, or the slices without it"
+            ),
+            ([_, second, ..], 0) => format!(
+                "each of them is a volume of its own, such as {name} ({what}) and {}, although all have one \
+                 Series Instance UID (0020,000E); send one of them alone",
+                second.0
+            ),
+            (whole, slices) => format!(
+                "{} files are volumes of their own, such as {name} ({what}), and {slices} are slices, although all \
+                 have one Series Instance UID (0020,000E); send one volume alone, or the slices alone",
+                whole.len()
+            ),
+        }
     }
 
     /// Why the files are not one series.

@@ -8,14 +8,14 @@ use super::super::limits::ReadLimits;
 use super::super::source::{Source, VolumeFile};
 use super::attributes::{
     Attributes, BITS_ALLOCATED, BITS_STORED, COLUMNS, DOUBLE_PADDING, DOUBLE_PADDING_LIMIT,
-    FLOAT_PADDING, FLOAT_PADDING_LIMIT, FRAME_REAL_WORLD_INTERCEPT, FRAME_REAL_WORLD_SLOPE,
-    FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT, MODALITY_TABLE, NUMBER_OF_FRAMES,
-    PADDING, PADDING_LIMIT, PHOTOMETRIC, PIXEL_REPRESENTATION, REAL_WORLD_INTERCEPT,
-    REAL_WORLD_SLOPE, RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
+    FLOAT_PADDING, FLOAT_PADDING_LIMIT, FRAME_RESCALE_INTERCEPT, FRAME_RESCALE_SLOPE, HIGH_BIT,
+    MODALITY_TABLE, NUMBER_OF_FRAMES, PADDING, PADDING_LIMIT, PHOTOMETRIC, PIXEL_REPRESENTATION,
+    RESCALE_INTERCEPT, RESCALE_SLOPE, ROWS, SAMPLES,
 };
 use super::codec::{self, FrameError, FrameLayout};
 use super::fragments::frames_of;
 use super::kind::{Kind, is_ct};
+use super::real_world::MAPPING_NAME;
 use super::scan::{Fragment, PixelElement, PixelPlace, Scan};
 use super::syntax::Syntax;
 use crate::progress::Cancelled;
@@ -153,7 +153,7 @@ impl Pixels {
             byte_order: match storage {
                 // Decoded frames are little endian.
                 Storage::Frames(_) | Storage::Bits { .. } => ByteOrder::Little,
-                Storage::Whole { .. } => a.byte_order,
+                Storage::Whole { .. } => scan.byte_order,
             },
             limit: limits.unpacked_bytes,
             extent,
@@ -260,6 +260,18 @@ impl FrameReader<'_> {
         };
         let mut reader = VoxelReader::continuing(figures, format, source);
         reader.stream(begin, count, take, report)?;
+        if let Some(stored) = reader.stored_without_slope() {
+            return Err(VolumeError::Field {
+                file: pixels.file.name().into(),
+                field: RESCALE_SLOPE.name,
+                value: "0".into(),
+                reason: format!(
+                    "the slice is not empty (a stored number is {stored}), and a slope of 0 makes all its values \
+                     one; expected the slope that the slice was scaled by"
+                ),
+                byte: None,
+            });
+        }
         Ok(reader.into_figures())
     }
 
@@ -523,16 +535,12 @@ fn single(number: f64) -> f64 {
     }
 }
 
-/// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the
-/// first item of the Real World Value Mapping; `None` if there is neither or they change nothing.
+/// Slope and intercept of `frame` or of the whole file: Rescale Slope and Intercept, otherwise the Real
+/// World Value Mapping; `None` if there is neither or they change nothing. A slope of 0 is one of an empty slice.
 fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError> {
     let rescale = [
         (FRAME_RESCALE_SLOPE, FRAME_RESCALE_INTERCEPT),
         (RESCALE_SLOPE, RESCALE_INTERCEPT),
-    ];
-    let real_world = [
-        (FRAME_REAL_WORLD_SLOPE, FRAME_REAL_WORLD_INTERCEPT),
-        (REAL_WORLD_SLOPE, REAL_WORLD_INTERCEPT),
     ];
     let mut found = None;
     for (slope, inter) in rescale {
@@ -545,16 +553,17 @@ fn scaling(a: &Attributes, frame: Option<usize>) -> Result<Scaling, VolumeError>
         let reason = "values by a table are not supported; expected Rescale Slope".into();
         return Err(a.wrong(MODALITY_TABLE.name, "present", reason));
     }
-    for (slope, inter) in real_world {
-        if let (None, Some(value)) = (&found, a.double(slope, frame)) {
-            let inter = a.double(inter, frame).unwrap_or(0.0);
-            found = Some((slope.name, value, inter));
-        }
+    if found.is_none() {
+        let mapping = a.mappings.linear(frame);
+        let mapping = mapping.map_err(|reason| a.wrong(MAPPING_NAME, "not linear", reason))?;
+        found = mapping.map(|(slope, inter)| (MAPPING_NAME, slope, inter));
     }
     let Some((field, slope, inter)) = found else {
         return Ok(None);
     };
-    if !slope.is_finite() || slope == 0.0 || !inter.is_finite() {
+    // A writer that scales each slice by its own maximum gives an empty one the slope 0.
+    let is_rescale = field != MAPPING_NAME;
+    if !slope.is_finite() || (slope == 0.0 && !is_rescale) || !inter.is_finite() {
         let value = format!("{slope} (intercept {inter})");
         let reason = "expected a finite slope other than 0 and a finite intercept".into();
         return Err(a.wrong(field, &value, reason));

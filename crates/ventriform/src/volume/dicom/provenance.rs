@@ -15,8 +15,15 @@ use super::attributes::{
 macro_rules! attributes_of_fields {
     ($($field:ident = $attribute:expr;)*) => {
         impl Provenance {
-            /// The provenance that the data set states, without the frames of the slices.
+            /// The provenance that the data set states, without the frames of the slices and without what is no value
+            /// of its representation.
             pub(super) fn of(a: &Attributes) -> Self {
+                let mut stated = Self::as_stated(a);
+                stated.put_right();
+                stated
+            }
+
+            fn as_stated(a: &Attributes) -> Self {
                 let mut undecoded = Vec::new();
                 $(if a.decoded($attribute).is_err() {
                     undecoded.push(stringify!($field).to_owned());
@@ -31,7 +38,7 @@ macro_rules! attributes_of_fields {
                 .settled(a)
             }
 
-            /// Which of the attributes cannot be decoded, and why, for people to read.
+            /// Which of the attributes cannot be decoded or are put right, and why, for people to read.
             pub(super) fn warnings(a: &Attributes) -> Vec<String> {
                 let sets = a.character_sets(&[]);
                 let unknown = sets.unknown().map(|term| format!(
@@ -44,7 +51,8 @@ macro_rules! attributes_of_fields {
                     let reason = decoded.err()?;
                     Some(format!("{} cannot be decoded: {reason}.", attribute.name))
                 });
-                unknown.into_iter().chain(each).collect()
+                let right = Self::as_stated(a).put_right();
+                unknown.into_iter().chain(each).chain(right).chain(a.notes()).collect()
             }
         }
     };

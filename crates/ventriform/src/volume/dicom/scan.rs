@@ -8,19 +8,25 @@
 use super::super::VolumeError;
 use super::super::facts::ByteOrder;
 use super::super::source::Source;
-use super::attributes::{Attribute, Attributes};
+use super::attributes::{Attribute, Attributes, IMAGE_TYPE, clip};
 use super::codec::Compression;
-use super::kind::Kind;
+use super::kind::{self, Kind};
+use super::real_world::{Item, MAPPING_NAME, Part, Stated};
+use super::representation;
 use super::syntax::Syntax;
 use super::unknown::UnknownSequences;
 use crate::progress::Monitor;
 use dicom_core::header::DataElementHeader;
 use dicom_core::{Tag, VR};
+use dicom_encoding::decode::explicit_be::ExplicitVRBigEndianDecoder;
+use dicom_encoding::decode::explicit_le::ExplicitVRLittleEndianDecoder;
 use dicom_encoding::text::SpecificCharacterSet;
 use dicom_encoding::transfer_syntax::{DynDecoder, Endianness};
 use dicom_parser::dataset::LazyDataToken;
 use dicom_parser::dataset::lazy_read::LazyDataSetReader;
 use dicom_parser::{DynStatefulDecoder, StatefulDecode, StatefulDecoder};
+use std::cell::Cell;
+use std::rc::Rc;
 
 /// Deepest nesting of sequences that is read.
 const MAX_SEQUENCE_DEPTH: usize = 32;
@@ -56,6 +62,8 @@ pub(super) struct Scan {
     pub element: PixelElement,
     /// Whether the value representation of the pixels is OW.
     pub words: bool,
+    /// Byte order of the pixels in one piece.
+    pub byte_order: ByteOrder,
     /// Where the pixels are.
     pub pixels: PixelPlace,
 }
@@ -116,6 +124,7 @@ pub(super) fn scan(
         kind,
         element: found.element,
         words: found.words,
+        byte_order: found.byte_order,
         pixels: found.pixels,
     })
 }
@@ -156,6 +165,7 @@ pub(super) fn attributes(
 struct Found {
     element: PixelElement,
     words: bool,
+    byte_order: ByteOrder,
     pixels: PixelPlace,
 }
 
@@ -175,8 +185,9 @@ fn find_pixels(
         reason: e.to_string(),
     };
     let start = source.position();
-    let mut reader =
-        LazyDataSetReader::new(decoder(source, syntax).map_err(|e| damaged(start, &e))?);
+    let little = &mut walk.little;
+    let decoder = decoder(source, syntax, little).map_err(|e| damaged(start, &e))?;
+    let mut reader = LazyDataSetReader::new(decoder);
     let mut pixels: Option<Pieces> = None;
     // Whether fragments of a picture inside a sequence, such as an icon, are passed over.
     let mut inner = false;
@@ -216,6 +227,11 @@ fn find_pixels(
                     return Ok(Some(Found {
                         element,
                         words: header.vr == VR::OW,
+                        byte_order: if walk.little.get() {
+                            ByteOrder::Little
+                        } else {
+                            walk.attributes.byte_order
+                        },
                         pixels: PixelPlace::Whole {
                             begin: byte,
                             length,
@@ -283,6 +299,7 @@ fn find_pixels(
     Ok(pieces.map(|pieces| Found {
         element: PixelElement::Integer,
         words: false,
+        byte_order: ByteOrder::Little,
         pixels: PixelPlace::Fragments {
             offsets: pieces.offsets,
             fragments: pieces.fragments,
@@ -290,16 +307,25 @@ fn find_pixels(
     }))
 }
 
-/// A decoder of what follows in `source`.
+/// A decoder of what follows in `source`. In explicit VR, `little` becomes what says of every header whether
+/// its value is in Little Endian whatever the file is in.
 fn decoder<'a>(
     source: &'a mut Source,
     syntax: &Syntax,
+    little: &mut Rc<Cell<bool>>,
 ) -> dicom_parser::stateful::decode::Result<DynStatefulDecoder<&'a mut Source>> {
     let (ts, start) = (syntax.transfer_syntax, source.position());
-    if !syntax.is_explicit_little() {
+    let headers: DynDecoder<&'a mut Source> = if syntax.is_implicit() {
         return DynStatefulDecoder::new_with_ts(source, ts, start);
-    }
-    let headers: DynDecoder<_> = Box::<UnknownSequences>::default();
+    } else if ts.endianness() == Endianness::Big {
+        let headers = UnknownSequences::<ExplicitVRBigEndianDecoder>::default();
+        *little = headers.little();
+        Box::new(headers)
+    } else {
+        let headers = UnknownSequences::<ExplicitVRLittleEndianDecoder>::default();
+        *little = headers.little();
+        Box::new(headers)
+    };
     let text = SpecificCharacterSet::default();
     let values = ts.basic_decoder();
     Ok(StatefulDecoder::new_with_position(
@@ -355,6 +381,8 @@ struct Walk {
     attributes: Attributes,
     /// Open sequences from the outermost inward, each with the number of items begun so far.
     path: Vec<(Tag, usize)>,
+    /// Whether the value of the last header is in Little Endian whatever the file is in.
+    little: Rc<Cell<bool>>,
 }
 
 impl Walk {
@@ -369,6 +397,7 @@ impl Walk {
         Self {
             attributes,
             path: Vec::new(),
+            little: Rc::default(),
         }
     }
 
@@ -414,6 +443,9 @@ impl Walk {
     ) -> Result<dicom_parser::stateful::decode::Result<()>, VolumeError> {
         // The caller has checked that the length comes from a 32-bit field.
         let bytes = length as u32;
+        if let Some((item, part)) = Item::find(&self.path, header.tag) {
+            return self.take_mapping(item, part, header, length, decoder);
+        }
         let Some((attribute, frame)) = Attribute::find(&self.path, header.tag) else {
             return Ok(decoder.skip_bytes(bytes));
         };
@@ -430,7 +462,83 @@ impl Walk {
         }
         let mut value = Vec::new();
         let read = decoder.read_to_vec(bytes, &mut value);
+        let (value, changed) = self.settled(header, value).map_err(|own| {
+            let stated = format!("of the value representation {}", header.vr);
+            let reason = format!("expected {own}, and the value cannot be converted");
+            self.attributes.wrong(attribute.name, &stated, reason)
+        })?;
+        if changed {
+            self.attributes.put_right(attribute, header.vr);
+        }
+        let value = self.unlisted(attribute, value);
         self.attributes.insert(attribute, frame, value);
+        Ok(read)
+    }
+
+    /// `value`, of an Image Type that is one text its values.
+    fn unlisted(&mut self, attribute: Attribute, value: Vec<u8>) -> Vec<u8> {
+        if attribute != IMAGE_TYPE {
+            return value;
+        }
+        match kind::unlisted(&String::from_utf8_lossy(&value)) {
+            Some(values) => {
+                self.attributes.note(format!(
+                    "{} has one value, which looks like a list: it is read as {}.",
+                    IMAGE_TYPE.name,
+                    clip(&values)
+                ));
+                values.into_bytes()
+            }
+            None => value,
+        }
+    }
+
+    /// `value` in the representation of its attribute, and whether that changed it.
+    fn settled(&self, header: &DataElementHeader, value: Vec<u8>) -> Result<(Vec<u8>, bool), VR> {
+        let (order, little) = (self.attributes.byte_order, self.little.get());
+        representation::settled(header.tag, header.vr, value, order, little)
+    }
+
+    /// Reads what an element says of an item of the Real World Value Mapping.
+    fn take_mapping<D: StatefulDecode>(
+        &mut self,
+        item: Item,
+        part: Part,
+        header: &DataElementHeader,
+        length: u64,
+        decoder: &mut D,
+    ) -> Result<dicom_parser::stateful::decode::Result<()>, VolumeError> {
+        let bytes = length as u32;
+        if !self.attributes.mappings.has_room() {
+            let reason = "the file describes more frames than are read".into();
+            return Err(self
+                .attributes
+                .wrong(MAPPING_NAME, "given too often", reason));
+        }
+        if part.is_long() {
+            let count = Stated::Count(bytes as usize / size_of::<f64>());
+            self.attributes.mappings.insert(item, part, count);
+            return Ok(decoder.skip_bytes(bytes));
+        }
+        if length > MAX_VALUE_BYTES {
+            return Ok(decoder.skip_bytes(bytes));
+        }
+        let mut value = Vec::new();
+        let read = decoder.read_to_vec(bytes, &mut value);
+        let settled = self.settled(header, value);
+        let (value, _) = settled.map_err(|own| {
+            let stated = format!("of the value representation {}", header.vr);
+            let reason = format!("expected {own}, and the value cannot be converted");
+            self.attributes.wrong(MAPPING_NAME, &stated, reason)
+        })?;
+        // Bounds have the sign of the pixels, in whose representation they are written.
+        let vr = match (representation::standard(header.tag), header.vr) {
+            (VR::US, VR::SS) => VR::SS,
+            (own, _) => own,
+        };
+        if let Some(stated) = Stated::of(&value, vr, self.attributes.byte_order) {
+            self.attributes.mappings.insert(item, part, stated);
+        }
         Ok(read)
     }
 }

@@ -17,10 +17,12 @@ use super::super::VolumeError;
 use super::super::facts::AffineSource;
 use super::super::open::Placement;
 use super::attributes::{
-    Attributes, FRAME_BETWEEN_SLICES, FRAME_ORIENTATION, FRAME_POSITION, FRAME_THICKNESS,
-    ORIENTATION, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
+    Attribute, Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_BETWEEN_SLICES,
+    FRAME_ORIENTATION, FRAME_POSITION, FRAME_THICKNESS, ORIENTATION, POSITION, SLICE_THICKNESS,
+    SPACING_BETWEEN_SLICES,
 };
 use super::geometry::{directions, pixel_spacing};
+use super::kind::is_nuclear;
 use super::volumes::{Marks, deal};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
@@ -71,13 +73,25 @@ impl Located {
     /// [`VolumeError::Field`] for invalid or missing spacings and directions.
     pub(super) fn of(a: &Attributes, part: usize, frame: usize) -> Result<Self, VolumeError> {
         let of = Some(frame);
-        let orientation = match a.decimals_of(FRAME_ORIENTATION, of)? {
-            Some(orientation) => Some(orientation),
-            None => a.decimals(ORIENTATION)?,
+        let first = |attributes: [Attribute; 3]| {
+            let stated = attributes.into_iter();
+            let mut stated = stated.filter(|attribute| !a.texts_of(*attribute, of).is_empty());
+            stated.next()
         };
-        let position = match a.decimals_of::<3>(FRAME_POSITION, of)? {
-            Some(position) => Some(position),
-            None => a.decimals(POSITION)?,
+        let mut orientations = [FRAME_ORIENTATION, ORIENTATION, DETECTOR_ORIENTATION];
+        let mut positions = [FRAME_POSITION, POSITION, DETECTOR_POSITION];
+        // A slice of a Nuclear Medicine series has its place where an image of all its slices has.
+        if is_nuclear(a) {
+            orientations.swap(1, 2);
+            positions.swap(1, 2);
+        }
+        let orientation = match first(orientations) {
+            Some(attribute) => a.decimals_of(attribute, of)?,
+            None => None,
+        };
+        let position = match first(positions) {
+            Some(attribute) => a.decimals_of::<3>(attribute, of)?,
+            None => None,
         };
         let (x, y) = directions(a, orientation.unwrap_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]))?;
         Ok(Self {

@@ -154,10 +154,9 @@ impl Syntax {
         }
     }
 
-    /// Whether the data set is in Explicit VR Little Endian, whatever its pixels are in.
-    pub(super) fn is_explicit_little(&self) -> bool {
-        let big = self.transfer_syntax.endianness() == Endianness::Big;
-        !big && self.transfer_syntax.uid() != IMPLICIT_LITTLE
+    /// Whether the data set is in Implicit VR.
+    pub(super) fn is_implicit(&self) -> bool {
+        self.transfer_syntax.uid() == IMPLICIT_LITTLE
     }
 }
 

@@ -15,6 +15,7 @@ mod padding;
 mod refused;
 mod sorted;
 mod text;
+mod unknown;
 
 /// An element's value.
 #[derive(Clone)]
@@ -78,7 +79,7 @@ impl Encoding {
                 bytes.extend(self.long(value.len() as u32));
             } else {
                 bytes.extend(vr.as_bytes());
-                if matches!(*vr, "SQ" | "OW" | "OB") {
+                if matches!(*vr, "SQ" | "OW" | "OB" | "UN") {
                     bytes.extend([0, 0]);
                     bytes.extend(self.long(value.len() as u32));
                 } else {
@@ -312,7 +313,7 @@ fn the_slice_vector_orders_the_frames() {
     for wrong in [
         vec![1, 2, 3],
         vec![1, 2, 2, 4],
-        vec![0, 1, 2, 3],
+        vec![0, 1, 1, 3],
         vec![1, 2, 3, 5],
     ] {
         let result = changed(|e| {

@@ -16,6 +16,7 @@ use super::attributes::{
     OLD_TRIGGER_TIME, RR_INTERVAL_VECTOR, RR_INTERVALS, SERIES_TYPE, TIME_SLOT_VECTOR, TIME_SLOTS,
     TRIGGER_TIME,
 };
+use super::frames::counted;
 use super::kind::Kind;
 
 /// Milliseconds of a minute.
@@ -26,9 +27,9 @@ const MINUTE_MS: f64 = 60_000.0;
 /// # Errors
 /// [`VolumeError::Field`] if a part is not a number, or is negative.
 pub(super) fn of(a: &Attributes) -> Result<Vec<GateTiming>, VolumeError> {
-    let slots = a.shorts(TIME_SLOT_VECTOR).into_iter().max();
+    let slots = counted(a, TIME_SLOT_VECTOR).into_iter().max();
     let stated = a.shorts(TIME_SLOTS).first().copied();
-    let intervals = a.shorts(RR_INTERVAL_VECTOR).into_iter().max();
+    let intervals = counted(a, RR_INTERVAL_VECTOR).into_iter().max();
     let of_interval = |interval| {
         let own = Some(usize::from(interval));
         Ok(GateTiming {
@@ -94,7 +95,7 @@ pub(super) fn is_of_gates(a: &Attributes) -> bool {
 /// Whether an image of one volume says that it is one gate of several: a gated Nuclear Medicine image whose frames are of one R-R
 /// interval and one time slot, or an image of a moment after the R wave.
 pub(super) fn is_one_gate(a: &Attributes, kind: Kind) -> bool {
-    let one = |vector| a.shorts(vector).iter().all(|number| *number == 1);
+    let one = |vector| counted(a, vector).iter().all(|number| *number == 1);
     match kind {
         Kind::Nuclear { gated: true } => one(RR_INTERVAL_VECTOR) && one(TIME_SLOT_VECTOR),
         Kind::Nuclear { gated: false } | Kind::Enhanced => {

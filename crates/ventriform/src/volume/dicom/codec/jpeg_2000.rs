@@ -81,6 +81,7 @@ pub(super) fn decode(
     Ok(Numbers {
         values: values.collect(),
         bits: size.bits,
+        lossless: structure.is_reversible(),
     })
 }
 
@@ -441,9 +442,13 @@ impl<'a> Structure<'a> {
         ))
     }
 
+    fn is_reversible(&self) -> bool {
+        self.styles.iter().all(|style| style.reversible)
+    }
+
     /// Checks the kind of wavelet and the number of parts.
     fn check(&self, size: &ImageSize, tiles: u64, irreversible: bool) -> Result<(), String> {
-        let reversible = self.styles.iter().all(|style| style.reversible);
+        let reversible = self.is_reversible();
         if !irreversible && !reversible {
             return Err(
                 "the frame is irreversible JPEG 2000; the transfer syntax allows reversible only"

@@ -36,6 +36,7 @@ pub(super) fn decode(
     Ok(Numbers {
         values,
         bits: header.bits,
+        lossless: header.near == 0,
     })
 }
 

@@ -8,7 +8,10 @@
 //!    blocks) must be such that decoding costs a bounded time per pixel. Only then is memory taken.
 //! 2. RLE, [JPEG-LS](jpeg_ls) and [JPEG](jpeg) are decoded here, JPEG 2000 by
 //!    [`hayro-jpeg2000`](jpeg_2000); none of them has `unsafe` code.
-//! 3. Every number must be one that Bits Stored and Pixel Representation can hold.
+//! 3. Of a number with more bits than are stored, the lowest Bits Stored bits count, as in native pixels:
+//!    the others may hold an overlay or nothing (PS3.5 8.1.1). A number of a lossy code stream, where such bits
+//!    do not survive, must be one that Bits Stored and Pixel Representation can hold, and so must a number with
+//!    fewer bits than are stored.
 //! 4. A panic of a decoder becomes an error of this frame.
 //!
 //! Guaranteed: the numbers are those that the standard defines, or the frame is refused. (The cosine
@@ -113,6 +116,8 @@ struct Numbers {
     values: Vec<i32>,
     /// Bits of a number in the code stream.
     bits: u32,
+    /// Whether every bit is that of the encoder's input.
+    lossless: bool,
 }
 
 impl FrameLayout {
@@ -158,16 +163,19 @@ impl FrameLayout {
     /// `numbers` as little endian numbers of this layout.
     ///
     /// A code stream of as many bits as are stored holds the stored bits, whatever sign it states
-    /// (PS3.5 8.2). One of other bits holds numbers, which must be the same in the stored bits; an
-    /// unsigned one may also hold signed numbers extended to its width.
+    /// (PS3.5 8.2), and a lossless one of more bits holds them in its lowest. Any other holds numbers, which must
+    /// be the same in the stored bits; an unsigned one may also hold signed numbers extended to its width, and one
+    /// of more bits signed numbers with zeros above the stored bits.
     fn pack(self, numbers: &Numbers) -> Result<Vec<u8>, String> {
         let spare = 64 - numbers.bits;
         let holds = |value: i32| {
             let stored = self.stored(value);
             let extended = i64::from(value) << spare >> spare;
-            stored == i64::from(value) || (self.signed && stored == extended)
+            let bare = numbers.bits > self.bits && i64::from(value) >> self.bits == 0;
+            stored == i64::from(value) || (self.signed && (stored == extended || bare))
         };
-        let wrong = if numbers.bits == self.bits {
+        let holds_bits = numbers.lossless && numbers.bits > self.bits;
+        let wrong = if numbers.bits == self.bits || holds_bits {
             None
         } else {
             numbers.values.iter().find(|value| !holds(**value))

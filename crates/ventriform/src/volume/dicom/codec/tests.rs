@@ -184,7 +184,7 @@ fn code_blocks_and_layers_are_counted_before_decoding() {
 }
 
 #[test]
-fn numbers_beyond_the_stored_bits_are_refused() {
+fn the_lowest_stored_bits_of_a_lossless_number_count() {
     let layout = |bits, signed| FrameLayout {
         columns: 1,
         rows: 1,
@@ -192,28 +192,47 @@ fn numbers_beyond_the_stored_bits_are_refused() {
         bits,
         signed,
     };
-    let pack = |stored: (u32, bool), coded: (u32, bool), value| {
+    // The number that a reader of the stored bits finds.
+    let read = |stored: (u32, bool), coded: (u32, bool), lossless, value| {
         let numbers = Numbers {
             values: vec![value],
             bits: coded.0,
+            lossless,
         };
         let packed = layout(stored.0, stored.1).pack(&numbers).ok()?;
-        Some(i16::from_le_bytes([packed[0], packed[1]]))
+        let unused = 16 - stored.0;
+        Some(if stored.1 {
+            i32::from(i16::from_le_bytes([packed[0], packed[1]]) << unused >> unused)
+        } else {
+            i32::from(u16::from_le_bytes([packed[0], packed[1]]) << unused >> unused)
+        })
     };
     let (u12, s12, u16, s16) = ((12, false), (12, true), (16, false), (16, true));
-    assert_eq!(pack(u12, u16, 4095), Some(4095));
-    assert_eq!(pack(u12, u16, 4096), None);
-    assert_eq!(pack(u12, s16, -1), None);
-    assert_eq!(pack(s12, s16, -2048), Some(-2048));
-    assert_eq!(pack(s12, s16, -2049), None);
-    // Extended to 16 bits, or of the stored width.
-    assert_eq!(pack(s12, u16, 0xf800), Some(-2048));
-    assert_eq!(pack(s12, u16, 0x0800), None);
-    assert_eq!(pack(s12, u12, 0x0fff), Some(0x0fff));
-    assert_eq!(pack(u12, s12, -1), Some(-1));
-    assert_eq!(pack(s16, u12, 4095), Some(4095));
-    assert_eq!(pack(u16, u12, 4095), Some(4095));
-    assert_eq!(pack(u16, s12, -1), None);
+    for (stored, coded, value, lossless, lossy) in [
+        (u12, u16, 4095, Some(4095), Some(4095)),
+        // An overlay or anything else above the stored bits.
+        (u12, u16, 0x8123, Some(0x123), None),
+        (u12, u16, 0xf000, Some(0), None),
+        (u12, s16, -0x7edd, Some(0x123), None),
+        (s12, u16, 0x8fff, Some(-1), None),
+        (s12, s16, -2049, Some(2047), None),
+        (s12, s16, -2048, Some(-2048), Some(-2048)),
+        // Signed, extended to the width of the code stream or not.
+        (s12, u16, 0xf800, Some(-2048), Some(-2048)),
+        (s12, u16, 0x0800, Some(-2048), Some(-2048)),
+        (s12, s16, 0x0fff, Some(-1), Some(-1)),
+        // As many bits as are stored, or fewer.
+        (s12, u12, 0x0fff, Some(-1), Some(-1)),
+        (u12, s12, -1, Some(4095), Some(4095)),
+        (s16, u12, 4095, Some(4095), Some(4095)),
+        (u16, u12, 4095, Some(4095), Some(4095)),
+        (u16, s12, -1, None, None),
+    ] {
+        for (exact, expected) in [(true, lossless), (false, lossy)] {
+            let found = read(stored, coded, exact, value);
+            assert_eq!(found, expected, "{stored:?} {coded:?} {value} {exact}");
+        }
+    }
 }
 
 #[test]

@@ -109,6 +109,7 @@ pub(super) fn decode(
     Ok(Numbers {
         values,
         bits: header.bits,
+        lossless: process == Process::Lossless,
     })
 }
 
