@@ -1,5 +1,6 @@
 //! Why no ventricle was found.
 
+use super::hot_voxels::Outshone;
 use super::not_a_heart::NotAHeart;
 use crate::progress::Cancelled;
 
@@ -19,6 +20,12 @@ pub enum LocateError {
         /// Why it is not a heart.
         reason: NotAHeart,
     },
+    /// Without a hint, no place in the volume is a candidate.
+    #[error("no heart found: nowhere does a bright wall lie about a darker cavity")]
+    NoCandidate,
+    /// A few voxels outshine all others.
+    #[error(transparent)]
+    HotVoxels(#[from] Outshone),
     /// No place in the volume meets the hints.
     #[error("the hinted centre or region lies outside the volume")]
     HintOutside,
