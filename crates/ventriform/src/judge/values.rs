@@ -235,14 +235,16 @@ mod tests {
         let shape = [40; 3];
         let frame = VoxelToPatient::centred(shape, [5.0; 3], Vec3::zeros()).unwrap();
         let shell = |p: &Vec3| (-((p.norm() - 35.0) / 8.0).powi(2)).exp();
-        let mut number = 0_u32;
-        let volume = Volume::sampled(shape, frame, |p| {
-            number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let noise = f64::from(number >> 16) / f64::from(u16::MAX) - 0.5;
-            let body = if p.norm() < 85.0 { 10.0 } else { 0.0 };
+        let body = |p: &Vec3| if p.norm() < 85.0 { 10.0 } else { 0.0 };
+        let mut volume = Volume::sampled(shape, frame, |p| {
             let side = 0.7 + 0.3 * p.x / p.norm().max(1.0);
-            body + 100.0 * side * shell(p) + 0.1 * body * noise
+            body(p) + 100.0 * side * shell(p)
         });
+        let mut number = 0_u32;
+        for voxel in volume.voxels.iter_mut().filter(|v| **v > 1.0) {
+            number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *voxel += (number >> 16) as f32 / f32::from(u16::MAX) - 0.5;
+        }
         let wall = (0..volume.voxels.len()).filter(|v| {
             let index = [v % 40, v / 40 % 40, v / 1600].map(|n| n as f64);
             shell(&volume.frame.to_patient(&Vec3::from(index))) > 0.5
