@@ -470,6 +470,16 @@ impl Explain for LocateError {
                 "Check that the file is a reconstructed heart scan; if it is, give the heart's \
                  centre as `center` (x,y,z in LPS millimetres).",
             ),
+            LocateError::NoCandidate => (
+                (Fault::Content, "no-heart"),
+                Some("center"),
+                "Check that the file is a reconstructed heart scan, in counts from 0 on.",
+            ),
+            LocateError::HotVoxels(_) => (
+                (Fault::Content, "hot-voxels"),
+                None,
+                "Replace these voxels by the mean of their neighbours, or send the scan as it was reconstructed.",
+            ),
             LocateError::HintOutside => (
                 (Fault::Request, "hint-outside"),
                 None,

@@ -3,10 +3,12 @@
 use super::confidence;
 use super::dark_apex::{self, DarkApex};
 use super::evidence::Evidence;
+use super::exchanged_axes;
 use super::field_of_view;
 use super::flags::{ApexDirection, DarkPart, Flag};
 use super::liver_side;
 use super::septum;
+use super::values;
 use crate::deform::dynamics::StopReason;
 use crate::deform::{FittedModel, Orbit, WallSurfaces};
 use crate::geometry::Vec3;
@@ -60,11 +62,29 @@ pub(super) fn flags(
         flags.push(Flag::TouchesBorder { share });
     }
     if ventricle {
+        flags.extend(of_values(model, volume));
         flags.extend(cut(model, volume));
         flags.extend(mirrored(model, volume));
         flags.extend(implausible(model, evidence));
     }
     flags
+}
+
+/// Flags of values that are no counts; none for a map of labels, whose values are none by design.
+fn of_values(model: &FittedModel, volume: &Volume) -> Vec<Flag> {
+    let Some(wall) = model
+        .sensed_wall
+        .as_ref()
+        .filter(|_| few_values(volume).is_none())
+    else {
+        return Vec::new();
+    };
+    let voxels = values::voxels_of(wall, volume);
+    let uptake = field_of_view::bright_uptake(wall, volume);
+    let saturated = values::saturation(&voxels, volume).map(Flag::Saturated);
+    let background = values::background(volume, uptake).map(Flag::Background);
+    let hot = values::hot_voxels(&voxels, volume).map(Flag::HotVoxels);
+    saturated.into_iter().chain(background).chain(hot).collect()
 }
 
 /// `flags` with the one of an uncertain fit as this `chance` wants it.
@@ -77,9 +97,15 @@ pub(super) fn with_chance(mut flags: Vec<Flag>, chance: f64, evidence: &Evidence
 }
 
 /// The chance of a good fit that got these `flags`: it is calibrated on images of uptake, and at most 0.5 in a map
-/// of labels.
+/// of labels and in an image whose values are no counts.
 pub(super) fn limited(chance: f64, flags: &[Flag]) -> f64 {
-    if flags.iter().any(|f| matches!(f, Flag::LabelMap { .. })) {
+    let no_counts = |flag: &Flag| {
+        matches!(
+            flag,
+            Flag::LabelMap { .. } | Flag::Saturated(_) | Flag::Background(_) | Flag::HotVoxels(_)
+        )
+    };
+    if flags.iter().any(no_counts) {
         chance.min(0.5)
     } else {
         chance
@@ -174,8 +200,8 @@ const OPEN_SIDE_SINE: f64 = 0.25;
 /// simulated scans (seed 8801) the right outweighs the left by 0.02 and more, in four real ones by 0.46 and more.
 const LIVER_FLAG_SHARE: f64 = 0.25;
 
-/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, or of a liver on the left
-/// below one that hardly points to a side.
+/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, of surroundings that
+/// show two exchanged axes, or of a liver on the left below an apex that hardly points to a side.
 fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     let (cup, orientation) = (model.cup.as_ref()?, model.patient_orientation.as_ref()?);
     let claims =
@@ -194,11 +220,14 @@ fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
         let degrees = part.clamp(-1.0, 1.0).asin().to_degrees();
         return Some(Flag::Mirrored { towards, degrees });
     }
+    let wall = model.sensed_wall.as_ref()?;
+    let uptake = field_of_view::bright_uptake(wall, volume);
+    if let Some((pair, score)) = exchanged_axes::exchanged(volume, &cup.centre, uptake) {
+        return Some(Flag::ExchangedAxes { pair, score });
+    }
     if axis.x > OPEN_SIDE_SINE {
         return None;
     }
-    let wall = model.sensed_wall.as_ref()?;
-    let uptake = field_of_view::bright_uptake(wall, volume);
     let right = liver_side::liver_side(volume, cup, uptake)?;
     (right <= -LIVER_FLAG_SHARE).then_some(Flag::LiverOnTheLeft {
         share: 0.5 - 0.5 * right,

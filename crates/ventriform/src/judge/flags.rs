@@ -1,6 +1,8 @@
 //! Warnings about a fit, as codes and sentences for the report.
 
 use super::evidence::Evidence;
+use super::exchanged_axes::{AxisPair, Score};
+use super::values::{Background, HotVoxels, Saturation};
 use crate::deform::dynamics::StopReason;
 
 /// A warning about a fit.
@@ -66,6 +68,24 @@ pub enum Flag {
         /// Number of different values.
         values: usize,
     },
+    /// The values of the wall were cut off above.
+    #[error(
+        "{:.0} % of the wall's voxels have its greatest value, {}: values were cut off there (saturated at a greatest number, clipped by a \
+         window or a percentile). The wall looks thicker and its defects shallower than they are: send the scan as it was \
+         reconstructed",
+        100.0 * .0.share, .0.value
+    )]
+    Saturated(Saturation),
+    /// The background does not lie at zero.
+    #[error("{}", background_text(.0))]
+    Background(Background),
+    /// Single voxels of the wall outshine it.
+    #[error(
+        "{} voxel(s) of the wall outshine all about them; the brightest, {:?} (i, j, k from 0), holds {}, those about it {} at most: \
+         damaged values, by which per cent of uptake are wrong. Replace them by those of their neighbours",
+        .0.count, .0.index, .0.value, .0.beside
+    )]
+    HotVoxels(HotVoxels),
     /// The apical wall, or a part of it, is too dark to be seen.
     #[error("{}", dark_apex_text(*uptake, *part))]
     DarkApex {
@@ -112,6 +132,14 @@ pub enum Flag {
     LiverOnTheLeft {
         /// Share of the bright activity below the heart that lies on the left, 0..=1.
         share: f64,
+    },
+    /// What surrounds the heart shows that two axes of the image were exchanged.
+    #[error("{}", exchanged_text(*pair, score))]
+    ExchangedAxes {
+        /// The axes.
+        pair: AxisPair,
+        /// What speaks for it.
+        score: Score,
     },
     /// The image ends in the wall.
     #[error(
@@ -181,6 +209,57 @@ fn dark_apex_text(uptake: f64, part: DarkPart) -> String {
     }
 }
 
+fn background_text(found: &Background) -> String {
+    let Background {
+        value,
+        of_uptake,
+        negative,
+    } = found;
+    let percent = 100.0 * of_uptake;
+    if *value < 0.0 {
+        format!(
+            "the background is negative: it lies at {value}, {percent:.0} % of the wall's uptake, and {:.0} % of all voxels are below 0: \
+             values were scaled or shifted, or padded below 0. Per cent of uptake are wrong: send counts, which begin at 0 (subtract \
+             the background's value, or set padding to 0)",
+            100.0 * negative
+        )
+    } else {
+        format!(
+            "no part of the volume is dark: hardly a voxel is below {value}, {percent:.0} % of the wall's uptake. A constant was added, or \
+             an intercept left out: per cent of uptake are wrong. Send counts, which begin at 0"
+        )
+    }
+}
+
+fn exchanged_text(pair: AxisPair, score: &Score) -> String {
+    let (axes, order, ends) = match pair {
+        AxisPair::SidesAndLength => (
+            "the axes from side to side and from feet to head",
+            "z, y, x",
+            "at the sides",
+        ),
+        AxisPair::DepthAndLength => (
+            "the axes from front to back and from feet to head",
+            "x, z, y",
+            "in front and behind",
+        ),
+    };
+    let liver = if score.side < 0.0 {
+        format!(
+            ", and {:.0} % of the bright activity about the heart lies where liver and gut would after an exchange",
+            50.0 - 50.0 * score.side
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "{axes} are probably exchanged, which mirrors the heart (an array in {order} order with the affine of its image): the body is cut \
+         off {ends} more than above and below (logarithm of the ends' areas {:.2}, usually above 0){liver}. Transpose the array. \
+         The sides of the polar map are those of the file",
+        score.ends
+    )
+}
+
 /// The two positions in the projections, in words.
 fn two_places(evidence: &Evidence) -> String {
     evidence.views.map_or_else(String::new, |views| {
@@ -234,11 +313,17 @@ impl Flag {
             Flag::Motion { .. } => "motion",
             Flag::RightVentricle { .. } => "right_ventricle",
             Flag::LabelMap { .. } => "label_map",
+            Flag::Saturated(_) => "saturated",
+            Flag::Background(found) if found.value < 0.0 => "negative_background",
+            Flag::Background(_) => "raised_background",
+            Flag::HotVoxels(_) => "hot_voxels",
             Flag::DarkApex { .. } => "dark_apex",
             Flag::NotAtRest { .. } => "not_at_rest",
             Flag::Folded { .. } => "folded",
             Flag::PoorContrast { .. } => "poor_contrast",
-            Flag::Mirrored { .. } | Flag::LiverOnTheLeft { .. } => "mirrored",
+            Flag::Mirrored { .. } | Flag::ExchangedAxes { .. } | Flag::LiverOnTheLeft { .. } => {
+                "mirrored"
+            }
             Flag::FieldOfView { .. } => "field_of_view",
             Flag::TouchesBorder { .. } => "touches_border",
             Flag::ImplausibleShape { .. } => "implausible_shape",

@@ -6,7 +6,7 @@
 //! 1. [`evidence`]: figures of the wall as the sensors left it, before its base plane was put;
 //!    [`motion`]: whether the projections of the image show the wall in two positions.
 //! 2. [`confidence`]: the chances of a good fit, of motion and of a heart, by calibrated logistic models.
-//! 3. [`flags`]: the warnings, by [`flag_rules`]; [`uncertainty`] and [`volume_intervals`]: how far each node and the
+//! 3. [`flags`]: the warnings, by [`flag_rules`], among them [`values`] (no counts) and [`exchanged_axes`]; [`uncertainty`] and [`volume_intervals`]: how far each node and the
 //!    volumes may be off.
 //! 4. [`septum`]: whether the fit is to be made again without the septum's sensors; [`refusal`]: whether it is a
 //!    heart at all.
@@ -20,6 +20,7 @@ pub mod confidence;
 pub mod consensus;
 mod dark_apex;
 pub mod evidence;
+pub mod exchanged_axes;
 mod field_of_view;
 mod fit;
 mod flag_rules;
@@ -34,6 +35,7 @@ pub mod septum;
 mod test_fits;
 pub mod uncertainty;
 mod uncertainty_calibration;
+pub mod values;
 mod volume_calibration;
 pub mod volume_intervals;
 

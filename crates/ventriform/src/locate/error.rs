@@ -1,5 +1,6 @@
 //! Why no ventricle was found.
 
+use super::hot_voxels::Outshone;
 use super::not_a_heart::NotAHeart;
 use crate::grid::Volume;
 use crate::grid::size::OddSize;
@@ -23,6 +24,12 @@ pub enum LocateError {
         /// The size of the volume, if it is not that of a scan of a chest.
         size: Option<OddSize>,
     },
+    /// Without a hint, no place in the volume is a candidate.
+    #[error("no heart found: nowhere does a bright wall lie about a darker cavity")]
+    NoCandidate,
+    /// A few voxels outshine all others.
+    #[error(transparent)]
+    HotVoxels(#[from] Outshone),
     /// No place in the volume meets the hints.
     #[error("the hinted centre or region lies outside the volume")]
     HintOutside,

@@ -55,7 +55,7 @@ impl Cups {
     /// Searches the whole of `volume`.
     ///
     /// # Errors
-    /// [`LocateError::Blank`], [`LocateError::HintOutside`] or [`LocateError::Cancelled`].
+    /// [`LocateError::Blank`], [`LocateError::NoCandidate`], [`LocateError::HintOutside`] or [`LocateError::Cancelled`].
     pub fn everywhere(
         volume: &Volume,
         hints: &Hints,
@@ -65,7 +65,12 @@ impl Cups {
         let search = CupSearch::new(&field, hints);
         let found = search.everywhere(f64::from(brightest), monitor)?;
         if found.is_empty() {
-            return Err(LocateError::HintOutside);
+            let hinted = hints.centre.is_some() || hints.region.is_some();
+            return Err(if hinted {
+                LocateError::HintOutside
+            } else {
+                LocateError::NoCandidate
+            });
         }
         Ok(Self {
             field,

@@ -43,6 +43,7 @@ pub mod directions;
 mod error;
 mod grey_blocks;
 mod hints;
+mod hot_voxels;
 pub mod localisation;
 mod not_a_heart;
 pub mod patient_orientation;
@@ -57,6 +58,7 @@ use crate::progress::{Cancelled, Monitor};
 use cup_search::{CupSearch, ScoredCup};
 pub use error::LocateError;
 pub use hints::Hints;
+pub use hot_voxels::Outshone;
 use localisation::{Cups, Localisation};
 pub use not_a_heart::NotAHeart;
 use rays::{Cavity, RaySearch, UNCERTAIN_SCORE};
@@ -89,13 +91,14 @@ enum Decision {
 /// Decides where the left ventricle is in `volume`.
 ///
 /// # Errors
-/// [`LocateError::Blank`], [`LocateError::HintOutside`] and [`LocateError::Cancelled`]. A
-/// doubtful heart is no error here.
+/// [`LocateError::Blank`], [`LocateError::HotVoxels`], [`LocateError::NoCandidate`], [`LocateError::HintOutside`] and
+/// [`LocateError::Cancelled`]. A doubtful heart is no error here.
 pub fn find<'v>(
     volume: &'v Volume,
     hints: &Hints,
     monitor: &Monitor,
 ) -> Result<Heart<'v>, LocateError> {
+    hot_voxels::check(volume)?;
     let rays = RaySearch::new(volume, monitor)?;
     let proposal = rays.best(|centre| hints.admit(&to_patient(volume, centre)));
     let proposal = proposal.filter(|c| c.score >= UNCERTAIN_SCORE);

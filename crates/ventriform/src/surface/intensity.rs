@@ -87,6 +87,10 @@ fn find_ventricle(
         Ok(heart) => heart.cavity(monitor)?,
         Err(LocateError::Cancelled(e)) => return Err(e.into()),
         Err(LocateError::HintOutside) => return Err(SurfaceError::HintOutside),
+        Err(LocateError::HotVoxels(found)) => {
+            facts.warnings.push(found.to_string());
+            None
+        }
         Err(_) => None,
     };
     let Some(cavity) = found.filter(|c| c.score >= PLAUSIBLE_SCORE) else {

@@ -15,6 +15,7 @@ use super::attributes::{
     Attributes, DETECTOR_ORIENTATION, DETECTOR_POSITION, FRAME_PIXEL_SPACING, ORIENTATION,
     PIXEL_SPACING, POSITION, SLICE_THICKNESS, SPACING_BETWEEN_SLICES,
 };
+use super::posture;
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
@@ -39,15 +40,19 @@ pub(super) fn place(a: &Attributes, shape: [usize; 3]) -> Result<Placement, Volu
         None => a.decimals(POSITION)?,
     };
     let known = orientation.is_some() && position.is_some();
-    let (x, y) = directions(a, orientation.unwrap_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]))?;
-    if orientation.is_none() {
-        warnings.push(
-            "The file has no Image Orientation (Patient): axial slices of a supine patient are \
-             assumed."
-                .into(),
-        );
-    }
+    let cosines = match orientation {
+        Some(cosines) => cosines,
+        None => {
+            let assumed = posture::assumed(a)?;
+            warnings.push(assumed.warning);
+            assumed.cosines
+        }
+    };
+    let (x, y) = directions(a, cosines)?;
     let z = x.cross(&y).normalize();
+    if orientation.is_some() {
+        warnings.extend(posture::contradictions(a, [x, y], between_slices * z));
+    }
     let linear =
         Matrix3::from_columns(&[between_columns * x, between_rows * y, between_slices * z]);
     let origin = position.map(Vec3::from).unwrap_or_else(|| {

@@ -10,11 +10,13 @@
 //!    than the standard's.
 //! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
-//! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them.
+//! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them; `posture`: what else
+//!    says how they lie in the patient.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
 //!    one place belong together. `segments`: labels. `gate_series`: files of one gate each.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
-//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text.
+//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text; `rest_stress`: which scan
+//!    of a study they name.
 //!
 //! Guaranteed: no memory is taken for a stated size before the file was found large enough for it;
 //! beside the voxels, one compressed frame and at most 16 MiB of attributes are held. A damaged
@@ -35,9 +37,11 @@ mod geometry;
 mod header;
 mod kind;
 mod pixels;
+mod posture;
 mod provenance;
 mod real_world;
 mod representation;
+mod rest_stress;
 mod scan;
 mod segments;
 mod stack;

@@ -3,14 +3,15 @@
 use super::super::Provenance;
 use super::attributes::{
     ACCESSION_NUMBER, ACQUISITION_DATE, ACQUISITION_DATE_TIME, ACQUISITION_TIME, Attributes,
-    CONTENT_DATE, CONTEXT_MEANING, CONVOLUTION_KERNEL, CORRECTED_IMAGE, FRAME_OF_REFERENCE,
-    IMAGE_TYPE, INJECTED_DOSE, INJECTION_DATE_TIME, INJECTION_TIME, MANUFACTURER, MODALITY,
-    MODEL_NAME, NUCLIDE_MEANING, PATIENT_BIRTH_DATE, PATIENT_ID, PATIENT_NAME, PATIENT_POSITION,
-    PATIENT_SEX, PHARMACEUTICAL_MEANING, PHARMACEUTICAL_NAME, POSITION_REFERENCE, POSTURE_MEANING,
-    PROTOCOL_MEANING, PROTOCOL_NAME, RECONSTRUCTION_METHOD, REFERRING_PHYSICIAN, SCAN_ARC,
-    SERIES_DATE, SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS,
-    SOP_INSTANCE, STUDY_DATE, STUDY_DESCRIPTION, STUDY_ID, STUDY_TIME, STUDY_UID, UNITS, clip,
+    CONTENT_DATE, CONVOLUTION_KERNEL, CORRECTED_IMAGE, FRAME_OF_REFERENCE, IMAGE_TYPE,
+    INJECTED_DOSE, INJECTION_DATE_TIME, INJECTION_TIME, MANUFACTURER, MODALITY, MODEL_NAME,
+    NUCLIDE_MEANING, PATIENT_BIRTH_DATE, PATIENT_ID, PATIENT_NAME, PATIENT_POSITION, PATIENT_SEX,
+    PHARMACEUTICAL_MEANING, PHARMACEUTICAL_NAME, POSITION_REFERENCE, POSTURE_MEANING,
+    PROTOCOL_NAME, RECONSTRUCTION_METHOD, REFERRING_PHYSICIAN, SCAN_ARC, SERIES_DATE,
+    SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SOFTWARE_VERSIONS, SOP_CLASS, SOP_INSTANCE,
+    STUDY_DATE, STUDY_DESCRIPTION, STUDY_ID, STUDY_TIME, STUDY_UID, UNITS, clip,
 };
+use super::rest_stress::rest_or_stress;
 
 macro_rules! attributes_of_fields {
     ($($field:ident = $attribute:expr;)*) => {
@@ -119,28 +120,4 @@ impl Provenance {
         self.patient_position = self.patient_position.or_else(|| a.prose(POSTURE_MEANING));
         self
     }
-}
-
-/// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one.
-fn rest_or_stress(a: &Attributes) -> Option<String> {
-    [
-        CONTEXT_MEANING,
-        PROTOCOL_MEANING,
-        PROTOCOL_NAME,
-        SERIES_DESCRIPTION,
-        STUDY_DESCRIPTION,
-    ]
-    .into_iter()
-    .find_map(|attribute| {
-        let text = a.prose(attribute)?.to_lowercase();
-        let words: Vec<&str> = text.split(|c: char| !c.is_alphabetic()).collect();
-        let any = |names: &[&str]| words.iter().any(|word| names.contains(word));
-        let rest = any(&["rest", "resting", "rst", "ruhe", "repos"]);
-        let stress = any(&["stress", "str", "strs", "exercise", "belastung", "effort"]);
-        match (rest, stress) {
-            (true, false) => Some("rest".to_owned()),
-            (false, true) => Some("stress".to_owned()),
-            _ => None,
-        }
-    })
 }

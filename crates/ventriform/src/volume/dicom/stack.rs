@@ -23,10 +23,12 @@ use super::attributes::{
 };
 use super::geometry::{directions, pixel_spacing};
 use super::kind::is_nuclear;
+use super::posture;
 use super::volumes::{Marks, deal};
 use crate::geometry::Vec3;
 use crate::geometry::frame::VoxelToPatient;
 use nalgebra::Matrix3;
+use std::collections::BTreeSet;
 
 /// Positions closer than this are the same, mm.
 const SAME_POSITION: f64 = 0.01;
@@ -50,6 +52,8 @@ pub(super) struct Located {
     axes: [Vec3; 2],
     /// Whether the file states the directions.
     oriented: bool,
+    /// What they were taken from if it does not, or what contradicts them.
+    notes: Vec<String>,
     /// Distance of rows and of columns, mm.
     spacing: [f64; 2],
     /// Attributes that tell frames at the same position apart.
@@ -93,13 +97,26 @@ impl Located {
             Some(attribute) => a.decimals_of::<3>(attribute, of)?,
             None => None,
         };
-        let (x, y) = directions(a, orientation.unwrap_or([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]))?;
+        let mut notes = Vec::new();
+        let cosines = match orientation {
+            Some(cosines) => cosines,
+            None => {
+                let assumed = posture::assumed(a)?;
+                notes.push(assumed.warning);
+                assumed.cosines
+            }
+        };
+        let (x, y) = directions(a, cosines)?;
+        if orientation.is_some() {
+            notes.extend(posture::contradictions(a, [x, y], Vec3::zeros()));
+        }
         Ok(Self {
             part,
             frame,
             position: position.map(Vec3::from),
             axes: [x, y],
             oriented: orientation.is_some(),
+            notes,
             spacing: pixel_spacing(a, of)?,
             marks: Marks::default(),
         })
@@ -239,9 +256,8 @@ impl Stack {
             _ => (position(slices - 1) - origin) / (slices as f64 - 1.0),
         };
         check_steps(&position, slices, step)?;
-        if !first.oriented {
-            warnings.push(unoriented());
-        }
+        let notes: BTreeSet<&String> = frames.iter().flat_map(|frame| &frame.notes).collect();
+        warnings.extend(notes.into_iter().cloned());
         let frame = first.frame(origin, step).ok_or_else(flat)?;
         Ok(Self {
             slices,
@@ -270,7 +286,7 @@ impl Stack {
              array."
                 .into(),
         ];
-        warnings.extend((!first.oriented).then(unoriented));
+        warnings.extend(first.notes.iter().cloned());
         Ok(Self {
             slices: 1,
             order: vec![0],
@@ -286,11 +302,6 @@ impl Stack {
 /// The warning about a volume of one slice.
 pub(super) fn one_slice() -> String {
     "The file holds a single slice. Send all files of the series together to get the whole volume."
-        .into()
-}
-
-fn unoriented() -> String {
-    "The file has no Image Orientation (Patient): axial slices of a supine patient are assumed."
         .into()
 }
 
@@ -370,6 +381,7 @@ mod tests {
             position: Some(Vec3::new(1.0, 2.0, z)),
             axes: [Vec3::x(), Vec3::y()],
             oriented: true,
+            notes: Vec::new(),
             spacing: [2.0, 3.0],
             marks: Marks::from([Mark::time(rank)]),
         }

@@ -12,6 +12,7 @@ mod company;
 mod compressed;
 mod objects;
 mod padding;
+mod posture;
 mod refused;
 mod sorted;
 mod text;
