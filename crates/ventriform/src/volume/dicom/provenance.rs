@@ -114,7 +114,7 @@ impl Provenance {
 }
 
 /// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one.
-fn rest_or_stress(a: &Attributes) -> Option<String> {
+pub(super) fn rest_or_stress(a: &Attributes) -> Option<String> {
     [
         CONTEXT_MEANING,
         PROTOCOL_MEANING,
