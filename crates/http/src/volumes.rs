@@ -123,7 +123,7 @@ pub struct VolumeBody {
     /// The voxel values in rising order if the volume looks like a label map.
     label_values: Option<Vec<i64>>,
     /// The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 DICOM or NIfTI files of one gate each,
-    /// or a 4-D NIfTI file whose header does not contradict.
+    /// or a 4-D NIfTI file whose header does not contradict and whose volumes look like gates.
     gates: Option<GateFacts>,
     /// Oddities of the file that do not prevent its use.
     warnings: Vec<String>,

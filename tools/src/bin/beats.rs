@@ -78,7 +78,7 @@ fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> R
     let quiet = Monitor::silent();
     let file = VolumeFile::at(folder.join("gated.nii.gz"));
     let reading = read_gates(&[file], true, &ReadLimits::default(), &quiet)?;
-    let study = GatedStudy::new(reading.gates, &quiet)?;
+    let study = GatedStudy::new(reading.gates, &reading.lost, &quiet)?;
     let fit = FitParameters::default();
     let order = SegmentationParameters {
         deform: fit

@@ -704,7 +704,9 @@ fn volume_advice(error: &VolumeError) -> String {
             "Send all slices: every file of the series, or a volume with at least two voxels along each axis.".into()
         }
         VolumeError::NotOneSeries { .. } => {
-            "Send all files of one series, each once, as several files or as one zip.".into()
+            "Send all files of one scan, each once, as several files or as one zip; where they are of one scan and their headers contradict \
+             each other, export it again from the system that made it."
+                .into()
         }
         VolumeError::Unrecognised { .. } => {
             "Give NIfTI (.nii, .nii.gz, or a .hdr/.img pair) or DICOM (a multi-frame NM, PET, CT or \

@@ -26,14 +26,17 @@ pub struct GatedStudy {
     pub factors: Vec<f64>,
     /// Share of the usual counts that each gate lacks; negative where it has more.
     pub losses: Vec<f64>,
+    /// Gates that tell nothing of the beat, counted from 0.
+    lost: Vec<usize>,
 }
 
 impl GatedStudy {
-    /// The study of these gates.
+    /// The study of these gates, of which those in `lost`, counted from 0, tell nothing of the beat: neither the sum nor the curve has
+    /// them.
     ///
     /// # Errors
     /// [`BeatError`]: fewer gates than 6 or more than 32, gates on different grids, a gate without counts.
-    pub fn new(gates: Vec<Volume>, monitor: &Monitor) -> Result<Self, BeatError> {
+    pub fn new(gates: Vec<Volume>, lost: &[usize], monitor: &Monitor) -> Result<Self, BeatError> {
         if !GATE_COUNTS.contains(&gates.len()) {
             return Err(BeatError::GateCount {
                 found: gates.len(),
@@ -65,7 +68,8 @@ impl GatedStudy {
         let factors: Vec<f64> = counts.iter().map(|counts| usual / counts).collect();
         // In f64, where the order of the gates does not show after rounding to f32.
         let mut voxels = vec![0.0_f64; first.voxels.len()];
-        for (gate, factor) in gates.iter().zip(&factors) {
+        let told = |(index, _): &(usize, _)| !lost.contains(index);
+        for (_, (gate, factor)) in gates.iter().zip(&factors).enumerate().filter(told) {
             monitor.check().map_err(|Cancelled| BeatError::Cancelled)?;
             for (sum, value) in voxels.iter_mut().zip(&gate.voxels) {
                 *sum += factor * f64::from(*value);
@@ -82,12 +86,15 @@ impl GatedStudy {
             gates,
             sum,
             factors,
+            lost: lost.to_vec(),
         })
     }
 
     /// Whether each gate has counts enough to tell something of the curve.
     pub fn counted(&self) -> Vec<bool> {
-        let enough = |loss: &f64| *loss <= COUNT_LOSS_LEFT_OUT_SHARE;
-        self.losses.iter().map(enough).collect()
+        let told = |(gate, loss): (usize, &f64)| {
+            *loss <= COUNT_LOSS_LEFT_OUT_SHARE && !self.lost.contains(&gate)
+        };
+        self.losses.iter().enumerate().map(told).collect()
     }
 }

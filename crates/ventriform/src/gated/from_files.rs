@@ -61,7 +61,7 @@ pub fn from_files(
         });
     }
     let mut reading = read_gates(order.gates, order.choice.gated, limits, monitor)?;
-    let study = GatedStudy::new(std::mem::take(&mut reading.gates), monitor)?;
+    let study = GatedStudy::new(std::mem::take(&mut reading.gates), &reading.lost, monitor)?;
     let parameters = order.parameters.clone();
     let fit = SegmentationParameters {
         deform: parameters
@@ -179,7 +179,7 @@ impl GatedHeart {
         let stated = self.stated_flags();
         let parts = BeatParts {
             segment_names: names,
-            first_frame: self.reading.first_frame,
+            frames: self.reading.frames.clone(),
             rr_ms: self.rr_ms,
             timing: self.reading.timing.clone(),
             long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),

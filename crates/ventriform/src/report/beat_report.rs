@@ -193,8 +193,8 @@ pub struct TimingReport {
 pub struct BeatParts {
     /// Names of the segments, 1 to 17.
     pub segment_names: Vec<String>,
-    /// The volume of the input that is the first gate, counted from 0.
-    pub first_frame: usize,
+    /// For each gate the volume of the input that it is, counted from 0.
+    pub frames: Vec<usize>,
     /// The R-R interval, ms.
     pub rr_ms: Option<f64>,
     /// What the file says of the beats.
@@ -266,7 +266,7 @@ impl BeatReport {
             gates: (beat.gates.iter().zip(&beat.factors).enumerate())
                 .map(|(gate, (volumes, factor))| GateReport {
                     gate: gate + 1,
-                    frame: parts.first_frame + gate,
+                    frame: parts.frames.get(gate).copied().unwrap_or(gate),
                     cavity_ml: round(volumes.cavity_ml),
                     wall_ml: round(volumes.wall_ml),
                     counts_factor: round(*factor),

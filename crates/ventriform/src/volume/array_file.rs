@@ -98,6 +98,14 @@ impl OpenVolume for ArrayFile {
         )
     }
 
+    fn assumes_gates(&self) -> bool {
+        self.volumes.len() > 1
+    }
+
+    fn reads_again(&self) -> bool {
+        true
+    }
+
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {
         let held = &self.volumes[frame].voxels;
         let mut voxels = Vec::with_capacity(held.len());

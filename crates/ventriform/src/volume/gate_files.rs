@@ -111,6 +111,17 @@ impl OpenVolume for GateFiles {
         self.first.stated_grid()
     }
 
+    fn assumes_gates(&self) -> bool {
+        true
+    }
+
+    fn volume_names(&self) -> Vec<&str> {
+        let names = [self.first.header().file].into_iter();
+        names
+            .chain(self.others.iter().map(VolumeFile::name))
+            .collect()
+    }
+
     fn decode_frame(&mut self, frame: usize, monitor: &Monitor) -> Result<Decoded, VolumeError> {
         self.with(frame, |file| file.decode_frame(0, monitor))
     }

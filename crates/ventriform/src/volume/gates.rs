@@ -4,8 +4,10 @@
 //! what the file says of the beats. Of several R-R intervals, that with the most counts is taken; the others are
 //! named in a warning.
 
+use super::dicom::one_scan::{Reach, ScanStatement, contradiction};
 use super::facts::VolumeFacts;
 use super::gate_timing::GateTiming;
+use super::left_out::LeftOut;
 use super::nifti::grid::StatedGrid;
 use super::open::Reading;
 use super::provenance::Provenance;
@@ -17,8 +19,10 @@ pub use crate::grid::gates::GATE_COUNTS;
 pub struct GatedReading {
     /// The gates, in their order.
     pub gates: Vec<Volume>,
-    /// The volume of the file that is the first gate, or the file, counted from 0: the others follow it.
-    pub first_frame: usize,
+    /// For each gate the volume of the file, or the file, that it is, counted from 0.
+    pub frames: Vec<usize>,
+    /// Gates that tell nothing of the beat, counted from 0: those that repeat another, or have far too many counts.
+    pub lost: Vec<usize>,
     /// The timing that the file states of the beats that were taken.
     pub timing: GateTiming,
     /// Facts about the file, or that of the first gate, with warnings of all.
@@ -29,24 +33,16 @@ pub struct GatedReading {
     pub stated_grid: Option<StatedGrid>,
 }
 
-/// The difference in patient or study between a gate's header and that of gate 1; `None` if there is none.
-fn other_scan(first: Option<&Provenance>, scan: Option<&Provenance>) -> Option<String> {
-    let (first, scan) = (first?, scan?);
-    let fields = [
-        (
-            "Patient ID (0010,0020)",
-            &first.patient_id,
-            &scan.patient_id,
-        ),
-        (
-            "Study Instance UID (0020,000D)",
-            &first.study_uid,
-            &scan.study_uid,
-        ),
-    ];
-    fields.into_iter().find_map(|(name, wanted, found)| {
-        let (wanted, found) = (wanted.as_deref()?.trim(), found.as_deref()?.trim());
-        (wanted != found).then(|| format!("has another {name} than gate 1"))
+/// The first gate, counted from 1, that is of another scan than those before it, and how that shows. `said` has what the file of each
+/// gate says, where each is a file of its own.
+fn other_scan(said: &[ScanStatement]) -> Option<(usize, String)> {
+    let said: Vec<&ScanStatement> = said.iter().collect();
+    (2..=said.len()).find_map(|gates| {
+        let reason = contradiction(&said[..gates], Reach::Gates)?;
+        Some((
+            gates,
+            format!("is of another scan than those before it: {reason}"),
+        ))
     })
 }
 
@@ -56,11 +52,21 @@ impl GatedReading {
         self.scans.first()
     }
 
-    /// The gates that were read one by one, and what their file says of the beats of each R-R interval.
+    /// The gates that were read one by one from the volumes `frames` of which those in `lost` tell nothing, what their file says of the beats of each R-R interval and, where each is a file of
+    /// its own, what it says of the scan.
     ///
     /// # Errors
-    /// [`VolumeError::OtherGate`] if their headers name several patients or studies.
-    pub(super) fn of(readings: Vec<Reading>, timings: &[GateTiming]) -> Result<Self, VolumeError> {
+    /// [`VolumeError::OtherGate`] if their headers are of several scans.
+    pub(super) fn of(
+        readings: Vec<Reading>,
+        mut frames: Vec<usize>,
+        left_out: &LeftOut,
+        timings: &[GateTiming],
+        said: &[ScanStatement],
+    ) -> Result<Self, VolumeError> {
+        if let Some((gate, difference)) = other_scan(said) {
+            return Err(VolumeError::OtherGate { gate, difference });
+        }
         let mut readings = readings.into_iter();
         let first = readings.next().ok_or(VolumeError::NoFile)?.usable()?;
         let mut facts = first.facts;
@@ -75,13 +81,6 @@ impl GatedReading {
             gates.push(reading.volume);
             scans.push(reading.provenance);
         }
-        for (index, scan) in scans.iter().enumerate() {
-            if let Some(difference) = other_scan(scans[0].as_ref(), scan.as_ref()) {
-                let gate = index + 1;
-                return Err(VolumeError::OtherGate { gate, difference });
-            }
-        }
-        let mut first_frame = 0;
         let mut timing = timings.first().cloned().unwrap_or_default();
         let each = timing.gates_of_interval(gates.len());
         if each < gates.len() {
@@ -106,7 +105,9 @@ impl GatedReading {
                 main + 1,
                 others.join(", ")
             ));
-            first_frame = main * each;
+            let first_frame = main * each;
+            frames = frames.split_off(first_frame);
+            frames.truncate(each);
             gates = gates.split_off(first_frame);
             gates.truncate(each);
             scans = scans.split_off(first_frame);
@@ -114,38 +115,15 @@ impl GatedReading {
             timing = timings.get(main).cloned().unwrap_or_default();
         }
         facts.warnings.extend(timing.warnings(gates.len()));
+        let lost = (frames.iter().enumerate()).filter(|(_, frame)| left_out.lost.contains(frame));
         Ok(Self {
+            lost: lost.map(|(gate, _)| gate).collect(),
             gates,
-            first_frame,
+            frames,
             timing,
             facts,
             scans: scans.into_iter().collect::<Option<_>>().unwrap_or_default(),
             stated_grid: first.stated_grid,
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gates_of_other_patients_and_studies_are_named() {
-        let text = |text: &str| Some(text.to_owned());
-        let first = Provenance {
-            patient_id: text("17"),
-            study_uid: text("1.2.3"),
-            ..Provenance::default()
-        };
-        let told = |change: &dyn Fn(&mut Provenance)| {
-            let mut other = first.clone();
-            change(&mut other);
-            other_scan(Some(&first), Some(&other)).unwrap_or_default()
-        };
-        assert!(told(&|other| other.patient_id = text("18")).contains("Patient ID"));
-        assert!(told(&|other| other.study_uid = text("1.2.4")).contains("Study Instance UID"));
-        assert_eq!(told(&|other| other.patient_id = text("17 ")), "");
-        assert_eq!(told(&|other| other.patient_id = None), "");
-        assert_eq!(other_scan(Some(&first), None), None);
     }
 }

@@ -3,10 +3,12 @@
 //! A format implements [`OpenVolume`]; [`read`] and [`inspect`] do the rest.
 
 use super::decode::DataType;
+use super::dicom::one_scan::ScanStatement;
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, GateFacts, IntensitySummary, LengthUnit, VolumeFacts,
 };
 use super::gate_timing::GateTiming;
+use super::left_out::LeftOut;
 use super::limits::ReadOptions;
 use super::nifti::grid::StatedGrid;
 use super::preview::MiddlePlanes;
@@ -80,6 +82,11 @@ pub(super) trait OpenVolume {
         None
     }
 
+    /// What its first file says of the scan; `None` unless it is DICOM.
+    fn scan_statement(&self) -> Option<&ScanStatement> {
+        None
+    }
+
     /// The place of the grid in the words of NIfTI; `None` for other formats.
     fn stated_grid(&self) -> Option<StatedGrid> {
         None
@@ -99,6 +106,26 @@ pub(super) trait OpenVolume {
     /// the format does not say.
     fn why_not_gated(&self) -> Option<&str> {
         None
+    }
+
+    /// Whether nothing but their number calls its volumes gates.
+    fn assumes_gates(&self) -> bool {
+        false
+    }
+
+    /// Whether volumes can be decoded in any order and more than once.
+    fn reads_again(&self) -> bool {
+        false
+    }
+
+    /// The names of the files that hold a volume each; empty for others.
+    fn volume_names(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
+    /// Volumes among gates that are left out of their sum and of the beat.
+    fn left_out(&self) -> LeftOut {
+        LeftOut::default()
     }
 
     /// The stated timing of gated volumes, for each R-R interval; empty if the file states none.
@@ -234,7 +261,7 @@ pub(super) fn read(
         gates: gates_of(file),
         ..facts(header, frame, intensity, decoded.warnings)?
     };
-    let provenance = file.provenance(frame.unwrap_or(0));
+    let provenance = file.provenance(frame.unwrap_or_else(|| first_summed(file)));
     Ok(Reading {
         volume,
         facts,
@@ -247,7 +274,7 @@ pub(super) fn read(
 /// The gates of `file`; `None` if its volumes are no gates.
 fn gates_of(file: &dyn OpenVolume) -> Option<GateFacts> {
     let header = file.header();
-    let frames = header.frames;
+    let frames = header.frames - file.left_out().extra.len();
     header
         .gated
         .then(|| GateTiming::facts(&file.gate_timings(), frames))
@@ -264,11 +291,20 @@ pub(super) fn because(error: VolumeError, why: Option<&str>) -> VolumeError {
     }
 }
 
-/// The sum of all volumes of `file`.
+/// The first volume of `file` that is summed.
+pub(super) fn first_summed(file: &dyn OpenVolume) -> usize {
+    let left_out = file.left_out();
+    let mut frames = 0..file.header().frames;
+    frames.find(|frame| !left_out.has(*frame)).unwrap_or(0)
+}
+
+/// The sum of all volumes of `file` that are not left out.
 fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeError> {
     let frames = file.header().frames;
-    let mut sum = file.decode_frame(0, monitor)?;
-    for frame in 1..frames {
+    let left_out = file.left_out();
+    let first = first_summed(file);
+    let mut sum = file.decode_frame(first, monitor)?;
+    for frame in (first + 1..frames).filter(|frame| !left_out.has(*frame)) {
         let mut add = |first: usize, part: &[f32]| {
             let voxels = sum.voxels[first..].iter_mut();
             voxels.zip(part).for_each(|(sum, voxel)| *sum += voxel);
@@ -279,8 +315,9 @@ fn sum(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Decoded, VolumeEr
     tally.add_portion(&sum.voxels);
     sum.tally = tally;
     sum.warnings.push(format!(
-        "The {frames} gates were summed. Set `frame` to a number from 0 (the first) to {} (the last) for \
+        "The {} gates were summed. Set `frame` to a number from 0 (the first) to {} (the last) for \
          one of them.",
+        frames - left_out.count(),
         frames - 1
     ));
     Ok(sum)

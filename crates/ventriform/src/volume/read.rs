@@ -2,16 +2,20 @@
 
 use super::array_file::ArrayFile;
 use super::dicom::DicomFile;
+use super::dicom::one_scan::ScanStatement;
 use super::gate_files::{GateFiles, order_of, taken_for_gates};
+use super::gate_look::look;
 use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
+use super::judged_gates::judged;
+use super::left_out::LeftOut;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
 use super::source::VolumeFile;
 use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
-use super::{LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
+use super::{GateFacts, LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
 use crate::draw::Image;
 use crate::grid::gates::GATE_COUNTS;
 use crate::mesh::TriMesh;
@@ -32,17 +36,25 @@ pub fn read(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Reading, VolumeError> {
-    read_with_timings(files, options, limits, monitor).map(|(reading, _)| reading)
+    read_with_statements(files, options, limits, monitor).map(|(reading, _)| reading)
 }
 
-/// As [`read()`], with what the files say of the beats of gated volumes.
-fn read_with_timings(
+/// What files say beside their volume.
+struct Statements {
+    /// Of the beats of gated volumes.
+    timings: Vec<GateTiming>,
+    /// Of the scan.
+    scan: Option<ScanStatement>,
+}
+
+/// As [`read()`], with what the files say beside the volume.
+fn read_with_statements(
     files: &[VolumeFile],
     options: &ReadOptions,
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<(Reading, Vec<GateTiming>), VolumeError> {
-    let mut opened = open(files, limits, monitor)?;
+) -> Result<(Reading, Statements), VolumeError> {
+    let mut opened = open_judged(files, limits, monitor)?;
     let reading = open::read(&mut *opened.file, *options, monitor);
     let mut reading = reading.map_err(|error| error.with_path(files))?;
     reading.facts.warnings.extend(opened.notes);
@@ -50,7 +62,11 @@ fn read_with_timings(
     if intensity.labels.is_some() && is_rounded(intensity, reading.facts.data_type) {
         reading.facts.intensity.labels = exact_labels(files, &reading, limits, monitor)?;
     }
-    Ok((reading, opened.file.gate_timings()))
+    let said = Statements {
+        timings: opened.file.gate_timings(),
+        scan: opened.file.scan_statement().cloned(),
+    };
+    Ok((reading, said))
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
@@ -87,8 +103,10 @@ pub fn read_gates(
                 Err(opened.err().unwrap_or(error))
             }
             read => {
-                let (readings, timing) = read?;
-                let mut gated = GatedReading::of(readings, &[timing])?;
+                let (readings, timing, said) = read?;
+                let frames = (0..readings.len()).collect();
+                let all = LeftOut::default();
+                let mut gated = GatedReading::of(readings, frames, &all, &[timing], &said)?;
                 gated.facts.warnings.push(taken_for_gates(&order));
                 Ok(gated)
             }
@@ -111,14 +129,28 @@ pub fn read_gates(
         return Err(too_many_voxels(header.file, voxels, limits));
     }
     let timings = opened.file.gate_timings();
-    let one = |frame: usize| {
-        let options = ReadOptions { frame: Some(frame) };
-        let read = open::read(&mut *opened.file, options, &monitor.part(frame, frames));
+    let mut look = look(&mut *opened.file, true, monitor)?;
+    if !opened.file.reads_again() {
+        opened.file = open(files, limits, monitor)?.file;
+    }
+    let kept = (0..frames).filter(|frame| !look.left_out.extra.contains(frame));
+    let kept: Vec<usize> = kept.collect();
+    let one = |frame: &usize| {
+        let options = ReadOptions {
+            frame: Some(*frame),
+        };
+        let read = open::read(&mut *opened.file, options, &monitor.part(*frame, frames));
         read.map_err(|error| error.with_path(files))
     };
-    let mut readings: Vec<Reading> = (0..frames).map(one).collect::<Result<_, _>>()?;
-    readings[0].facts.warnings.append(&mut opened.notes);
-    GatedReading::of(readings, &timings)
+    let mut readings: Vec<Reading> = kept.iter().map(one).collect::<Result<_, _>>()?;
+    let first = &mut readings[0].facts;
+    first.warnings.append(&mut look.warnings);
+    first.warnings.append(&mut opened.notes);
+    first.gates = first.gates.map(|gates| GateFacts {
+        number: gates.number - (frames - kept.len()).min(gates.number),
+        ..gates
+    });
+    GatedReading::of(readings, kept, &look.left_out, &timings, &[])
 }
 
 /// What files hold of a heart beat.
@@ -136,7 +168,7 @@ pub enum HeldGates {
 }
 
 /// Whether `files` hold gates of a heart beat that a beat can be fitted to, by the header or because `gated` says that
-/// their volumes are gates. Nothing is decoded.
+/// their volumes are gates.
 ///
 /// # Errors
 /// [`VolumeError`].
@@ -146,10 +178,15 @@ pub fn hold_gates(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<HeldGates, VolumeError> {
-    let opened = open(files, limits, monitor)?;
+    let opened = if gated {
+        open(files, limits, monitor)?
+    } else {
+        open_judged(files, limits, monitor)?
+    };
     let header = opened.file.header();
+    let gates = header.frames - opened.file.left_out().extra.len();
     let stated = opened.file.gate_timings().into_iter().next();
-    let each = stated.unwrap_or_default().gates_of_interval(header.frames);
+    let each = stated.unwrap_or_default().gates_of_interval(gates);
     if header.frames == 1 || !(header.gated || gated) {
         return Ok(HeldGates::NotGated);
     }
@@ -201,20 +238,22 @@ fn too_many_voxels(file: &str, asked: u64, limits: &ReadLimits) -> VolumeError {
 }
 
 /// Reads files that hold one gate each, as long as they have together no more voxels than a volume may, with what the
-/// first says of the beats.
+/// first says of the beats, and what each says of the scan.
 fn one_by_one(
     files: &[VolumeFile],
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<(Vec<Reading>, GateTiming), VolumeError> {
+) -> Result<(Vec<Reading>, GateTiming, Vec<ScanStatement>), VolumeError> {
     let (mut readings, mut voxels) = (Vec::with_capacity(files.len()), 0);
+    let mut said = Vec::new();
     let mut of_first = None;
     for (index, file) in files.iter().enumerate() {
         let part = monitor.part(index, files.len());
         let own = std::slice::from_ref(file);
-        let (reading, timings) = read_with_timings(own, &ReadOptions::default(), limits, &part)?;
+        let (reading, stated) = read_with_statements(own, &ReadOptions::default(), limits, &part)?;
         let reading = reading.usable()?;
-        of_first.get_or_insert(timings.into_iter().next());
+        said.extend(stated.scan);
+        of_first.get_or_insert(stated.timings.into_iter().next());
         voxels += reading.volume.voxels.len() as u64;
         if voxels > limits.voxels {
             return Err(too_many_voxels(file.name(), voxels, limits));
@@ -225,7 +264,7 @@ fn one_by_one(
         gates_per_interval: None,
         ..of_first.flatten().unwrap_or_default()
     };
-    Ok((readings, timing))
+    Ok((readings, timing, said))
 }
 
 /// The exact labels of the volume that was read as `reading`; `None` if there are too many.
@@ -329,11 +368,14 @@ pub fn provenance(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Option<Provenance>, VolumeError> {
-    let file = open(files, limits, monitor)?.file;
+    let file = match options.frame {
+        Some(_) => open(files, limits, monitor)?.file,
+        None => open_judged(files, limits, monitor)?.file,
+    };
     let header = file.header();
     let frame = options.choose(header.frames, header.gated);
     let frame = frame.map_err(|error| open::because(error, file.why_not_gated()))?;
-    Ok(file.provenance(frame.unwrap_or(0)))
+    Ok(file.provenance(frame.unwrap_or_else(|| open::first_summed(&*file))))
 }
 
 /// Returns the facts about `files`. For several volumes the intensities are taken over all of them.
@@ -350,7 +392,7 @@ pub fn inspect(
 ) -> Result<VolumeFacts, VolumeError> {
     let notes = RefCell::new(Vec::new());
     let again = || {
-        let opened = open(files, limits, monitor)?;
+        let opened = open_judged(files, limits, monitor)?;
         notes.replace(opened.notes);
         Ok(opened.file)
     };
@@ -387,6 +429,20 @@ fn open(
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
     open_as(files, &MeshStatement::default(), limits, monitor)
+}
+
+/// As [`open()`], with the volumes that are taken for gates looked at.
+fn open_judged(
+    files: &[VolumeFile],
+    limits: &ReadLimits,
+    monitor: &Monitor,
+) -> Result<Opened, VolumeError> {
+    let opened = open(files, limits, monitor)?;
+    let again = || Ok(open(files, limits, monitor)?.file);
+    Ok(Opened {
+        file: judged(opened.file, again, monitor)?,
+        notes: opened.notes,
+    })
 }
 
 /// As [`open()`], with what the caller states of a mesh.

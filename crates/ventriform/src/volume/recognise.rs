@@ -193,8 +193,19 @@ impl<'a> Sorted<'a> {
             1 => Some(format!("1 {kind}")),
             count => Some(format!("{count} {kind}s")),
         };
+        // Each of them could be read alone.
+        let volumes = named(self.singles.len(), "NIfTI file").map(|counted| {
+            let mut names: Vec<&str> = self.singles.iter().map(|file| file.name()).collect();
+            names.sort_unstable();
+            let more = match names.len().saturating_sub(MOST_NAMED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            names.truncate(MOST_NAMED);
+            format!("{counted} ({}{more})", names.join(", "))
+        });
         let kinds = [
-            named(self.singles.len(), "NIfTI file"),
+            volumes,
             named(self.headers.len(), "NIfTI header"),
             named(self.dicom.len(), "DICOM file"),
             named(self.arrays.len(), "array"),

@@ -59,6 +59,10 @@ const PHARMACEUTICAL_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0304)];
 const NUCLIDE_CODE: &[Tag] = &[Tag(0x0054, 0x0016), Tag(0x0054, 0x0300)];
 const CONTEXT_NAME: &[Tag] = &[Tag(0x0040, 0x0555), Tag(0x0040, 0xa168)];
 const PROTOCOL_CODE: &[Tag] = &[Tag(0x0040, 0x0260)];
+/// Energy Window Information Sequence with its Energy Window Range Sequence, of Nuclear Medicine.
+const ENERGY_WINDOW: &[Tag] = &[Tag(0x0054, 0x0012), Tag(0x0054, 0x0013)];
+/// Energy Window Range Sequence, of PET.
+const PET_ENERGY_WINDOW: &[Tag] = &[Tag(0x0054, 0x0013)];
 const POSTURE_CODE: &[Tag] = &[Tag(0x0054, 0x0410), Tag(0x0054, 0x0412)];
 const GANTRY_CODE: &[Tag] = &[Tag(0x0054, 0x0414)];
 const VIEW_CODE: &[Tag] = &[Tag(0x0054, 0x0220)];
@@ -267,6 +271,18 @@ attributes! {
     SEGMENT_REGION_VALUE = SEGMENT_REGION_PATH, 0x0008, 0x0100, "Code Value (0008,0100)";
     SEGMENT_REGION_MEANING = SEGMENT_REGION_PATH, 0x0008, 0x0104, "Code Meaning (0008,0104)";
     FRAME_SEGMENT = FRAME_SEGMENT_PATH, 0x0062, 0x000b, "Referenced Segment Number (0062,000B)";
+    PATIENT_ID_ISSUER = &[], 0x0010, 0x0021, "Issuer of Patient ID (0010,0021)";
+    RESCALE_TYPE = &[], 0x0028, 0x1054, "Rescale Type (0028,1054)";
+    COUNTS_SOURCE = &[], 0x0054, 0x1002, "Counts Source (0054,1002)";
+    SUV_TYPE = &[], 0x0054, 0x1006, "SUV Type (0054,1006)";
+    RANDOMS_METHOD = &[], 0x0054, 0x1100, "Randoms Correction Method (0054,1100)";
+    ATTENUATION_METHOD = &[], 0x0054, 0x1101, "Attenuation Correction Method (0054,1101)";
+    DECAY_CORRECTION = &[], 0x0054, 0x1102, "Decay Correction (0054,1102)";
+    SCATTER_METHOD = &[], 0x0054, 0x1105, "Scatter Correction Method (0054,1105)";
+    ENERGY_LOWER = ENERGY_WINDOW, 0x0054, 0x0014, "Energy Window Lower Limit (0054,0014)";
+    ENERGY_UPPER = ENERGY_WINDOW, 0x0054, 0x0015, "Energy Window Upper Limit (0054,0015)";
+    PET_ENERGY_LOWER = PET_ENERGY_WINDOW, 0x0054, 0x0014, "Energy Window Lower Limit (0054,0014)";
+    PET_ENERGY_UPPER = PET_ENERGY_WINDOW, 0x0054, 0x0015, "Energy Window Upper Limit (0054,0015)";
 }
 
 /// Whether `tag` is a sequence that holds a needed attribute.

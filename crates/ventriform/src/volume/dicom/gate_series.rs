@@ -1,19 +1,22 @@
-//! A gated study in DICOM files of one gate each.
+//! A gated study in DICOM files of one gate each, or in one series for each gate.
 //!
-//! In: 6 to 32 Nuclear Medicine or Enhanced images of one study. Out: what one image with all gates would be.
+//! In: 6 to 32 Nuclear Medicine or Enhanced images of one study, or as many PET series of slices. Out: what one image with all
+//! gates would be.
 //!
-//! They are gates if each holds one volume, all lie on one grid, all belong to one series or say each that they are a gate
-//! ([`timing::is_one_gate`]), and a number in their headers orders them: of [`ORDERING_ATTRIBUTES`] the first that all have and no
-//! two share. Otherwise they are volumes of their own, which only a person can call gates.
+//! They are gates if each holds one volume, all lie on one grid, all say that they are gates ([`timing::is_one_gate`],
+//! [`timing::is_of_gates`]), nothing says that they are of several scans ([`one_scan`](super::one_scan)), and a number in their headers
+//! orders them: of [`ORDERING_ATTRIBUTES`] the first that all have and no two share. Otherwise they are volumes of their own, which
+//! only a person can call gates.
 //!
-//! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that the volumes of one series are moments of
-//! one beat; a fit tells ([`crate::beat`]), and a warning says what was taken for what.
+//! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that gates are moments of one beat; a fit
+//! tells ([`crate::beat`]), and a warning says what was taken for what.
 
 use super::attributes::{
-    ACQUISITION_NUMBER, Attribute, Attributes, INSTANCE_NUMBER, SERIES_NUMBER, SERIES_UID,
-    STUDY_UID, TEMPORAL_POSITION, TRIGGER_TIME,
+    ACQUISITION_NUMBER, Attribute, Attributes, INSTANCE_NUMBER, RR_INTERVALS, SERIES_NUMBER,
+    TEMPORAL_POSITION, TIME_SLOTS, TRIGGER_TIME,
 };
 use super::kind::Kind;
+use super::one_scan::{Reach, ScanStatement, contradiction};
 use super::{Content, DicomFile, ScannedFile, StoredSlice, VolumeError, timing};
 use crate::grid::gates::{GATE_COUNTS, SAME_PLACE_MM};
 use crate::progress::Monitor;
@@ -31,53 +34,61 @@ const ORDERING_ATTRIBUTES: [Attribute; 5] = [
     SERIES_NUMBER,
 ];
 
-/// What the header of one file says of its place among the others.
-struct Place {
-    study: Option<String>,
-    series: Option<String>,
-    is_one_gate: bool,
+/// What the header of a gate says of its place among the others.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Place {
     numbers: [Option<f64>; ORDERING_ATTRIBUTES.len()],
+    /// The gates that the study has, if the header of one of several says so.
+    of: usize,
 }
 
 impl Place {
-    fn of(a: &Attributes, kind: Kind) -> Self {
+    pub(super) fn of(a: &Attributes) -> Self {
         let number = |attribute| {
             let stated = a.decimals::<1>(attribute).ok().flatten();
             stated.map(|[number]| number)
         };
+        let first = |attribute| a.shorts(attribute).first().map_or(1, |n| usize::from(*n));
         Self {
-            study: a.text(STUDY_UID),
-            series: a.text(SERIES_UID),
-            is_one_gate: timing::is_one_gate(a, kind),
             numbers: ORDERING_ATTRIBUTES.map(number),
+            of: first(TIME_SLOTS) * first(RR_INTERVALS),
         }
     }
 }
 
-/// Whether the files belong together: one study, and one series or gates by their own words.
-fn belong_together(places: &[Place]) -> bool {
-    let same = |of: fn(&Place) -> &Option<String>| {
-        let first = places.first().and_then(|place| of(place).as_ref());
-        first.is_some() && places.iter().all(|place| of(place).as_ref() == first)
-    };
-    same(|place| &place.study)
-        && (same(|place| &place.series) || places.iter().all(|place| place.is_one_gate))
+/// What files of a volume each are together.
+pub(super) enum Joined {
+    /// Gates of one beat.
+    Gates(Box<DicomFile>),
+    /// They say that they are gates, and are none of one beat for this reason.
+    Contradiction(String),
+    /// Volumes of their own.
+    No,
 }
 
-/// The order of the files, as indices, and the name of the number that orders them.
+/// The order of gates, as indices, and the name of the number that orders them; `None` if none does.
 fn order_of(places: &[Place]) -> Option<(Vec<usize>, &'static str)> {
-    let by = |(at, attribute): (usize, &Attribute)| {
+    for (at, attribute) in ORDERING_ATTRIBUTES.iter().enumerate() {
         let numbers = places.iter().map(|place| place.numbers[at]);
-        let numbers: Vec<f64> = numbers.collect::<Option<_>>()?;
+        let Some(numbers) = numbers.collect::<Option<Vec<f64>>>() else {
+            continue;
+        };
         let mut order: Vec<usize> = (0..places.len()).collect();
         order.sort_by(|&a, &b| numbers[a].total_cmp(&numbers[b]));
-        let distinct = (order.windows(2)).all(|two| numbers[two[0]] < numbers[two[1]]);
-        distinct.then_some((order, attribute.name))
-    };
-    ORDERING_ATTRIBUTES.iter().enumerate().find_map(by)
+        let rises = |two: &[usize]| numbers[two[0]] < numbers[two[1]];
+        if order.windows(2).all(rises) {
+            return Some((order, attribute.name));
+        }
+        // Some moments twice are those of two beats.
+        let moments = attribute.name == TRIGGER_TIME.name;
+        if moments && order.windows(2).any(rises) {
+            return None;
+        }
+    }
+    None
 }
 
-/// The gates in `files`; `None` if they are not one gate each.
+/// The gates in `files`, of which each is one volume.
 ///
 /// # Errors
 /// [`VolumeError`] if one of them cannot be read.
@@ -85,29 +96,57 @@ pub(super) fn open(
     files: &[&VolumeFile],
     limits: &ReadLimits,
     monitor: &Monitor,
-) -> Result<Option<DicomFile>, VolumeError> {
+) -> Result<Joined, VolumeError> {
     if !GATE_COUNTS.contains(&files.len()) {
-        return Ok(None);
+        return Ok(Joined::No);
     }
-    let (mut places, mut gates) = (Vec::new(), Vec::new());
+    let (mut places, mut gates, mut said) = (Vec::new(), Vec::new(), Vec::new());
     for file in files {
         monitor.check()?;
         let scanned = ScannedFile::open(file, limits, monitor)?;
-        let kind = scanned.scan.kind;
-        if !matches!(kind, Kind::Nuclear { .. } | Kind::Enhanced) || scanned.is_one_slice() {
-            return Ok(None);
+        let (kind, a) = (scanned.scan.kind, &scanned.scan.attributes);
+        let whole =
+            matches!(kind, Kind::Nuclear { .. } | Kind::Enhanced) && !scanned.is_one_slice();
+        if !whole || !timing::is_one_gate(a, kind) {
+            return Ok(Joined::No);
         }
-        places.push(Place::of(&scanned.scan.attributes, kind));
+        places.push(Place::of(a));
+        said.push(ScanStatement::of(a));
         let gate = DicomFile::of_scan(file, scanned, limits)?;
         if gate.volumes != 1 {
-            return Ok(None);
+            return Ok(Joined::No);
         }
         gates.push(gate);
     }
-    if !belong_together(&places) || !on_one_grid(&gates) {
-        return Ok(None);
+    let said: Vec<&ScanStatement> = said.iter().collect();
+    Ok(joined(gates, &places, &said, "files"))
+}
+
+/// Whether so many volumes, whose places are these, are the gates that they say they are parts of.
+fn are_all(places: &[Place]) -> bool {
+    let said = places.iter().map(|place| place.of);
+    { said }.all(|of| of <= 1 || of == places.len())
+}
+
+/// All `gates`, which say that they are gates, as one file. `what` holds one gate each.
+pub(super) fn joined(
+    gates: Vec<DicomFile>,
+    places: &[Place],
+    said: &[&ScanStatement],
+    what: &str,
+) -> Joined {
+    if let Some(reason) = contradiction(said, Reach::Gates) {
+        return Joined::Contradiction(format!(
+            "they say that they are gates, but not of one scan: {reason}"
+        ));
     }
-    Ok(order_of(&places).map(|(order, name)| joined(gates, &order, name)))
+    if !on_one_grid(&gates) || !are_all(places) {
+        return Joined::No;
+    }
+    match order_of(places) {
+        Some((order, name)) => Joined::Gates(Box::new(in_order(gates, &order, name, what))),
+        None => Joined::No,
+    }
 }
 
 fn on_one_grid(gates: &[DicomFile]) -> bool {
@@ -118,12 +157,12 @@ fn on_one_grid(gates: &[DicomFile]) -> bool {
 }
 
 /// All `gates` as one file, in this order, which the attribute called `name` gives.
-fn joined(gates: Vec<DicomFile>, order: &[usize], name: &str) -> DicomFile {
+fn in_order(gates: Vec<DicomFile>, order: &[usize], name: &str, what: &str) -> DicomFile {
     let mut gates: Vec<Option<DicomFile>> = gates.into_iter().map(Some).collect();
     let in_order = order.iter().filter_map(|&at| gates[at].take());
     let mut gates: Vec<DicomFile> = in_order.collect();
     let mut warnings: Vec<String> = Vec::new();
-    let (mut parts, mut stored) = (Vec::new(), Vec::new());
+    let (mut parts, mut stored, mut instances) = (Vec::new(), Vec::new(), Vec::new());
     for (volume, gate) in gates.iter_mut().enumerate() {
         for warning in mem::take(&mut gate.warnings) {
             if !warnings.contains(&warning) {
@@ -131,17 +170,19 @@ fn joined(gates: Vec<DicomFile>, order: &[usize], name: &str) -> DicomFile {
             }
         }
         if let Content::Slices(slices) = &gate.content {
+            let before = parts.len();
             let of_gate = |slice: &StoredSlice| StoredSlice {
-                part: volume,
+                part: before + slice.part,
                 volume,
                 ..*slice
             };
             stored.extend(slices.iter().map(of_gate));
         }
         parts.append(&mut gate.parts);
+        instances.append(&mut gate.instances);
     }
     warnings.push(format!(
-        "{} files of one volume each were taken for the gates of one heart beat, in the order of their {name}.",
+        "{} {what} of one volume each were taken for the gates of one heart beat, in the order of their {name}.",
         gates.len()
     ));
     let gate_scans = gates.iter().map(|gate| gate.provenance.clone()).collect();
@@ -149,7 +190,7 @@ fn joined(gates: Vec<DicomFile>, order: &[usize], name: &str) -> DicomFile {
     let first = gates.swap_remove(0);
     let timing = first.timings.first().cloned().unwrap_or_default();
     DicomFile {
-        name: "the files of gates".into(),
+        name: format!("the {what} of gates"),
         content: Content::Slices(stored),
         volumes,
         gated: true,
@@ -159,6 +200,7 @@ fn joined(gates: Vec<DicomFile>, order: &[usize], name: &str) -> DicomFile {
             ..timing
         }],
         parts,
+        instances,
         gate_scans,
         warnings,
         ..first

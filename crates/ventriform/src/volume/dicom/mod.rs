@@ -13,7 +13,8 @@
 //! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them; `posture`: what else
 //!    says how they lie in the patient.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
-//!    one place belong together. `segments`: labels. `gate_series`: files of one gate each.
+//!    one place belong together. `segments`: labels. `gate_series`: files or series of one gate each.
+//!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
 //! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text; `rest_stress`: which scan
 //!    of a study they name.
@@ -36,6 +37,7 @@ mod gate_series;
 mod geometry;
 mod header;
 mod kind;
+pub(crate) mod one_scan;
 mod pixels;
 mod posture;
 mod provenance;
@@ -43,6 +45,7 @@ mod real_world;
 mod representation;
 mod rest_stress;
 mod scan;
+mod scans;
 mod segments;
 mod stack;
 mod syntax;
@@ -58,13 +61,16 @@ pub(super) use syntax::is_dicom;
 
 use self::attributes::{
     Attributes, IMAGES_IN_ACQUISITION, INSTANCE_NUMBER, MODALITY, NUMBER_OF_FRAMES,
-    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, SLICE_THICKNESS,
-    SOP_INSTANCE, TIME_SLICES, TIME_SLOTS, clip,
+    NUMBER_OF_SLICES, RR_INTERVALS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_INSTANCE,
+    TIME_SLICES, TIME_SLOTS,
 };
 use self::frames::FrameOrder;
+use self::gate_series::{Joined, Place};
 use self::kind::Kind;
+use self::one_scan::{Reach, ScanStatement, contradiction};
 use self::pixels::{Pixels, too_many_voxels};
 use self::scan::Scan;
+use self::scans::Scans;
 use self::segments::Segments;
 use self::stack::{Located, Stack, stated_gap};
 use self::volumes::Marks;
@@ -77,6 +83,7 @@ use super::source::VolumeFile;
 use super::summary::Tally;
 use super::values::is_uid;
 use super::{Provenance, Segment, VolumeError};
+use crate::grid::gates::GATE_COUNTS;
 use crate::progress::{Monitor, Stage};
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -101,8 +108,10 @@ pub(super) struct DicomFile {
     provenance: Provenance,
     /// SOP Instance UID of each file of a series.
     instances: Vec<String>,
-    /// Whose scan each gate is, if each is a file of its own; empty otherwise.
+    /// Whose scan each gate is, if each is a file or a series of its own; empty otherwise.
     gate_scans: Vec<Provenance>,
+    /// What its first file says of the scan.
+    statement: ScanStatement,
     warnings: Vec<String>,
 }
 
@@ -170,12 +179,16 @@ impl DicomFile {
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        let sorted = company::set_apart(files, limits, monitor)?;
+        // What an error names must not depend on the order of the files.
+        let mut files = files.to_vec();
+        files.sort_by(|a, b| a.name().cmp(b.name()));
+        let sorted = company::set_apart(&files, limits, monitor)?;
         let mut opened = match &sorted.slices[..] {
             [file] => Self::single(file, limits, monitor)?,
             slices => match gate_series::open(slices, limits, monitor)? {
-                Some(gates) => gates,
-                None => Self::series(slices, limits, monitor)?,
+                Joined::Gates(gates) => *gates,
+                Joined::Contradiction(reason) => return Err(not_one(slices.len(), reason)),
+                Joined::No => Self::series(slices, limits, monitor)?,
             },
         };
         opened.warnings.extend(sorted.notes);
@@ -295,107 +308,44 @@ impl DicomFile {
             parts: vec![pixels],
             instances: Vec::new(),
             gate_scans: Vec::new(),
+            statement: ScanStatement::of(a),
             warnings,
         })
     }
 
-    /// Opens the files of a series, each with one slice.
+    /// Opens the files of a series, each with one slice, or of a series for each gate.
     fn series(
         files: &[&VolumeFile],
         limits: &ReadLimits,
         monitor: &Monitor,
     ) -> Result<Self, VolumeError> {
-        let refuse = |reason| {
-            Err(VolumeError::NotOneSeries {
-                count: files.len(),
-                reason,
-            })
-        };
-        let mut series = Series::default();
-        let mut whole = Vec::new();
+        let mut scans = Scans::default();
+        let mut all: BTreeMap<String, Series> = BTreeMap::new();
         for file in files {
             monitor.check()?;
             let scanned = ScannedFile::open(file, limits, monitor)?;
-            let is_slice = scanned.scan.kind.is_single_slice() || scanned.is_one_slice();
-            let ScannedFile { scan, pixels } = scanned;
-            series.name(&scan.attributes);
-            if !is_slice {
-                whole.push((file.name(), scan.kind));
-            } else if let Some(reason) = series.add(&scan.attributes, pixels)? {
-                return refuse(reason);
+            let statement = ScanStatement::of(&scanned.scan.attributes);
+            let whole = !scanned.scan.kind.is_single_slice() && !scanned.is_one_slice();
+            scans.add(&scanned, &statement, whole);
+            if !whole {
+                let ScannedFile { scan, pixels } = scanned;
+                let uid = scan.attributes.text(SERIES_UID).unwrap_or_default();
+                let series = all.entry(uid).or_default();
+                series.add(&scan.attributes, pixels, statement)?;
             }
         }
-        whole.sort_unstable_by_key(|(name, _)| *name);
-        if !whole.is_empty() {
-            return refuse(series.beside(&whole, files.len()));
+        if scans.whole() > 0 {
+            return Err(not_one(files.len(), scans.listed()));
         }
-        if let Some(reason) = series.contradiction() {
-            return refuse(reason);
+        if scans.series() > 1 {
+            return match Series::gates(all.into_values().collect(), limits)? {
+                Joined::Gates(gates) => Ok(*gates),
+                Joined::Contradiction(reason) => Err(not_one(files.len(), reason)),
+                Joined::No => Err(not_one(files.len(), scans.listed())),
+            };
         }
-        let Some(mut first) = series.first.take() else {
-            return Err(VolumeError::NoFile);
-        };
-        let extent = series.parts[0].extent;
-        let name = |part: usize| series.parts[part].name().to_owned();
-        let stack = match Stack::of(&series.located, extent, first.gap, &name) {
-            Ok(stack) => stack,
-            Err(reason) => return refuse(reason),
-        };
-        let volumes = series.located.len() / stack.slices;
-        if series.slices > stack.slices {
-            return refuse(format!(
-                "{} is {}, and they hold {} slices; slices are missing at an end",
-                NUMBER_OF_SLICES.name, series.slices, stack.slices
-            ));
-        }
-        let gated = volumes > 1 && series.gated;
-        let timings = if gated {
-            series.timings_of(&stack)?
-        } else {
-            Vec::new()
-        };
-        let mut warnings = first.warnings;
-        warnings.extend(series.warnings(&stack, volumes));
-        let voxels = (extent[0] * extent[1]) as u64 * stack.slices as u64;
-        if voxels > limits.voxels {
-            return Err(VolumeError::TooLarge {
-                file: "the series".into(),
-                what: "voxels",
-                asked: voxels,
-                limit: limits.voxels,
-            });
-        }
-        let (parts, mut instances) = series.in_order(&stack.order);
-        let nameless = instances.iter().filter(|uid| !is_uid(uid)).count();
-        if nameless > 0 {
-            warnings.push(format!(
-                "{} of {nameless} files is no UID; no DICOM object made of them refers to the files.",
-                SOP_INSTANCE.name
-            ));
-            instances.clear();
-            first.provenance.sop_instance_uid = None;
-        }
-        let stored = (0..parts.len()).map(|part| StoredSlice {
-            part,
-            frame: 0,
-            volume: part / stack.slices,
-            slice: part % stack.slices,
-        });
-        Ok(Self {
-            name: "the series".into(),
-            format: FileFormat::DicomSeries,
-            content: Content::Slices(stored.collect()),
-            volumes,
-            gated,
-            timings,
-            shape: [extent[0], extent[1], stack.slices],
-            placement: stack.placement,
-            provenance: first.provenance,
-            parts,
-            instances,
-            gate_scans: Vec::new(),
-            warnings,
-        })
+        let series = all.into_values().next().ok_or(VolumeError::NoFile)?;
+        series.volumes(false, limits).map(|(file, _)| file)
     }
 
     fn slice_voxels(&self) -> usize {
@@ -565,50 +515,38 @@ struct Series {
     instances: Vec<String>,
     /// The timing that each part states; an error counts only where the series is gated.
     timings: Vec<Result<GateTiming, VolumeError>>,
+    /// What each part says of the scan.
+    statements: Vec<ScanStatement>,
+    /// What each part says of its place among gates.
+    places: Vec<Place>,
     /// The part of each SOP Instance UID.
     known: BTreeMap<String, usize>,
-    /// Every series by its UID.
-    names: BTreeMap<String, SeriesName>,
     /// The first instance.
     first: Option<First>,
     /// Whether a file says that the volumes are gates.
     gated: bool,
-    /// Files that repeat an instance.
-    repeated: usize,
+    /// Files that say that the series is one gate.
+    of_a_gate: usize,
+    /// What files that repeat an instance say of the scan.
+    repeated: Vec<ScanStatement>,
+    /// Two files that have one UID and are different images.
+    clash: Option<String>,
     /// The most that any file states: slices of a volume, volumes, images.
     slices: usize,
-    volumes: usize,
+    time_points: usize,
     images: f64,
     /// Whether the description is that of another kind of image.
     warning: Option<String>,
 }
 
-/// A series in a person's words.
-#[derive(Default)]
-struct SeriesName {
-    number: Option<String>,
-    description: Option<String>,
-    files: usize,
-}
-
 impl Series {
-    /// Counts the file with attributes `a` to its series.
-    fn name(&mut self, a: &Attributes) {
-        let uid = a.text(SERIES_UID).unwrap_or_default();
-        let name = self.names.entry(uid).or_default();
-        // The least, whatever the order of the files.
-        let least = |known: &mut Option<String>, given: Option<String>| {
-            if known.is_none() || given.is_some() && given < *known {
-                *known = given;
-            }
-        };
-        least(&mut name.number, a.text(SERIES_NUMBER));
-        least(&mut name.description, a.prose(SERIES_DESCRIPTION));
-        name.files += 1;
-    }
-
-    /// Adds a slice; `Some` says why it cannot be one of the series.
-    fn add(&mut self, a: &Attributes, pixels: Pixels) -> Result<Option<String>, VolumeError> {
+    /// Adds a slice.
+    fn add(
+        &mut self,
+        a: &Attributes,
+        pixels: Pixels,
+        statement: ScanStatement,
+    ) -> Result<(), VolumeError> {
         let instance = a.text(SOP_INSTANCE).unwrap_or_default();
         let mut located = Located::of(a, self.parts.len(), 0)?;
         located.marks = Marks::of_file(a);
@@ -616,18 +554,18 @@ impl Series {
             if located.is_same_place(&self.located[*known])
                 && image_hash(&pixels)? == image_hash(&self.parts[*known])?
             {
-                self.repeated += 1;
-                return Ok(None);
+                self.repeated.push(statement);
+                return Ok(());
             }
             let mut names = [pixels.name(), self.parts[*known].name()];
             names.sort_unstable();
-            return Ok(Some(format!(
+            self.clash.get_or_insert(format!(
                 "{} and {} have the same SOP Instance UID (0008,0018) and are different images; \
                  an export that gives each image its own is needed",
                 names[0], names[1]
-            )));
+            ));
         }
-        if !instance.is_empty() {
+        if !instance.is_empty() && !self.known.contains_key(&instance) {
             self.known.insert(instance.clone(), self.parts.len());
         }
         let number = match a.decimals::<1>(INSTANCE_NUMBER) {
@@ -646,10 +584,13 @@ impl Series {
         if timing::is_of_gates(a) {
             self.gated = true;
         }
+        if timing::is_slice_of_a_gate(a) {
+            self.of_a_gate += 1;
+        }
         let stated = |attribute| a.shorts(attribute).first().map_or(1, |n| usize::from(*n));
         self.slices = self.slices.max(stated(NUMBER_OF_SLICES));
-        let volumes = stated(TIME_SLOTS) * stated(RR_INTERVALS) * stated(TIME_SLICES);
-        self.volumes = self.volumes.max(volumes);
+        let time_points = stated(TIME_SLOTS) * stated(RR_INTERVALS) * stated(TIME_SLICES);
+        self.time_points = self.time_points.max(time_points);
         self.warning = attenuation_warning(a).or(self.warning.take());
         if let Ok(Some([images])) = a.decimals::<1>(IMAGES_IN_ACQUISITION) {
             self.images = self.images.max(images);
@@ -657,63 +598,20 @@ impl Series {
         self.located.push(located);
         self.instances.push(instance);
         self.timings.push(timing::of_slice(a));
+        self.statements.push(statement);
+        self.places.push(Place::of(a));
         self.parts.push(pixels);
-        Ok(None)
-    }
-
-    /// The series, and how to choose one.
-    fn listed(&self) -> String {
-        let each = self.names.iter().take(8).map(|(uid, name)| {
-            let number = name.number.as_deref().map(clip);
-            let number = number.map_or_else(|| "without number".into(), |n| format!("number {n}"));
-            let described = name.description.as_deref().map(clip);
-            let described = described.map_or_else(String::new, |text| format!(" \"{text}\""));
-            format!(
-                "{number}{described} (UID {}, {} files)",
-                clip(uid),
-                name.files
-            )
-        });
-        let list: Vec<String> = each.collect();
-        format!(
-            "they belong to {} series: {}; send the files of one of them alone",
-            self.names.len(),
-            list.join(", ")
-        )
-    }
-
-    /// Why files of which `whole` are volumes of their own are not one volume, and what to send.
-    fn beside(&self, whole: &[(&str, Kind)], files: usize) -> String {
-        let (name, kind) = whole[0];
-        let what = kind.noun();
-        if self.names.len() > 1 {
-            return format!(
-                "{name} is {what}, a volume of its own and not a slice of a series; {}",
-                self.listed()
-            );
-        }
-        match (whole, files - whole.len()) {
-            ([_], slices) => format!(
-                "{name} is {what}, a volume of its own, and {slices} other files are slices, although all have \
-                 one Series Instance UID (0020,000E); send {name} alone, or the slices without it"
-            ),
-            ([_, second, ..], 0) => format!(
-                "each of them is a volume of its own, such as {name} ({what}) and {}, although all have one \
-                 Series Instance UID (0020,000E); send one of them alone",
-                second.0
-            ),
-            (whole, slices) => format!(
-                "{} files are volumes of their own, such as {name} ({what}), and {slices} are slices, although all \
-                 have one Series Instance UID (0020,000E); send one volume alone, or the slices alone",
-                whole.len()
-            ),
-        }
+        Ok(())
     }
 
     /// Why the files are not one series.
     fn contradiction(&self) -> Option<String> {
-        if self.names.len() > 1 {
-            return Some(self.listed());
+        let said: Vec<&ScanStatement> = self.statements.iter().chain(&self.repeated).collect();
+        if let Some(reason) = contradiction(&said, Reach::Series) {
+            return Some(reason);
+        }
+        if let Some(clash) = &self.clash {
+            return Some(clash.clone());
         }
         let extents = self.parts.iter().map(|part| part.extent);
         let (least, most) = (extents.clone().min()?, extents.max()?);
@@ -725,13 +623,136 @@ impl Series {
         })
     }
 
+    /// Why the slices in `stack` are not of one scan each; all of it is one if it is `gated`.
+    fn mixture(&self, stack: &Stack, gated: bool) -> Option<String> {
+        let each = if gated {
+            stack.order.len()
+        } else {
+            stack.slices
+        };
+        let mut volumes = stack.order.chunks(each);
+        volumes.find_map(|volume| {
+            let said: Vec<&ScanStatement> = volume.iter().map(|at| &self.statements[*at]).collect();
+            contradiction(&said, Reach::Volume)
+        })
+    }
+
+    /// The gates that `all` series are, one each.
+    fn gates(all: Vec<Self>, limits: &ReadLimits) -> Result<Joined, VolumeError> {
+        let is_gate = |series: &Self| series.of_a_gate == series.parts.len();
+        if !GATE_COUNTS.contains(&all.len()) || !all.iter().all(is_gate) {
+            return Ok(Joined::No);
+        }
+        let (mut gates, mut places) = (Vec::new(), Vec::new());
+        for series in all {
+            let (gate, place) = series.volumes(true, limits)?;
+            if gate.volumes != 1 {
+                return Ok(Joined::No);
+            }
+            gates.push(gate);
+            places.push(place);
+        }
+        let said: Vec<ScanStatement> = gates.iter().map(|gate| gate.statement.clone()).collect();
+        let said: Vec<&ScanStatement> = said.iter().collect();
+        Ok(gate_series::joined(gates, &places, &said, "series"))
+    }
+
+    /// The volumes that the files make up, with the place of the first slice among gates; of a series that is one gate of several
+    /// if `one_gate`.
+    fn volumes(
+        mut self,
+        one_gate: bool,
+        limits: &ReadLimits,
+    ) -> Result<(DicomFile, Place), VolumeError> {
+        let count = self.parts.len() + self.repeated.len();
+        let refuse = |reason| Err(not_one(count, reason));
+        if let Some(reason) = self.contradiction() {
+            return refuse(reason);
+        }
+        let Some(mut first) = self.first.take() else {
+            return Err(VolumeError::NoFile);
+        };
+        let extent = self.parts[0].extent;
+        let name = |part: usize| self.parts[part].name().to_owned();
+        let stack = match Stack::of(&self.located, extent, first.gap, &name) {
+            Ok(stack) => stack,
+            Err(reason) => return refuse(reason),
+        };
+        let volumes = self.located.len() / stack.slices;
+        if self.slices > stack.slices {
+            return refuse(format!(
+                "{} is {}, and they hold {} slices; slices are missing at an end",
+                NUMBER_OF_SLICES.name, self.slices, stack.slices
+            ));
+        }
+        let gated = volumes > 1 && self.gated;
+        if let Some(reason) = self.mixture(&stack, gated) {
+            return refuse(reason);
+        }
+        let timings = if gated || one_gate {
+            self.timings_of(&stack)?
+        } else {
+            Vec::new()
+        };
+        let mut warnings = first.warnings;
+        let stated = if one_gate { self.time_points } else { volumes };
+        warnings.extend(self.warnings(&stack, stated));
+        let voxels = (extent[0] * extent[1]) as u64 * stack.slices as u64;
+        if voxels > limits.voxels {
+            return Err(VolumeError::TooLarge {
+                file: "the series".into(),
+                what: "voxels",
+                asked: voxels,
+                limit: limits.voxels,
+            });
+        }
+        let lowest = stack.order[0];
+        let (statement, place) = (
+            mem::take(&mut self.statements[lowest]),
+            self.places[lowest].clone(),
+        );
+        let (parts, mut instances) = self.in_order(&stack.order);
+        let nameless = instances.iter().filter(|uid| !is_uid(uid)).count();
+        if nameless > 0 {
+            warnings.push(format!(
+                "{} of {nameless} files is no UID; no DICOM object made of them refers to the files.",
+                SOP_INSTANCE.name
+            ));
+            instances.clear();
+            first.provenance.sop_instance_uid = None;
+        }
+        let stored = (0..parts.len()).map(|part| StoredSlice {
+            part,
+            frame: 0,
+            volume: part / stack.slices,
+            slice: part % stack.slices,
+        });
+        let file = DicomFile {
+            name: "the series".into(),
+            format: FileFormat::DicomSeries,
+            content: Content::Slices(stored.collect()),
+            volumes,
+            gated,
+            timings,
+            shape: [extent[0], extent[1], stack.slices],
+            placement: stack.placement,
+            provenance: first.provenance,
+            parts,
+            instances,
+            gate_scans: Vec::new(),
+            statement,
+            warnings,
+        };
+        Ok((file, place))
+    }
+
     /// Warnings about `volumes` volumes in `stack`.
     fn warnings(&self, stack: &Stack, volumes: usize) -> Vec<String> {
         let mut warnings: Vec<String> = self.warning.clone().into_iter().collect();
-        if self.repeated > 0 {
+        if !self.repeated.is_empty() {
             warnings.push(format!(
                 "{} files repeat an instance of the series and were left out.",
-                self.repeated
+                self.repeated.len()
             ));
         }
         if self.images > self.parts.len() as f64 {
@@ -748,11 +769,11 @@ impl Series {
                 NUMBER_OF_SLICES.name, self.slices, stack.slices
             ));
         }
-        if self.volumes > volumes {
+        if self.time_points > volumes {
             warnings.push(format!(
                 "The header states {} volumes (time slots, R-R intervals, time slices), and the \
                  files hold {volumes}: part of the series may be missing.",
-                self.volumes
+                self.time_points
             ));
         }
         warnings
@@ -783,6 +804,11 @@ impl Series {
         files.sort_unstable_by_key(|(place, _)| *place);
         files.into_iter().map(|(_, file)| file).unzip()
     }
+}
+
+/// The refusal of `count` files for `reason`.
+fn not_one(count: usize, reason: String) -> VolumeError {
+    VolumeError::NotOneSeries { count, reason }
 }
 
 /// A hash over the values of the only frame of `pixels`.
@@ -846,6 +872,14 @@ impl OpenVolume for DicomFile {
 
     fn gate_timings(&self) -> Vec<GateTiming> {
         self.timings.clone()
+    }
+
+    fn reads_again(&self) -> bool {
+        true
+    }
+
+    fn scan_statement(&self) -> Option<&ScanStatement> {
+        Some(&self.statement)
     }
 
     fn provenance(&self, frame: usize) -> Option<Provenance> {

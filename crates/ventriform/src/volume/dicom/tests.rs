@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 mod company;
 mod compressed;
 mod objects;
+mod one_scan;
 mod padding;
 mod posture;
 mod refused;
@@ -441,7 +442,7 @@ fn every_gate_is_read_with_the_timing_of_the_beats() {
         .map(|gate| gate.voxels.clone())
         .collect();
     assert_eq!(found, later);
-    assert_eq!(reading.first_frame, 2);
+    assert_eq!(reading.frames, [2, 3]);
     let told = |warning: &String| warning.contains("2 R-R intervals of 2 gates: interval 2");
     assert!(reading.facts.warnings.iter().any(told));
     let gates = reading.facts.gates.unwrap();

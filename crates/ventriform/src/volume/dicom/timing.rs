@@ -92,6 +92,16 @@ pub(super) fn is_of_gates(a: &Attributes) -> bool {
     }
 }
 
+/// Whether a slice says that the series it belongs to is one gate of several: as one of a gated series, or by its moment after the R
+/// wave.
+pub(super) fn is_slice_of_a_gate(a: &Attributes) -> bool {
+    let uptake = matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT"));
+    let kind = a.texts(SERIES_TYPE).into_iter().next();
+    let other = matches!(kind.as_deref(), Some("DYNAMIC" | "WHOLE BODY"));
+    let moment = matches!(a.decimals::<1>(TRIGGER_TIME), Ok(Some(_)));
+    is_of_gates(a) || (uptake && moment && !other)
+}
+
 /// Whether an image of one volume says that it is one gate of several: a gated Nuclear Medicine image whose frames are of one R-R
 /// interval and one time slot, or an image of a moment after the R wave.
 pub(super) fn is_one_gate(a: &Attributes, kind: Kind) -> bool {

@@ -42,6 +42,9 @@ pub(super) fn check_header(file: &VolumeFile, limits: &ReadLimits) -> Result<(),
     Ok(())
 }
 
+/// What a warning says of volumes that nothing calls gates.
+pub(super) const TAKEN_FOR_GATES: &str = "they are taken for gates of one heart beat";
+
 /// A NIfTI file whose header has been read and checked.
 pub(super) struct NiftiFile {
     header: Header,
@@ -64,8 +67,7 @@ impl NiftiFile {
         let not_gates = gates::contradiction(&header);
         if header.frames > 1 && not_gates.is_none() {
             header.warnings.push(format!(
-                "Nothing in the header says what the {} volumes are: they are taken for gates of one \
-                 heart beat.",
+                "Nothing in the header says what the {} volumes are: {TAKEN_FOR_GATES}.",
                 header.frames
             ));
         }
@@ -114,6 +116,10 @@ impl OpenVolume for NiftiFile {
             unit: self.header.unit,
             warnings: &self.header.warnings,
         }
+    }
+
+    fn assumes_gates(&self) -> bool {
+        self.header.frames > 1 && self.not_gates.is_none()
     }
 
     fn why_not_gated(&self) -> Option<&str> {

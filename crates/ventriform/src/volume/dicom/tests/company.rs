@@ -132,7 +132,7 @@ fn two_volumes_and_headers_without_voxels_are_refused() {
     let two = [("a.nii", single.clone()), ("b.nii", single.clone())];
     assert!(matches!(
         refuse(&two),
-        VolumeError::NotOneVolume { held, .. } if held == "2 NIfTI files"
+        VolumeError::NotOneVolume { held, .. } if held == "2 NIfTI files (a.nii, b.nii)"
     ));
     let mixed = [("a.nii", single.clone()), ("b.dcm", slice.clone())];
     assert!(matches!(refuse(&mixed), VolumeError::NotOneVolume { .. }));

@@ -688,12 +688,12 @@ fn gated_pet_of_several_intervals_has_the_timing_of_the_one_with_the_most_counts
     let limits = ReadLimits::default();
     let reading =
         crate::volume::read_gates(&files(&slices), false, &limits, &Monitor::silent()).unwrap();
-    assert_eq!((reading.gates.len(), reading.first_frame), (8, 8));
+    assert_eq!((reading.gates.len(), reading.frames[0]), (8, 8));
     assert_eq!(reading.timing.rr_ms, Some(1050.0));
 }
 
 /// Gate `n` as an image of its own, whose numbers begin with 100 n.
-fn one_gate(n: usize, series: &'static str) -> Elements {
+pub(super) fn one_gate(n: usize, series: &'static str) -> Elements {
     let first = 100 * n as u16;
     let mut elements = slices();
     elements.extend([
@@ -710,13 +710,20 @@ fn one_gate(n: usize, series: &'static str) -> Elements {
     elements
 }
 
+/// As [`one_gate`], with the time after the R wave, which calls it a gate.
+pub(super) fn timed_gate(n: usize, series: &'static str) -> Elements {
+    let mut elements = one_gate(n, series);
+    elements.insert((0x18, 0x1060), ("DS", written(112 * n)));
+    elements
+}
+
 /// As they are, in any order, and in an archive: like one image of all gates.
 #[test]
 fn images_of_one_gate_each_are_read_as_one_gated_study() {
     let limits = ReadLimits::default();
     let quiet = Monitor::silent();
     // Names that order them otherwise.
-    let mut images: Vec<Elements> = (0..8).map(|n| one_gate(n, "1.2.9")).collect();
+    let mut images: Vec<Elements> = (0..8).map(|n| timed_gate(n, "1.2.9")).collect();
     images.reverse();
     let loose = files(&images);
     let named: Vec<String> = (0..8).map(|n| format!("S/{n}")).collect();
@@ -739,7 +746,7 @@ fn images_of_one_gate_each_are_read_as_one_gated_study() {
         assert_eq!(held.unwrap(), crate::volume::HeldGates::Beat);
         let facts = inspect_volume(given, &limits, &quiet).unwrap();
         assert_eq!((facts.frames, facts.gates.is_some()), (8, true));
-        let told = facts.warnings.iter().any(|w| w.contains("Instance Number"));
+        let told = facts.warnings.iter().any(|w| w.contains("Trigger Time"));
         assert!(told, "{:?}", facts.warnings);
         let sum = read_files(given).unwrap().volume;
         let gates = reading.gates.iter().map(|gate| gate.voxels[5]);
@@ -747,20 +754,28 @@ fn images_of_one_gate_each_are_read_as_one_gated_study() {
     }
     // What does not belong together is what it was: volumes of their own.
     let apart = |change: fn(&mut Elements, usize)| {
-        let mut images: Vec<Elements> = (0..8).map(|n| one_gate(n, "1.2.9")).collect();
+        let mut images: Vec<Elements> = (0..8).map(|n| timed_gate(n, "1.2.9")).collect();
         for (n, image) in images.iter_mut().enumerate() {
             change(image, n);
         }
         read_files(&files(&images))
     };
-    let changes: [fn(&mut Elements, usize); 4] = [
-        // Series each, that do not say that they are gates.
-        |image, n| drop(image.insert((0x20, 0x0e), ("UI", written(format!("1.2.9.{n}"))))),
+    let changes: [fn(&mut Elements, usize); 6] = [
+        // One or all do not say that they are gates.
+        |image, n| {
+            if n == 3 {
+                image.remove(&(0x18, 0x1060));
+            }
+        },
+        |image, _| drop(image.remove(&(0x18, 0x1060))),
+        // Each moment twice, as of two beats.
+        |image, n| drop(image.insert((0x18, 0x1060), ("DS", written(100 * (n % 4))))),
         |image, n| drop(image.insert((0x20, 0x0d), ("UI", written(format!("1.{n}"))))),
         // No number orders them.
         |image, n| {
             image.insert((0x20, 0x11), ("IS", written(1)));
             image.insert((0x20, 0x13), ("IS", written(1 + n / 2)));
+            image.insert((0x18, 0x1060), ("DS", written(0)));
         },
         |image, n| drop(image.insert((0x18, 0x88), ("DS", written(5 + n % 2)))),
     ];
@@ -773,6 +788,7 @@ fn images_of_one_gate_each_are_read_as_one_gated_study() {
     assert!(matches!(few, VolumeError::NotOneSeries { .. }), "{few}");
     // Gates by their own words need not be of one series.
     let gated: fn(&mut Elements, usize) = |image, n| {
+        image.remove(&(0x18, 0x1060));
         image.extend([
             (
                 (0x08, 0x08),
