@@ -5,8 +5,8 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::VolumeFile;
 use super::attributes::{
-    Attribute, Attributes, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES, SERIES_UID, SOP_CLASS, SOP_INSTANCE,
-    STUDY_DESCRIPTION, STUDY_UID,
+    Attribute, Attributes, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES, SERIES_UID, SOP_CLASS,
+    SOP_INSTANCE, STUDY_DESCRIPTION, STUDY_UID,
 };
 use super::kind::Kind;
 use super::{guarded, kind, scan, syntax, timing};
