@@ -8,6 +8,7 @@
 //!    the limits; `unpack` is a faster way for small files.
 //! 2. `archive`, `folder` and `recognise`: finds the files in a zip archive or a folder, and determines
 //!    the format by the content. A name only tells which `.img` belongs to a `.hdr` among many files.
+//!    `foreign`: formats that are not read are named, with how to convert them.
 //! 3. [`nifti`] or `dicom`: checks the header field by field.
 //! 4. `decode`: decodes the voxels in portions directly into the result.
 //! 5. `summary`: figures over the values, and whether they look like labels.

@@ -14,7 +14,7 @@ pub(super) fn ct(height: &'static str, first: u16) -> Elements {
         ((0x08, 0x05), ("CS", Text("ISO_IR 192"))),
         ((0x08, 0x08), ("CS", Text("ORIGINAL\\PRIMARY\\AXIAL"))),
         ((0x08, 0x16), ("UI", Text("1.2.840.10008.5.1.4.1.1.2"))),
-        ((0x08, 0x18), ("UI", Text(height))),
+        ((0x08, 0x18), ("UI", written(format!("1.2.{height}")))),
         ((0x08, 0x60), ("CS", Text("CT"))),
         ((0x10, 0x10), ("PN", Text("Müller^Ä"))),
         ((0x18, 0x50), ("DS", Text("2"))),
@@ -115,7 +115,7 @@ fn slices_of_a_series_are_ordered_by_their_positions() {
         let corner = reading.volume.frame.to_patient(&Vec3::new(2.0, 1.0, 2.0));
         assert!((corner - Vec3::new(9.0, 4.5, 6.0)).norm() < 1e-12);
         let from = reading.provenance.unwrap();
-        assert_eq!(from.instance_uids, ["0", "3", "6"]);
+        assert_eq!(from.instance_uids, ["1.2.0", "1.2.3", "1.2.6"]);
         assert_eq!(from.patient_name.as_deref(), Some("Müller^Ä"));
         assert_eq!(from.study_uid.as_deref(), Some("1.2.3"));
         assert!(!format!("{from:?}").contains("ller"));
@@ -156,14 +156,14 @@ fn files_that_are_not_one_series_are_named() {
 fn several_slices_at_one_place_are_several_volumes() {
     let late = |height, first, instance| {
         let mut slice = ct(height, first);
-        slice.insert((0x08, 0x18), ("UI", Text(instance)));
+        slice.insert((0x08, 0x18), ("UI", written(format!("1.2.{instance}"))));
         slice.insert((0x18, 0x1060), ("DS", Text("400")));
         slice
     };
     let four = [
-        late("0", 60, "a"),
+        late("0", 60, "7"),
         ct("3", 6),
-        late("3", 70, "b"),
+        late("3", 70, "8"),
         ct("0", 0),
     ];
     let needed = read_files(&files(&four)).unwrap_err();
@@ -181,7 +181,7 @@ fn several_slices_at_one_place_are_several_volumes() {
         second.volume.voxels[..7],
         [55.0, 56.0, 57.0, 58.0, 59.0, 60.0, 65.0]
     );
-    assert_eq!(second.provenance.unwrap().instance_uids, ["a", "b"]);
+    assert_eq!(second.provenance.unwrap().instance_uids, ["1.2.7", "1.2.8"]);
 }
 
 pub(super) fn item(tag: (u16, u16), vr: &'static str, value: Value) -> Elements {
