@@ -324,6 +324,8 @@ def calibrate(
         Threads to work on; by default as many as there are processors.
     [parameters]
 
+    Points and directions are RAS, whatever the frame of a scan is.
+
     Returns
     -------
     Calibration
@@ -356,6 +358,8 @@ def build_normals(cohort: Path, *, progress: Any = None, threads: int | None = N
     threads : int, optional
         Threads to work on; by default as many as there are processors.
     [parameters]
+
+    Points and directions are RAS.
 
     Returns
     -------

@@ -361,6 +361,10 @@ def evaluate(
     mesh_frame: str | None = None,
     leave_one_out: bool = False,
     in_sample: str | Sequence[str] = (),
+    support: float = 0.0,
+    support_radius: float = 46.0,
+    support_scaling: str = 'fixed',
+    no_align: bool = False,
     progress: Any = None,
     threads: int | None = None,
 ) -> Evaluation: ...

@@ -148,13 +148,18 @@ def _placed(name: str, value: Any, frame_for: Callable[[str], Frame]) -> Any:
     return turned(numbers) if len(numbers) == 3 and frame_for(name) == "RAS" else value
 
 
+def summary(row: Row) -> str:
+    """What a parameter is, in a sentence, with places in the frame that they are given in."""
+    text: str = row["summary"]
+    for lps, own in IN_FRAME:
+        text = text.replace(lps, own)
+    return text
+
+
 def _described(row: Row) -> str:
     known = default(row)
     told = f", default {known!r}" if known is not None else ", optional"
-    summary = row["summary"]
-    for lps, own in IN_FRAME:
-        summary = summary.replace(lps, own)
-    return f"    {row['name']} : {values(row)}{told}\n        {summary}."
+    return f"    {row['name']} : {values(row)}{told}\n        {summary(row)}."
 
 
 def with_table(*commands: str) -> Callable[[Function], Function]:
