@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 from collections.abc import Iterable
 from typing import Any
 
@@ -21,10 +19,14 @@ def table(title: str, rows: Iterable[Row], picture: bytes | None = None) -> str:
     made = f"<table><caption style='text-align:left'><b>{_text(title)}</b></caption>{''.join(lines)}</table>"
     if picture is None:
         return made
+    import base64
+
     data = base64.b64encode(picture).decode()
     image = f"<img alt='' style='max-height:18em' src='data:image/png;base64,{data}'>"
     return f"<div style='display:flex;gap:2em;align-items:center'>{made}{image}</div>"
 
 
 def _text(value: Any) -> str:
+    import html
+
     return html.escape(str(value))

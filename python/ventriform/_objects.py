@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from datetime import datetime, timezone
 from typing import Any
 
 from . import _checks
@@ -80,6 +79,8 @@ def _secret(given: Any) -> bytes:
 
 def _moment(given: Any) -> tuple[str, str]:
     """Date and time, UTC, as DICOM writes them."""
+    from datetime import datetime, timezone
+
     fix = "Give a time with its zone, such as 2026-11-23T13:45:00Z."
     if isinstance(given, str):
         try:
