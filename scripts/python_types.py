@@ -129,19 +129,19 @@ def stub():
     tree = ast.parse(source)
     lines = ['"""Signatures of `_functions`. Written by scripts/python_types.py: change that, or the library\'s tables."""', ""]
     results = [alias.name for node in tree.body if getattr(node, "module", "") == "_results" for alias in node.names]
-    lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from typing import Any, Literal", ""]
+    lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from datetime import datetime", "from typing import Any, Literal", ""]
     lines += [f"from ._results import {', '.join(name for name in results if name[0].isupper())}", ""]
     for node in tree.body:
         if isinstance(node, ast.Assign) and node.targets[0].id not in ("__all__",):
             lines.append(ast.unparse(node))
         if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
             continue
-        commands = [d.args[0].value for d in node.decorator_list if isinstance(d, ast.Call)]
+        commands = [arg.value for d in node.decorator_list if isinstance(d, ast.Call) for arg in d.args]
         node.decorator_list, node.body = [], [ast.Expr(ast.Constant(...))]
         if commands:
             taken = {a.arg for a in node.args.args + node.args.kwonlyargs + node.args.posonlyargs}
             node.args.kwarg = None
-            for row in _tables.rows(commands[0]):
+            for row in [row for command in commands for row in _tables.rows(command)]:
                 if row["name"] not in taken:
                     annotation = ast.parse(_tables.annotation(row), mode="eval").body
                     node.args.kwonlyargs.append(ast.arg(row["name"], annotation))

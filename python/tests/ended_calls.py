@@ -86,7 +86,7 @@ def calls(folder: pathlib.Path) -> dict[str, Callable[[], Callable[[], object]]]
         "generate from noise": of_noise,
         "segment": lambda: lambda: vf.segment(scan),
         "beat": lambda: lambda: vf.beat(gated),
-        "compare": lambda: lambda: vf.compare(folder / "stress/spect.nii.gz", scan),
+        "compare": lambda: lambda: vf.compare(stress=folder / "stress/spect.nii.gz", rest=scan),
         "measure": of_volumes,
         "measure surfaces": of_surfaces,
         "calibrate": lambda: lambda: vf.calibrate(cohort),

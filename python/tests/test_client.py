@@ -18,7 +18,7 @@ def test_upload_submit_wait_download_search(service: str, scan: pathlib.Path, fi
         volume = client.upload(scan)
         assert client.upload(scan.read_bytes()).id == volume.id
         job = client.submit("segmentation", volume.id, model="auto")
-        done = client.wait(job.id, progress=lambda stage, fraction: told.append(fraction))
+        done = client.wait(job, progress=lambda stage, fraction: told.append(fraction))
         assert done.state == "succeeded"
         assert next(iter(client.search("segmentations")))["id"] == done.segmentation
         mask = client.download(f"/v1/segmentations/{done.segmentation}/mask.nii.gz")

@@ -189,3 +189,22 @@ def test_progress_is_told_to_functions_and_bars(server: Server) -> None:
         client.wait("job_1", progress=lambda stage, fraction: told.append((stage, fraction)))
         assert told == [("export", 1.0)]
         assert refusal(lambda: client.wait("job_1", progress=3)).field == "progress"
+
+
+def test_a_job_is_taken_as_submit_returned_it(server: Server) -> None:
+    with Client(address(server)) as client:
+        job = client.submit("model", "v1")
+        assert client.job(job).id == client.job(job.id).id == client.wait(job).id == "job_1"
+        assert [told.id for told in client.events(job)] == ["job_1"]
+        sent = len(server.got)
+        for wrong in (None, 3, "", "../volumes/x", "a/b", "job 1", StoredVolume, {"id": "job_1"}):
+            for use in (client.job, client.wait, lambda one: list(client.events(one))):
+                with pytest.raises(vf.InputError, match="no job"):
+                    use(wrong)  # type: ignore[operator]
+        assert len(server.got) == sent, "nothing is sent"
+
+
+def test_coordinates_are_sent_in_the_frame_of_the_service(server: Server) -> None:
+    with Client(address(server)) as client:
+        client.submit("segmentation", "v1", center=vf.Coordinates([1.0, 2.0, 3.0], frame="RAS"), axis=[0.0, 1.0, 0.0])
+    assert json.loads(server.got[-1][2])["parameters"] == {"center": [-1.0, -2.0, 3.0], "axis": [0.0, 1.0, 0.0]}

@@ -75,7 +75,7 @@ def test_everything_pickles(scan: pathlib.Path, model: vf.Model, fit: vf.Fit, ga
 
 
 def test_an_edited_pickle_is_refused(model: vf.Model) -> None:
-    restored, (state, frame, name) = model.__reduce__()
+    restored, (state, frame, name, *_) = model.__reduce__()
     (mesh, reference), *rest = state
     broken = ([(mesh[0], [[0, 1, 10_000]]), reference], *rest)
     with pytest.raises(vf.InputError):

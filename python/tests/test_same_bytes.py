@@ -71,7 +71,7 @@ def test_a_beat(gated: pathlib.Path, command: Command, tmp_path: pathlib.Path) -
 def test_a_comparison(folder: pathlib.Path, command: Command, tmp_path: pathlib.Path) -> None:
     stress, rest = (folder / name / "spect.nii.gz" for name in ("stress", "rest"))
     command("compare", "--stress", stress, "--rest", rest, "-o", tmp_path / "out")
-    ours = vf.compare(stress, rest)
+    ours = vf.compare(stress=stress, rest=rest)
     assert_same(ours.files, tmp_path / "out")
     assert ours.polar("difference").shape == (32, 60)
     assert ours.report.to_dict() == json.loads((tmp_path / "out/comparison.json").read_text())

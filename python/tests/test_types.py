@@ -82,7 +82,7 @@ def test_help_shows_every_parameter_with_its_range(name: str) -> None:
         if row["name"] in ("label", "reader") and f"    {row['name']} : " not in text:
             continue
         assert f"{row['name']} : {_tables.values(row)}" in text, row["name"]
-        assert " ".join(row["summary"].split()) in text
+        assert " ".join(_tables.summary(row).split()) in text
 
 
 @pytest.mark.parametrize(

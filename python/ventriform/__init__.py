@@ -6,8 +6,9 @@
 >>> fit.mask, fit.confidence, fit.polar
 
 Functions: `read`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`, `evaluate`,
-`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in the patient frame RAS, as nibabel has it, unless
-`frame="LPS"` is asked for; files are LPS, as the command writes them.
+`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in the
+patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`. `Coordinates` state
+theirs. Files are LPS, as the command writes them.
 
 Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is a
 client of the service (extra `client`).
@@ -18,6 +19,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ._errors import (
+    FileDeniedError,
+    FileError,
+    FileIsFolderError,
+    FileIsNoFolderError,
+    FileMissingError,
     InputError,
     InternalError,
     MissingExtraError,
@@ -25,6 +31,7 @@ from ._errors import (
     UnreadableError,
     VentriformError,
 )
+from ._frames import Coordinates
 from ._functions import beat, build_normals, calibrate, compare, evaluate, generate, measure, phantom, read, segment
 from ._native import __version__
 from ._results import (
@@ -50,7 +57,8 @@ if TYPE_CHECKING:
     from .client import Client
 
 __all__ = [
-    "Beat", "Calibration", "Client", "Comparison", "Evaluation", "Files", "Fit", "Flag", "InputError", "InternalError",
+    "Beat", "Calibration", "Client", "Comparison", "Coordinates", "Evaluation", "FileDeniedError", "FileError",
+    "FileIsFolderError", "FileIsNoFolderError", "FileMissingError", "Files", "Fit", "Flag", "InputError", "InternalError",
     "Measured", "MissingExtraError", "Model", "NormalLimits", "Phantom", "Profile", "Surface", "TooLargeError",
     "UnreadableError", "VentriformError", "Volume", "Wall", "__version__", "beat", "build_normals", "calibrate", "compare",
     "evaluate", "generate", "measure", "phantom", "plot", "read", "reports", "segment",

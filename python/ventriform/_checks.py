@@ -7,9 +7,16 @@ import numbers
 import operator
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ._errors import InputError
+from ._errors import InputError, file_error
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+#: Most threads that a call works on.
+MOST_THREADS = 1024
 
 #: Beyond any number of points; the library has limits of its own.
 MOST_POINTS = 2**32 - 1
@@ -20,6 +27,38 @@ def path(field: str, value: Any) -> str:
     if not isinstance(value, (str, os.PathLike)):
         raise InputError(field, f"A {type(value).__name__} is no path.", "Give the path of a folder.")
     return os.fsdecode(value)
+
+
+def folder(field: str, value: Any) -> str:
+    """The whole path of the folder that `value` names."""
+    given = path(field, value)
+    whole = given if os.path.isabs(given) else os.path.join(os.getcwd(), given)
+    try:
+        os.scandir(whole).close()
+    except OSError as error:
+        raise file_error(field, whole, error) from error
+    except ValueError as error:
+        raise InputError(field, f"{given!r} is no path: {error}.", "Give the path of a folder.") from error
+    return whole
+
+
+def threads(value: Any) -> int | None:
+    """The number of threads to work on; None for as many as there are processors."""
+    return None if value is None else whole("threads", value, 1, MOST_THREADS)
+
+
+def positions(field: str, value: Any, count: int) -> NDArray[np.float64]:
+    """The positions that `value` is, one for each of `count` vertices."""
+    import numpy as np
+
+    fix = f"Give an array of finite numbers of the shape ({count}, 3)."
+    try:
+        found = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(field, f"They are no positions: {error}.", fix) from error
+    if found.shape != (count, 3) or not np.isfinite(found).all():
+        raise InputError(field, f"They have the shape {found.shape}, or are not all finite.", fix)
+    return found
 
 
 def text(field: str, value: Any) -> str:

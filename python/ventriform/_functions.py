@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from . import _checks, _inputs, _native
-from ._errors import InputError
-from ._frames import checked
+from . import _checks, _inputs, _native, _objects
+from ._errors import InputError, file_error
+from ._frames import Frame, checked
 from ._results import (
     Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume,
-    teller, unwrap,
+    frame_of, teller, unwrap,
 )
-from ._tables import with_table
+from ._tables import to_lps, with_table
 
 Path = str | os.PathLike[str]
 
@@ -24,23 +24,27 @@ def _kept(source: Any) -> tuple[str, Any] | None:
     if not isinstance(sources, Sequence) or not sources:
         return None
     if all(_inputs.is_path(one) for one in sources):
-        return "paths", [os.fspath(one) for one in sources]
+        return "paths", [_inputs.whole_path(one) for one in sources]
     if all(_inputs.is_bytes(one) for one in sources):
         return "bytes", [(f"bytes{n}", bytes(one)) for n, one in enumerate(sources, 1)]
     return None
 
 
-def read(source: Any, *, frame: str = "RAS") -> Volume:
+def read(source: Any, *, frame: str = "RAS", threads: int | None = None) -> Volume:
     """Reads a scan, decoding every voxel once, so that an unusable file is refused here.
 
     Parameters
     ----------
     source : path, sequence of paths, bytes, open file, or image
         NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a file that is open
-        in binary mode, from where it is to its end; a `Volume`; an image of nibabel or SimpleITK; a dataset of pydicom, or
-        those of a series. Files named by paths are read again when they are used, so they must stay where they are.
+        in binary mode, from where it is to its end; a `Volume`; a pair (array, affine); an image of nibabel, SimpleITK,
+        MONAI or xarray; a dataset of pydicom, or those of a series. Files named by paths are read again when they are used,
+        so they must stay where and as they are: one with other bytes is refused.
     frame : {'RAS', 'LPS'}
-        The patient frame of the volume's affine.
+        The patient frame of the volume's affine, of points and directions that are given for it, and of its results. A pair's
+        affine is in it.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
     """
     kept = checked(frame)
     if isinstance(source, Volume):
@@ -48,13 +52,17 @@ def read(source: Any, *, frame: str = "RAS") -> Volume:
     # Its bytes are given out once.
     if not _inputs.is_path(source) and _inputs.is_open_file(source):
         source = _inputs.content(source)
-    native = _inputs.native(source, unwrap)
-    native.frames()
-    return Volume._of(native, kept, _kept(source))
+    native = _inputs.native(source, unwrap, kept)
+    paths = [stored for _, stored in native.files() if isinstance(stored, str)]
+    stamps = [_inputs.Stamp(path) for path in paths]
+    native.inspect(_how(None, threads))
+    for stamp in stamps:
+        stamp.check()
+    return Volume._of(native, kept, _kept(source), stamps)
 
 
 @with_table("generate")
-def generate(scan: Any, *, progress: Any = None, **parameters: Any) -> Model:
+def generate(scan: Any, *, progress: Any = None, threads: int | None = None, **parameters: Any) -> Model:
     """Makes a surface model of a volume, as `ventriform generate`.
 
     Parameters
@@ -63,6 +71,8 @@ def generate(scan: Any, *, progress: Any = None, **parameters: Any) -> Model:
         As `read` takes it.
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
     [parameters]
 
     Returns
@@ -75,10 +85,12 @@ def generate(scan: Any, *, progress: Any = None, **parameters: Any) -> Model:
         If the volume cannot be read, no model can be made of it, or a parameter cannot be used.
     """
     native = _inputs.native(scan, unwrap)
-    return Model(_native.generate(native, parameters, teller(progress)), name=_stem(scan, "model"))
+    with _inputs.asking(native):
+        made = _native.generate(native, parameters, _how(progress, threads))
+    return Model(made, frame_of(scan), _stem(scan, "model"))
 
 
-@with_table("segment")
+@with_table("segment", "dicom")
 def segment(
     scan: Any,
     *,
@@ -90,6 +102,7 @@ def segment(
     parts: Sequence[str] = (),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     **parameters: Any,
 ) -> Fit:
     """Fits a model to the left ventricle, or another organ, in a volume, as `ventriform segment`.
@@ -111,9 +124,12 @@ def segment(
     parts : sequence of {'endocardium', 'epicardium', 'base'}
         Parts of the wall that become files of their own.
     deidentify : bool
-        Leave patient, study and series out of report.html.
+        Leave patient, study and series out of report.html, and the patient's identity out of DICOM objects (PS3.15, basic
+        profile).
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
     [parameters]
 
     Returns
@@ -125,14 +141,17 @@ def segment(
     InputError
         If the volume or a model cannot be read, the organ is not found, or a parameter cannot be used.
     """
-    order = _order(model, formats, parts, (normals, parameters), deidentify)
+    frame = frame_of(scan)
+    parameters, order = _ordered("segment", parameters, deidentify, lambda _: frame)
+    order |= _order(model, formats, parts, (normals, parameters), deidentify)
     order["expert"] = None if expert is None else _inputs.native(_mask(expert), unwrap)
     order["reader"] = _profile(reader)
     native = _inputs.native(scan, unwrap)
-    return Fit(_native.segment(native, order, parameters, teller(progress)))
+    with _inputs.asking(native):
+        return Fit(_native.segment(native, order, parameters, _how(progress, threads)), frame)
 
 
-@with_table("beat")
+@with_table("beat", "dicom")
 def beat(
     gates: Any,
     *,
@@ -141,6 +160,7 @@ def beat(
     formats: Sequence[str] = ("glb",),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     **parameters: Any,
 ) -> Beat:
     """Fits one model in motion to the gates of a study, as `ventriform beat`.
@@ -149,7 +169,7 @@ def beat(
     ----------
     gates : Volume, path, bytes or image, or a sequence of them
         A volume with all gates, or one for each gate in their order.
-    model, normals, formats, deidentify, progress
+    model, normals, formats, deidentify, progress, threads
         As `segment` takes them.
     [parameters]
 
@@ -162,20 +182,25 @@ def beat(
     InputError
         If the gates cannot be read or are no beat, or a parameter cannot be used.
     """
-    order = _order(model, formats, (), (normals, parameters), deidentify)
-    return Beat(_native.beat(_inputs.gates(gates, unwrap), order, parameters, teller(progress)))
+    frame = frame_of(gates, "gates")
+    parameters, order = _ordered("beat", parameters, deidentify, lambda _: frame)
+    order |= _order(model, formats, (), (normals, parameters), deidentify)
+    scans = _inputs.gates(gates, unwrap)
+    with _inputs.asking(*scans):
+        return Beat(_native.beat(scans, order, parameters, _how(progress, threads)), frame)
 
 
-@with_table("compare")
+@with_table("compare", "dicom")
 def compare(
+    *,
     stress: Any,
     rest: Any,
-    *,
     model: Any = "auto",
     normals: Any = None,
     formats: Sequence[str] = ("glb", "json"),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     **parameters: Any,
 ) -> Comparison:
     """Compares rest and stress of one patient, as `ventriform compare`.
@@ -183,8 +208,8 @@ def compare(
     Parameters
     ----------
     stress, rest : Volume, path, bytes or image, or a sequence of gates
-        The scans. Where both are gated, a beat is fitted to each.
-    model, normals, formats, deidentify, progress
+        The scans, by these names alone. Where both are gated, a beat is fitted to each.
+    model, normals, formats, deidentify, progress, threads
         As `segment` takes them.
     [parameters]
 
@@ -197,10 +222,23 @@ def compare(
     InputError
         If a heart cannot be fitted, the scans are one scan or of two patients, or a parameter cannot be used.
     """
-    order = _order(model, formats, (), (normals, parameters), deidentify)
+    frames = {"stress": frame_of(stress, "stress"), "rest": frame_of(rest, "rest")}
+
+    def frame_for(name: str) -> Frame:
+        scan = name.partition("_")[0]
+        if scan in frames:
+            return frames[scan]
+        if frames["stress"] != frames["rest"]:
+            reason = f"It is for both scans, of which stress is in {frames['stress']} and rest in {frames['rest']}."
+            raise InputError(name, reason, "Give ventriform.Coordinates(numbers, frame=...), or bring both to one frame.")
+        return frames["stress"]
+
+    parameters, order = _ordered("compare", parameters, deidentify, frame_for)
+    order |= _order(model, formats, (), (normals, parameters), deidentify)
     scans = [_inputs.gates(scan, unwrap) for scan in (stress, rest)]
-    made = _native.compare(scans[0], scans[1], order, parameters, teller(progress))
-    return Comparison(made["files"])
+    with _inputs.asking(*scans[0], *scans[1]):
+        made = _native.compare(scans[0], scans[1], order, parameters, _how(progress, threads))
+    return Comparison(made["files"], frames["stress"])
 
 
 def measure(
@@ -214,6 +252,7 @@ def measure(
     mesh_unit: str | None = None,
     mesh_frame: str | None = None,
     progress: Any = None,
+    threads: int | None = None,
 ) -> Measured:
     """Compares two masks, as `ventriform measure`.
 
@@ -235,6 +274,8 @@ def measure(
         Frame of meshes that do not state theirs.
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
 
     Returns
     -------
@@ -249,7 +290,7 @@ def measure(
     masks = [_inputs.native(_mask(mask), unwrap) for mask in (a, b)]
     labels = [None if one is None else str(one) for one in (label, label_a, label_b)]
     text, structures, resampled = _native.measure(
-        masks[0], masks[1], labels, bool(resample), [mesh_unit, mesh_frame], teller(progress)
+        masks[0], masks[1], labels, bool(resample), [mesh_unit, mesh_frame], _how(progress, threads)
     )
     return Measured(text, structures, resampled)
 
@@ -261,6 +302,7 @@ def calibrate(
     mask: str = "lv_expert_img",
     name: str = "reader",
     progress: Any = None,
+    threads: int | None = None,
     **parameters: Any,
 ) -> Calibration:
     """Learns how a reader draws the wall, as `ventriform calibrate`.
@@ -278,7 +320,11 @@ def calibrate(
         The reader's name in reports.
     progress : callable or tqdm, optional
         Told 'fit' and the share of the cases that is done.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
     [parameters]
+
+    Points and directions are RAS, whatever the frame of a scan is.
 
     Returns
     -------
@@ -293,13 +339,14 @@ def calibrate(
 
     of_masks = _checks.text("mask", mask)
     _checks.text("name", name)
-    text, figures = _native.calibrate(_cases(cohort), of_masks, parameters, teller(progress))
+    parameters = to_lps("calibrate", parameters, lambda _: "RAS")
+    text, figures = _native.calibrate(_cases(cohort), of_masks, parameters, _how(progress, threads))
     table = json.loads(figures)
     return Calibration(Profile(text.encode(), name), table["cases"], table["problems"])
 
 
 @with_table("normals")
-def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> NormalLimits:
+def build_normals(cohort: Path, *, progress: Any = None, threads: int | None = None, **parameters: Any) -> NormalLimits:
     """Builds normal limits from scans of healthy people, as `ventriform normals build`.
 
     Parameters
@@ -308,7 +355,11 @@ def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> N
         A folder with scans and cohort.csv: case, file, sex, protocol, tracer, attenuation_corrected, healthy.
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
     [parameters]
+
+    Points and directions are RAS.
 
     Returns
     -------
@@ -319,8 +370,9 @@ def build_normals(cohort: Path, *, progress: Any = None, **parameters: Any) -> N
     InputError
         If the table cannot be read, a group has too few usable cases, or a parameter cannot be used.
     """
-    folder = _checks.path("cohort", cohort)
-    return NormalLimits(_native.build_normals(folder, parameters, teller(progress)).encode())
+    folder = _checks.folder("cohort", cohort)
+    parameters = to_lps("normals", parameters, lambda _: "RAS")
+    return NormalLimits(_native.build_normals(folder, parameters, _how(progress, threads)).encode())
 
 
 def evaluate(
@@ -338,7 +390,12 @@ def evaluate(
     mesh_frame: str | None = None,
     leave_one_out: bool = False,
     in_sample: str | Sequence[str] = (),
+    support: float = 0.0,
+    support_radius: float = 46.0,
+    support_scaling: str = "fixed",
+    no_align: bool = False,
     progress: Any = None,
+    threads: int | None = None,
 ) -> Evaluation:
     """Makes models of a cohort's templates, fits them to every patient and writes tables, as `ventriform evaluate`.
 
@@ -369,8 +426,18 @@ def evaluate(
         Choose model, number of points and reader's profile for each case without that case.
     in_sample : sequence of str, or 'all'
         Cases that the program's constants were chosen on, or all: their figures are labelled in-sample.
+    support : float, 0 to 1e6
+        Stiffness of support springs between all nodes within a radius, to study their effect.
+    support_radius : float, 0 to 1000
+        Longest support spring, mm.
+    support_scaling : {'fixed', 'per-node'}
+        Whether a support spring's stiffness falls with the number of nodes.
+    no_align : bool
+        Skip the alignment of the model as a whole, as for models that are placed by hand.
     progress : callable or tqdm, optional
         Told step and its completed fraction.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
 
     Returns
     -------
@@ -384,11 +451,12 @@ def evaluate(
     import tempfile
 
     _checks.one_of("method", method, ("refined", "paper"))
+    _checks.one_of("support_scaling", support_scaling, ("fixed", "per-node"))
     _check_mesh(mesh_unit, mesh_frame)
     if out is not None:
         _checks.path("out", out)
     order = {
-        "cohort": _checks.path("cohort", cohort),
+        "cohort": _checks.folder("cohort", cohort),
         "points": _checks.wholes("points", points, 0, _checks.MOST_POINTS),
         "reference_points": _checks.wholes("reference_points", reference_points, 0, _checks.MOST_POINTS),
         "models": _checks.words("models", models), "method": method,
@@ -396,12 +464,14 @@ def evaluate(
         "label": None if label is None else str(label), "resample": bool(resample), "mesh_unit": mesh_unit,
         "mesh_frame": mesh_frame, "leave_one_out": bool(leave_one_out),
         "in_sample": ["all"] if in_sample == "all" else _checks.words("in_sample", in_sample),
+        "align": not no_align, "support": _checks.number("support", support),
+        "support_radius": _checks.number("support_radius", support_radius), "support_scaling": support_scaling,
         "program": _program(),
     }
-    told = teller(progress)
+    how = _how(progress, threads)
     temporary = tempfile.TemporaryDirectory(prefix="ventriform-") if out is None else None
-    folder = temporary.name if temporary is not None else _checks.path("out", out)
-    return Evaluation(folder, _native.evaluate({**order, "out": folder}, told), temporary=temporary)
+    folder = temporary.name if temporary is not None else _inputs.whole_path(out)
+    return Evaluation(folder, _native.evaluate({**order, "out": folder}, how), temporary=temporary)
 
 
 def phantom(
@@ -420,6 +490,7 @@ def phantom(
     defects: Mapping[int, float] | None = None,
     frame: str = "RAS",
     progress: Any = None,
+    threads: int | None = None,
 ) -> Phantom:
     """Simulates a scan with its true mask.
 
@@ -447,6 +518,8 @@ def phantom(
         The patient frame of the volumes' affine.
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
+    threads : int, optional
+        Threads to work on; by default as many as there are processors.
 
     Returns
     -------
@@ -475,9 +548,23 @@ def phantom(
         ],
         "seed": _checks.whole("seed", seed, 0, 2**64 - 1),
     }
-    voxels, truth, lps = _native.phantom(order, teller(progress))
+    voxels, truth, lps = _native.phantom(order, _how(progress, threads))
     made = [Volume(array, lps, frame="LPS").in_frame(kept) for array in (voxels, truth)]
     return Phantom(made[0], made[1])
+
+
+def _how(progress: Any, threads: Any) -> tuple[Any, int | None]:
+    """Whom a call tells of its progress, and on how many threads it works."""
+    return teller(progress), _checks.threads(threads)
+
+
+def _ordered(
+    command: str, given: dict[str, Any], deidentify: bool, frame_for: Callable[[str], Frame]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Parameters with points and directions in LPS, and what is stated of DICOM objects, apart."""
+    stated = {name: value for name, value in given.items() if name in _objects.NAMES}
+    others = {name: value for name, value in given.items() if name not in stated}
+    return to_lps(command, others, frame_for), {"dicom": _objects.order(stated, deidentify)}
 
 
 def _stem(source: Any, otherwise: str) -> str:
@@ -489,7 +576,7 @@ def _stem(source: Any, otherwise: str) -> str:
 def _cases(cohort: Any) -> Any:
     """The folder of a cohort as it is, or name, scan and mask of each case."""
     if _inputs.is_path(cohort):
-        return _checks.path("cohort", cohort)
+        return _checks.folder("cohort", cohort)
     fix = "Give a folder, pairs (scan, mask), or a dictionary of names and such pairs."
     if isinstance(cohort, Mapping):
         named = list(cohort.items())
@@ -506,7 +593,7 @@ def _cases(cohort: Any) -> Any:
         try:
             scan, mask = (_inputs.native(one, unwrap) for one in (pair[0], _mask(pair[1])))
         except InputError as error:
-            raise InputError("cohort", f"{name}: {error.reason}", error.fix, error.code) from error
+            raise error._about("cohort", f"{name}: ")
         cases.append((name, scan, mask))
     return cases
 
@@ -539,9 +626,9 @@ def _order(
     models: list[Any] = []
     for one in given:
         if isinstance(one, Model):
-            models.append((one.name, one._native))
+            models.append((one.name, one._unchanged()))
         elif _inputs.is_path(one):
-            models.append(os.fspath(one))
+            models.append(one if one == "auto" else _opened("model", one))
         else:
             raise InputError("model", f"A {type(one).__name__} is no model.", "Give 'auto', a Model or a path.")
     normals, parameters = limits
@@ -577,7 +664,16 @@ def _content(field: str, source: Any) -> bytes:
         with open(source, "rb") as file:
             return file.read()
     except OSError as error:
-        raise InputError(field, f"{error}.", "Give the path of a file that can be read.") from error
+        raise file_error(field, source, error) from error
+    except ValueError as error:
+        raise InputError(field, f"{source!r} is no path: {error}.", "Give the path of a file.") from error
+
+
+def _opened(field: str, path: Any) -> str:
+    """The whole path of a file that the system opens."""
+    whole = _inputs.whole_path(path)
+    _inputs.open_each(field, [whole])
+    return whole
 
 
 def _program() -> bytes:

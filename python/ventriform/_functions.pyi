@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from typing import Any, Literal
 
 from ._results import Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume
@@ -11,11 +12,13 @@ def read(
     source: Any,
     *,
     frame: str = 'RAS',
+    threads: int | None = None,
 ) -> Volume: ...
 def generate(
     scan: Any,
     *,
     progress: Any = None,
+    threads: int | None = None,
     points: int = 150,
     seed: int = 1,
     starts: int | None = None,
@@ -66,6 +69,7 @@ def segment(
     parts: Sequence[str] = (),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     kept_model: str | int | None = None,
     label: str | int | None = None,
     resample: bool = False,
@@ -109,6 +113,19 @@ def segment(
     polar_extension: float = 3.0,
     polar_blur: float = 3.0,
     polar_projection: Literal['standard', 'area'] = 'standard',
+    dicom: bool = False,
+    patient_id: str | None = None,
+    patient_name: str | None = None,
+    patient_birth_date: str | None = None,
+    patient_sex: str | None = None,
+    study_uid: str | None = None,
+    study_date: str | None = None,
+    study_id: str | None = None,
+    accession_number: str | None = None,
+    referring_physician: str | None = None,
+    frame_of_reference_uid: str | None = None,
+    deidentify_secret: str | None = None,
+    made_at: str | datetime | None = None,
 ) -> Fit: ...
 def beat(
     gates: Any,
@@ -118,6 +135,7 @@ def beat(
     formats: Sequence[str] = ('glb',),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     gated: bool = False,
     mass_g: float | None = None,
     rr_ms: float | None = None,
@@ -156,16 +174,30 @@ def beat(
     polar_extension: float = 3.0,
     polar_blur: float = 3.0,
     polar_projection: Literal['standard', 'area'] = 'standard',
+    dicom: bool = False,
+    patient_id: str | None = None,
+    patient_name: str | None = None,
+    patient_birth_date: str | None = None,
+    patient_sex: str | None = None,
+    study_uid: str | None = None,
+    study_date: str | None = None,
+    study_id: str | None = None,
+    accession_number: str | None = None,
+    referring_physician: str | None = None,
+    frame_of_reference_uid: str | None = None,
+    deidentify_secret: str | None = None,
+    made_at: str | datetime | None = None,
 ) -> Beat: ...
 def compare(
+    *,
     stress: Any,
     rest: Any,
-    *,
     model: Any = 'auto',
     normals: Any = None,
     formats: Sequence[str] = ('glb', 'json'),
     deidentify: bool = False,
     progress: Any = None,
+    threads: int | None = None,
     stress_protocol: str | int | None = None,
     rest_protocol: str | int | None = None,
     gated: bool = False,
@@ -207,6 +239,19 @@ def compare(
     polar_extension: float = 3.0,
     polar_blur: float = 3.0,
     polar_projection: Literal['standard', 'area'] = 'standard',
+    dicom: bool = False,
+    patient_id: str | None = None,
+    patient_name: str | None = None,
+    patient_birth_date: str | None = None,
+    patient_sex: str | None = None,
+    study_uid: str | None = None,
+    study_date: str | None = None,
+    study_id: str | None = None,
+    accession_number: str | None = None,
+    referring_physician: str | None = None,
+    frame_of_reference_uid: str | None = None,
+    deidentify_secret: str | None = None,
+    made_at: str | datetime | None = None,
 ) -> Comparison: ...
 def measure(
     a: Any,
@@ -219,6 +264,7 @@ def measure(
     mesh_unit: str | None = None,
     mesh_frame: str | None = None,
     progress: Any = None,
+    threads: int | None = None,
 ) -> Measured: ...
 def calibrate(
     cohort: Path | Mapping[str, tuple[Any, Any]] | Iterable[tuple[Any, Any]],
@@ -226,6 +272,7 @@ def calibrate(
     mask: str = 'lv_expert_img',
     name: str = 'reader',
     progress: Any = None,
+    threads: int | None = None,
     kept_model: str | int | None = None,
     label: str | int | None = None,
     resample: bool = False,
@@ -270,6 +317,7 @@ def build_normals(
     cohort: Path,
     *,
     progress: Any = None,
+    threads: int | None = None,
     mixed: bool = False,
     roll: float = 0.0,
     superior: Literal['body', 'frame'] | Sequence[float] = 'body',
@@ -313,7 +361,12 @@ def evaluate(
     mesh_frame: str | None = None,
     leave_one_out: bool = False,
     in_sample: str | Sequence[str] = (),
+    support: float = 0.0,
+    support_radius: float = 46.0,
+    support_scaling: str = 'fixed',
+    no_align: bool = False,
     progress: Any = None,
+    threads: int | None = None,
 ) -> Evaluation: ...
 def phantom(
     *,
@@ -331,5 +384,6 @@ def phantom(
     defects: Mapping[int, float] | None = None,
     frame: str = 'RAS',
     progress: Any = None,
+    threads: int | None = None,
 ) -> Phantom: ...
 _OF_LIMITS = ('sex', 'protocol', 'stress_protocol', 'rest_protocol', 'tracer', 'attenuation_corrected')

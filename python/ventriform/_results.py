@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from . import _checks, _inputs, _native
+from . import _checks, _html, _inputs, _native
 from ._errors import InputError, MissingExtraError
-from ._frames import Frame, affine_from_lps, checked, points_from_lps
+from ._frames import Frame, affine_from_lps, checked, points_from_lps, points_to_lps
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,12 +29,43 @@ def extra(package: str, name: str) -> Any:
     try:
         return importlib.import_module(package)
     except ImportError as error:
-        raise MissingExtraError(package, name) from error
+        raise MissingExtraError(package.partition(".")[0], name) from error
 
 
 def unwrap(source: Any) -> _native.NativeVolume | None:
-    """The native volume of a `Volume`."""
-    return source._native if isinstance(source, Volume) else None
+    """The native volume of a `Volume`, whose files are as they were when it was read."""
+    return source._current() if isinstance(source, Volume) else None
+
+
+def frame_of(source: Any, field: str = "scan") -> Frame:
+    """The patient frame of a volume, or of the volumes of gates; RAS of anything else."""
+    volumes = source if isinstance(source, (list, tuple)) else [source]
+    frames: set[Frame] = {one.frame for one in volumes if isinstance(one, Volume)}
+    if len(frames) > 1:
+        raise InputError(field, "Its volumes are in RAS and in LPS.", "Bring them to one frame: volume.in_frame('RAS').")
+    return frames.pop() if frames else "RAS"
+
+
+def simpleitk_image(array: Any, lps: Any) -> Any:
+    """Voxels (i, j, k) and their affine to LPS as an image of SimpleITK."""
+    import numpy as np
+
+    package = extra("SimpleITK", "simpleitk")
+    place = np.array(lps, dtype=np.float64)
+    spacing = np.linalg.norm(place[:3, :3], axis=0)
+    direction = place[:3, :3] / spacing
+    if np.abs(direction.T @ direction - np.eye(3)).max() > OBLIQUE:
+        fix = "Resample it to a grid with right angles, or use to_nibabel()."
+        raise InputError("affine", "SimpleITK has no images of a grid without right angles.", fix)
+    image = package.GetImageFromArray(np.ascontiguousarray(array.transpose()))
+    image.SetSpacing(spacing.tolist())
+    image.SetOrigin(place[:3, 3].tolist())
+    image.SetDirection(direction.ravel().tolist())
+    return image
+
+
+OBLIQUE = 1e-4
+"""Greatest cosine of two axes of a grid that has right angles."""
 
 
 class Volume:
@@ -52,7 +83,7 @@ class Volume:
         The patient frame of `affine`, and of this volume's own: RAS as nibabel has it, LPS as DICOM and SimpleITK.
     """
 
-    __slots__ = ("_frame", "_native", "_source")
+    __slots__ = ("_frame", "_native", "_source", "_stamps")
 
     def __init__(self, array: Any, affine: Any, *, frame: str = "RAS") -> None:
         kept = checked(frame)
@@ -60,14 +91,28 @@ class Volume:
         self._native = _native.NativeVolume.from_array(_inputs.voxels(array), rows)
         self._frame: Frame = kept
         self._source: tuple[str, Any] | None = None
+        self._stamps: list[_inputs.Stamp] = []
 
     @classmethod
-    def _of(cls, native: _native.NativeVolume, frame: Frame, source: tuple[str, Any] | None = None) -> Volume:
+    def _of(
+        cls,
+        native: _native.NativeVolume,
+        frame: Frame,
+        source: tuple[str, Any] | None = None,
+        stamps: Sequence[_inputs.Stamp] = (),
+    ) -> Volume:
         made = cls.__new__(cls)
         made._native = native
         made._frame = frame
         made._source = source
+        made._stamps = list(stamps)
         return made
+
+    def _current(self) -> _native.NativeVolume:
+        """The native volume, whose files have not changed since they were read."""
+        for stamp in self._stamps:
+            stamp.check()
+        return self._native
 
     @property
     def frame(self) -> Frame:
@@ -76,7 +121,7 @@ class Volume:
 
     def in_frame(self, frame: str) -> Volume:
         """The same volume with its affine to another patient frame."""
-        return Volume._of(self._native, checked(frame), self._source)
+        return Volume._of(self._native, checked(frame), self._source, self._stamps)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -111,8 +156,25 @@ class Volume:
         """The voxels of one volume of several, counted from 0; without `frame` those of the only one, or of the sum of the gates."""
         if frame is not None:
             frame = _checks.whole("frame", frame, 0, self.frames - 1)
-        voxels, _ = self._native.voxels(frame)
+        native = self._current()
+        with _inputs.asking(native):
+            voxels, _ = native.voxels(frame)
         return voxels
+
+    def _voxels(self) -> NDArray[np.float32]:
+        """All voxels: (i, j, k), or (i, j, k, gate)."""
+        import numpy as np
+
+        if self.frames == 1:
+            return self.array
+        return np.stack([self.data(gate) for gate in range(self.frames)], axis=-1)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """All voxels as NumPy asks for them: (i, j, k), or (i, j, k, gate) of several volumes. Always a new array."""
+        if copy is False:
+            raise ValueError("the voxels are read anew each time: numpy.asarray(volume) makes an array of them")
+        voxels = self._voxels()
+        return voxels if dtype is None else voxels.astype(dtype, copy=False)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -129,6 +191,23 @@ class Volume:
         """The volume as a `nibabel.Nifti1Image`; of a gated one the sum of its gates (`data(gate)` has each)."""
         return extra("nibabel", "nibabel").Nifti1Image(self.array, affine_from_lps(self._native.affine(), "RAS"))
 
+    def to_simpleitk(self) -> Any:
+        """The volume as a `SimpleITK.Image`; of a gated one the sum of its gates (`data(gate)` has each)."""
+        return simpleitk_image(self.array, self._native.affine())
+
+    def _repr_html_(self) -> str:
+        facts = self.facts
+        rows = [
+            ("voxels", " × ".join(map(str, self.shape))),
+            ("size", " × ".join(f"{mm:.4g}" for mm in self.spacing_mm) + " mm"),
+            ("volumes", self.frames),
+            ("frame", self.frame),
+            ("format", facts.get("format")),
+            ("values", facts.get("data_type")),
+            *(("warning", warning) for warning in self.warnings),
+        ]
+        return _html.table("Volume", rows)
+
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.shape))
         gates = f", {self.frames} volumes" if self.frames > 1 else ""
@@ -137,23 +216,22 @@ class Volume:
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._source is not None:
-            return _volume_again, (self._source, self._frame)
-        import numpy as np
-
-        if self.frames == 1:
-            array = self.array
-        else:
-            gates = [self.data(gate) for gate in range(self.frames)]
-            array = np.stack(gates, axis=-1)
+            return _volume_again, (self._source, self._frame, [(stamp.path, stamp.digest) for stamp in self._stamps])
+        array = self._voxels()
         if self.facts["affine_source"] == "pixdim":
             return _unplaced_again, (array, self.spacing_mm, self._frame)
         return _array_again, (array, affine_from_lps(self._native.affine(), "LPS"), self._frame)
 
 
-def _volume_again(source: tuple[str, Any], frame: Frame) -> Volume:
+def _volume_again(source: tuple[str, Any], frame: Frame, stamps: Sequence[tuple[str, bytes]] = ()) -> Volume:
     kind, content = source
-    native = _native.NativeVolume.from_paths(content) if kind == "paths" else _native.NativeVolume.from_bytes(content)
-    return Volume._of(native, frame, source)
+    if kind != "paths":
+        return Volume._of(_native.NativeVolume.from_bytes(content), frame, source)
+    native = _inputs.of_paths("source", content)
+    if stamps and [path for path, _ in stamps] != [path for _, path in native.files()]:
+        reason = f"{content[0]} holds other files than when it was read."
+        raise InputError("source", reason, "Read it again: ventriform.read(path).", "file-changed")
+    return Volume._of(native, frame, source, [_inputs.Stamp(path, digest) for path, digest in stamps])
 
 
 def _array_again(array: Any, affine: Any, frame: Frame) -> Volume:
@@ -167,27 +245,39 @@ def _unplaced_again(array: Any, sizes_mm: Sequence[float], frame: Frame) -> Volu
 class Surface:
     """A triangle surface.
 
+    Arrays are copies, made each time that one is asked for. Vertices that are assigned are this object's own: what it was
+    made of stays as it was.
+
     Attributes
     ----------
-    vertices : ndarray, (n, 3), float64
-        Positions, mm, in `frame`.
-    faces : ndarray, (m, 3), int32
-        Vertices of each triangle, counter-clockwise seen from outside.
     frame : {'RAS', 'LPS'}
         The patient frame of the positions.
     """
 
-    __slots__ = ("_lps", "faces", "frame", "vertices")
+    __slots__ = ("_faces", "_lps", "frame")
 
     def __init__(self, lps: _Floats, faces: NDArray[np.int32], frame: Frame) -> None:
         self._lps = lps
-        self.vertices = points_from_lps(lps, frame)
-        self.faces = faces
+        self._faces = faces
         self.frame: Frame = frame
+
+    @property
+    def vertices(self) -> _Floats:
+        """Positions, mm, in `frame`, (n, 3)."""
+        return points_from_lps(self._lps, self.frame)
+
+    @vertices.setter
+    def vertices(self, positions: Any) -> None:
+        self._lps = points_to_lps(_checks.positions("vertices", positions, len(self._lps)), self.frame)
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """Vertices of each triangle, counter-clockwise seen from outside, (m, 3)."""
+        return self._faces.copy()
 
     def in_frame(self, frame: str) -> Surface:
         """The surface in another patient frame."""
-        return Surface(self._lps, self.faces, checked(frame))
+        return Surface(self._lps, self._faces, checked(frame))
 
     def to_pyvista(self) -> Any:
         """The surface as a `pyvista.PolyData`."""
@@ -202,35 +292,45 @@ class Surface:
 
     def _mesh(self) -> bytes:
         """The bytes of the library's own file of a mesh, which states frame and unit, with every digit."""
-        document = {"frame": "LPS", "unit": "mm", "vertices": self._lps.tolist(), "triangles": self.faces.tolist()}
+        document = {"frame": "LPS", "unit": "mm", "vertices": self._lps.tolist(), "triangles": self._faces.tolist()}
         return json.dumps(document).encode()
 
+    def _rows(self) -> list[_html.Row]:
+        """What a notebook shows of it."""
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        size = " × ".join(f"{mm:.1f}" for mm in high - low)
+        return [("vertices", len(self._lps)), ("faces", len(self._faces)), ("size", f"{size} mm"), ("frame", self.frame)]
+
+    def _repr_html_(self) -> str:
+        return _html.table(type(self).__name__, self._rows())
+
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({len(self.vertices)} vertices, {len(self.faces)} faces, {self.frame})"
+        return f"{type(self).__name__}({len(self._lps)} vertices, {len(self._faces)} faces, {self.frame})"
 
 
 class Wall(Surface):
-    """A wall of the ventricle: its surface, and the voxels inside it.
+    """A wall of the ventricle: its surface, and the voxels inside it."""
 
-    Attributes
-    ----------
-    mask : ndarray, (i, j, k), bool
-        Voxels of the scan's grid whose centre is inside, in Fortran order.
-    """
-
-    __slots__ = ("mask",)
+    __slots__ = ("_mask",)
 
     def __init__(self, lps: _Floats, faces: NDArray[np.int32], frame: Frame, mask: NDArray[np.bool_]) -> None:
         super().__init__(lps, faces, frame)
-        self.mask = mask
+        self._mask = mask
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Voxels of the scan's grid whose centre is inside the wall as it was fitted, (i, j, k), in Fortran order."""
+        return self._mask.copy(order="F")
 
     def in_frame(self, frame: str) -> Wall:
         """The wall in another patient frame."""
-        return Wall(self._lps, self.faces, checked(frame), self.mask)
+        return Wall(self._lps, self._faces, checked(frame), self._mask)
 
 
 class Model(Surface):
     """A surface model of a volume: a closed surface of exactly as many points as asked for.
+
+    Its files, and fits of it, are of the model as it was made: they are refused once other vertices were assigned.
 
     Attributes
     ----------
@@ -238,27 +338,40 @@ class Model(Surface):
         Its name in reports of fits.
     """
 
-    __slots__ = ("_native", "_report", "name")
+    __slots__ = ("_made", "_native", "name")
 
     def __init__(self, native: _native.NativeModel, frame: Frame = "RAS", name: str = "model") -> None:
         lps, faces = native.mesh()
         super().__init__(lps, faces, frame)
         self._native = native
-        self._report: reports.ModelReport | None = None
+        self._made = lps
         self.name = name
 
     def in_frame(self, frame: str) -> Model:
         """The model with its positions in another patient frame. Its files are the same."""
-        return Model(self._native, checked(frame), self.name)
+        made = Model(self._native, checked(frame), self.name)
+        made._lps, made._made = self._lps, self._made
+        return made
+
+    def _unchanged(self) -> _native.NativeModel:
+        """The native model, if this is still it."""
+        if self._lps is not self._made:
+            reason = "Other vertices were assigned than those that were computed."
+            fix = "Use the model that `generate` returned, or save this surface by to_trimesh() or to_pyvista()."
+            raise InputError("vertices", reason, fix)
+        return self._native
 
     @property
     def report(self) -> reports.ModelReport:
         """Figures about the model and how it was made."""
-        if self._report is None:
-            from .reports import ModelReport
+        from .reports import ModelReport
 
-            self._report = ModelReport.from_json(self._native.report())
-        return self._report
+        return ModelReport.from_json(self._native.report(), frame=self.frame)
+
+    def _rows(self) -> list[_html.Row]:
+        report = self.report
+        found = [("distance to the surface", f"{report.distance.mean_mm:.2f} mm")]
+        return [("name", self.name), *super()._rows(), *found, *(("warning", one) for one in report.warnings)]
 
     @property
     def surface(self) -> Surface:
@@ -271,14 +384,14 @@ class Model(Surface):
         """The part of a ventricle's wall that each triangle is of: 1 endocardium, 2 epicardium, 3 base; else empty."""
         import numpy as np
 
-        return np.frombuffer(bytes(self._native.parts()), dtype=np.uint8)
+        return np.frombuffer(bytearray(self._native.parts()), dtype=np.uint8)
 
     def to_bytes(self, format: str, part: str | None = None) -> bytes:
         """The bytes of the model's file: `glb`, `gltf`, `stl`, `ply`, `obj`, `vtp`, `vtk` or `json`; LPS.
 
         `part` (`endocardium`, `epicardium` or `base`) leaves only that part of a ventricle's wall.
         """
-        return bytes(self._native.encode(format, part))
+        return bytes(self._unchanged().encode(format, part))
 
     def save(self, path: _Path, part: str | None = None) -> None:
         """Writes the model to a file, whose extension chooses the format, with the bytes of `ventriform generate`."""
@@ -290,18 +403,22 @@ class Model(Surface):
     def save_report(self, path: _Path, *, deidentify: bool = False) -> None:
         """Writes the report: `.json`, or `.html` as a page, which names patient and study unless `deidentify`."""
         if os.fspath(path).lower().endswith(".html"):
-            _write(path, self._native.page(deidentify).encode())
+            _write(path, self._unchanged().page(deidentify).encode())
         elif os.fspath(path).lower().endswith(".json"):
             _write(path, self._native.report().encode())
         else:
             raise InputError("path", f"`{path}` is no name of a report.", "End it in .json or .html.")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _model_again, (self._native.state(), self.frame, self.name)
+        own = None if self._lps is self._made else self._lps
+        return _model_again, (self._native.state(), self.frame, self.name, own)
 
 
-def _model_again(state: tuple[Any, ...], frame: Frame, name: str) -> Model:
-    return Model(_native.NativeModel.restored(state), frame, name)
+def _model_again(state: tuple[Any, ...], frame: Frame, name: str, own: _Floats | None = None) -> Model:
+    made = Model(_native.NativeModel.restored(state), frame, name)
+    if own is not None:
+        made._lps = own
+    return made
 
 
 class Flag:
@@ -352,14 +469,33 @@ class Files(Mapping[str, bytes]):
         """The content of a JSON file."""
         return json.loads(self._files[name])
 
-    def save(self, folder: _Path) -> None:
-        """Writes all files into a folder, which is made if it is missing."""
-        os.makedirs(folder, exist_ok=True)
-        for name, content in self._files.items():
-            _write(os.path.join(folder, name), content)
+    def save(self, path: _Path) -> None:
+        """Writes all files into a folder, which is made if it is missing; or one of them, if `path` ends in its name."""
+        name = os.path.basename(_checks.path("path", path))
+        if name in self._files and not os.path.isdir(path):
+            _write(path, self._files[name])
+            return
+        ending = next((end for end in FILE_ENDINGS if name.lower().endswith(end)), None)
+        if ending is not None and not os.path.isdir(path):
+            alike = [own for own in self._files if own.lower().endswith(ending)] or list(self._files)
+            fix = f"Give the path of a folder, or one that ends in {' or '.join(alike)}; `files[name]` are the bytes of each."
+            raise InputError("path", f"`{name}` is none of the {len(self._files)} files of the result.", fix)
+        os.makedirs(path, exist_ok=True)
+        for own, content in self._files.items():
+            _write(os.path.join(path, own), content)
+
+    def _repr_html_(self) -> str:
+        return _html.table("Files", [(name, f"{len(content)} bytes") for name, content in self._files.items()])
 
     def __repr__(self) -> str:
         return f"Files({', '.join(self._files)})"
+
+
+FILE_ENDINGS = (
+    ".nii", ".nii.gz", ".gz", ".hdr", ".img", ".nrrd", ".mha", ".mhd", ".npy", ".npz", ".dcm", ".zip", ".json", ".html", ".csv",
+    ".png", ".svg", ".jpg", ".pdf", ".txt", ".xlsx", ".glb", ".gltf", ".stl", ".ply", ".obj", ".vtk", ".vtp", ".pkl", ".h5",
+)
+"""What names of files end in, and hardly one of a folder."""
 
 
 def _write(path: _Path, content: bytes) -> None:
@@ -378,37 +514,27 @@ class Result:
 
     files: Files
 
-    def save(self, folder: _Path) -> None:
-        """Writes the files that the command would write."""
-        self.files.save(folder)
+    def save(self, path: _Path) -> None:
+        """Writes the files that the command would write into a folder; or one of them, if `path` ends in its name, such as
+        mask.nii.gz."""
+        self.files.save(path)
 
 
 class Fit(Result):
     """A model fitted to a patient.
 
+    Arrays and surfaces are copies, made each time that one is asked for: keep what you use more than once.
+
     Attributes
     ----------
-    mask : ndarray, (i, j, k), bool
-        Voxels of the scan's grid inside the wall that is shown.
-    walls : dict of str to Wall
-        `apparent`: the wall as the blurred image shows it; `anatomical`: without what blur, beating and breathing add.
-        Other organs have the one that is shown.
-    surface : Wall
-        The wall that is shown: the one that `edge` asks for, as the reader draws it if one was given.
     frame : {'RAS', 'LPS'}
-        The patient frame of `affine` and of the surfaces.
+        The patient frame of `affine`, of the surfaces and of the positions in `report`: that of the scan.
     """
 
     def __init__(self, made: dict[str, Any], frame: Frame = "RAS") -> None:
         self._made = made
         self.files = Files(made["files"])
         self.frame: Frame = frame
-        lps, faces = made["mesh"]
-        self.surface = Wall(lps, faces, frame, made["mask"])
-        self.walls: dict[str, Wall] = {made["shown"]: self.surface}
-        if "other" in made:
-            lps, faces = made["other_mesh"]
-            self.walls[made["other"]] = Wall(lps, faces, frame, made["other_mask"])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Fit, (self._made, self.frame)
@@ -418,8 +544,24 @@ class Fit(Result):
         return Fit(self._made, checked(frame))
 
     @property
+    def surface(self) -> Wall:
+        """The wall that is shown: the one that `edge` asks for, as the reader draws it if one was given."""
+        lps, faces = self._made["mesh"]
+        return Wall(lps, faces, self.frame, self._made["mask"])
+
+    @property
+    def walls(self) -> dict[str, Wall]:
+        """`apparent`: the wall as the blurred image shows it; `anatomical`: without what blur, beating and breathing add.
+        Other organs have the one that is shown."""
+        walls = {self._made["shown"]: self.surface}
+        if "other" in self._made:
+            lps, faces = self._made["other_mesh"]
+            walls[self._made["other"]] = Wall(lps, faces, self.frame, self._made["other_mask"])
+        return walls
+
+    @property
     def mask(self) -> NDArray[np.bool_]:
-        """Voxels of the scan's grid inside the wall that is shown."""
+        """Voxels of the scan's grid inside the wall that is shown, (i, j, k), in Fortran order."""
         return self.surface.mask
 
     @property
@@ -427,23 +569,27 @@ class Fit(Result):
         """From voxel indices to millimetres in `frame`, (4, 4)."""
         return affine_from_lps(self._made["affine"], self.frame)
 
-    @cached_property
+    @property
     def report(self) -> reports.SegmentationReport:
-        """The figures of `report.json`."""
+        """The figures of `report.json`; points and directions are `Coordinates` in `frame`."""
         from .reports import SegmentationReport
 
-        return SegmentationReport.from_json(self.files["report.json"])
+        return SegmentationReport.from_json(self.files["report.json"], frame=self.frame)
+
+    @cached_property
+    def _report(self) -> reports.SegmentationReport:
+        return self.report
 
     @property
     def confidence(self) -> float:
         """The chance that a reader who draws the visible edge agrees (Jaccard index 0.75 or more), calibrated on simulated
         scans, 0 to 1."""
-        return self.report.fit.confidence
+        return self._report.fit.confidence
 
     @property
     def flags(self) -> list[Flag]:
         """Reasons to look closer."""
-        return [Flag(flag.code, flag.reason) for flag in self.report.flags]
+        return [Flag(flag.code, flag.reason) for flag in self._report.flags]
 
     @property
     def polar_map(self) -> reports.PolarMap | None:
@@ -477,13 +623,26 @@ class Fit(Result):
         """The mask of a wall, by default of the one that is shown, as a `nibabel.Nifti1Image` of 0 and 1."""
         import numpy as np
 
-        if wall is not None and wall not in self.walls:
-            raise InputError("wall", f"There is no wall `{wall}`.", f"Give one of {', '.join(self.walls)}.")
-        mask = self.mask if wall is None else self.walls[wall].mask
         place = affine_from_lps(self._made["affine"], "RAS")
-        image = extra("nibabel", "nibabel").Nifti1Image(mask.astype(np.uint8), place)
+        image = extra("nibabel", "nibabel").Nifti1Image(self._mask_of(wall).astype(np.uint8), place)
         image.header.set_xyzt_units("mm")
         return image
+
+    def to_nibabel(self, wall: str | None = None) -> Any:
+        """As `mask_image`."""
+        return self.mask_image(wall)
+
+    def to_simpleitk(self, wall: str | None = None) -> Any:
+        """The mask of a wall, by default of the one that is shown, as a `SimpleITK.Image` of 0 and 1."""
+        import numpy as np
+
+        return simpleitk_image(self._mask_of(wall).astype(np.uint8), self._made["affine"])
+
+    def _mask_of(self, wall: str | None) -> NDArray[np.bool_]:
+        walls = self.walls
+        if wall is not None and wall not in walls:
+            raise InputError("wall", f"There is no wall `{wall}`.", f"Give one of {', '.join(walls)}.")
+        return self.mask if wall is None else walls[wall].mask
 
     def to_pyvista(self) -> Any:
         """The wall that is shown as a `pyvista.PolyData`."""
@@ -493,29 +652,48 @@ class Fit(Result):
         """The wall that is shown as a `trimesh.Trimesh`."""
         return self.surface.to_trimesh()
 
+    def _repr_html_(self) -> str:
+        report = self._report
+        rows = [
+            ("confidence", f"{self.confidence:.2f}"),
+            ("wall", _html.figure(report.volumes_ml.wall, "ml")),
+            ("cavity", _html.figure(report.volumes_ml.cavity, "ml")),
+            ("model", report.template),
+            ("frame", self.frame),
+            *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
+        ]
+        return _html.table("Fit", rows, self.files.get("polar.png"))
+
     def __repr__(self) -> str:
-        return f"Fit(confidence={self.confidence:.2f}, wall={self.report.volumes_ml.wall:.1f} ml, flags={len(self.flags)})"
+        wall = self._report.volumes_ml.wall
+        return f"Fit(confidence={self.confidence:.2f}, wall={wall:.1f} ml, flags={len(self.flags)})"
 
 
 class Beat(Result):
-    """One wall in motion of a gated study.
+    """One wall in motion of a gated study. Arrays and surfaces are copies, made each time that one is asked for.
 
     Attributes
     ----------
-    faces : ndarray, (m, 3), int32
-        The triangles of all gates.
-    vertices : ndarray, (gates, n, 3), float64
-        Positions of the wall's nodes at every gate, mm, in `frame`.
+    frame : {'RAS', 'LPS'}
+        The patient frame of the positions, those in `report` included: that of the scan.
     """
 
     def __init__(self, made: dict[str, Any], frame: Frame = "RAS") -> None:
-        import numpy as np
-
         self._made = made
         self.files = Files(made["files"])
         self.frame: Frame = frame
-        self.faces: NDArray[np.int32] = made["faces"]
-        self.vertices = points_from_lps(np.stack(made["vertices"]), frame)
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """The triangles of all gates, (m, 3)."""
+        return _triangles(self._made)
+
+    @property
+    def vertices(self) -> _Floats:
+        """Positions of the wall's nodes at every gate, mm, in `frame`, (gates, n, 3)."""
+        import numpy as np
+
+        return points_from_lps(np.stack(self._made["vertices"]), self.frame)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Beat, (self._made, self.frame)
@@ -527,51 +705,105 @@ class Beat(Result):
     @property
     def surfaces(self) -> list[Surface]:
         """The wall at every gate."""
-        return [Surface(lps, self.faces, self.frame) for lps in self._made["vertices"]]
+        faces = self.faces
+        return [Surface(lps, faces, self.frame) for lps in self._made["vertices"]]
 
-    @cached_property
+    @property
     def report(self) -> reports.BeatReport:
-        """The figures of `beat.json`."""
+        """The figures of `beat.json`; points and directions are `Coordinates` in `frame`."""
         from .reports import BeatReport
 
-        return BeatReport.from_json(self.files["beat.json"])
+        return BeatReport.from_json(self.files["beat.json"], frame=self.frame)
+
+    @cached_property
+    def _report(self) -> reports.BeatReport:
+        return self.report
 
     @property
     def ef_percent(self) -> float | None:
         """Ejection fraction; None if the gates are no beat."""
-        return self.report.ef_percent
+        return self._report.ef_percent
 
     @property
     def flags(self) -> list[Flag]:
         """Reasons to look closer."""
-        return [Flag(flag.code, flag.reason) for flag in self.report.flags]
+        return [Flag(flag.code, flag.reason) for flag in self._report.flags]
+
+    def _repr_html_(self) -> str:
+        report = self._report
+        rows = [
+            ("EDV", _html.figure(report.edv_ml, "ml")),
+            ("ESV", _html.figure(report.esv_ml, "ml")),
+            ("EF", _html.figure(report.ef_percent, "%")),
+            ("gates", len(self._made["vertices"])),
+            ("frame", self.frame),
+            *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
+        ]
+        return _html.table("Beat", rows)
 
     def __repr__(self) -> str:
-        report = self.report
+        report = self._report
         ef = "None" if report.ef_percent is None else f"{report.ef_percent:.0f} %"
         return f"Beat(EDV {report.edv_ml:.0f} ml, ESV {report.esv_ml:.0f} ml, EF {ef})"
 
 
-class Comparison(Result):
-    """Rest and stress of one patient, compared."""
+def _triangles(made: dict[str, Any]) -> NDArray[np.int32]:
+    faces: NDArray[np.int32] = made["faces"].copy()
+    return faces
 
-    def __init__(self, files: dict[str, bytes]) -> None:
+
+class Comparison(Result):
+    """Rest and stress of one patient, compared.
+
+    Attributes
+    ----------
+    frame : {'RAS', 'LPS'}
+        The patient frame of the positions in `report`: that of the scan at stress.
+    """
+
+    def __init__(self, files: dict[str, bytes], frame: Frame = "RAS") -> None:
         self.files = Files(files)
+        self.frame: Frame = frame
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Comparison, (dict(self.files),)
+        return Comparison, (dict(self.files), self.frame)
 
-    @cached_property
+    def in_frame(self, frame: str) -> Comparison:
+        """The comparison with the positions in its report in another patient frame. Its files are the same."""
+        return Comparison(dict(self.files), checked(frame))
+
+    @property
     def report(self) -> reports.ComparisonReport:
         """The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories, flags."""
         from .reports import ComparisonReport
 
-        return ComparisonReport.from_json(self.files["comparison.json"])
+        return ComparisonReport.from_json(self.files["comparison.json"], frame=self.frame)
+
+    @cached_property
+    def _report(self) -> reports.ComparisonReport:
+        return self.report
 
     @property
     def flags(self) -> list[Flag]:
         """Reasons to look closer."""
-        return [Flag(flag.code, flag.reason) for flag in self.report.flags]
+        return [Flag(flag.code, flag.reason) for flag in self._report.flags]
+
+    def _rows(self) -> list[_html.Row]:
+        report = self._report
+        return [
+            ("TID", _html.figure(report.tid, "")),
+            ("reversible", _html.figure(report.reversible_percent, "% of the wall")),
+            ("fixed", _html.figure(report.fixed_percent, "% of the wall")),
+            ("frame", self.frame),
+            *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
+        ]
+
+    def _repr_html_(self) -> str:
+        return _html.table("Comparison", self._rows(), self.files.get("slices.png"))
+
+    def __repr__(self) -> str:
+        report = self._report
+        return f"Comparison(TID {report.tid:.2f}, reversible {report.reversible_percent:.0f} %, fixed {report.fixed_percent:.0f} %)"
 
     def polar(self, scan: str) -> _Floats:
         """The polar map of `stress`, `rest` or their `difference`, (32, 60); NaN where there is none."""
@@ -628,6 +860,10 @@ class Measured:
         """The figures as `ventriform measure` prints them."""
         return dict(self._figures)
 
+    def _repr_html_(self) -> str:
+        shown = [(name, value) for name, value in self._figures.items() if isinstance(value, (int, float))]
+        return _html.table("Measured", [(name.replace("_", " "), f"{value:.4g}") for name, value in shown])
+
     def __repr__(self) -> str:
         return f"Measured(jaccard={self.jaccard:.3f}, dice={self.dice:.3f})"
 
@@ -670,6 +906,16 @@ class Profile:
         """Writes the file that `ventriform calibrate` would write."""
         _write(path, self._text)
 
+    def _rows(self) -> list[_html.Row]:
+        document = self.to_dict()
+        return [("name", self.name), *((key, document[key]) for key in ("kind", "edge") if key in document)]
+
+    def _repr_html_(self) -> str:
+        return _html.table("Profile", self._rows())
+
+    def __repr__(self) -> str:
+        return f"Profile({self.name!r}, kind={self.to_dict().get('kind')!r})"
+
 
 class NormalLimits:
     """Normal limits of healthy people, as `build_normals` makes them: `normals` of `segment`, `beat` and `compare`."""
@@ -680,7 +926,7 @@ class NormalLimits:
     def __reduce__(self) -> tuple[Any, ...]:
         return NormalLimits, (self._text,)
 
-    @cached_property
+    @property
     def document(self) -> reports.LimitsDocument:
         """Their file: groups with cases, maps of mean and standard deviation, and how they were made."""
         from .reports import LimitsDocument
@@ -705,6 +951,14 @@ class NormalLimits:
         """Writes the file that `ventriform normals build` would write."""
         _write(path, self._text)
 
+    def _repr_html_(self) -> str:
+        document = self.document
+        rows = [("people", document.people), *(("group", repr(group)) for group in document.groups)]
+        return _html.table("NormalLimits", [*rows, ("left out", len(document.excluded))])
+
+    def __repr__(self) -> str:
+        return f"NormalLimits({len(self.groups)} groups, {len(self.excluded)} cases left out)"
+
 
 class Calibration:
     """A reader's profile with figures that say what it is worth.
@@ -726,6 +980,13 @@ class Calibration:
         self.profile = profile
         self.cases = cases
         self.problems = [(case, why) for case, why in problems]
+
+    def _repr_html_(self) -> str:
+        rows = [("profile", self.profile.name), ("cases", len(self.cases))]
+        return _html.table("Calibration", [*rows, *(("problem", f"{case}: {why}") for case, why in self.problems)])
+
+    def __repr__(self) -> str:
+        return f"Calibration({self.profile!r}, {len(self.cases)} cases, {len(self.problems)} problems)"
 
 
 class Evaluation:
@@ -749,6 +1010,13 @@ class Evaluation:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Evaluation, (self.folder, self.problems)
+
+    def _repr_html_(self) -> str:
+        rows = [("folder", self.folder), *(("problem", f"{case}: {why}") for case, why in self.problems)]
+        return _html.table("Evaluation", rows)
+
+    def __repr__(self) -> str:
+        return f"Evaluation({self.folder!r}, {len(self.problems)} problems)"
 
     def table(self, name: str) -> list[dict[str, str]]:
         """The rows of `table1`, `figure3` or `fits`."""
@@ -783,6 +1051,12 @@ class Phantom:
     def __init__(self, volume: Volume, truth: Volume) -> None:
         self.volume = volume
         self.truth = truth
+
+    def _repr_html_(self) -> str:
+        return _html.table("Phantom", [("volume", self.volume), ("truth", self.truth)])
+
+    def __repr__(self) -> str:
+        return f"Phantom({self.volume!r})"
 
 
 Progress = Callable[[str, float], object]

@@ -8,13 +8,24 @@ import numbers
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from . import _native
+from . import _native, _objects
+from ._documents import is_place
 from ._errors import InputError
+from ._frames import Coordinates, Frame, turned
 
 Row = dict[str, Any]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_TABLES: dict[str, list[Row]] = _native.parameter_tables()
+_TABLES: dict[str, list[Row]] = {**_native.parameter_tables(), "dicom": _objects.ROWS}
+
+#: How the tables say LPS, and what it is in Python.
+IN_FRAME = (
+    ("in the LPS frame of the volume", "in the scan's patient frame"),
+    ("often 0,-1,0:", "often 0,1,0 in RAS and 0,-1,0 in LPS:"),
+    ("in LPS millimetres", "in millimetres of the scan's patient frame"),
+    ("x,y,z in LPS,", "x,y,z in the scan's patient frame,"),
+    ("x,y,z in LPS.", "x,y,z in the scan's patient frame."),
+)
 
 
 def rows(command: str) -> list[Row]:
@@ -55,6 +66,10 @@ def annotation(row: Row) -> str:
         made = "Sequence[int]"
     elif kind == "numbers":
         made = "Sequence[float]"
+    elif kind == "string":
+        made = "str"
+    elif kind == "time":
+        made = "str | datetime"
     else:
         made = "str | int"
     return made if default(row) is not None else f"{made} | None"
@@ -79,6 +94,8 @@ def values(row: Row) -> str:
     if kind in ("integers", "numbers"):
         word = "int" if kind == "integers" else "float"
         return word if row["count"] == 1 else f"{row['count']} {word}s"
+    if kind == "time":
+        return f"str or datetime, such as {row['example']}"
     return f"str, such as {row['example']}"
 
 
@@ -105,20 +122,54 @@ def checked(command: str, parameters: dict[str, Any]) -> dict[str, Any]:
     return made
 
 
+def to_lps(command: str, parameters: dict[str, Any], frame_for: Callable[[str], Frame]) -> dict[str, Any]:
+    """Parameters with points and directions in LPS. Plain numbers are in the frame that `frame_for` a parameter's name gives;
+    `Coordinates` have their own."""
+    made = dict(parameters)
+    for row in rows(command):
+        name = row["name"]
+        if is_place(name) and made.get(name) is not None:
+            made[name] = _placed(name, made[name], frame_for)
+    return made
+
+
+def _placed(name: str, value: Any, frame_for: Callable[[str], Frame]) -> Any:
+    if isinstance(value, Coordinates):
+        return list(value.in_frame("LPS"))
+    if isinstance(value, str):
+        if "," in value:
+            raise InputError(name, f"`{value}` is a text.", "Give 3 numbers x, y, z.")
+        return value
+    try:
+        numbers = [float(number) for number in value]
+    except (TypeError, ValueError, OverflowError):
+        # Refused by the table.
+        return value
+    return turned(numbers) if len(numbers) == 3 and frame_for(name) == "RAS" else value
+
+
+def summary(row: Row) -> str:
+    """What a parameter is, in a sentence, with places in the frame that they are given in."""
+    text: str = row["summary"]
+    for lps, own in IN_FRAME:
+        text = text.replace(lps, own)
+    return text
+
+
 def _described(row: Row) -> str:
     known = default(row)
     told = f", default {known!r}" if known is not None else ", optional"
-    return f"    {row['name']} : {values(row)}{told}\n        {row['summary']}."
+    return f"    {row['name']} : {values(row)}{told}\n        {summary(row)}."
 
 
-def with_table(command: str) -> Callable[[Function], Function]:
-    """Gives a function with `**parameters` the signature and the docstring of its table, and checks what it is given."""
+def with_table(*commands: str) -> Callable[[Function], Function]:
+    """Gives a function with `**parameters` the signature and the docstring of its tables, and checks what it is given."""
 
     def decorate(function: Function) -> Function:
         own = inspect.signature(function)
         before = [p for p in own.parameters.values() if p.kind is not p.VAR_KEYWORD]
         taken = {p.name for p in before}
-        listed = [row for row in rows(command) if row["name"] not in taken]
+        listed = [row for command in commands for row in rows(command) if row["name"] not in taken]
         added = [
             inspect.Parameter(row["name"], inspect.Parameter.KEYWORD_ONLY, default=default(row), annotation=annotation(row))
             for row in listed
@@ -127,7 +178,9 @@ def with_table(command: str) -> Callable[[Function], Function]:
         @functools.wraps(function)
         def with_checks(*given: Any, **parameters: Any) -> Any:
             ours = {name: value for name, value in parameters.items() if name not in taken}
-            return function(*given, **{**parameters, **checked(command, ours)})
+            for command in commands:
+                ours = checked(command, ours)
+            return function(*given, **{**parameters, **ours})
 
         with_checks.__signature__ = own.replace(parameters=[*before, *added])  # type: ignore[attr-defined]
         head = inspect.cleandoc(function.__doc__ or "")

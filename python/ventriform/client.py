@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -14,7 +15,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 from . import _tables
-from ._errors import InputError, VentriformError
+from ._errors import InputError, VentriformError, file_error
+from ._frames import Coordinates
 from ._inputs import content, files, is_bytes, is_open_file, is_path, native
 from ._results import extra, teller, unwrap
 from .reports import Job, StoredVolume
@@ -85,7 +87,7 @@ class Client:
     >>> with vf.Client("http://127.0.0.1:8080", key) as service:
     ...     volume = service.upload("rest.dcm")
     ...     job = service.submit("segmentation", volume.id, model="auto")
-    ...     done = service.wait(job.id)
+    ...     done = service.wait(job)
     ...     mask = service.download(f"/v1/segmentations/{done.segmentation}/mask.nii.gz")
     """
 
@@ -100,6 +102,10 @@ class Client:
             raise InputError("timeout", f"It is {timeout!r}.", "Give seconds above 0.")
         headers = {"Authorization": f"Bearer {key}"} if key else {}
         self._http: httpx.Client = package.Client(base_url=base, headers=headers, timeout=timeout)
+
+    def __repr__(self) -> str:
+        state = ", closed" if self._http.is_closed else ""
+        return f"Client({str(self._http.base_url)!r}{state})"
 
     def __enter__(self) -> Client:
         return self
@@ -207,7 +213,8 @@ class Client:
             An upload, or its id.
         **parameters
             Those of the function of this kind: numbers and arrays of NumPy are sent as numbers. `model`, `expert` and
-            `normals` are ids of what is stored; `model` may be 'auto'.
+            `normals` are ids of what is stored; `model` may be 'auto'. Points and directions are LPS, as the service's
+            results; `Coordinates` are turned into it.
 
         Raises
         ------
@@ -226,13 +233,13 @@ class Client:
         body = {**{name: _plain(name, value) for name, value in own.items()}, "parameters": given}
         return Job.from_dict(_object(self.request("POST", "/v1/jobs", json=body)))
 
-    def job(self, id: str) -> Job:
-        """A job as it is now."""
-        return Job.from_dict(_object(self.request("GET", f"/v1/jobs/{id}")))
+    def job(self, job: str | Job) -> Job:
+        """A job as it is now, by its id or as `submit` returned it."""
+        return Job.from_dict(_object(self.request("GET", f"/v1/jobs/{_job_id(job)}")))
 
     def wait(
         self,
-        id: str,
+        job: str | Job,
         *,
         timeout: float = 600.0,
         progress: Any = None,
@@ -241,8 +248,8 @@ class Client:
 
         Parameters
         ----------
-        id : str
-            The job's id.
+        job : str or Job
+            What `submit` returned, or its id.
         timeout : float
             Seconds to wait at most.
         progress : callable or tqdm, optional
@@ -253,6 +260,7 @@ class Client:
         ServiceError
             If the job failed or was cancelled, or has not ended within `timeout` seconds (code ``timeout``).
         """
+        id = _job_id(job)
         tell = teller(progress)
         end = time.monotonic() + timeout
         while True:
@@ -266,18 +274,18 @@ class Client:
                 # A stream may break; the job is asked for itself below.
                 if error.code != "unreachable":
                     raise
-            job = self.job(id)
-            if job.state == "succeeded":
-                return job
-            if job.state in ("failed", "cancelled"):
-                raise _problem(job.to_dict().get("error") or {}, 200, f"The job was {job.state}.", job.state)
+            now = self.job(id)
+            if now.state == "succeeded":
+                return now
+            if now.state in ("failed", "cancelled"):
+                raise _problem(now.to_dict().get("error") or {}, 200, f"The job was {now.state}.", now.state)
             if time.monotonic() > end:
-                raise ServiceError(0, "timeout", f"The job {id} is {job.state} after {timeout:g} seconds.", "Wait longer.")
+                raise ServiceError(0, "timeout", f"The job {id} is {now.state} after {timeout:g} seconds.", "Wait longer.")
             time.sleep(POLL_SECONDS)
 
-    def events(self, id: str) -> Iterator[Job]:
+    def events(self, job: str | Job) -> Iterator[Job]:
         """The job each time that something changes, until it has ended."""
-        target = self._target(f"/v1/jobs/{id}/events")
+        target = self._target(f"/v1/jobs/{_job_id(job)}/events")
         headers = {"Accept": "text/event-stream"}
         with self._sending(target), self._http.stream("GET", target, headers=headers) as answer:
             if answer.status_code >= 400:
@@ -322,15 +330,17 @@ def _named(make: Callable[..., Made], *given: Any) -> Made:
     try:
         return make(*given)
     except InputError as error:
-        if error.field not in (None, "source"):
-            raise
-        raise type(error)("scan", error.reason, error.fix, error.code) from error
+        if error.field in (None, "source"):
+            error._about("scan")
+        raise
 
 
 def _open(path: Any) -> BinaryIO:
     try:
         return open(path, "rb")
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise file_error("scan", path, error) from error
+    except ValueError as error:
         raise InputError("scan", f"{error}.", "Give the path of a file that can be read.") from error
 
 
@@ -365,6 +375,8 @@ def _url(address: Any, fix: str) -> httpx.URL:
 
 def _plain(name: str, value: Any) -> Any:
     """A parameter's value of what JSON has."""
+    if isinstance(value, Coordinates):
+        value = value.in_frame("LPS")
     try:
         plain: Any = json.loads(json.dumps(value, allow_nan=False, default=_numbers))
         json.dumps(plain, ensure_ascii=False).encode()
@@ -372,6 +384,17 @@ def _plain(name: str, value: Any) -> Any:
         fix = "Give a number, a word, true or false, or a sequence of numbers."
         raise InputError(name, f"It cannot be sent: {error}.", fix) from error
     return plain
+
+
+def _job_id(job: Any) -> str:
+    """The id of a job, which is part of a path."""
+    id = job.id if isinstance(job, Job) else job
+    if not isinstance(id, str) or not _ID.fullmatch(id):
+        raise InputError("job", f"{job!r} is no job.", "Give what `submit` returned, or its id.")
+    return id
+
+
+_ID = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def _numbers(value: Any) -> Any:

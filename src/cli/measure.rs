@@ -3,7 +3,7 @@
 use super::limit_args::LimitArgs;
 use super::mesh_args::MeshArgs;
 use super::output::{json, note};
-use anyhow::{Result, anyhow};
+use anyhow::{Error, Result, anyhow};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
@@ -110,6 +110,16 @@ struct ReadMask {
     by_common_label: bool,
 }
 
+/// The error `text` about the file at `path`, which many errors state already.
+fn named(path: &Path, text: &str) -> Error {
+    let path = path.display().to_string();
+    if text.contains(&path) {
+        anyhow!("{text}")
+    } else {
+        anyhow!("{path}: {text}")
+    }
+}
+
 /// Reads the mask at `path`: the structure `own`, otherwise the one that `common` names, otherwise the
 /// only one.
 fn read(
@@ -163,6 +173,6 @@ fn read(
             mask,
             by_common_label,
         }),
-        Err(error) => Err(anyhow!("{}: {}", path.display(), error.with_advice())),
+        Err(error) => Err(named(path, &error.with_advice())),
     }
 }

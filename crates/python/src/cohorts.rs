@@ -1,7 +1,7 @@
 //! `calibrate`, `normals build` and `evaluate`: work on folders of cases.
 
 use crate::errors::{Stopped, broken, refused, stopped};
-use crate::run::{Tell, run, run_steps};
+use crate::run::{How, Tell, run, run_steps};
 use crate::values::with_fit;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
@@ -9,6 +9,7 @@ use pyo3::types::PyDict;
 use serde_json::json;
 use std::path::PathBuf;
 use ventriform::deform::DeformParameters;
+use ventriform::deform::elastic::{Stiffness, SupportScaling};
 use ventriform::evaluate::calibration::{
     Calibration, CalibrationCase, CalibrationError, CaseFigures, calibrate as learn, cases_of,
 };
@@ -54,13 +55,13 @@ impl GivenCases {
 
 /// The text of the profile, and the table of cases and problems as JSON.
 #[pyfunction]
-#[pyo3(signature = (cohort, mask, parameters, progress=None))]
+#[pyo3(signature = (cohort, mask, parameters, how))]
 pub fn calibrate(
     py: Python<'_>,
     cohort: GivenCases,
     mask: String,
     parameters: &Bound<'_, PyDict>,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: How<'_>,
 ) -> PyResult<(String, String)> {
     let parameters = with_fit::<CalibrationChoice>(parameters)?.fit;
     let fix = match &cohort {
@@ -69,7 +70,7 @@ pub fn calibrate(
         }
         GivenCases::Cases(_) => "Give a scan and a reader's mask of it for each case.",
     };
-    run_steps(py, progress, move |tell, monitor| {
+    run_steps(py, &how, move |tell, monitor| {
         let no_cohort = |error| match error {
             CalibrationError::Cancelled(cancelled) => Stopped::from(cancelled),
             error => Stopped::Failed(refused("cohort", error, fix)),
@@ -109,19 +110,19 @@ fn cases_table(made: &Calibration) -> String {
 
 /// The text of normal limits, built of healthy people's scans.
 #[pyfunction]
-#[pyo3(signature = (cohort, parameters, progress=None))]
+#[pyo3(signature = (cohort, parameters, how))]
 pub fn build_normals(
     py: Python<'_>,
     cohort: PathBuf,
     parameters: &Bound<'_, PyDict>,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: How<'_>,
 ) -> PyResult<String> {
     let options = NormalsOptions {
         parameters: with_fit(parameters)?,
         program_version: env!("CARGO_PKG_VERSION").to_owned(),
         limits: ReadLimits::default(),
     };
-    run(py, Plan::NORMALS, progress, |monitor| {
+    run(py, Plan::NORMALS, &how, |monitor| {
         let made = normals::build(&cohort, &options, &|_, _| (), monitor);
         Ok(made.map_err(no_limits)?.to_json())
     })
@@ -155,7 +156,30 @@ pub struct EvaluationOrder {
     mesh_frame: Option<String>,
     leave_one_out: bool,
     in_sample: Vec<String>,
+    align: bool,
+    support: f64,
+    support_radius: f64,
+    support_scaling: String,
     program: Vec<u8>,
+}
+
+impl EvaluationOrder {
+    /// How models are fitted.
+    fn deform(&self) -> DeformParameters {
+        DeformParameters {
+            align: self.align,
+            stiffness: Stiffness {
+                support: self.support,
+                support_radius: self.support_radius,
+                support_scaling: match self.support_scaling.as_str() {
+                    "per-node" => SupportScaling::PerNode,
+                    _ => SupportScaling::Fixed,
+                },
+                ..Stiffness::default()
+            },
+            ..DeformParameters::default()
+        }
+    }
 }
 
 struct Told<'a>(Tell<'a>);
@@ -168,24 +192,26 @@ impl EvaluationObserver for Told<'_> {
 
 /// Fits models to every patient of a cohort and writes tables, plots and pictures; gives the problems.
 #[pyfunction]
-#[pyo3(signature = (order, progress=None))]
+#[pyo3(signature = (order, how))]
 pub fn evaluate(
     py: Python<'_>,
     order: EvaluationOrder,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: How<'_>,
 ) -> PyResult<Vec<(String, String)>> {
-    run_steps(py, progress, move |tell, monitor| {
+    run_steps(py, &how, move |tell, monitor| {
         let refuse = |error: EvaluateError| match error {
             EvaluateError::Cancelled(cancelled) => Stopped::from(cancelled),
             EvaluateError::ModelParameter(error) => stopped(&error),
+            EvaluateError::FitParameter(error) => stopped(&error),
             error => Stopped::Failed(refused("cohort", error, "")),
         };
+        let deform = order.deform();
         let parameters = EvaluationParameters {
             points: order.points,
             reference_points: order.reference_points,
             variants: variants(&order.models)?,
             method: order.method,
-            deform: DeformParameters::default(),
+            deform,
             in_sample: match order.in_sample.as_slice() {
                 [word] if word == "all" => InSample::All,
                 names => InSample::Named(names.to_vec()),

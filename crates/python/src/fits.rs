@@ -4,20 +4,22 @@ use crate::arrays::{affine, mesh, positions, voxels};
 use crate::errors::{Stopped, refused, stopped};
 use crate::files::{Files, formats, named, unwritable};
 use crate::given::{GivenModel, GivenModels, files, normals, reader};
-use crate::run::run;
+use crate::run::{How, run};
 use crate::values::{table, with_fit};
 use crate::volumes::NativeVolume;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use ventriform::export::Part;
+use ventriform::export::dicom::{Deidentification, Moment, StatedIdentity};
 use ventriform::gated::{self, GatedOrder};
 use ventriform::mesh_files::MeshStatement;
+use ventriform::objects::{self, ObjectChoice, ObjectError};
 use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters};
-use ventriform::progress::{Monitor, Plan};
+use ventriform::progress::Plan;
 use ventriform::rest_stress::{self, ComparisonOrder};
 use ventriform::segmentation::{self, SegmentationOrder};
-use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions, VolumeFile};
+use ventriform::volume::ReadLimits;
 
 /// The inputs of a fit beside its parameters.
 #[derive(FromPyObject)]
@@ -37,20 +39,43 @@ pub struct FitOrder {
     reader: Option<(String, Vec<u8>)>,
     /// Whether the page names nobody.
     deidentify: bool,
+    /// The DICOM objects to make.
+    dicom: Option<GivenObjects>,
 }
 
-fn whose(
-    files: &[VolumeFile],
-    frame: Option<usize>,
-    monitor: &Monitor<'_>,
-) -> Result<Option<Provenance>, Stopped> {
-    let found = volume::provenance(
-        files,
-        &ReadOptions { frame },
-        &ReadLimits::default(),
-        monitor,
-    );
-    found.map_err(|error| stopped(&error))
+/// What is stated of DICOM objects.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct GivenObjects {
+    /// Patient and study, by the names of [`StatedIdentity`]'s fields, as JSON.
+    stated: String,
+    /// The secret that new UIDs are derived from, if the identity is to be removed.
+    secret: Option<Vec<u8>>,
+    /// Date and time, as DICOM writes them, UTC.
+    made: (String, String),
+}
+
+impl FitOrder {
+    /// The choice of DICOM objects, and what is stated of patient and study for the page; nothing if that names nobody.
+    fn objects(&mut self) -> Result<(Option<ObjectChoice>, Option<StatedIdentity>), Stopped> {
+        let Some(given) = self.dicom.take() else {
+            return Ok((None, (!self.deidentify).then(StatedIdentity::default)));
+        };
+        let stated: StatedIdentity = serde_json::from_str(&given.stated)
+            .map_err(|error| Stopped::Failed(refused("dicom", error, "")))?;
+        let (date, time) = given.made;
+        let choice = ObjectChoice {
+            stated: stated.clone(),
+            deidentify: given.secret.map(|secret| Deidentification { secret }),
+            made: Moment { date, time },
+        };
+        Ok((Some(choice), (!self.deidentify).then_some(stated)))
+    }
+}
+
+/// What fails if an identity is unknown.
+fn unordered(error: ObjectError) -> Stopped {
+    stopped(&error)
 }
 
 fn files_of(py: Python<'_>, files: Files) -> PyResult<Bound<'_, PyDict>> {
@@ -63,25 +88,34 @@ fn files_of(py: Python<'_>, files: Files) -> PyResult<Bound<'_, PyDict>> {
 
 /// The left ventricle, or another organ, of the volume.
 #[pyfunction]
-#[pyo3(signature = (volume, order, parameters, progress=None))]
+#[pyo3(signature = (volume, order, parameters, how))]
 pub fn segment<'py>(
     py: Python<'py>,
     volume: Py<NativeVolume>,
-    order: FitOrder,
+    mut order: FitOrder,
     parameters: &Bound<'py, PyDict>,
-    progress: Option<&Bound<'py, PyAny>>,
+    how: How<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let parameters: FitParameters = table(parameters)?;
+    let objects = order.objects();
     let scan = &volume.get().files;
     let expert = order.expert.map(|expert| expert.get().files.clone());
     let (given, profile, limits_given) =
         (GivenModels::new(order.model), order.reader, order.normals);
-    let (names, parts, anonymous) = (order.formats, order.parts, order.deidentify);
-    let (made, files) = run(py, Plan::SEGMENTATION, progress, |monitor| {
+    let (names, parts) = (order.formats, order.parts);
+    let (made, files) = run(py, Plan::SEGMENTATION, &how, |monitor| {
+        let (objects, stated) = objects?;
+        let limits = ReadLimits::default();
         let formats = formats(&names)?;
+        let objects = objects.map(|o| o.order(scan, parameters.frame, &limits, monitor));
+        let objects = objects.transpose().map_err(unordered)?;
         let (auto, models) = given.read(&parameters.mask.mesh, monitor)?;
         let normals = normals(limits_given)?;
-        let whose = whose(scan, parameters.frame, monitor)?.filter(|_| !anonymous);
+        let whose = stated.map(|s| objects::whose(scan, parameters.frame, &s, &limits, monitor));
+        let whose = whose
+            .transpose()
+            .map_err(|error| stopped(&error))?
+            .flatten();
         let order = SegmentationOrder {
             volume: scan,
             expert: expert.as_deref(),
@@ -91,7 +125,7 @@ pub fn segment<'py>(
             normals: normals.as_ref(),
             parameters: &parameters,
         };
-        let made = segmentation::from_files(&order, &ReadLimits::default(), monitor);
+        let made = segmentation::from_files(&order, &limits, monitor);
         let made = made.map_err(|error| stopped(&error))?;
         let mut files = made.files(&formats, None, monitor).map_err(unwritable)?;
         for name in &parts {
@@ -100,6 +134,10 @@ pub fn segment<'py>(
             files.extend(cut.map_err(unwritable)?);
         }
         files.push(made.page(&files, whose.as_ref()));
+        if let Some(order) = objects {
+            let objects = made.dicom_files(&order.of(&made));
+            files.extend(objects.map_err(|error| stopped(&error))?);
+        }
         Ok((made, named(files)))
     })?;
     let segmentation = made.segmentation;
@@ -129,27 +167,30 @@ fn no_part(name: &str) -> Stopped {
 
 /// One wall in motion of the gates.
 #[pyfunction]
-#[pyo3(signature = (gates, order, parameters, progress=None))]
+#[pyo3(signature = (gates, order, parameters, how))]
 pub fn beat<'py>(
     py: Python<'py>,
     gates: Vec<Py<NativeVolume>>,
-    order: FitOrder,
+    mut order: FitOrder,
     parameters: &Bound<'py, PyDict>,
-    progress: Option<&Bound<'py, PyAny>>,
+    how: How<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let parameters = with_fit::<BeatChoice>(parameters)?;
+    let objects = order.objects();
     let gates = files(&gates);
     let (given, limits_given) = (GivenModels::new(order.model), order.normals);
-    let (names, anonymous) = (order.formats, order.deidentify);
-    let (made, files) = run(py, Plan::BEAT, progress, |monitor| {
+    let names = order.formats;
+    let (made, files) = run(py, Plan::BEAT, &how, |monitor| {
+        let (objects, stated) = objects?;
+        let limits = ReadLimits::default();
         let formats = formats(&names)?;
-        // Files of one gate each are not one volume; whose scan they are says the first.
-        let whose = match whose(&gates, Some(0), monitor) {
-            Err(error) if gates.len() > 1 => {
-                whose(&gates[..1], Some(0), monitor).map_err(|_| error)
-            }
-            whose => whose,
-        }?;
+        let objects = objects.map(|o| o.order_of_gates(&gates, &limits, monitor));
+        let objects = objects.transpose().map_err(unordered)?;
+        let whose = stated.map(|s| objects::whose_gates(&gates, &s, &limits, monitor));
+        let whose = whose
+            .transpose()
+            .map_err(|error| stopped(&error))?
+            .flatten();
         let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = GatedOrder {
@@ -160,10 +201,14 @@ pub fn beat<'py>(
             parameters: &parameters.fit,
             choice: parameters.choice,
         };
-        let made = gated::from_files(&order, &ReadLimits::default(), monitor);
+        let made = gated::from_files(&order, &limits, monitor);
         let made = made.map_err(|error| stopped(&error))?;
         let mut files = made.files(&formats, monitor).map_err(unwritable)?;
-        files.push(made.page(&files, whose.filter(|_| !anonymous).as_ref()));
+        files.push(made.page(&files, whose.as_ref()));
+        if let Some(order) = objects {
+            let objects = made.dicom_files(&order.of_beat(&made));
+            files.extend(objects.map_err(|error| stopped(&error))?);
+        }
         Ok((made, named(files)))
     })?;
     let result = PyDict::new(py);
@@ -184,23 +229,31 @@ pub fn beat<'py>(
 
 /// Rest and stress of one patient.
 #[pyfunction]
-#[pyo3(signature = (stress, rest, order, parameters, progress=None))]
+#[pyo3(signature = (stress, rest, order, parameters, how))]
 pub fn compare<'py>(
     py: Python<'py>,
     stress: Vec<Py<NativeVolume>>,
     rest: Vec<Py<NativeVolume>>,
-    order: FitOrder,
+    mut order: FitOrder,
     parameters: &Bound<'py, PyDict>,
-    progress: Option<&Bound<'py, PyAny>>,
+    how: How<'py>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let parameters = with_fit::<ComparisonChoice>(parameters)?;
+    let objects = order.objects();
     let (stress, rest) = (files(&stress), files(&rest));
     let (given, limits_given) = (GivenModels::new(order.model), order.normals);
-    let (names, anonymous) = (order.formats, order.deidentify);
-    let files = run(py, Plan::COMPARISON, progress, |monitor| {
+    let names = order.formats;
+    let files = run(py, Plan::COMPARISON, &how, |monitor| {
+        let (objects, stated) = objects?;
+        let limits = ReadLimits::default();
         let formats = formats(&names)?;
-        // Of gates that are no volume together, the first says whose they are.
-        let whose = whose(&stress, None, monitor).or_else(|_| whose(&stress, Some(0), monitor))?;
+        let objects = objects.map(|o| o.order_of_pair([&stress, &rest], &limits, monitor));
+        let objects = objects.transpose().map_err(unordered)?;
+        let whose = stated.map(|s| objects::whose_either(&stress, &s, &limits, monitor));
+        let whose = whose
+            .transpose()
+            .map_err(|error| stopped(&error))?
+            .flatten();
         let (auto, models) = given.read(&MeshStatement::default(), monitor)?;
         let normals = normals(limits_given)?;
         let order = ComparisonOrder {
@@ -211,10 +264,18 @@ pub fn compare<'py>(
             normals: normals.as_ref(),
             parameters: &parameters,
         };
-        let made = rest_stress::from_files(&order, &ReadLimits::default(), monitor);
+        let made = rest_stress::from_files(&order, &limits, monitor);
         let made = made.map_err(|error| stopped(&error))?;
         let mut files = made.files(&formats, monitor).map_err(unwritable)?;
-        files.push(made.page(&files, whose.filter(|_| !anonymous).as_ref()));
+        files.push(made.page(&files, whose.as_ref()));
+        if let Some([stress, rest]) = objects {
+            let scans = [
+                stress.of_compared(&made.stress),
+                rest.of_compared(&made.rest),
+            ];
+            let objects = made.dicom_files(&scans, &files);
+            files.extend(objects.map_err(|error| stopped(&error))?);
+        }
         Ok(named(files))
     })?;
     let result = PyDict::new(py);

@@ -1,7 +1,7 @@
 //! `measure`: the agreement of two masks.
 
 use crate::errors::{Stopped, broken, stopped};
-use crate::run::run;
+use crate::run::{How, run};
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
@@ -17,7 +17,7 @@ type Measured = (String, [Option<String>; 2], bool);
 
 /// Compares the mask with the reference. `labels` are those of both, of the mask and of the reference.
 #[pyfunction]
-#[pyo3(signature = (mask, reference, labels, resample, mesh, progress=None))]
+#[pyo3(signature = (mask, reference, labels, resample, mesh, how))]
 pub fn measure(
     py: Python<'_>,
     mask: Py<NativeVolume>,
@@ -25,7 +25,7 @@ pub fn measure(
     labels: [Option<String>; 3],
     resample: bool,
     mesh: [Option<String>; 2],
-    progress: Option<&Bound<'_, PyAny>>,
+    how: How<'_>,
 ) -> PyResult<Measured> {
     let (a, b) = (&mask.get().files, &reference.get().files);
     let [unit, frame] = mesh;
@@ -33,7 +33,7 @@ pub fn measure(
         unit: unit.as_deref().and_then(MeshUnit::named),
         frame: frame.as_deref().and_then(MeshFrame::named),
     };
-    run(py, Plan::SEGMENTATION, progress, |monitor| {
+    run(py, Plan::SEGMENTATION, &how, |monitor| {
         let [common, own_a, own_b] = labels.each_ref().map(Option::as_deref);
         let a = read(a, [own_a, common], stated, monitor)?;
         let b = read(b, [own_b, common], stated, monitor)?;

@@ -3,7 +3,7 @@
 use crate::arrays::{self, MeshArrays};
 use crate::errors::{Stopped, broken, exception, refused, stopped};
 use crate::files::formats;
-use crate::run::run;
+use crate::run::{How, run};
 use crate::values::table;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
@@ -50,16 +50,16 @@ impl NativeModel {
 
 /// A model of the volume.
 #[pyfunction]
-#[pyo3(signature = (volume, parameters, progress=None))]
+#[pyo3(signature = (volume, parameters, how))]
 pub fn generate(
     py: Python<'_>,
     volume: Py<NativeVolume>,
     parameters: &Bound<'_, PyDict>,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: How<'_>,
 ) -> PyResult<NativeModel> {
     let parameters: ModelParameters = table(parameters)?;
     let files = &volume.get().files;
-    run(py, Plan::GENERATION, progress, |monitor| {
+    run(py, Plan::GENERATION, &how, |monitor| {
         let limits = ReadLimits::default();
         let made = pipeline::generate(files, &parameters, &limits, monitor);
         let model = made.map_err(|error| stopped(&error))?;
@@ -95,7 +95,7 @@ impl NativeModel {
 
     /// The report as a page; without patient, study and series if `deidentify`.
     fn page(&self, py: Python<'_>, deidentify: bool) -> PyResult<String> {
-        run(py, Plan::GENERATION, None, |monitor| {
+        run(py, Plan::GENERATION, &How::default(), |monitor| {
             let closeness = self.model.closeness(monitor)?;
             let scan = self.scan.as_ref().filter(|_| !deidentify);
             Ok(self.model.report_html(Some(&closeness), scan))
@@ -105,7 +105,7 @@ impl NativeModel {
     /// The bytes of the model's file in a format, or of one part of it.
     #[pyo3(signature = (format, part=None))]
     fn encode(&self, py: Python<'_>, format: String, part: Option<String>) -> PyResult<Vec<u8>> {
-        run(py, Plan::GENERATION, None, |_| {
+        run(py, Plan::GENERATION, &How::default(), |_| {
             let [format] = formats(&[format])?[..] else {
                 return Err(Stopped::Cancelled);
             };
@@ -162,7 +162,7 @@ impl NativeModel {
             frame_of_reference_uid: uid,
         };
         let scan = scan.map_err(|e| unusable(e.to_string()))?;
-        run(py, Plan::GENERATION, None, |monitor| {
+        run(py, Plan::GENERATION, &How::default(), |monitor| {
             Self::new(model, scan, monitor)
         })
     }

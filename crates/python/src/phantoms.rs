@@ -2,7 +2,7 @@
 
 use crate::arrays::{affine, voxels};
 use crate::errors::{Stopped, refused};
-use crate::run::run;
+use crate::run::{How, run};
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use ventriform::progress::Plan;
@@ -35,11 +35,11 @@ type Simulated<'py> = (
 
 /// Simulates a scan.
 #[pyfunction]
-#[pyo3(signature = (order, progress=None))]
+#[pyo3(signature = (order, how))]
 pub fn phantom<'py>(
     py: Python<'py>,
     order: PhantomOrder,
-    progress: Option<&Bound<'py, PyAny>>,
+    how: How<'py>,
 ) -> PyResult<Simulated<'py>> {
     let defect = |&(segment, severity): &(u8, f64)| PerfusionDefect { segment, severity };
     let parameters = PhantomParameters {
@@ -57,7 +57,7 @@ pub fn phantom<'py>(
         seed: order.seed,
         ..PhantomParameters::default()
     };
-    let made = run(py, Plan::GENERATION, progress, |monitor| {
+    let made = run(py, Plan::GENERATION, &how, |monitor| {
         simulate(&parameters, monitor).map_err(|error| {
             let fix = "Give values in the ranges that help(ventriform.phantom) lists.";
             Stopped::Failed(refused("phantom", error, fix))

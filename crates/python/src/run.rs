@@ -25,8 +25,15 @@ use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalPro
 /// Time between two looks for signals and progress.
 const LOOK_EVERY: Duration = Duration::from_millis(25);
 
-/// The pool of this process, by its number.
-static PROCESS_POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+/// The pools of this process, by its number and by that of their threads: 0 for as many as there are processors.
+static PROCESS_POOLS: Mutex<Vec<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(Vec::new());
+
+/// Most threads that a call may ask for.
+const MOST_THREADS: usize = 1024;
+
+/// How a call works: whom it tells of its progress, and on how many threads.
+#[derive(FromPyObject, Default)]
+pub struct How<'py>(Option<Bound<'py, PyAny>>, Option<usize>);
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -43,23 +50,27 @@ fn import_numpy(py: Python<'_>) -> PyResult<()> {
     Ok(())
 }
 
-/// The pool of this process. It is asked for with the interpreter held, so that no other thread holds the lock while a
-/// process is forked.
-fn pool(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
-    let mut kept = lock(&PROCESS_POOL);
+/// The pool of this process with so many threads. It is asked for with the interpreter held, so that no other thread holds
+/// the lock while a process is forked.
+fn pool(py: Python<'_>, threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
+    let threads = threads.unwrap_or(0).min(MOST_THREADS);
+    let mut kept = lock(&PROCESS_POOLS);
     let process = std::process::id();
-    if let Some((owner, pool)) = &*kept
-        && *owner == process
-    {
+    let own = (kept.iter()).find(|(owner, size, _)| (*owner, *size) == (process, threads));
+    if let Some((_, _, pool)) = own {
         return Ok(Arc::clone(pool));
     }
     let made = ThreadPoolBuilder::new()
+        .num_threads(threads)
         .thread_name(|n| format!("ventriform-{n}"))
         .build()
         .map_err(|error| exception(py, &broken(error)))?;
     let made = Arc::new(made);
-    // The threads of a parent's pool are not here to be told to end.
-    std::mem::forget(kept.replace((process, Arc::clone(&made))));
+    // The threads of a parent's pools are not here to be told to end.
+    let (own, parents) = (kept.drain(..)).partition(|(owner, _, _)| *owner == process);
+    *kept = own;
+    std::mem::forget::<Vec<_>>(parents);
+    kept.push((process, threads, Arc::clone(&made)));
     Ok(made)
 }
 
@@ -159,10 +170,10 @@ fn raise<T>(py: Python<'_>, outcome: Outcome<T>) -> PyResult<T> {
 pub fn run<T: Send>(
     py: Python<'_>,
     plan: Plan,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: &How<'_>,
     work: impl FnOnce(&Monitor<'_>) -> Result<T, Stopped> + Send,
 ) -> PyResult<T> {
-    watched(py, plan, progress, |_, monitor| work(monitor))
+    watched(py, plan, how, |_, monitor| work(monitor))
 }
 
 /// Tells a step of work and its completed fraction.
@@ -171,10 +182,10 @@ pub type Tell<'a> = &'a (dyn Fn(&'static str, f64) + Sync);
 /// Does `work` of many scans, which tells its steps itself and not the stages of each scan.
 pub fn run_steps<T: Send>(
     py: Python<'_>,
-    progress: Option<&Bound<'_, PyAny>>,
+    how: &How<'_>,
     work: impl FnOnce(Tell<'_>, &Monitor<'_>) -> Result<T, Stopped> + Send,
 ) -> PyResult<T> {
-    watched(py, Plan::SEGMENTATION, progress, |watch, monitor| {
+    watched(py, Plan::SEGMENTATION, how, |watch, monitor| {
         let tell = |step, fraction| watch.tell_step(step, fraction);
         work(&tell, &monitor.without_observer())
     })
@@ -183,11 +194,12 @@ pub fn run_steps<T: Send>(
 fn watched<T: Send>(
     py: Python<'_>,
     plan: Plan,
-    progress: Option<&Bound<'_, PyAny>>,
+    How(progress, threads): &How<'_>,
     work: impl FnOnce(&Watch<T>, &Monitor<'_>) -> Result<T, Stopped> + Send,
 ) -> PyResult<T> {
     import_numpy(py)?;
-    let pool = pool(py)?;
+    let progress = progress.as_ref();
+    let pool = pool(py, *threads)?;
     let watch = Watch::new(plan);
     let watched = &watch;
     std::thread::scope(|scope| {

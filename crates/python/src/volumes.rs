@@ -2,7 +2,7 @@
 
 use crate::arrays::{affine, voxels};
 use crate::errors::{exception, refused, stopped};
-use crate::run::run;
+use crate::run::{How, run};
 use numpy::{PyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -30,10 +30,14 @@ impl NativeVolume {
 
     /// The facts about the files, every voxel of which is decoded the first time.
     fn known(&self, py: Python<'_>) -> PyResult<&VolumeFacts> {
+        self.known_by(py, &How::default())
+    }
+
+    fn known_by(&self, py: Python<'_>, how: &How<'_>) -> PyResult<&VolumeFacts> {
         if let Some(facts) = self.facts.get() {
             return Ok(facts);
         }
-        let facts = run(py, Plan::SEGMENTATION, None, |monitor| {
+        let facts = run(py, Plan::SEGMENTATION, how, |monitor| {
             let facts = volume::inspect(&self.files, &ReadLimits::default(), monitor);
             facts.map_err(|error| stopped(&error))
         })?;
@@ -49,7 +53,7 @@ impl NativeVolume {
     /// The volume in files; a folder stands for the files in it.
     #[staticmethod]
     fn from_paths(py: Python<'_>, paths: Vec<PathBuf>) -> PyResult<Self> {
-        let files = run(py, Plan::SEGMENTATION, None, |_| {
+        let files = run(py, Plan::SEGMENTATION, &How::default(), |_| {
             VolumeFile::given(&paths, &ReadLimits::default()).map_err(|error| stopped(&error))
         })?;
         Ok(Self::new(files))
@@ -115,6 +119,11 @@ impl NativeVolume {
         stored.collect()
     }
 
+    /// Decodes every voxel, so that files that cannot be used are refused.
+    fn inspect(&self, py: Python<'_>, how: How<'_>) -> PyResult<()> {
+        self.known_by(py, &how).map(|_| ())
+    }
+
     /// Format, values and place, as JSON.
     fn facts(&self, py: Python<'_>) -> PyResult<String> {
         let facts = FileFacts::of(self.known(py)?);
@@ -145,7 +154,7 @@ impl NativeVolume {
     /// The voxels of a frame, or of the only volume, or of the sum of the gates; and their affine.
     #[pyo3(signature = (frame=None))]
     fn voxels<'py>(&self, py: Python<'py>, frame: Option<usize>) -> PyResult<PlacedVoxels<'py>> {
-        let read = run(py, Plan::SEGMENTATION, None, |monitor| {
+        let read = run(py, Plan::SEGMENTATION, &How::default(), |monitor| {
             let options = ReadOptions { frame };
             let read = volume::read(&self.files, &options, &ReadLimits::default(), monitor);
             Ok(read.map_err(|error| stopped(&error))?.volume)

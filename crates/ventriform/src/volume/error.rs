@@ -223,7 +223,7 @@ pub enum VolumeError {
 }
 
 impl VolumeError {
-    /// The name of the file that it is about.
+    /// The name of the file, or the place of the files, that it is about.
     pub(super) fn file_mut(&mut self) -> Option<&mut String> {
         match self {
             Self::Empty { file }
@@ -240,7 +240,8 @@ impl VolumeError {
             | Self::Overflow { file, .. }
             | Self::NoFiniteVoxel { file }
             | Self::Mesh { file, .. }
-            | Self::Io { file, .. } => Some(file),
+            | Self::Io { file, .. }
+            | Self::NotOneVolume { place: file, .. } => Some(file),
             _ => None,
         }
     }

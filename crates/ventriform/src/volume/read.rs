@@ -12,7 +12,7 @@ use super::left_out::LeftOut;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
-use super::source::VolumeFile;
+use super::source::{FOLDER, VolumeFile};
 use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
 use super::{GateFacts, LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
@@ -462,7 +462,7 @@ fn open_named(
     monitor: &Monitor,
 ) -> Result<Opened, VolumeError> {
     let in_folder = files.iter().any(VolumeFile::was_found);
-    let mut inside = in_folder.then_some("the folder");
+    let mut inside = in_folder.then_some(FOLDER);
     let mut members = Vec::with_capacity(files.len());
     for file in files {
         monitor.check()?;

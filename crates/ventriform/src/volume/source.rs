@@ -42,6 +42,9 @@ enum Content {
     Arrays(Arc<[Volume]>),
 }
 
+/// What errors call a folder that files were found in.
+pub(super) const FOLDER: &str = "the folder";
+
 /// The name of a file for messages: control characters are escaped.
 fn shown(name: String) -> String {
     escaped(&name).into_owned()
@@ -177,6 +180,13 @@ impl VolumeFile {
         }
     }
 
+    /// The folder that the caller named by its path, and in which the file was found.
+    fn folder(&self) -> Option<&Path> {
+        let path = self.path().filter(|_| self.by_path && self.found)?;
+        path.ancestors()
+            .nth(Path::new(&self.name).components().count())
+    }
+
     /// Whether the file was found in an archive or a folder, and not named by a person.
     pub(super) fn was_found(&self) -> bool {
         self.found
@@ -268,6 +278,10 @@ impl VolumeError {
             let whole: Vec<String> = whole.map(VolumeFile::whole_name).collect();
             if !whole.is_empty() {
                 *named = whole.join(" or ");
+            } else if named == FOLDER
+                && let Some(folder) = files.iter().find_map(VolumeFile::folder)
+            {
+                *named = format!("{FOLDER} {}", shown(folder.display().to_string()));
             }
         }
         self
@@ -786,6 +800,7 @@ mod tests {
     use super::*;
     use crate::geometry::Vec3;
     use crate::geometry::frame::VoxelToPatient;
+    use crate::volume::ReadLimits;
 
     #[test]
     fn the_other_half_lies_beside() {
@@ -844,6 +859,40 @@ mod tests {
                 .stream_stored(&mut |_| ())
                 .is_err()
         );
+    }
+
+    #[test]
+    fn a_file_that_is_named_by_its_path_is_told_by_all_of_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("patient_017/spect.nii.gz");
+        std::fs::create_dir(path.parent().unwrap()).unwrap();
+        let error = |file: &str, files: &[VolumeFile]| {
+            let error = VolumeError::Empty { file: file.into() };
+            error.with_path(files).to_string()
+        };
+        let whole = format!("{} is empty", path.display());
+        assert_eq!(
+            error("spect.nii.gz", &VolumeFile::with_other_half(&path)),
+            whole
+        );
+        std::fs::write(&path, b"").unwrap();
+        for given in [path.as_path(), path.parent().unwrap()] {
+            let files = VolumeFile::given(&[given], &ReadLimits::DEFAULT).unwrap();
+            assert_eq!(error("spect.nii.gz", &files), whole);
+            assert_eq!(files[0].name(), "spect.nii.gz");
+        }
+        // What a service stores under a key is told by the name that it was sent with.
+        let stored = [
+            VolumeFile::named("spect.nii.gz", &path),
+            VolumeFile::at(&path),
+        ];
+        assert_eq!(error("spect.nii.gz", &stored[..1]), "spect.nii.gz is empty");
+        assert_eq!(error("spect.nii.gz", &stored[1..]), "spect.nii.gz is empty");
+        assert_eq!(error("other", &stored), "other is empty");
+        let files = VolumeFile::given(&[folder.path()], &ReadLimits::DEFAULT).unwrap();
+        let whole = format!("the folder {} is empty", folder.path().display());
+        assert_eq!(error(FOLDER, &files), whole);
+        assert_eq!(error(FOLDER, &stored), "the folder is empty");
     }
 
     #[test]
