@@ -55,6 +55,7 @@ mod refused;
 mod replicas;
 mod s3;
 mod s3_server;
+mod scan_erasures;
 mod scans;
 mod scu;
 mod security;

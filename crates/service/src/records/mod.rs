@@ -34,6 +34,7 @@ mod priority;
 mod product;
 mod resource;
 mod scan;
+mod scan_erasure;
 mod store_error;
 mod tenant;
 mod volume;
@@ -63,6 +64,9 @@ pub use priority::Priority;
 pub use product::{Product, ProductFile};
 pub use resource::Resource;
 pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
+pub use scan_erasure::{
+    SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
+};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};
 pub use volume::{FileRecord, StoredVolume};
