@@ -62,6 +62,7 @@ mod security;
 mod segmentations;
 mod shutdown;
 mod storage;
+mod stores_found;
 mod tenants;
 mod tls;
 mod traces;
