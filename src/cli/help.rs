@@ -1,7 +1,7 @@
 //! What the command line says of itself: `-h` on one screen, `--help` in full; and refusals and failures in words.
 //!
 //! The short help has the arguments that stand under no heading, and those of [`USUAL_SETTINGS`], each with the beginning of its
-//! text; the number of the others under each heading; and the first examples.
+//! text; the number of the others under each heading; and the first examples. Lists of commands have the beginnings of theirs.
 
 use clap::{Arg, Command};
 use std::error::Error;
@@ -54,7 +54,14 @@ pub fn with_short_help(command: Command) -> Command {
         let others = others.collect::<Vec<_>>().join(", ");
         end += &format!("\nMore options in --help: {others}");
     }
-    let command = command.mut_subcommands(with_short_help);
+    let command = command.mut_subcommands(|below| {
+        let about = below.get_about().map(ToString::to_string);
+        let below = with_short_help(below);
+        match about {
+            Some(about) => below.about(beginning(&about)).long_about(about),
+            None => below,
+        }
+    });
     match whole {
         Some(whole) => command
             .after_long_help(whole)

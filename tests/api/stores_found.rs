@@ -106,10 +106,11 @@ fn a_command_that_finds_no_store_makes_none() {
         assert!(said(&output).contains("ventriform-data"), "{words:?}");
         assert!(!here.join("ventriform-data").exists(), "{words:?}");
     }
-    // A folder that is empty may be one before the first start; only what makes something makes a store there.
+    // A folder that is empty may be one before the first start, or one that has lost all: only what makes something, or
+    // repairs, makes a store there.
     let empty = here.join("empty");
     std::fs::create_dir(&empty).unwrap();
-    for words in &commands[1..8] {
+    for words in commands[1..8].iter().filter(|words| words[0] != "doctor") {
         let refused = run(here, words, Told::Flag, &empty);
         assert_eq!(refused.status.code(), Some(1), "{words:?}");
         assert!(names(&empty).is_empty(), "{words:?}");

@@ -71,15 +71,8 @@ pub async fn examine(
     s3: Option<&S3Location>,
     heirs: Option<&Tenant>,
 ) -> Result<Examination, DoctorError> {
-    // Rows can be made anew of what is in a bucket, in a folder that is still empty.
-    require_store(
-        folder,
-        if s3.is_some() {
-            IfNone::Make
-        } else {
-            IfNone::Refuse
-        },
-    )?;
+    // An empty one may have lost all, or is to have rows of what is in a bucket.
+    require_store(folder, IfNone::Make)?;
     check_place(folder, s3)?;
     require_file(folder)?;
     let mut lock = FolderLock::wait_for(|| FolderLock::take(folder)).await?;
