@@ -11,7 +11,7 @@
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
-import copy, csv, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+import copy, csv, gzip, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
 
 import pydicom
 from jsonschema import Draft202012Validator
@@ -303,6 +303,14 @@ def everything(walk, folder):
     for template in ("/healthz", "/readyz", "/metrics"):
         call("get", template, expect=200)
 
+    # A patient of whom nothing is left.
+    _, volume = call("post", "/v1/volumes", expect=201, body=gzip.decompress(scan), headers=octets)
+    stated = {"patient_id": "4712", "study_uid": "1.2.840.99999.1.2"}
+    call("put", "/v1/volumes/{id}/identity", expect=200, id=volume["id"], body=stated)
+    for query, status in (("", 422), ("?patient=", 422), ("?patient=4713", 404), ("?patient=4712&dry_run=true", 200)):
+        call("delete", "/v1/volumes", expect=status, query=query)
+    call("delete", "/v1/volumes", expect=409, query="?patient=4712&plan=" + "0" * 32)
+    call("delete", "/v1/volumes", expect=200, query="?patient=4712", headers={"prefer": "return=representation"})
     _, volume = call("post", "/v1/volumes", expect=201, body=scan, headers=octets)
     call("post", "/v1/volumes", expect=200, body=scan, headers=octets)
     call("get", "/v1/volumes", expect=200)

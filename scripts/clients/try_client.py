@@ -10,7 +10,8 @@ from ventriform_client.api.beats import get_beat, get_beat_mesh_glb, get_beat_re
 from ventriform_client.api.jobs import create_job, get_job
 from ventriform_client.api.models import get_model, get_model_mesh_glb, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import Beat, BeatParameters, BeatReport, Job, JobState, Model, ModelParameters, ModelReport, Problem, Volume, VolumeJobRequest
+from ventriform_client.models import (Beat, BeatJobRequest, BeatParameters, BeatReport, Job, JobState, Model, ModelJobRequest, ModelParameters,
+                                      ModelReport, Problem, Volume)
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
@@ -32,7 +33,8 @@ def stored(path):
 
 def made(kind, volume, parameters):
     """The job of that kind, when it has succeeded."""
-    request = VolumeJobRequest.from_dict({"kind": kind, "volume": volume.id})
+    requests = {"model": ModelJobRequest, "beat": BeatJobRequest}
+    request = requests[kind].from_dict({"kind": kind, "volume": volume.id})
     request.parameters = parameters
     job = create_job.sync(client=client, body=request)
     assert isinstance(job, Job), job

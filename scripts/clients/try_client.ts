@@ -29,7 +29,7 @@ async function stored(path = "") {
 }
 
 /** The job, when it has succeeded. */
-async function made(order: components["schemas"]["VolumeJobRequest"]): Promise<Job> {
+async function made(order: components["schemas"]["JobRequest"]): Promise<Job> {
   const filed = await client.POST("/v1/jobs", { body: order });
   check(filed.data, filed.error);
   let job: Job = filed.data;

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
 use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
 use ventriform_service::records::ListRequest;
+use ventriform_store::IfNone;
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]
@@ -43,7 +44,7 @@ pub fn run(args: &AuditArgs) -> Result<()> {
 }
 
 async fn check(args: &DataArgs) -> Result<()> {
-    let store = args.open().await?;
+    let store = args.open(IfNone::Refuse).await?;
     let report = verify(&*store).await?;
     if let Some(broken) = report.broken {
         bail!(
@@ -61,7 +62,7 @@ async fn check(args: &DataArgs) -> Result<()> {
 }
 
 async fn print(args: &DataArgs) -> Result<()> {
-    let store = args.open().await?;
+    let store = args.open(IfNone::Refuse).await?;
     let mut before = None;
     loop {
         let page = ListRequest {

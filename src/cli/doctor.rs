@@ -1,13 +1,12 @@
 //! `ventriform doctor` and `ventriform backup`: checking, repairing and copying a data folder.
 
+use super::data_args::StoreArgs;
 use super::output::{json, say};
-use super::serve::variable;
 use crate::server::s3_location;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
-use ventriform_service::config::{BlobPlace, Flags, Settings};
 use ventriform_service::records::Tenant;
 use ventriform_store::Examination;
 
@@ -22,13 +21,8 @@ use ventriform_store::Examination;
 The status is 0 if nothing is wrong or everything was repaired, else 1. A repair deletes no content:
 what is broken or has no record is moved into the folder `quarantine`.")]
 pub struct DoctorArgs {
-    /// Folder of the service
-    #[arg(long, value_name = "DIR")]
-    data_dir: PathBuf,
-    /// Where the service keeps the files, if not in the folder: s3://BUCKET/PREFIX. Address and
-    /// credentials come from the environment, as for the service [env: VENTRIFORM_BLOBS]
-    #[arg(long, value_name = "URL")]
-    blobs: Option<BlobPlace>,
+    #[command(flatten)]
+    store: StoreArgs,
     /// Repair what can be repaired
     #[arg(long)]
     repair: bool,
@@ -48,9 +42,8 @@ pub struct DoctorArgs {
 The target is empty or holds an earlier backup, of which unchanged files are kept. To restore, stop
 the service, copy the target to the data folder, and start the service.")]
 pub struct BackupArgs {
-    /// Folder of the service
-    #[arg(long, value_name = "DIR")]
-    data_dir: PathBuf,
+    #[command(flatten)]
+    store: StoreArgs,
     /// Folder to copy to
     target: PathBuf,
 }
@@ -61,16 +54,15 @@ pub struct BackupArgs {
 /// If the folder cannot be examined, or something is wrong that was not repaired.
 pub fn run(args: &DoctorArgs) -> Result<()> {
     let heirs = args.repair.then_some(&args.tenant);
-    let flags = Flags {
-        blobs: args.blobs.clone(),
-        ..Flags::default()
-    };
-    let mut settings = Settings::load(&flags, variable)?.0;
-    settings.read_aws(variable);
+    let service = args.store.settings()?;
+    service.require_file("the tools of PostgreSQL check it, such as pg_amcheck")?;
     ventriform_http::install_cryptography();
-    let s3 = s3_location(&settings);
-    let found = ventriform_store::examine(&args.data_dir, s3.as_ref(), heirs);
-    let found = Runtime::new()?.block_on(found)?;
+    let s3 = s3_location(&service.settings);
+    let found = ventriform_store::examine(&service.settings.data_dir, s3.as_ref(), heirs);
+    let found = Runtime::new()?.block_on(found);
+    let found = found
+        .map_err(|error| service.explained(error))
+        .with_context(|| format!("examining {}", service.settings.data_dir.display()))?;
     if args.json {
         json(&serde_json::to_string_pretty(&found)?)
     } else {
@@ -106,7 +98,22 @@ fn print(found: &Examination) {
 /// # Errors
 /// If the folder cannot be copied, or items in it are damaged.
 pub fn back_up(args: &BackupArgs) -> Result<()> {
-    let done = Runtime::new()?.block_on(ventriform_store::backup(&args.data_dir, &args.target))?;
+    let service = args.store.settings()?;
+    service.require_file("the tools of PostgreSQL copy it, such as pg_dump")?;
+    if let Some(bucket) = s3_location(&service.settings) {
+        bail!(
+            "the files of the service are in {bucket}, and this command copies those in a data folder: the tools of S3 copy \
+             a bucket. For a folder with its files, give --blobs folder"
+        );
+    }
+    let done = ventriform_store::backup(&service.settings.data_dir, &args.target);
+    let done = Runtime::new()?.block_on(done);
+    let done = done
+        .map_err(|error| service.explained(error))
+        .with_context(|| {
+            let folder = service.settings.data_dir.display();
+            format!("copying {folder} to {}", args.target.display())
+        })?;
     say!(
         "{} items in the backup, {} of them copied now",
         done.items,

@@ -20,7 +20,7 @@ use ventriform::progress::Monitor;
 /// Make models of the templates, fit them to every patient, write tables, plots and pictures
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  ventriform evaluate --cohort cohort --points 67,110,150,200,300 --out evaluation
+  ventriform evaluate cohort --points 67,110,150,200,300 -o evaluation
 Writes evaluation.html, evaluation.json, table1.csv, figure3.csv and fits.csv; models/ holds the
 models, fits/ the result and the fitted mesh of every fit. Existing fits are reused unless the
 model, files, options or program have changed.")]
@@ -84,7 +84,7 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "CASE,...|all", value_delimiter = ',')]
     in_sample: Vec<String>,
     /// Folder for the results (created if missing)
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long = "output", alias = "out", value_name = "DIR")]
     out: PathBuf,
 }
 

@@ -12,6 +12,7 @@ use ventriform_service::access::{
 };
 use ventriform_service::config::{Size, Span};
 use ventriform_service::records::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
+use ventriform_store::IfNone;
 
 /// Make, list and revoke API keys, also while the service runs
 #[derive(Debug, Args)]
@@ -105,7 +106,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
         expires_at: args.expires.map(|s| now.saturating_add(span(s))),
     };
     let (key, text) = ApiKey::make(request, now)?;
-    let store = args.data.open().await?;
+    let store = args.data.open(IfNone::Make).await?;
     let event = event(Activity::KeyCreated, &key, now);
     store.add_key(&key, &event).await?;
     note!(
@@ -119,7 +120,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
 }
 
 async fn list(args: &DataArgs) -> Result<()> {
-    let store = args.open().await?;
+    let store = args.open(IfNone::Refuse).await?;
     let now = SystemClock.now();
     let mut before = None;
     say!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
@@ -145,7 +146,7 @@ async fn list(args: &DataArgs) -> Result<()> {
 }
 
 async fn revoke(args: &RevokeArgs) -> Result<()> {
-    let store = args.data.open().await?;
+    let store = args.data.open(IfNone::Refuse).await?;
     let Some(key) = store.key(&args.id).await? else {
         bail!(
             "there is no key {}; `ventriform keys list` shows all",

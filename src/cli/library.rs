@@ -1,9 +1,10 @@
 //! `ventriform templates import`: adds models to the library in a service's data folder.
 
+use super::data_args::StoreArgs;
 use super::keys::AUDIT_AGENT;
 use super::mesh_args::{MeshArgs, mesh_bytes};
 use super::output::say;
-use super::serve::settings_beside;
+use crate::server::store_settings;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -11,16 +12,15 @@ use std::sync::Arc;
 use tokio::runtime::Runtime;
 use ventriform::volume::ReadLimits;
 use ventriform_service::access::{AccessStore, Activity, AuditEvent};
-use ventriform_service::config::DatabaseUrl;
 use ventriform_service::items::{Items, NotAdded, TemplateSource};
 use ventriform_service::records::{Clock, Failure, ProductRoom, SystemClock, Tenant};
 use ventriform_service::work::{Engine, TEMPLATE_BYTES};
-use ventriform_store::{Store, StoreSettings};
+use ventriform_store::{IfNone, Store, require_store};
 
 /// The arguments of `templates import`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  ventriform templates build --cohort cohort --points 150 -o templates
+  ventriform templates build cohort --points 150 -o templates
   ventriform templates import templates/*.json --data-dir ventriform-data
 While the service runs, send the models to it instead:
   curl --data-binary @templates/t1_150.json -H 'content-type: application/json' \\
@@ -30,13 +30,8 @@ pub struct ImportArgs {
     /// file's name becomes the template's name
     #[arg(value_name = "MODEL", required = true)]
     models: Vec<PathBuf>,
-    /// Data folder of the service (created if missing)
-    #[arg(long, value_name = "DIR")]
-    data_dir: PathBuf,
-    /// Database of the service: `sqlite`, or the URL of a PostgreSQL database
-    /// [env: VENTRIFORM_DATABASE] [default: sqlite]
-    #[arg(long, value_name = "URL")]
-    database: Option<DatabaseUrl>,
+    #[command(flatten)]
+    store: StoreArgs,
     /// Fit the models in every job with `model=auto`, beside the built-in hearts; otherwise only jobs
     /// that name them do
     #[arg(long)]
@@ -54,12 +49,14 @@ pub struct ImportArgs {
 /// If a mesh cannot serve as a template, or the data folder is in use or cannot be written.
 pub fn import(args: &ImportArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
-        let settings = settings_beside(Some(&args.data_dir), args.database.as_ref())?;
-        let database = StoreSettings {
-            database: settings.postgres(),
-            ..StoreSettings::default()
-        };
-        let store = Store::open_with(&settings.data_dir, database).await?;
+        let service = args.store.settings()?;
+        let settings = &service.settings;
+        if settings.database.0.is_none() {
+            require_store(&settings.data_dir, IfNone::Make)
+                .map_err(|error| service.explained(error))?;
+        }
+        ventriform_http::install_cryptography();
+        let store = Store::open_with(&settings.data_dir, store_settings(settings)).await?;
         let items = Arc::new(Items::new(
             store.rows.clone(),
             store.blobs.clone(),
@@ -93,7 +90,7 @@ async fn add(
     room: ProductRoom,
 ) -> Result<(String, bool)> {
     let organ = &args.organ;
-    let mesh = mesh_bytes(path, TEMPLATE_BYTES)?;
+    let mesh = mesh_bytes(path, TEMPLATE_BYTES, "give one with fewer triangles")?;
     let output = engine
         .reader
         .template(&mesh, organ, &args.mesh.into())

@@ -1,12 +1,11 @@
 //! The limits of the commands that read files of volumes, masks and meshes.
 
 use super::serve::variable;
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
 use clap::Args;
-use std::fmt::Display;
 use std::str::FromStr;
 use ventriform::volume::ReadLimits;
-use ventriform_service::config::Size;
+use ventriform_service::config::{Settings, Size};
 
 /// Limits on what is read.
 #[derive(Debug, Default, Args)]
@@ -26,16 +25,22 @@ pub struct LimitArgs {
 }
 
 impl LimitArgs {
-    /// The limits: those of the flags, else of the environment, else the defaults.
+    /// The limits: those of the flags, else of the environment, else of the file that VENTRIFORM_CONFIG names, else the
+    /// defaults.
     ///
     /// # Errors
-    /// If a variable of the environment is no such value.
+    /// If a variable or a key of the file is no such value.
     pub fn limits(&self) -> Result<ReadLimits> {
         let default = ReadLimits::DEFAULT;
-        let mesh = given(self.mesh_limit, "VENTRIFORM_MESH_LIMIT")?;
+        let mesh = given(
+            self.mesh_limit,
+            "mesh_limit",
+            "a size with a unit, such as 64MiB",
+        )?;
+        let count = "a whole number, such as 8192";
         Ok(ReadLimits {
-            files: given(self.file_limit, "VENTRIFORM_FILE_LIMIT")?.unwrap_or(default.files),
-            folder_levels: given(self.folder_limit, "VENTRIFORM_FOLDER_LIMIT")?
+            files: given(self.file_limit, "file_limit", count)?.unwrap_or(default.files),
+            folder_levels: given(self.folder_limit, "folder_limit", count)?
                 .unwrap_or(default.folder_levels),
             mesh_bytes: mesh.map_or(default.mesh_bytes, |size| size.0),
             ..default
@@ -43,17 +48,17 @@ impl LimitArgs {
     }
 }
 
-/// The flag, or else the variable of the environment.
-fn given<T: FromStr>(flag: Option<T>, name: &str) -> Result<Option<T>>
-where
-    T::Err: Display,
-{
-    let parse = |text: String| {
-        let parsed = text.parse().map_err(|error| anyhow::anyhow!("{error}"));
-        parsed.with_context(|| format!("{name} is `{text}`"))
-    };
-    match flag {
-        Some(value) => Ok(Some(value)),
-        None => variable(name).map(parse).transpose(),
+/// The flag, or else what the environment or the file of settings says.
+fn given<T: FromStr>(flag: Option<T>, setting: &str, permitted: &str) -> Result<Option<T>> {
+    if flag.is_some() {
+        return Ok(flag);
     }
+    let Some((text, origin)) = Settings::stated(setting, variable)? else {
+        return Ok(None);
+    };
+    let value = text.parse().map_err(|_| {
+        let from = origin.of(setting);
+        anyhow!("{setting} = `{text}` ({from}): give {permitted}")
+    })?;
+    Ok(Some(value))
 }

@@ -43,13 +43,13 @@ fn parse_frame(text: &str) -> Result<MeshFrame, String> {
 /// The bytes of a file of a mesh.
 ///
 /// # Errors
-/// If it cannot be read, or is larger than `limit`.
-pub(super) fn mesh_bytes(path: &Path, limit: u64) -> Result<Vec<u8>> {
+/// If it cannot be read, or is larger than `limit`; then `advice` says what to do.
+pub(super) fn mesh_bytes(path: &Path, limit: u64, advice: &str) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let file = std::fs::File::open(path)?;
     file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
-        bail!("the file has more than the {limit} bytes that a mesh may have");
+        bail!("the file has more than the {limit} bytes that a mesh may have; {advice}");
     }
     Ok(bytes)
 }
@@ -64,7 +64,8 @@ pub(super) fn read_mesh(
     limits: &ReadLimits,
 ) -> Result<TriMesh> {
     let context = || format!("{}", path.display());
-    let bytes = mesh_bytes(path, limits.mesh_bytes).with_context(context)?;
+    let advice = "give one with fewer triangles, or raise the limit: --mesh-limit 256MiB";
+    let bytes = mesh_bytes(path, limits.mesh_bytes, advice).with_context(context)?;
     let read = mesh_files::read_where_silent(&bytes, stated, limits.mesh_bytes, &Monitor::silent())
         .map_err(|error| anyhow!(error.with_advice()))
         .with_context(context)?;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
 use ventriform_service::access::verify;
 use ventriform_service::config::{BlobPlace, DatabaseUrl, Flags, Settings};
-use ventriform_store::{Destination, Migrated, MovedFiles, Progress, open_database};
+use ventriform_store::{Destination, IfNone, Migrated, MovedFiles, Progress, open_database};
 
 /// Time between two lines about the progress.
 const TOLD_EVERY: Duration = Duration::from_secs(2);
@@ -92,7 +92,7 @@ pub fn run(args: &MigrateArgs) -> Result<()> {
 
 /// Notes in the database that its files are at `place`.
 fn note_moved(place: &str, records: &DataArgs) -> Result<()> {
-    let settings = records.settings()?;
+    let settings = records.settings()?.settings;
     let files = match place.split_once("://") {
         Some(("s3", _)) => {
             let blobs: BlobPlace = place.parse().map_err(anyhow::Error::msg)?;
@@ -112,15 +112,25 @@ fn note_moved(place: &str, records: &DataArgs) -> Result<()> {
     };
     ventriform_http::install_cryptography();
     let database = settings.postgres();
-    let noted = ventriform_store::note_moved_files(&settings.data_dir, database.as_ref(), &files);
-    let items = Runtime::new()?.block_on(noted)?;
+    let items = Runtime::new()?.block_on(async {
+        if database.is_some() {
+            // An empty database would be made into that of a store without items.
+            records.open(IfNone::Refuse).await?.close().await;
+        }
+        let data_dir = &settings.data_dir;
+        let noted = ventriform_store::note_moved_files(data_dir, database.as_ref(), &files);
+        anyhow::Ok(noted.await?)
+    })?;
     say!("the files of {items} items are in {place}, as the records say now");
     Ok(())
 }
 
 impl MigrateArgs {
     fn destination(&self) -> Result<Destination> {
-        let mut flags = Flags::default();
+        let mut flags = Flags {
+            config: self.records.config(),
+            ..Flags::default()
+        };
         let mut folder = None;
         for part in &self.to {
             let twice = match part.split_once("://") {

@@ -12,6 +12,7 @@ mod dicom_args;
 mod doctor;
 mod evaluate;
 mod generate;
+mod help;
 mod inspect;
 mod keys;
 mod library;
@@ -34,7 +35,7 @@ pub use bar::Bar;
 pub use parameter_args::{FitArgs, ModelArgs, UnusableArgument};
 
 use self::output::note;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Surface models of the left ventricle from cardiac SPECT
@@ -102,7 +103,11 @@ const USAGE_STATUS: u8 = 2;
 
 /// Runs the command that the arguments of the process name.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let matches = help::with_short_help(Cli::command()).try_get_matches();
+    let cli = matches.and_then(|matches| {
+        Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut Cli::command()))
+    });
+    let cli = match cli {
         Ok(cli) => cli,
         Err(error) => return refuse(&error),
     };
@@ -141,7 +146,7 @@ pub fn main() -> ExitCode {
     match outcome.and_then(|()| output::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            note!("error: {error:#}");
+            note!("error: {}", help::failure(&format!("{error:#}")));
             if error.is::<UnusableArgument>() {
                 ExitCode::from(USAGE_STATUS)
             } else {
@@ -178,7 +183,7 @@ fn manual(of: Option<&str>) -> anyhow::Result<()> {
 /// characters escaped.
 fn refuse(error: &clap::Error) -> ExitCode {
     if error.use_stderr() {
-        note!("{}", error.render().to_string().trim_end());
+        note!("{}", help::refusal(error).trim_end());
     } else {
         // A reader that has closed the pipe has read enough.
         error.print().ok();
@@ -217,5 +222,96 @@ mod tests {
             open.extend(command.get_subcommands().cloned());
         }
         assert!(described > 100, "{described}");
+    }
+
+    /// Lines of a screen.
+    const SCREEN_LINES: usize = 40;
+
+    /// Every command with its path, below the program.
+    fn commands(above: &str, of: &clap::Command, all: &mut Vec<(String, clap::Command)>) {
+        for command in of.get_subcommands().filter(|one| !one.is_hide_set()) {
+            let path = format!("{above} {}", command.get_name());
+            commands(&path, command, all);
+            all.push((path, command.clone()));
+        }
+    }
+
+    #[test]
+    fn the_short_help_of_every_command_is_one_screen_and_the_long_one_has_all() {
+        let program = help::with_short_help(Cli::command()).term_width(100);
+        let mut all = vec![("ventriform".to_owned(), program.clone())];
+        commands("ventriform", &program, &mut all);
+        assert!(all.len() > 25, "{}", all.len());
+        for (path, mut command) in all {
+            command = command.term_width(100);
+            let short = command.render_help().to_string();
+            let lines = short.lines().count();
+            assert!(lines <= SCREEN_LINES, "{path}: {lines}\n{short}");
+            let long = command.render_long_help().to_string();
+            for arg in command.get_arguments().filter(|arg| !arg.is_hide_set()) {
+                if let Some(flag) = arg.get_long() {
+                    assert!(long.contains(&format!("--{flag}")), "{path}: {flag}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_messages_of_the_system_are_said_in_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        for error in [
+            std::fs::read(folder.path().join("none")).unwrap_err(),
+            std::fs::read(folder.path()).unwrap_err(),
+            std::fs::read(file.join("below")).unwrap_err(),
+        ] {
+            let text = help::failure(&format!("scan.nii: {error}"));
+            assert!(text.starts_with("scan.nii: "), "{text}");
+            assert!(!text.contains("os error"), "{text}");
+        }
+    }
+
+    #[test]
+    fn no_flag_of_any_command_refuses_a_value_in_the_words_of_the_standard_library() {
+        let program = Cli::command();
+        let mut all = Vec::new();
+        commands("ventriform", &program, &mut all);
+        let raw = [
+            "invalid digit",
+            "invalid float",
+            "invalid socket",
+            "provided string was",
+            "target type",
+            "cannot parse",
+            "empty string",
+        ];
+        let mut refused = 0;
+        for (path, command) in all {
+            let flags = command
+                .get_arguments()
+                .filter(|arg| arg.get_action().takes_values());
+            for flag in flags.filter_map(|arg| arg.get_long()) {
+                for value in ["abc", "-", "1e99", "99999999999999999999999999", "1:2", ""] {
+                    let words = path.split(' ').chain([]).map(str::to_owned);
+                    let given = [format!("--{flag}={value}")];
+                    let parsed = Cli::command().try_get_matches_from(words.chain(given));
+                    let Err(error) = parsed else { continue };
+                    let text = help::refusal(&error);
+                    if error.kind() != clap::error::ErrorKind::ValueValidation {
+                        continue;
+                    }
+                    refused += 1;
+                    assert!(text.contains(&format!("--{flag}")), "{text}");
+                    let bare = raw.iter().find(|raw| text.contains(*raw));
+                    assert!(bare.is_none(), "{path}: {text}");
+                    assert!(
+                        text.contains("give") || text.contains("is not in"),
+                        "{path}: {text}"
+                    );
+                }
+            }
+        }
+        assert!(refused > 300, "{refused}");
     }
 }

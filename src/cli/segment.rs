@@ -24,6 +24,7 @@ use ventriform::volume::{ReadLimits, VolumeFile};
 /// Fit a model to the left ventricle (or another organ) in a volume
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  ventriform segment scan.nii.gz -o out
   ventriform segment scan.nii.gz --model lv.json -o out
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
   ventriform segment scan.nii.gz --model heart.stl --expert drawn.vtp --mesh-frame ras -o out
@@ -40,7 +41,7 @@ pub struct SegmentArgs {
     input: Vec<PathBuf>,
     /// Model to fit: a closed mesh (JSON as `generate` writes it, STL, PLY, OBJ, VTK, VTP, glTF), or auto for
     /// the built-in hearts (repeatable: the fit with the greatest confidence is kept)
-    #[arg(long, value_name = "MODEL", required = true)]
+    #[arg(long, value_name = "MODEL", default_value = MODEL_AUTO)]
     model: Vec<PathBuf>,
     /// Folder to write to (created if missing)
     #[arg(short, long = "output", value_name = "OUTDIR")]

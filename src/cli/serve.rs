@@ -6,12 +6,12 @@ use crate::server;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::net::{SocketAddr, TcpListener};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use ventriform::volume::ReadLimits;
 use ventriform_http::Running;
-use ventriform_service::config::{DatabaseUrl, Flags, Settings};
+use ventriform_service::config::{Flags, Settings};
 use ventriform_service::jobs::{Isolation, serve_isolated};
 use ventriform_service::work::Engine;
 
@@ -136,10 +136,13 @@ pub fn check_health(args: &HealthcheckArgs) -> Result<()> {
             // is sent, and nothing but the status is used.
             .tls_danger_accept_invalid_certs(true)
             .build()?;
-        let answer = client
-            .get(format!("{scheme}://{address}/readyz"))
-            .send()
-            .await?;
+        let answer = client.get(format!("{scheme}://{address}/readyz")).send();
+        let answer = answer.await.with_context(|| {
+            format!(
+                "no service answers at {address}; start it, or give the address that it has by --listen or \
+                 VENTRIFORM_LISTEN, such as 127.0.0.1:8080"
+            )
+        })?;
         if !answer.status().is_success() {
             bail!(
                 "the service at {address} is not ready: it answered {}",
@@ -249,29 +252,16 @@ pub fn compute(args: &ComputeArgs) -> Result<()> {
     serve_isolated(&args.engine().works).context("standard input holds no job of a service")
 }
 
-/// The settings of a command beside the service, with the given data folder and database.
-///
-/// # Errors
-/// If a setting is invalid.
-pub fn settings_beside(
-    data_dir: Option<&PathBuf>,
-    database: Option<&DatabaseUrl>,
-) -> Result<Settings> {
-    let flags = Flags {
-        data_dir: data_dir.cloned(),
-        database: database.cloned(),
-        ..Flags::default()
-    };
-    Ok(Settings::load(&flags, variable)?.0)
-}
-
 pub(super) fn variable(name: &str) -> Option<String> {
     std::env::var(name).ok()
 }
 
 fn bind(listen: SocketAddr) -> Result<TcpListener> {
     TcpListener::bind(listen).with_context(|| {
-        format!("cannot listen on {listen}; give another address, or port 0 for any free port")
+        format!(
+            "cannot listen on {listen} (--listen); give another address of this machine, such as 127.0.0.1:8081, or port 0 for \
+             any free port"
+        )
     })
 }
 

@@ -27,8 +27,9 @@ use ventriform_service::records::{
     ErasureAgent, ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed,
     Idempotency, Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState,
     JobStore, JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product,
-    ProductFile, ProductRoom, Resource, ScanFields, ScanFilter, Scans, SendOrder, SeriesSource,
-    StoreFault, StoredVolume, SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
+    ProductFile, ProductRoom, Resource, ScanErasureOrder, ScanErasures, ScanFields, ScanFilter,
+    ScanSelection, Scans, ScansErased, SendOrder, SeriesSource, StoreFault, StoredVolume,
+    SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
@@ -265,6 +266,7 @@ contracts!(
     jobs_end_in_every_way,
     holds_keep_what_they_name,
     erasures_leave_receipts,
+    scans_are_erased_together,
     old_things_expire,
     lists_find_by_tags_and_scans,
     a_page_is_planned_by_the_bytes_of_its_rows,
@@ -858,6 +860,195 @@ async fn erasures_leave_receipts(on: &Stores) {
     );
     assert!(on.b.erased_at(&tenant(), &volume).await.unwrap().is_none());
     assert!(on.a.overwrite_erased().await.is_ok());
+}
+
+fn scan_erasure(of: [(&str, &str); 1], cascade: bool) -> ScanErasureOrder {
+    let value = |name: &str| of.iter().find(|one| one.0 == name).map(|one| one.1.into());
+    ScanErasureOrder {
+        tenant: tenant(),
+        selection: ScanSelection {
+            patient: value("patient"),
+            study: value("study"),
+            series: value("series"),
+            accession: value("accession"),
+        },
+        cascade,
+        only_plan: None,
+        by: ErasureAgent {
+            name: "somebody".into(),
+            ..ErasureAgent::default()
+        },
+    }
+}
+
+/// The volumes of a patient go in one transaction with all that was made of them, or not at all.
+async fn scans_are_erased_together(on: &Stores) {
+    let owner = tenant();
+    let scan = |series: &str| {
+        let fields = json!({"patient_id": "PAT_1%", "study_uid": "1.2", "series_uid": series,
+            "accession_number": "A 7"});
+        ScanFields(object(fields))
+    };
+    let mut volumes = Vec::new();
+    for series in ["1.2.1", "1.2.2"] {
+        let id = random_id(Resource::Volume.prefix());
+        let volume = stored_volume(&id, 1_000);
+        let (tags, scan) = (Tags::default(), scan(series));
+        for owner in [tenant(), other()] {
+            let added = on.a.add_volume(&volume, &owner, &tags, Some(&scan));
+            assert!(added.await.unwrap());
+        }
+        volumes.push(id);
+    }
+    // Of the same patient, as the tenant says; and of another one, whose ID matches as a pattern only.
+    for patient in ["PAT_1%", "PATS12"] {
+        let id = on.volume(&tenant()).await;
+        let stated = ScanFields(object(json!({"patient_id": patient, "study_uid": "1.3"})));
+        assert!(on.a.state_scan(&tenant(), &id, &stated).await.unwrap());
+        volumes.push(id);
+    }
+    let [first, second, stated, stranger] = &volumes[..] else {
+        panic!("{volumes:?}")
+    };
+    on.file(&new_job(first)).await;
+    let (job, lease) = on.claim().await.unwrap();
+    let result = model(first);
+    on.b.finish(&lease, &succeeded(&result), now())
+        .await
+        .unwrap()
+        .unwrap();
+    // A comparison of the first with a volume of somebody else.
+    let compared = product(
+        random_id(Resource::Comparison.prefix()),
+        Some(first.as_str()),
+    );
+    for source in [first, stranger] {
+        let added =
+            on.a.add_product(&compared, &owner, Some(source), AMPLE_ROOM);
+        added.await.unwrap();
+    }
+
+    let by = |name, value, cascade| scan_erasure([(name, value)], cascade);
+    let order = by("patient", "PAT_1%", true);
+    let plan = async |order: &ScanErasureOrder| on.b.plan_scan_erasure(order).await.unwrap();
+    let sorted = |ids: &[&String]| {
+        let mut ids: Vec<String> = ids.iter().map(|id| (*id).clone()).collect();
+        ids.sort();
+        ids
+    };
+    for (name, value, found) in [
+        ("patient", "PAT_1%", sorted(&[first, second, stated])),
+        ("patient", "pat_1%", vec![]),
+        ("patient", "PAT", vec![]),
+        ("study", "1.2", sorted(&[first, second])),
+        ("study", "1.3", sorted(&[stated, stranger])),
+        ("series", "1.2.2", sorted(&[second])),
+        ("accession", "A 7", sorted(&[first, second])),
+    ] {
+        assert_eq!(
+            plan(&by(name, value, true)).await.volumes,
+            found,
+            "{name} {value}"
+        );
+    }
+    let nothing = ScanErasureOrder {
+        selection: ScanSelection::default(),
+        ..order.clone()
+    };
+    assert_eq!(plan(&nothing).await.volumes, Vec::<String>::new());
+    let planned = plan(&order).await;
+    let items: Vec<String> = planned.items.iter().map(|item| item.id.clone()).collect();
+    let mut expected = sorted(&[first, second, stated]);
+    expected.extend(sorted(&[&result.id, &compared.id]));
+    assert_eq!(items, expected);
+    assert_eq!(planned.jobs, std::slice::from_ref(&job.id));
+    assert!(planned.is_free() && planned.unread == 0, "{planned:?}");
+    let alone = plan(&by("patient", "PAT_1%", false)).await;
+    assert_eq!((alone.items.len(), alone.jobs.len()), (3, 0));
+
+    // Kept as a whole, with all that is in the way.
+    let hold = LegalHold {
+        reason: "a trial".into(),
+        since: now(),
+        by: "somebody".into(),
+    };
+    let set = on.a.set_legal_hold(&owner, stranger, Some(&hold));
+    assert!(set.await.unwrap());
+    let waiting = NewJob {
+        needs: [("expert".to_owned(), second.clone())].into(),
+        ..new_job(stranger)
+    };
+    let waiting = on.file(&waiting).await;
+    let erase = async |order: &ScanErasureOrder, expected: &[String]| {
+        on.b.erase_scans(order, expected, now()).await.unwrap()
+    };
+    let ScansErased::Kept(kept) = erase(&order, &items).await else {
+        panic!("a hold and a job keep it")
+    };
+    assert_eq!(kept.holds, std::slice::from_ref(stranger));
+    assert_eq!(kept.unfinished_jobs, std::slice::from_ref(&waiting.id));
+    on.a.interrupt(&waiting.id, now()).await.unwrap();
+    on.a.set_legal_hold(&tenant(), stranger, None)
+        .await
+        .unwrap();
+    let differing = ScanErasureOrder {
+        only_plan: Some(planned.tag()),
+        ..order.clone()
+    };
+    let differs = erase(&differing, &items).await;
+    assert!(
+        matches!(differs, ScansErased::Differs(_)),
+        "a job ended since"
+    );
+    let unexpected = erase(&order, &items[1..]).await;
+    assert_eq!(unexpected, ScansErased::Changed, "nobody has locked it");
+    for id in &volumes {
+        assert!(on.b.volume(&tenant(), id).await.unwrap().is_some());
+    }
+
+    let differing = ScanErasureOrder {
+        only_plan: Some(plan(&order).await.tag()),
+        ..order.clone()
+    };
+    let ScansErased::Done(receipt) = erase(&differing, &items).await else {
+        panic!("nothing is in the way")
+    };
+    let erased: Vec<String> = receipt.items.iter().map(|item| item.id.clone()).collect();
+    assert_eq!(erased, expected);
+    assert_eq!(receipt.jobs, sorted(&[&job.id, &waiting.id]));
+    assert_eq!(receipt.selected_by, ["patient"]);
+    let shared = |id: &String| id == first || id == second;
+    for item in &receipt.items {
+        assert_eq!(item.files_erased, !shared(&item.id), "{}", item.id);
+        assert!(on.b.erased_at(&tenant(), &item.id).await.unwrap().is_some());
+        let listed = on.b.receipts(&tenant(), Some(&item.id), ALL).await.unwrap();
+        assert_eq!(listed.items, std::slice::from_ref(&*receipt), "{}", item.id);
+    }
+    let read = on.b.receipt_within(&tenant(), &receipt.id, u64::MAX).await;
+    assert_eq!(read.unwrap(), Bounded::Read((*receipt).clone()));
+    for none in ["vol_", "vol\"", "id", "%"] {
+        let listed = on.b.receipts(&tenant(), Some(none), ALL).await.unwrap();
+        assert!(listed.items.is_empty(), "{none}");
+    }
+    // The trail names each volume, and nothing names the patient.
+    for id in sorted(&[first, second, stated]) {
+        let filter = AuditFilter {
+            object: Some(id.clone()),
+            ..AuditFilter::default()
+        };
+        let rows = on.b.audit(&filter, ALL).await.unwrap().items;
+        assert_eq!(rows.len(), 1, "{id}");
+    }
+    assert!(verify(&*on.a).await.unwrap().broken.is_none());
+    let text = serde_json::to_string(&*receipt).unwrap();
+    assert!(!text.contains("PAT_1"), "{text}");
+    // Others keep what is theirs, and who erases again finds nothing.
+    assert!(on.b.volume(&other(), first).await.unwrap().is_some());
+    assert!(on.b.volume(&tenant(), stranger).await.unwrap().is_some());
+    let ScansErased::Kept(none) = erase(&order, &items).await else {
+        panic!("there is none")
+    };
+    assert!(none.volumes.is_empty());
 }
 
 async fn old_things_expire(on: &Stores) {

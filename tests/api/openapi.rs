@@ -64,6 +64,52 @@ fn every_parameter_of_a_job_is_documented_twice() {
     }
 }
 
+/// A generated client tells the parameters of one kind of job from those of another by `kind`, and fills in no others' defaults.
+#[test]
+fn a_request_for_a_job_is_told_by_its_kind() {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let schemas = &document["components"]["schemas"];
+    let body = &document["paths"]["/v1/jobs"]["post"]["requestBody"]["content"]["application/json"];
+    let request = document
+        .pointer(text(&body["schema"]["$ref"]).trim_start_matches('#'))
+        .unwrap();
+    assert_eq!(request["discriminator"]["propertyName"], "kind");
+    let mapping = request["discriminator"]["mapping"].as_object().unwrap();
+    let one_of = request["oneOf"].as_array().unwrap();
+    assert_eq!((mapping.len(), one_of.len()), (5, 5));
+    for (kind, parameters) in [
+        ("model", "ModelParameters"),
+        ("segmentation", "SegmentationParameters"),
+        ("beat", "BeatParameters"),
+        ("comparison", "ComparisonParameters"),
+        ("normals", "NormalsParameters"),
+    ] {
+        assert!(
+            one_of.iter().any(|one| one["$ref"] == mapping[kind]),
+            "{kind}"
+        );
+        let name = text(&mapping[kind]);
+        let schema = &schemas[name.rsplit('/').next().unwrap()];
+        let fields = &schema["properties"];
+        assert_eq!(fields["kind"]["enum"], json!([kind]));
+        let reference = format!("#/components/schemas/{parameters}");
+        assert_eq!(fields["parameters"]["$ref"], reference, "{kind}");
+        assert_eq!(schema["additionalProperties"], false, "{kind}");
+        assert_eq!(schemas[parameters]["additionalProperties"], false, "{kind}");
+        // The kind may be left out of a request for a model, and of no other.
+        let required = schema["required"].as_array().cloned().unwrap_or_default();
+        assert_eq!(required.contains(&json!("kind")), kind != "model", "{kind}");
+        // A volume or else a source.
+        assert!(fields["volume"].is_object() && fields["source"].is_object());
+        assert_eq!(schema["not"]["required"], json!(["volume", "source"]));
+        assert_eq!(schema["then"]["required"], json!(["source"]));
+    }
+    for of_any_kind in ["VolumeJobRequest", "SourceJobRequest"] {
+        let discriminator = &schemas[of_any_kind]["discriminator"];
+        assert_eq!(*discriminator, request["discriminator"], "{of_any_kind}");
+    }
+}
+
 #[test]
 fn every_reference_resolves() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();

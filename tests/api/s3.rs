@@ -423,7 +423,11 @@ async fn the_service_works_with_its_files_in_a_bucket() {
     assert_eq!(app.volume("sphere").await, id);
     assert_eq!(app.get(&original).send().await.unwrap().status(), 200);
 
-    let erased = app.delete(&format!("/v1/volumes/{id}?cascade=true"));
+    // Erased by study, with all that was made of it.
+    let identity = app.client.put(format!("{}{identity}", app.url));
+    let identity = identity.json(&serde_json::json!({"study_uid": "1.2.3", "patient_id": "P1"}));
+    assert!(identity.send().await.unwrap().status().is_success());
+    let erased = app.delete("/v1/volumes?study=1.2.3&patient=P1");
     assert!(erased.send().await.unwrap().status().is_success());
     for kind in ["models", "segmentations"] {
         let left = server.keys(&format!("{prefix}/{kind}")).await;

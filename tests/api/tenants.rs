@@ -313,8 +313,10 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
                 .into_iter()
                 .chain(["keys", "webhooks", "webhooks/secret"]);
             let known: Vec<String> = known.map(|kind| format!("/v1/{kind}")).collect();
+            // By what a caller's own volumes are scans of: `scan_erasures.rs`.
+            let by_scans = method == Method::DELETE && path == "/v1/volumes";
             assert!(
-                method == Method::POST && known.contains(&path),
+                method == Method::POST && known.contains(&path) || by_scans,
                 "this test must know what {method} {path} can name"
             );
         }

@@ -304,10 +304,25 @@ fn masks_are_read_alike_by_every_command() {
 }
 
 #[test]
+fn without_a_model_the_built_in_hearts_are_fitted() {
+    let folder = folder();
+    let here = folder.path();
+    succeeds(here, "segment scan.nii.gz -o unnamed");
+    succeeds(here, "segment scan.nii.gz --model auto -o auto");
+    for file in ["mask.nii.gz", "mesh.stl"] {
+        let read = |of: &str| std::fs::read(here.join(of).join(file)).unwrap();
+        assert_eq!(read("unnamed"), read("auto"), "{file}");
+    }
+}
+
+#[test]
 fn templates_are_imported_into_a_data_folder() {
     let folder = folder();
     let here = folder.path();
     succeeds(here, "generate scan.nii.gz -o lv.json --points 110");
+    let nowhere = refusal(here, "templates import lv.json --data-dir data");
+    assert!(nowhere.contains("no such folder"), "{nowhere}");
+    std::fs::create_dir(here.join("data")).unwrap();
     let first = succeeds(here, "templates import lv.json --data-dir data");
     assert!(
         first.starts_with("tpl_") && first.trim().ends_with(" lv"),

@@ -36,7 +36,7 @@ const FOR_EVER: &str = "public, max-age=31536000, immutable";
 /// Cache control of files that are asked for again each time.
 const REVALIDATED_CACHE_CONTROL: &str = "no-cache";
 
-/// The page if the client prefers HTML_TYPE, else text.
+/// The page if the client prefers HTML, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
     let html = negotiate::best_offer(&headers, &["text/plain", "text/html"]) == Some(1);
     let page = html.then(|| index("./", &headers));
@@ -187,7 +187,7 @@ The jobs and their progress:
   curl -fsS '{url}/v1/jobs'
 Stored models, segmentations and beats:
   curl -fsS '{url}/v1/models'; curl -fsS '{url}/v1/segmentations'; curl -fsS '{url}/v1/beats'
-The report on a model (or a segmentation) as an HTML_TYPE page:
+The report on a model (or a segmentation) as an HTML page:
   curl -fsS '{url}/v1/models/ID/report.html' -o report.html
 
 All paths: {url}/docs, {url}/openapi.json

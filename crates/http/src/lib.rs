@@ -70,6 +70,7 @@ mod readers;
 mod request;
 mod response_cache;
 mod router;
+mod scan_erasures;
 mod scans;
 mod segmentations;
 mod server;

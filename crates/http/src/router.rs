@@ -18,8 +18,9 @@ use super::templates::{MESH_SIZE, Templates};
 use super::volumes::Volumes;
 use super::{
     audit, beats, collection, comparisons, erasures, front_page, health, idempotency, identities,
-    intake_status, jobs, keys, legal_hold, models, normals, products, readers, segmentations, stow,
-    templates, volume_download, volumes, voxels, webhook_request, webhooks, workitems,
+    intake_status, jobs, keys, legal_hold, models, normals, products, readers, scan_erasures,
+    segmentations, stow, templates, volume_download, volumes, voxels, webhook_request, webhooks,
+    workitems,
 };
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
@@ -59,10 +60,11 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         products::routes::<Templates>(),
         products::routes::<Readers>(),
     ];
-    let of_one_kind: [UtoipaMethodRouter<App>; 41] = [
+    let of_one_kind: [UtoipaMethodRouter<App>; 42] = [
         routes!(volumes::create_volume).layer(upload()),
         routes!(volumes::preview_volume),
         routes!(voxels::download_voxels),
+        routes!(scan_erasures::erase_volumes),
         routes!(volumes::update_volume).layer(json(settings.json_limit)),
         routes!(volume_download::download_volume),
         routes!(volume_download::download_volume_file),

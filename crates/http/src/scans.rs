@@ -42,18 +42,20 @@ impl From<ScanQuery> for ScanFilter {
 }
 
 fn value<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
-    let usable = |text: &str| {
-        let length = text.chars().count();
-        (1..=VALUE_LENGTH).contains(&length) && text.chars().all(is_printable)
-    };
     let expected =
         format!("1 to {VALUE_LENGTH} printable characters, as the DICOM header has them");
-    let read = |text: &str| usable(text).then(|| text.to_owned());
+    let read = |text: &str| is_value(text).then(|| text.to_owned());
     parsed(deserializer, read, &expected).map(Some)
 }
 
+/// Whether a text can be the value of an identifier in a header.
+pub fn is_value(text: &str) -> bool {
+    let length = text.chars().count();
+    (1..=VALUE_LENGTH).contains(&length) && text.chars().all(is_printable)
+}
+
 /// Longest value of a parameter, characters: that of a UID.
-const VALUE_LENGTH: usize = 64;
+pub const VALUE_LENGTH: usize = 64;
 
 /// The fields that callers of the scope `read` see: identifiers that DICOM systems exchange, the
 /// acquisition and the equipment.

@@ -16,8 +16,8 @@ use super::database::SqlStore;
 use super::doctor::{DoctorError, names};
 use super::sqlite;
 use super::{
-    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
-    require_file,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, IfNone, OpenError, StoreSettings,
+    check_place, require_file, require_store,
 };
 use crate::faults;
 use std::collections::BTreeSet;
@@ -45,6 +45,7 @@ pub struct Backup {
 /// # Errors
 /// If there is no database in `folder`, a service uses `target`, or the disk fails.
 pub async fn backup(folder: &Path, target: &Path) -> Result<Backup, DoctorError> {
+    require_store(folder, IfNone::Refuse)?;
     check_place(folder, None)?;
     require_file(folder)?;
     // If no service runs, closing the database moves its log into it.

@@ -31,8 +31,8 @@ use super::received;
 use super::s3::{BucketDoctor, S3Blobs, S3Location};
 use super::sqlite;
 use super::{
-    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
-    require_file,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, IfNone, OpenError, StoreSettings,
+    check_place, require_file, require_store,
 };
 use crate::faults;
 use std::collections::BTreeSet;
@@ -71,13 +71,8 @@ pub async fn examine(
     s3: Option<&S3Location>,
     heirs: Option<&Tenant>,
 ) -> Result<Examination, DoctorError> {
-    if !folder.is_dir() {
-        return Err(OpenError::Unusable {
-            path: folder.to_owned(),
-            reason: "there is no such folder".into(),
-        }
-        .into());
-    }
+    // An empty one may have lost all, or is to have rows of what is in a bucket.
+    require_store(folder, IfNone::Make)?;
     check_place(folder, s3)?;
     require_file(folder)?;
     let mut lock = FolderLock::wait_for(|| FolderLock::take(folder)).await?;

@@ -25,6 +25,7 @@
 //! folder for one whose items are missing.
 
 mod backup;
+mod beside;
 mod blobs;
 mod cache;
 mod content;
@@ -48,6 +49,7 @@ mod tables;
 mod writer;
 
 pub use backup::{Backup, backup};
+pub use beside::{IfNone, open_beside, require_store};
 pub use blobs::FileBlobs;
 pub use database::SqlStore;
 pub use doctor::{DoctorError, examine};
@@ -216,6 +218,14 @@ pub enum OpenError {
         folder: PathBuf,
         /// Where its records are.
         url: String,
+    },
+    /// There is no store where one is to be found.
+    #[error("{place} {reason}")]
+    NoStore {
+        /// The folder or the database.
+        place: String,
+        /// What it is instead.
+        reason: &'static str,
     },
     /// A migration to it was begun and did not end.
     #[error(
@@ -411,7 +421,7 @@ fn require_file(folder: &Path) -> Result<(), OpenError> {
 }
 
 /// The database of the settings, for commands beside a service that may be running on it. Creates a
-/// folder and a file of SQLite if they are missing.
+/// folder and a file of SQLite if they are missing; [`open_beside`] does not.
 ///
 /// # Errors
 /// If it cannot be used, or a service of another version runs on it.
@@ -585,6 +595,9 @@ fn has_items(folder: &Path) -> std::io::Result<bool> {
 /// The name of the database.
 const DATABASE_FILE: &str = "ventriform.db";
 
+/// The file that the process that uses a data folder has locked.
+const LOCK_FILE: &str = "lock";
+
 /// The file that says which database on a server holds the records of the folder.
 const MARKER_FILE: &str = "database";
 
@@ -634,7 +647,7 @@ impl FolderLock {
     }
 
     fn take(folder: &Path) -> Result<Self, OpenError> {
-        let path = folder.join("lock");
+        let path = folder.join(LOCK_FILE);
         let unusable = |error: std::io::Error| OpenError::Unusable {
             path: path.clone(),
             reason: error.to_string(),

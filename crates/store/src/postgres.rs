@@ -182,6 +182,16 @@ pub(super) async fn connect_unlimited(
     Ok(connection)
 }
 
+/// Whether a service has made its tables in the database.
+pub(super) async fn has_tables(settings: &PostgresSettings) -> Result<bool, sqlx::Error> {
+    let options = with_few_parameters(options_of(&settings.url)?);
+    let mut connection = options.connect().await?;
+    let made = sqlx::query_scalar("SELECT to_regclass('_sqlx_migrations') IS NOT NULL");
+    let made = made.fetch_one(&mut connection).await?;
+    connection.close().await?;
+    Ok(made)
+}
+
 /// Without the startup parameters that poolers do not know. Numbers are transferred in binary form, so the digits of
 /// their text do not matter.
 fn with_few_parameters(options: PgConnectOptions) -> PgConnectOptions {

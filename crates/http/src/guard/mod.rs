@@ -81,6 +81,9 @@ const ADMIN_PATHS: [&str; 5] = [
     "/v1/volumes/{id}/hold",
 ];
 
+/// The changes by which much goes at once: they need the scope `admin`, although others on the same path do not.
+const ADMIN_CHANGES: [(Method, &str); 1] = [(Method::DELETE, "/v1/volumes")];
+
 /// The paths under which everything needs at least the scope `submit`: they tell whose scans are
 /// stored.
 const PATIENT_PATHS: [&str; 2] = ["/v1/volumes/{id}/identity", "/dicom-web/workitems"];
@@ -101,7 +104,8 @@ fn needed(method: &Method, route: Option<&str>) -> Scope {
         let rest = route.and_then(|route| route.strip_prefix(*path));
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
     };
-    if ADMIN_PATHS.iter().any(below) {
+    let at = |(changing, path): &(Method, &str)| changing == method && route == Some(*path);
+    if ADMIN_PATHS.iter().any(below) || ADMIN_CHANGES.iter().any(at) {
         return Scope::Admin;
     }
     if method.is_safe() && !PATIENT_PATHS.iter().any(below) {
@@ -344,6 +348,7 @@ mod tests {
         assert_eq!(needs(Method::POST, again), Scope::Submit);
         assert_eq!(needs(Method::PUT, "/v1/volumes/{id}/hold"), Scope::Admin);
         assert_eq!(needs(Method::DELETE, "/v1/volumes/{id}"), Scope::Submit);
+        assert_eq!(needs(Method::DELETE, "/v1/volumes"), Scope::Admin);
         let identity = "/v1/volumes/{id}/identity";
         assert_eq!(needs(Method::GET, identity), Scope::Submit);
         let items = "/dicom-web/workitems";

@@ -5,8 +5,8 @@ use crate::tags;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
-    AdditionalProperties, AnyOfBuilder, ArrayBuilder, KnownFormat, Object, ObjectBuilder,
-    OneOfBuilder, Schema, SchemaFormat, SchemaType, Type,
+    AdditionalProperties, AnyOfBuilder, ArrayBuilder, Discriminator, KnownFormat, Object,
+    ObjectBuilder, OneOfBuilder, Schema, SchemaFormat, SchemaType, Type,
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
@@ -19,8 +19,66 @@ use ventriform_service::hooks::HookEvent;
 use ventriform_service::records::{LegalHold, Resource};
 use ventriform_service::work::{MOST_CASES, dicom};
 
-/// A job to be filed; `create_job` reads it field by field.
+/// A job to be filed, of a kind by which its parameters are told; `create_job` reads it field by field. That it has a volume or
+/// else a source is added to the finished document.
 pub struct JobRequest;
+
+/// A kind of job: its name, that of the schema of its request, and that of the schema of its parameters.
+struct JobKind {
+    kind: &'static str,
+    request: &'static str,
+    parameters: fn() -> Cow<'static, str>,
+    /// The kind of its result.
+    result: Resource,
+}
+
+/// The kinds; a job that names none is of the first.
+const JOB_KINDS: [JobKind; 5] = [
+    JobKind {
+        kind: "model",
+        request: "ModelJobRequest",
+        parameters: ModelParameters::name,
+        result: Resource::Model,
+    },
+    JobKind {
+        kind: "segmentation",
+        request: "SegmentationJobRequest",
+        parameters: FitParameters::name,
+        result: Resource::Segmentation,
+    },
+    JobKind {
+        kind: "beat",
+        request: "BeatJobRequest",
+        parameters: GatedParameters::name,
+        result: Resource::Beat,
+    },
+    JobKind {
+        kind: "comparison",
+        request: "ComparisonJobRequest",
+        parameters: ComparisonParameters::name,
+        result: Resource::Comparison,
+    },
+    JobKind {
+        kind: "normals",
+        request: "NormalsJobRequest",
+        parameters: NormalsJobParameters::name,
+        result: Resource::Normals,
+    },
+];
+
+/// The names of the schemas of requests, one for each kind of job.
+pub fn job_requests() -> impl Iterator<Item = &'static str> {
+    JOB_KINDS.iter().map(|kind| kind.request)
+}
+
+/// The value of `kind` and the schema that it stands for.
+pub fn job_discriminator() -> Discriminator {
+    let mapping = JOB_KINDS.iter().map(|kind| {
+        let schema = Ref::from_schema_name(kind.request);
+        (kind.kind, schema.ref_location)
+    });
+    Discriminator::with_mapping("kind", mapping)
+}
 
 impl ToSchema for JobRequest {
     fn name() -> Cow<'static, str> {
@@ -49,49 +107,96 @@ impl ToSchema for JobRequest {
             (SourceRequest::name(), SourceRequest::schema()),
         ];
         schemas.extend(own.map(|(name, schema)| (name.into(), schema)));
+        let of_kinds = JOB_KINDS.iter();
+        schemas.extend(of_kinds.map(|kind| (kind.request.to_owned(), request_of(kind))));
     }
 }
 
 impl PartialSchema for JobRequest {
     fn schema() -> RefOr<Schema> {
-        let requests = OneOfBuilder::new()
-            .item(Ref::from_schema_name(VolumeJobRequest::name()))
-            .item(Ref::from_schema_name(SourceJobRequest::name()));
+        let requests = job_requests().fold(OneOfBuilder::new(), |requests, name| {
+            requests.item(Ref::from_schema_name(name))
+        });
+        let requests = requests.discriminator(Some(job_discriminator()));
         Schema::OneOf(requests.build()).into()
     }
 }
 
-/// The fields that both kinds of job requests have, before and after what they work on.
-fn job_request(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
-    let text = || ObjectBuilder::new().schema_type(Type::String);
-    let kind = text()
+/// The request of a job of that kind, on a stored volume or a series in an archive.
+fn request_of(kind: &JobKind) -> RefOr<Schema> {
+    let is_usual = kind.kind == JOB_KINDS[0].kind;
+    let mut word = ObjectBuilder::new()
+        .schema_type(Type::String)
         .description(Some("The kind of work"))
-        .enum_values(Some([
-            "model",
-            "segmentation",
-            "beat",
-            "comparison",
-            "normals",
-        ]))
-        .default(Some(json!("model")));
-    let (external_id, labels) = tag_fields(false);
-    let [(_, send), (_, to)] = send_fields(&Resource::ALL);
-    let object = ObjectBuilder::new()
-        .property("external_id", external_id)
-        .property("labels", labels)
-        .property("kind", Schema::from(kind))
-        .property("priority", PriorityField::schema())
-        .property(input, schema)
-        .property("parameters", Ref::from_schema_name(JobParameters::name()))
-        .property("webhook", Ref::from_schema_name(WebhookRequest::name()))
-        .property("send", send)
-        .property("to", to)
-        .required(input)
-        .additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)));
+        .enum_values(Some([kind.kind]));
+    if is_usual {
+        word = word.default(Some(json!(kind.kind)));
+    }
+    let parameters = (kind.parameters)();
+    let source = Ref::from_schema_name(SourceRequest::name());
+    let mut object = job_request(
+        Schema::from(word),
+        &[("volume", volume_field().into()), ("source", source.into())],
+        &parameters,
+        &[kind.result],
+    );
+    if !is_usual {
+        object = object.required("kind");
+    }
+    if kind.result == Resource::Normals {
+        object = object.required("parameters");
+    }
     Schema::from(object.build()).into()
 }
 
-/// A job on a stored volume.
+/// The fields that all job requests have, before and after what they work on.
+fn job_request(
+    kind: Schema,
+    inputs: &[(&str, RefOr<Schema>)],
+    parameters: &str,
+    results: &[Resource],
+) -> ObjectBuilder {
+    let (external_id, labels) = tag_fields(false);
+    let [(_, send), (_, to)] = send_fields(results);
+    let mut object = ObjectBuilder::new()
+        .property("external_id", external_id)
+        .property("labels", labels)
+        .property("kind", kind)
+        .property("priority", PriorityField::schema());
+    for (name, schema) in inputs {
+        object = object.property(*name, schema.clone());
+    }
+    object = object
+        .property("parameters", Ref::from_schema_name(parameters))
+        .property("webhook", Ref::from_schema_name(WebhookRequest::name()));
+    if results.iter().any(|kind| !dicom::objects(*kind).is_empty()) {
+        object = object.property("send", send).property("to", to);
+    }
+    object.additional_properties(Some(AdditionalProperties::<Schema>::FreeForm(false)))
+}
+
+/// The request of a job of any kind on that input.
+fn request_on(input: &str, schema: RefOr<Schema>) -> RefOr<Schema> {
+    let kind = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .description(Some("The kind of work"))
+        .enum_values(Some(JOB_KINDS.map(|kind| kind.kind)))
+        .default(Some(json!(JOB_KINDS[0].kind)));
+    let fields = [(input, schema)];
+    let parameters = JobParameters::name();
+    let object = job_request(Schema::from(kind), &fields, &parameters, &Resource::ALL);
+    Schema::from(object.required(input).build()).into()
+}
+
+fn volume_field() -> Schema {
+    let volume = ObjectBuilder::new()
+        .schema_type(Type::String)
+        .description(Some("Id of the volume"))
+        .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
+    Schema::from(volume)
+}
+
+/// A job of any kind on a stored volume; [`JobRequest`] has a schema for each kind.
 pub struct VolumeJobRequest;
 
 impl ToSchema for VolumeJobRequest {
@@ -102,15 +207,11 @@ impl ToSchema for VolumeJobRequest {
 
 impl PartialSchema for VolumeJobRequest {
     fn schema() -> RefOr<Schema> {
-        let volume = ObjectBuilder::new()
-            .schema_type(Type::String)
-            .description(Some("Id of the volume"))
-            .examples(["vol_9f86d081884c7d659a2feaa0c55ad015"]);
-        job_request("volume", Schema::from(volume).into())
+        request_on("volume", volume_field().into())
     }
 }
 
-/// A job on a series in an archive.
+/// A job of any kind on a series in an archive.
 pub struct SourceJobRequest;
 
 impl ToSchema for SourceJobRequest {
@@ -122,7 +223,7 @@ impl ToSchema for SourceJobRequest {
 impl PartialSchema for SourceJobRequest {
     fn schema() -> RefOr<Schema> {
         let source = Ref::from_schema_name(SourceRequest::name());
-        job_request("source", source.into())
+        request_on("source", source.into())
     }
 }
 

@@ -3,19 +3,23 @@
 //!
 //! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
 //!    64 bits.
-//! 2. A path `.../{file}` becomes one path per file, so that each file has one media type and one
+//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave the
+//!    fields in one object, as generators of clients want them.
+//! 3. A path `.../{file}` becomes one path per file, so that each file has one media type and one
 //!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
 //!    names of a form: the meshes and labels of the gates of a beat.
-//! 3. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
+//! 4. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
-//! 4. Every operation gets examples: those of `examples.json`, recorded from a running service by
+//! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
 //!    `scripts/check_contract.py`, and a command line for curl.
-//! 5. Every operation takes `X-Request-Id`.
+//! 6. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;
+use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
 use crate::files::REPORT_PAGE;
 use crate::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
+use utoipa::ToSchema;
 use ventriform::export::Format;
 use ventriform::export::dicom::DicomObject;
 
@@ -26,6 +30,7 @@ const RECORDED_EXAMPLES: &str = include_str!("examples.json");
 pub fn finish(document: &mut Value) {
     flatten(&mut document["components"]["schemas"]);
     with_width(&mut document["components"]["schemas"]);
+    require_input(&mut document["components"]["schemas"]);
     one_path_per_file(document);
     let recorded = serde_json::from_str(RECORDED_EXAMPLES).expect("examples.json is an object");
     let problems = problem_examples(&recorded);
@@ -142,6 +147,19 @@ fn with_width(schema: &mut Value) {
         }
         Value::Array(items) => items.iter_mut().for_each(with_width),
         _ => {}
+    }
+}
+
+/// Says of requests for jobs that they have a volume or a source, and how those of any kind are told.
+fn require_input(schemas: &mut Value) {
+    for name in job_requests() {
+        let request = &mut schemas[name];
+        request["not"] = json!({"required": ["volume", "source"]});
+        request["if"] = json!({"not": {"required": ["volume"]}});
+        request["then"] = json!({"required": ["source"]});
+    }
+    for request in [VolumeJobRequest::name(), SourceJobRequest::name()] {
+        schemas[&*request]["discriminator"] = json!(job_discriminator());
     }
 }
 

@@ -25,9 +25,9 @@ pub use answers::{
     BeatAnswer, BeatFileAnswer, ComparisonAnswer, ComparisonFileAnswer, DicomProblems,
     DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems, IdentityProblems,
     ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, NormalsFileAnswer, OriginalAnswer,
-    PatchProblems, ReaderFileAnswer, ReportAnswer, ReportDocumentAnswer, ScopeProblems,
-    SegmentationAnswer, SegmentationFileAnswer, StowAnswers, UnchangedAnswer, UploadProblems,
-    WaitAnswers, WorkitemConflict, WorkitemProblems,
+    PatchProblems, ReaderFileAnswer, ReportAnswer, ReportDocumentAnswer, ScanErasureProblems,
+    ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, StowAnswers, UnchangedAnswer,
+    UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{
     ComparisonForm, ComparisonRequest, HoldRequest, JobParameters, JobRequest, MeshDocument,

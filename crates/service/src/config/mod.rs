@@ -35,6 +35,9 @@ use std::str::FromStr;
 /// The prefix of every environment variable.
 pub const VARIABLE_PREFIX: &str = "VENTRIFORM_";
 
+/// The variable with the path of the file.
+const CONFIG_VARIABLE: &str = "VENTRIFORM_CONFIG";
+
 /// The standard variable of OpenTelemetry for `otlp_endpoint`.
 const OTLP_VARIABLE: &str = "OTEL_EXPORTER_OTLP_ENDPOINT";
 
@@ -78,7 +81,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// A value is not valid for its setting.
-    #[error("{setting} = `{value}` ({origin}): {reason}")]
+    #[error("{setting} = `{value}` ({origin}): {reason}", origin = origin.of(setting))]
     BadValue {
         /// The setting's name.
         setting: &'static str,
@@ -109,6 +112,18 @@ pub enum Origin {
     File,
     /// The default.
     Default,
+}
+
+impl Origin {
+    /// In words, where the value of that setting came from.
+    pub fn of(self, setting: &str) -> String {
+        match self {
+            Origin::Flag => format!("flag --{}", setting.replace('_', "-")),
+            Origin::Variable => format!("variable {}", variable_name(setting)),
+            Origin::File => "file of --config".into(),
+            Origin::Default => "default".into(),
+        }
+    }
 }
 
 impl Display for Origin {
@@ -199,7 +214,8 @@ macro_rules! settings {
             $($(
                 $(#[doc = $doc])+
                 #[arg(long, value_name = "VALUE", num_args = arity(stringify!($kind)),
-                    default_missing_value = "true", help_heading = $group, help = row(stringify!($name)).help())]
+                    default_missing_value = "true", value_parser = <$kind as Setting>::parser(),
+                    help_heading = $group, help = row(stringify!($name)).help())]
                 pub $name: Option<$kind>,
             )+)+
         }
@@ -553,6 +569,15 @@ impl Default for Settings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Origins(Vec<Origin>);
 
+impl Origins {
+    /// Where the value of the setting with that name came from.
+    pub fn of(&self, setting: &str) -> Origin {
+        let place = Settings::NAMES.iter().position(|name| *name == setting);
+        let origin = place.and_then(|place| self.0.get(place));
+        origin.copied().unwrap_or(Origin::Default)
+    }
+}
+
 impl Settings {
     /// Resolves the settings: from `flags`, then `variable` (called with the full name, usually
     /// `std::env::var(..).ok()`), then the file, then the defaults.
@@ -566,7 +591,7 @@ impl Settings {
         let path = flags
             .config
             .clone()
-            .or_else(|| variable("VENTRIFORM_CONFIG").map(PathBuf::from));
+            .or_else(|| variable(CONFIG_VARIABLE).map(PathBuf::from));
         let file = match path {
             Some(path) => read_file(&path)?,
             None => FileContent::default(),
@@ -588,6 +613,25 @@ impl Settings {
         };
         let (settings, origins) = Self::resolve(flags, &layers)?;
         Ok((settings, Origins(origins)))
+    }
+
+    /// What the environment, or else the file that it names, says of one setting, and where; `None` if nothing. For commands
+    /// that need no other setting, and are not to fail by one.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or has a key that is no setting.
+    pub fn stated(
+        setting: &str,
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<Option<(String, Origin)>, ConfigError> {
+        if let Some(text) = variable(&variable_name(setting)) {
+            return Ok(Some((text, Origin::Variable)));
+        }
+        let Some(path) = variable(CONFIG_VARIABLE) else {
+            return Ok(None);
+        };
+        let text = read_file(Path::new(&path))?.values.remove(setting);
+        Ok(text.map(|text| (text, Origin::File)))
     }
 
     /// Takes the credentials of the archives and of an S3 store from the environment. Not part of
@@ -665,7 +709,7 @@ impl Layers {
         default: &str,
     ) -> Result<(T, Origin), ConfigError>
     where
-        T: FromStr<Err: Display>,
+        T: Setting,
     {
         if let Some(value) = flag {
             return Ok((value, Origin::Flag));
@@ -675,9 +719,9 @@ impl Layers {
             (None, Some(text)) => (text.as_str(), Origin::File),
             (None, None) => (default, Origin::Default),
         };
-        match text.parse() {
+        match T::read(text) {
             Ok(value) => Ok((value, origin)),
-            Err(error) => Err(ConfigError::BadValue {
+            Err(reason) => Err(ConfigError::BadValue {
                 setting,
                 // It may hold a password.
                 value: match setting {
@@ -685,7 +729,7 @@ impl Layers {
                     _ => text.to_owned(),
                 },
                 origin,
-                reason: error.to_string(),
+                reason,
             }),
         }
     }
@@ -696,7 +740,11 @@ fn read_file(path: &Path) -> Result<FileContent, ConfigError> {
         path: path.to_owned(),
         reason,
     };
-    let text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
+    let text = std::fs::read_to_string(path).map_err(|error| {
+        unreadable(format!(
+            "the file of settings cannot be read ({error}): give the path of a TOML file by --config or VENTRIFORM_CONFIG"
+        ))
+    })?;
     let table: toml::Table = text
         .parse()
         .map_err(|e: toml::de::Error| unreadable(e.to_string()))?;
@@ -731,28 +779,57 @@ fn nearest(key: &str) -> Option<String> {
         .map(|(_, name)| name.to_owned())
 }
 
-/// A value as it is written in the file. Needed because paths do not implement `Display`.
-trait Shown {
+/// The type of a setting: how its values are written, and read from a flag, a variable and the file.
+trait Setting: Clone + Send + Sync + 'static {
+    /// The value as it is written in the file.
     fn shown(&self) -> String;
-}
 
-impl Shown for PathBuf {
-    fn shown(&self) -> String {
-        self.display().to_string()
+    /// The value of a text.
+    ///
+    /// # Errors
+    /// What to give instead.
+    fn read(text: &str) -> Result<Self, String>;
+
+    /// The same, of a flag.
+    fn parser() -> clap::builder::ValueParser {
+        clap::builder::ValueParser::new(Self::read)
     }
 }
 
-macro_rules! shown_by_display {
+impl Setting for PathBuf {
+    fn shown(&self) -> String {
+        self.display().to_string()
+    }
+
+    fn read(text: &str) -> Result<Self, String> {
+        match text {
+            "" => Err("give a path such as ventriform-data".into()),
+            path => Ok(path.into()),
+        }
+    }
+
+    /// A path on the command line may be no text.
+    fn parser() -> clap::builder::ValueParser {
+        clap::builder::ValueParser::path_buf()
+    }
+}
+
+/// Types whose own errors say what to give instead.
+macro_rules! settings_of_our_own {
     ($($kind:ty),+) => {$(
-        impl Shown for $kind {
+        impl Setting for $kind {
             fn shown(&self) -> String {
                 self.to_string()
+            }
+
+            fn read(text: &str) -> Result<Self, String> {
+                text.parse().map_err(|error: <$kind as FromStr>::Err| error.to_string())
             }
         }
     )+};
 }
 
-shown_by_display!(
+settings_of_our_own!(
     Role,
     AeTitle,
     AllowList,
@@ -760,7 +837,6 @@ shown_by_display!(
     BlobPlace,
     DatabaseUrl,
     OtlpEndpoint,
-    SocketAddr,
     Count,
     MinFree,
     Span,
@@ -775,13 +851,32 @@ shown_by_display!(
     Tables<Procedure>,
     Tables<Sender>,
     String,
-    usize,
-    u32,
-    u64,
-    bool,
     Words,
     Limit<u64>,
     Limit<Size>
+);
+
+/// Types of the standard library, whose errors name a fault of syntax only.
+macro_rules! settings_of_the_library {
+    ($($kind:ty: $permitted:literal),+) => {$(
+        impl Setting for $kind {
+            fn shown(&self) -> String {
+                self.to_string()
+            }
+
+            fn read(text: &str) -> Result<Self, String> {
+                text.parse().map_err(|_| $permitted.to_owned())
+            }
+        }
+    )+};
+}
+
+settings_of_the_library!(
+    SocketAddr: "give an IP address with a port, such as 127.0.0.1:8080, 0.0.0.0:8080 or [::1]:8080",
+    usize: "give a whole number, such as 16",
+    u32: "give a whole number up to 4294967295, such as 16",
+    u64: "give a whole number, such as 16",
+    bool: "give `true` or `false`"
 );
 
 #[cfg(test)]

@@ -7,8 +7,8 @@
 
 use super::{Items, to_its_end};
 use crate::records::{
-    Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, Resource, StoreError,
-    Tenant, Timestamp,
+    Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, FileRecord, Receipt,
+    Resource, StoreError, Tenant, Timestamp,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -25,6 +25,9 @@ const PINS_POLL: Duration = Duration::from_millis(50);
 
 /// Local copies looked up at a time.
 const COPIES_BATCH: usize = 500;
+
+/// Items with the files that go with them.
+pub(super) type Doomed = BTreeMap<String, Vec<FileRecord>>;
 
 /// Ages at which things are erased. `None` keeps them until somebody erases them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -79,7 +82,7 @@ impl Items {
     }
 
     /// Waits a while for other processes that have pinned one of the items.
-    async fn wait_for_pins(&self, items: &[String]) -> Result<(), StoreError> {
+    pub(super) async fn wait_for_pins(&self, items: &[String]) -> Result<(), StoreError> {
         let Some(peers) = &self.peers else {
             return Ok(());
         };
@@ -166,30 +169,41 @@ impl Items {
         if ids.iter().any(|id| self.locks.is_pinned(id)) {
             return Ok(Erased::InUse);
         }
-        // Unless erased and settled below, the upkeep looks at them.
-        let mut doomed = BTreeMap::new();
-        for id in &ids {
+        let doomed = self.doom(&ids).await?;
+        let erased = self.catalogue.erase(order, &ids, self.clock.now()).await?;
+        if let Erased::Done(receipt) = &erased {
+            self.delete_files(receipt, &doomed).await;
+        }
+        Ok(erased)
+    }
+
+    /// Notes that files and records of items may disagree from now on, and returns their files. Unless they are erased and
+    /// settled, the upkeep looks at them.
+    pub(super) async fn doom(&self, ids: &[String]) -> Result<Doomed, StoreError> {
+        let mut doomed = Doomed::new();
+        for id in ids {
             let record = self.catalogue.record(id).await?;
             let files = record.map_or_else(Vec::new, |record| record.files());
             self.locks.doom(id, files.clone());
             doomed.insert(id.clone(), files);
         }
-        let erased = self.catalogue.erase(order, &ids, self.clock.now()).await?;
-        if let Erased::Done(receipt) = &erased {
-            self.overwrite_due.store(true, Ordering::Relaxed);
-            for item in &receipt.items {
-                let files = doomed.get(&item.id).map_or(&[][..], Vec::as_slice);
-                if item.files_erased
-                    && let Err(error) = self.blobs.delete(&item.id, files).await
-                {
-                    let id = &item.id;
-                    tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
-                    continue;
-                }
-                self.locks.settle(&item.id);
+        Ok(doomed)
+    }
+
+    /// Deletes the files of what a receipt names, where no tenant has it any more.
+    pub(super) async fn delete_files(&self, receipt: &Receipt, doomed: &Doomed) {
+        self.overwrite_due.store(true, Ordering::Relaxed);
+        for item in &receipt.items {
+            let files = doomed.get(&item.id).map_or(&[][..], Vec::as_slice);
+            if item.files_erased
+                && let Err(error) = self.blobs.delete(&item.id, files).await
+            {
+                let id = &item.id;
+                tracing::warn!(id, %error, "files could not be deleted; the upkeep tries again");
+                continue;
             }
+            self.locks.settle(&item.id);
         }
-        Ok(erased)
     }
 
     /// Erases items that are too old, page by page.

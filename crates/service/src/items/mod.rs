@@ -17,6 +17,7 @@
 mod add;
 mod content;
 mod erase;
+mod erase_scans;
 mod pins;
 mod read;
 mod sweep;

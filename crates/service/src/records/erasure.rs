@@ -60,8 +60,11 @@ pub struct Receipt {
     pub id: String,
     /// Whose item it was.
     pub tenant: Tenant,
-    /// The item that was to be erased.
+    /// The item that was to be erased; [`SELECTED_VOLUMES`](super::SELECTED_VOLUMES) if volumes were selected.
     pub item: String,
+    /// By what volumes were selected: names such as `study`, never their values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub selected_by: Vec<String>,
     /// When it was erased.
     pub erased_at: Timestamp,
     /// The name of who asked.

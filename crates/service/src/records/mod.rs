@@ -33,6 +33,7 @@ mod priority;
 mod product;
 mod resource;
 mod scan;
+mod scan_erasure;
 mod store_error;
 mod tenant;
 mod volume;
@@ -61,6 +62,9 @@ pub use priority::Priority;
 pub use product::{Product, ProductFile};
 pub use resource::Resource;
 pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
+pub use scan_erasure::{
+    SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
+};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};
 pub use ventriform::advice::{Failure, Fault};

@@ -10,8 +10,8 @@ use crate::query::{Query, QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::records::{
     AddedProduct, Bounded, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
-    ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource, ScanFields,
-    StoreResult, StoredVolume, Tags, Tenant, Timestamp,
+    ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource,
+    SELECTED_VOLUMES, ScanFields, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
 
 /// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
@@ -459,7 +459,14 @@ pub(super) fn listed_receipts(
     let mut query = QueryBuilder::new(format!("SELECT {columns} FROM erasures WHERE tenant = "));
     query.push_bind(tenant.to_string());
     if let Some(item) = item {
-        query.push(" AND item = ").push_bind(item.to_owned());
+        query.push(" AND item IN (").push_bind(item.to_owned());
+        query.push(", ").push_bind(SELECTED_VOLUMES);
+        query.push(") AND (item = ").push_bind(item.to_owned());
+        // A receipt for many volumes names them in its document only. Both engines have `replace`, and it knows no
+        // wildcards.
+        let named = format!("{{\"id\":{}", serde_json::Value::from(item));
+        query.push(" OR replace(receipt, ").push_bind(named);
+        query.push(", '') != receipt)");
     }
     push_page(&mut query, "sequence", page);
     query

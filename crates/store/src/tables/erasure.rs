@@ -18,7 +18,7 @@ use ventriform_service::records::{
 };
 
 /// The prefix of the ids of receipts.
-const RECEIPT_PREFIX: &str = "ers_";
+pub(super) const RECEIPT_PREFIX: &str = "ers_";
 
 /// The products of a volume.
 pub(super) async fn made_of(
@@ -76,6 +76,7 @@ pub(super) async fn erase(
         id: random_id(RECEIPT_PREFIX),
         tenant: tenant.clone(),
         item: order.id.clone(),
+        selected_by: Vec::new(),
         erased_at: now,
         erased_by: order.by.name.clone(),
         audit: AuditMark {
@@ -86,19 +87,25 @@ pub(super) async fn erase(
         items,
         jobs,
     };
+    store_receipt(to, &receipt).await?;
+    Ok(Erased::Done(Box::new(receipt)))
+}
+
+/// Stores a receipt.
+pub(super) async fn store_receipt(to: &mut Transaction<'_>, receipt: &Receipt) -> StoreResult<()> {
     query(
         "INSERT INTO erasures (id, tenant, item, erased_at, erased_by, receipt)
          VALUES ($1, $2, $3, $4, $5, $6)",
     )
     .bind(&receipt.id)
-    .bind(tenant.as_str())
+    .bind(receipt.tenant.as_str())
     .bind(&receipt.item)
-    .bind(now)
+    .bind(receipt.erased_at)
     .bind(&receipt.erased_by)
-    .bind(to_json(&receipt)?)
+    .bind(to_json(receipt)?)
     .execute(to)
     .await?;
-    Ok(Erased::Done(Box::new(receipt)))
+    Ok(())
 }
 
 /// The row of the audit trail about an erasure.
@@ -134,7 +141,7 @@ async fn has(
 }
 
 /// The item on legal hold that keeps this one: itself, or a volume that it was made of.
-async fn legal_hold(
+pub(super) async fn legal_hold(
     from: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
@@ -167,7 +174,7 @@ async fn is_needed(from: &mut Transaction<'_>, tenant: &Tenant, id: &str) -> Sto
 }
 
 /// Deletes a tenant's ownership and, if it was the last one, the record of the content.
-async fn release(
+pub(super) async fn release(
     to: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
@@ -199,7 +206,7 @@ async fn release(
 }
 
 /// The files of an item as its record describes them.
-async fn files_of(from: &mut Transaction<'_>, id: &str) -> StoreResult<Vec<ErasedFile>> {
+pub(super) async fn files_of(from: &mut Transaction<'_>, id: &str) -> StoreResult<Vec<ErasedFile>> {
     let row = query(
         "SELECT files FROM volumes WHERE id = $1 UNION ALL SELECT files FROM products WHERE id = $1",
     )
@@ -213,7 +220,7 @@ async fn files_of(from: &mut Transaction<'_>, id: &str) -> StoreResult<Vec<Erase
 }
 
 /// Deletes the records of the jobs on a volume, or that needed it.
-async fn delete_jobs(
+pub(super) async fn delete_jobs(
     to: &mut Transaction<'_>,
     tenant: &Tenant,
     volume: &str,

@@ -13,6 +13,7 @@ mod jobs;
 mod pages;
 mod peers;
 mod rows;
+mod scan_erasure;
 mod scans;
 mod worklist;
 

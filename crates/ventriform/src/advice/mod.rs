@@ -723,10 +723,7 @@ fn volume_advice(error: &VolumeError) -> String {
             "Transfer the file again; if that does not help, export it again from its source."
                 .into()
         }
-        VolumeError::TooLarge { what, limit, .. } => format!(
-            "Crop or resample the volume to at most {limit} {what}, or ask the operator to raise \
-             the limit."
-        ),
+        VolumeError::TooLarge { what, limit, .. } => too_large_advice(what, *limit),
         VolumeError::FrameNeeded { frames, .. } | VolumeError::FrameOutOfRange { frames, .. } => {
             let last = frames.saturating_sub(1);
             format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
@@ -752,6 +749,27 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::Memory { .. } => "Try again later, or use a smaller volume.".into(),
         VolumeError::Io { .. } => "Check that the file exists and can be read.".into(),
         VolumeError::Cancelled(_) => START_AGAIN.into(),
+    }
+}
+
+/// What to do about more of something than one volume may have.
+fn too_large_advice(what: &str, limit: u64) -> String {
+    match what {
+        "levels" => {
+            "Give the folder of the scan itself, not one far above it; `--folder-limit` allows more levels.".into()
+        }
+        _ if what.starts_with("files") || what.contains("directory") => format!(
+            "Give the files of one scan alone: at most {limit} {what}; `--file-limit`, or the operator's setting `file_limit`, \
+             allows more."
+        ),
+        _ if what.contains("bytes") => format!(
+            "Give one scan without other files, or a smaller one: at most {limit} {what}. The operator's setting \
+             `decompressed_limit` allows more."
+        ),
+        _ => format!(
+            "Crop or resample the volume to at most {limit} {what}, or ask the operator to raise \
+             the limit."
+        ),
     }
 }
 

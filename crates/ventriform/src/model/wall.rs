@@ -454,7 +454,7 @@ impl AxisFrame {
         let distance = outward.norm();
         WallPosition {
             row: from_apex / self.row_spacing() - 0.5,
-            // Rounding may give RAY_COLUMNS itself.
+            // Rounding may give `RAY_COLUMNS` itself.
             column: (turn * RAY_COLUMNS as f64 - 0.5).rem_euclid(RAY_COLUMNS as f64)
                 % RAY_COLUMNS as f64,
             distance,

@@ -440,7 +440,7 @@ mod tests {
             }
         );
         assert_eq!(search(20, 0).1, [21]);
-        // Up to LEAST_TRIED, or to a multiple of the first number if that is more, but never beyond MOST_POINTS.
+        // Up to `LEAST_TRIED`, or to a multiple of the first number if that is more, but never beyond `MOST_POINTS`.
         for (points, most) in [
             (20, LEAST_TRIED),
             (399, NEEDED_FACTOR * 400),

@@ -1,5 +1,5 @@
 //! A row of the trail as an AuditEvent of FHIR R4, in the form of IHE BALP (Basic Audit Log
-//! Patterns): `rest` events with the interaction as the subtype, and DICOM_SYSTEM codes for security
+//! Patterns): `rest` events with the interaction as the subtype, and codes of DICOM for security
 //! events.
 
 use super::event::{Activity, AuditRecord, Outcome};
@@ -42,7 +42,7 @@ impl Codes {
         let alert = ["110113", "Security Alert"];
         let attributes = ["110137", "User Security Attributes Changed"];
         let trail = ["110101", "Audit Log Used"];
-        // DICOM_SYSTEM has no codes for these.
+        // DICOM has no codes for these.
         let own = |code, display| Self {
             kind: coding(DICOM_SYSTEM, alert[0], alert[1]),
             subtype: coding(OWN_SYSTEM, code, display),

@@ -54,7 +54,11 @@ pub(super) fn put(
     set.text(tags::BURNED_IN_ANNOTATION, burned_in);
     set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
     if let Some(images) = scan.images() {
-        set.items(tags::SOURCE_IMAGE_SEQUENCE, images.processed());
+        let mut sources = images.processed();
+        for source in &mut sources {
+            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "NO");
+        }
+        set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
     }
     set.short(tags::SAMPLES_PER_PIXEL, 3);
     set.text(tags::PHOTOMETRIC_INTERPRETATION, "RGB");

@@ -3,7 +3,8 @@
 //!
 //! Every slice of a segment is a frame, also where it is empty: viewers that count frames would otherwise
 //! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order of the slices if the
-//! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
+//! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position. Each names the image or
+//! frame that its slice was read from, pixel for pixel (Spatial Locations Preserved), so that readers find it by that.
 
 use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
 use super::data_set::DataSet;
@@ -183,7 +184,12 @@ fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize)
     group.item(tags::SEGMENT_IDENTIFICATION_SEQUENCE, segment);
     if let Some(source) = results.scan.slice_reference(k) {
         let mut derivation = DataSet::new();
-        derivation.item(tags::SOURCE_IMAGE_SEQUENCE, for_processing(source));
+        let mut source = for_processing(source);
+        // Rows, columns and slices are the scan's own.
+        if results.scan.names_slice(k) {
+            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "YES");
+        }
+        derivation.item(tags::SOURCE_IMAGE_SEQUENCE, source);
         derivation.code(tags::DERIVATION_CODE_SEQUENCE, SEGMENTATION_STEP);
         group.item(tags::DERIVATION_IMAGE_SEQUENCE, derivation);
     }

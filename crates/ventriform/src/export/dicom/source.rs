@@ -376,14 +376,19 @@ impl SourceScan {
     pub(super) fn slice_reference(&self, k: usize) -> Option<DataSet> {
         let p = &self.provenance;
         let class = p.sop_class_uid.as_deref()?;
-        if let Some(uid) = p.instance_uids.get(k) {
-            return Some(reference(class, uid));
-        }
-        let mut item = reference(class, p.sop_instance_uid.as_deref()?);
+        let instance = p.instance_uids.get(k).or(p.sop_instance_uid.as_ref());
+        let mut item = reference(class, instance?);
         if let Some(frame) = p.slice_frames.get(k) {
             item.text(tags::REFERENCED_FRAME_NUMBER, frame.to_string());
         }
         Some(item)
+    }
+
+    /// Whether [`SourceScan::slice_reference`] names the one image or frame of slice `k`, and not an instance with others.
+    pub(super) fn names_slice(&self, k: usize) -> bool {
+        let p = &self.provenance;
+        let is_alone = self.shape[2] == 1 && p.sop_instance_uid.is_some();
+        is_alone || k < p.instance_uids.len() || k < p.slice_frames.len()
     }
 
     /// When the results were made.

@@ -243,6 +243,7 @@ fn the_mask_lies_where_it_was_made() {
                             text(source, tags::REFERENCED_SOP_INSTANCE_UID),
                             "1.2.3.4.5.6"
                         );
+                        assert_eq!(text(source, tags::SPATIAL_LOCATIONS_PRESERVED), "YES");
                     }
                 }
             }
@@ -295,6 +296,54 @@ fn the_cavity_is_a_segment_of_its_own() {
     let alone = from_reader(&write(None).unwrap().unwrap()[..]).unwrap();
     let uid = |set: &DefaultDicomObject| text(set, tags::SOP_INSTANCE_UID);
     assert_ne!(uid(&alone), uid(&set));
+}
+
+/// A slice whose image or frame is named is that image pixel for pixel; of an instance that is named as a whole, nothing is
+/// claimed; and no picture has the places of its scan.
+#[test]
+fn what_lies_as_its_source_does_says_so() {
+    let slices = SCAN_SHAPE[2];
+    let series = || Provenance {
+        slice_frames: Vec::new(),
+        instance_uids: (1..=slices).map(|k| format!("1.2.3.{k}")).collect(),
+        ..provenance()
+    };
+    let parts = Provenance {
+        slice_frames: (0..slices as u32).map(|k| k % 7 + 1).collect(),
+        ..series()
+    };
+    let whole = Provenance {
+        slice_frames: Vec::new(),
+        ..provenance()
+    };
+    for (known, framed, said) in [
+        (provenance(), true, Some("YES")),
+        (series(), false, Some("YES")),
+        (parts, true, Some("YES")),
+        (whole, false, None),
+    ] {
+        let scene = Scene::new(orientations()[0], known, true);
+        let cavity = Mask::empty(SCAN_SHAPE);
+        let made = scene.results().with_cavity(Some(&cavity));
+        let made = made.write(DicomObject::Mask).unwrap().unwrap();
+        let set = from_reader(&made[..]).unwrap();
+        let frames = items(&set, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
+        assert_eq!(frames.len(), 2 * slices);
+        for frame in frames {
+            let derivation = only(frame, tags::DERIVATION_IMAGE_SEQUENCE);
+            let source = only(derivation, tags::SOURCE_IMAGE_SEQUENCE);
+            let has = |tag| source.element(tag).is_ok();
+            assert_eq!(has(tags::REFERENCED_FRAME_NUMBER), framed);
+            let preserved = tags::SPATIAL_LOCATIONS_PRESERVED;
+            let preserved = has(preserved).then(|| text(source, preserved));
+            assert_eq!(preserved.as_deref(), said);
+        }
+        for picture in [DicomObject::Page, DicomObject::Polar] {
+            for source in items(&scene.read(picture), tags::SOURCE_IMAGE_SEQUENCE) {
+                assert_eq!(text(source, tags::SPATIAL_LOCATIONS_PRESERVED), "NO");
+            }
+        }
+    }
 }
 
 /// Slices of a volume are filled by its contours exactly where voxel centres lie inside the mesh.

@@ -897,6 +897,11 @@ impl OpenVolume for DicomFile {
                     .map(|slice| self.instances[slice.part].clone());
                 provenance.instance_uids = uids.collect();
                 provenance.sop_instance_uid = provenance.instance_uids.first().cloned();
+                // Instances of one frame each have no numbers of frames.
+                if slices.iter().any(|slice| slice.frame > 0) {
+                    let frames = slices.iter().map(|slice| slice.frame as u32 + 1);
+                    provenance.slice_frames = frames.collect();
+                }
             } else if (self.parts.len() == 1 || of_gate.is_some())
                 && self.format != FileFormat::DicomSeries
             {
