@@ -1,19 +1,23 @@
 //! `ventriform audit`: checks the audit trail of a data folder, also while the service runs on it.
 
-use super::data_args::DataArgs;
-use super::output::{json, say};
+use super::data_args::{DataArgs, StoreArgs};
+use super::output::{json, note, say};
+use crate::server::store_settings;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
+use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
 use ventriform_service::records::ListRequest;
-use ventriform_store::IfNone;
+use ventriform_store::{IfNone, Store, apply, missed, require_store};
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform audit verify --data-dir data
   ventriform audit print --data-dir data > audit.ndjson
+  ventriform audit missed --from data.broken --data-dir data
+  ventriform audit missed --from data.broken --data-dir data --apply
 
 `verify` prints the newest hash. Keep it in another place: a trail that was written anew as a
 whole has other hashes.")]
@@ -26,8 +30,23 @@ pub struct AuditArgs {
 enum AuditCommand {
     /// Walk the chain of hashes and name the first break; fails if there is one
     Verify(DataArgs),
+    /// Say what a newer trail has and this one lacks: keys revoked, items erased and legal holds set after the backup that
+    /// was restored here; with --apply, do the same here (stop the service first)
+    Missed(MissedArgs),
     /// Print all events, newest first, one FHIR AuditEvent per line
     Print(DataArgs),
+}
+
+#[derive(Debug, Args)]
+struct MissedArgs {
+    /// Data folder with the newer trail, such as the one that was replaced; its database may be damaged
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Do here what was missed
+    #[arg(long)]
+    apply: bool,
+    #[command(flatten)]
+    store: StoreArgs,
 }
 
 /// Runs the command.
@@ -38,6 +57,7 @@ pub fn run(args: &AuditArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
         match &args.command {
             AuditCommand::Verify(args) => check(args).await,
+            AuditCommand::Missed(args) => catch_up(args).await,
             AuditCommand::Print(args) => print(args).await,
         }
     })
@@ -47,6 +67,14 @@ async fn check(args: &DataArgs) -> Result<()> {
     let store = args.open(IfNone::Refuse).await?;
     let report = verify(&*store).await?;
     if let Some(broken) = report.broken {
+        for row in &report.unconfirmed {
+            note!(
+                "{} names row {} with the hash {}",
+                row.place,
+                row.sequence,
+                row.hash
+            );
+        }
         bail!(
             "the audit trail is broken: {broken} ({} rows before it are in order)",
             report.rows
@@ -58,6 +86,47 @@ async fn check(args: &DataArgs) -> Result<()> {
         report.newest,
         report.head
     );
+    Ok(())
+}
+
+async fn catch_up(args: &MissedArgs) -> Result<()> {
+    let service = args.store.settings()?;
+    ventriform_http::install_cryptography();
+    let folder = &service.settings.data_dir;
+    if service.settings.database.0.is_none() {
+        require_store(folder, IfNone::Refuse).map_err(|error| service.explained(error))?;
+    }
+    let mut store = Store::open_with(folder, store_settings(&service.settings)).await?;
+    let told = tell_missed(args, &store).await;
+    store.close().await;
+    told
+}
+
+async fn tell_missed(args: &MissedArgs, store: &Store) -> Result<()> {
+    let missed = missed(&store.rows, &args.from).await?;
+    for act in &missed.acts {
+        say!("{act}");
+    }
+    let rows = missed.rows.len();
+    say!(
+        "{} acts are missed; {rows} rows of the newer trail follow those here",
+        missed.acts.len()
+    );
+    for table in &missed.unread {
+        note!("of the newer store could not be read: {table}");
+    }
+    if args.apply {
+        let left = apply(store, &missed).await?;
+        if !left.is_empty() {
+            bail!("not done:\n{}", left.join("\n"));
+        }
+        say!("all of them are done here");
+    } else if !missed.acts.is_empty() || rows > 0 {
+        say!("do the same here: give --apply");
+    }
+    if !missed.unread.is_empty() {
+        bail!("what the unreadable tables say may be missed still");
+    }
     Ok(())
 }
 

@@ -8,27 +8,31 @@ use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::records::Tenant;
-use ventriform_store::Examination;
+use ventriform_store::{Examination, Repair, examine, examine_on_server};
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform doctor --data-dir data
   ventriform doctor --data-dir data --repair
+  ventriform doctor --data-dir data --repair --tenant clinic-b
   ventriform doctor --data-dir data --json
+  ventriform doctor --data-dir data --database postgres://ventriform@db/ventriform
   ventriform doctor --data-dir data --blobs s3://hearts/prod
 
-The status is 0 if nothing is wrong or everything was repaired, else 1. A repair deletes no content:
-what is broken or has no record is moved into the folder `quarantine`.")]
+The status is 0 if nothing is wrong or everything was repaired, else 1; also 1 if a repair found that rows are
+lost. A repair deletes no content: what is broken or has no record is moved into the folder `quarantine`. What it
+lost, gave to somebody or closed is named here and written into the audit trail.")]
 pub struct DoctorArgs {
     #[command(flatten)]
     store: StoreArgs,
     /// Repair what can be repaired
     #[arg(long)]
     repair: bool,
-    /// Tenant that gets the items whose holder is unknown
-    #[arg(long, value_name = "NAME", default_value = "default")]
-    tenant: Tenant,
+    /// Tenant that gets the items whose holder is unknown, with a legal hold on volumes; unless given, they go to the
+    /// quarantine, where they stay
+    #[arg(long, value_name = "NAME", requires = "repair")]
+    tenant: Option<Tenant>,
     /// Print the findings as JSON
     #[arg(long)]
     json: bool,
@@ -53,16 +57,23 @@ pub struct BackupArgs {
 /// # Errors
 /// If the folder cannot be examined, or something is wrong that was not repaired.
 pub fn run(args: &DoctorArgs) -> Result<()> {
-    let heirs = args.repair.then_some(&args.tenant);
+    let repair = args.repair.then(|| Repair {
+        heir: args.tenant.clone(),
+    });
     let service = args.store.settings()?;
-    service.require_file("the tools of PostgreSQL check it, such as pg_amcheck")?;
     ventriform_http::install_cryptography();
-    let s3 = s3_location(&service.settings);
-    let found = ventriform_store::examine(&service.settings.data_dir, s3.as_ref(), heirs);
-    let found = Runtime::new()?.block_on(found);
+    let settings = &service.settings;
+    let (s3, server) = (s3_location(settings), settings.postgres());
+    let found = Runtime::new()?.block_on(async {
+        let (folder, s3, repair) = (&settings.data_dir, s3.as_ref(), repair.as_ref());
+        match &server {
+            Some(server) => examine_on_server(folder, server, s3, repair).await,
+            None => examine(folder, s3, repair).await,
+        }
+    });
     let found = found
         .map_err(|error| service.explained(error))
-        .with_context(|| format!("examining {}", service.settings.data_dir.display()))?;
+        .with_context(|| format!("examining {}", settings.data_dir.display()))?;
     if args.json {
         json(&serde_json::to_string_pretty(&found)?)
     } else {
@@ -70,6 +81,11 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     }
     if found.is_healthy() {
         return Ok(());
+    }
+    if args.repair {
+        bail!(
+            "not everything could be repaired: what is lost is named above and in the audit trail; a backup may have it"
+        )
     }
     bail!("the folder is not healthy; repair it with --repair, or restore a backup")
 }

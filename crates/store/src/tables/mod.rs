@@ -10,6 +10,8 @@ mod figures;
 mod hooks;
 mod intake;
 mod jobs;
+mod marks;
+mod owners;
 mod pages;
 mod peers;
 mod rows;
@@ -17,5 +19,6 @@ mod scan_erasure;
 mod scans;
 mod worklist;
 
-pub(super) use catalogue::insert_content;
+pub(crate) use marks::{Access, Marks, anchor_of};
+pub(crate) use owners::{Holder, Holding, REPAIRER};
 pub(super) use rows::to_json;
