@@ -111,7 +111,7 @@ struct ReadMask {
 }
 
 /// The error `text` about the file at `path`, which many errors state already.
-fn named(path: &Path, text: &str) -> Error {
+fn about(path: &Path, text: &str) -> Error {
     let path = path.display().to_string();
     if text.contains(&path) {
         anyhow!("{text}")
@@ -173,6 +173,6 @@ fn read(
             mask,
             by_common_label,
         }),
-        Err(error) => Err(named(path, &error.with_advice())),
+        Err(error) => Err(about(path, &error.with_advice())),
     }
 }
