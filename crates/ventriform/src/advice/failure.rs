@@ -10,7 +10,8 @@ pub struct Failure {
     pub code: String,
     /// Where the cause lies.
     pub fault: Fault,
-    /// The cause, with the values involved, as a sentence. Contains no patient data.
+    /// The cause, with the values involved, as a sentence. Contains patient data only where files contradict each other
+    /// on whose they are.
     pub detail: String,
     /// The parameter, or the field of the file, that caused it.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -9,6 +9,7 @@
 //! 2. Of what nothing calls gates, each must show the heart where the others do (the correlation with their mean), have counts like
 //!    them, and not fall into groups: distances between the groups that are beyond all distances within them. A heart that beats passes
 //!    through all shapes between its extremes; scans at rest and under stress, or with and without attenuation correction, do not.
+//!    Where the volumes change by more than noise, each must be near the next.
 //!
 //! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes without groups are moments of
 //! one beat; a fit tells ([`crate::beat`]).
@@ -48,6 +49,14 @@ const GROUPS_APART: f64 = 2.0;
 const SMOOTH_STEP: f64 = 0.95;
 /// Least squared distance of noisy volumes, as a share of the usual step.
 const NOISE_STEP: f64 = 0.03;
+/// Share of the blocks that change most.
+const CHANGING_SHARE: f64 = 0.03;
+/// Variance of these over the usual one, both over the mean, from which on a change is none of noise.
+const CLEAR_CHANGE: f64 = 6.0;
+/// Mean squared step of a beat in these blocks, as a share of the mean squared distance: of eight gates and more, and of fewer.
+const CLEAR_STEPS: [f64; 2] = [0.55, 0.62];
+/// Blocks darker than this share of the brightest have no usual variance, and none below the second share has a scale.
+const DARK_SHARES: [f64; 2] = [0.1, 0.02];
 /// Squared distance, as a share of the squared contrast of the image, up to which groups are of equal images: 2 % of it.
 const EQUAL_DISTANCE: f64 = 3e-4;
 
@@ -327,6 +336,13 @@ impl Images {
                 groups.join("; ")
             ));
         }
+        if self.jumps(&kept, &distances) {
+            return Some(
+                "nothing in the file calls them gates, and they do not follow each other as moments of a beat do, as the hearts of several \
+                 people do not"
+                    .into(),
+            );
+        }
         let odd = !timed && !USUAL_GATES.contains(&kept.len());
         (odd && !is_smooth(&distances)).then(|| {
             format!(
@@ -336,6 +352,45 @@ impl Images {
                 USUAL_GATES.map(|n| n.to_string()).join(", ")
             )
         })
+    }
+
+    /// Whether volumes with these `distances` change by more than noise does, and not in steps as small as those of a beat.
+    fn jumps(&self, volumes: &[usize], distances: &[Vec<f64>]) -> bool {
+        if mean_apart(distances) <= EQUAL_DISTANCE {
+            return false;
+        }
+        let mean = self.mean(volumes, None);
+        let brightest = mean.iter().copied().fold(0.0, f64::max);
+        let count = volumes.len();
+        let change = |block: usize| {
+            let values = volumes.iter().map(|n| f64::from(self.blocks[*n][block]));
+            let square = values
+                .map(|value| (value - mean[block]).powi(2))
+                .sum::<f64>();
+            square / count as f64 / (mean[block] + DARK_SHARES[1] * brightest)
+        };
+        let changes: Vec<f64> = (0..mean.len()).map(change).collect();
+        let mut order: Vec<usize> = (0..mean.len()).collect();
+        order.sort_by(|a, b| changes[*b].total_cmp(&changes[*a]));
+        let most = &order[..((CHANGING_SHARE * order.len() as f64) as usize).max(1)];
+        let bright = order
+            .iter()
+            .filter(|block| mean[**block] > DARK_SHARES[0] * brightest);
+        let usual: Vec<f64> = bright.map(|block| changes[*block]).collect();
+        let Some(usual) = usual.get(usual.len() / 2) else {
+            return false;
+        };
+        let largest = most.iter().map(|block| changes[*block]).sum::<f64>() / most.len() as f64;
+        let between = |a: &usize, b: &usize| -> f64 {
+            let apart = |block: &usize| self.blocks[*a][*block] - self.blocks[*b][*block];
+            most.iter()
+                .map(|block| f64::from(apart(block)).powi(2))
+                .sum()
+        };
+        let row = |a: &usize| volumes.iter().map(|b| between(a, b)).collect();
+        let changing: Vec<Vec<f64>> = volumes.iter().map(row).collect();
+        let bound = CLEAR_STEPS[usize::from(count < USUAL_GATES[0])];
+        largest > CLEAR_CHANGE * usual && mean_step(&changing) > bound * mean_apart(&changing)
     }
 
     /// Squared distances between the volumes, as shares of the squared deviation of their mean.
@@ -453,11 +508,20 @@ fn is_noisy(distances: &[Vec<f64>]) -> bool {
 
 /// Whether neighbours about the cycle are nearer to each other than volumes are in the mean.
 fn is_smooth(distances: &[Vec<f64>]) -> bool {
+    mean_step(distances) <= SMOOTH_STEP * mean_apart(distances)
+}
+
+/// The mean distance of neighbours about the cycle.
+fn mean_step(distances: &[Vec<f64>]) -> f64 {
     let count = distances.len();
     let steps: f64 = (0..count).map(|n| distances[n][(n + 1) % count]).sum();
-    let all: f64 = distances.iter().flatten().sum();
-    let mean = all / (count * (count - 1)) as f64;
-    steps / count as f64 <= SMOOTH_STEP * mean
+    steps / count as f64
+}
+
+/// The mean distance of two.
+fn mean_apart(distances: &[Vec<f64>]) -> f64 {
+    let count = distances.len();
+    distances.iter().flatten().sum::<f64>() / (count * (count - 1)) as f64
 }
 
 #[cfg(test)]
@@ -699,6 +763,19 @@ mod tests {
             .collect();
         let told = refusal(&people);
         assert!(told.contains("shows another heart"), "{told}");
+        // Hearts of one place that differ a little.
+        let alike = |n: usize| {
+            let [a, b, c] = [5, 3, 7].map(|step| (n * step % 8) as f64 / 8.0 - 0.5);
+            let centre = USUAL.centre + 6.0 * Vec3::new(a, b, c);
+            Heart {
+                centre,
+                radius_mm: 30.0 + 4.0 * b,
+                ..USUAL
+            }
+            .image()
+        };
+        let told = refusal(&(0..8).map(alike).collect::<Vec<_>>());
+        assert!(told.contains("do not follow each other"), "{told}");
         // One stranger among gates.
         let mut stranger = beat(8, 1.0);
         stranger[5] = people[0].clone();

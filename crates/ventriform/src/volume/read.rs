@@ -54,7 +54,11 @@ fn read_with_statements(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<(Reading, Statements), VolumeError> {
-    let mut opened = open_judged(files, limits, monitor)?;
+    // A volume that the caller chose is what it is.
+    let mut opened = match options.frame {
+        Some(_) => open(files, limits, monitor)?,
+        None => open_judged(files, limits, monitor)?,
+    };
     let reading = open::read(&mut *opened.file, *options, monitor);
     let mut reading = reading.map_err(|error| error.with_path(files))?;
     reading.facts.warnings.extend(opened.notes);

@@ -18,12 +18,12 @@
 use super::attributes::{
     ACQUISITION_DATE, ACQUISITION_TIME, ATTENUATION_METHOD, Attribute, Attributes,
     CONVOLUTION_KERNEL, CORRECTED_IMAGE, COUNTS_SOURCE, DECAY_CORRECTION, ENERGY_LOWER,
-    ENERGY_UPPER, FRAME_OF_REFERENCE, IMAGE_TYPE, INJECTED_DOSE, INJECTION_TIME, MANUFACTURER,
-    MODALITY, MODEL_NAME, NUCLIDE_MEANING, PATIENT_BIRTH_DATE, PATIENT_ID, PATIENT_ID_ISSUER,
-    PATIENT_NAME, PATIENT_POSITION, PATIENT_SEX, PET_ENERGY_LOWER, PET_ENERGY_UPPER,
-    PHARMACEUTICAL_MEANING, PHARMACEUTICAL_NAME, RANDOMS_METHOD, RECONSTRUCTION_METHOD,
-    RESCALE_TYPE, SCATTER_METHOD, SERIES_DESCRIPTION, SERIES_TYPE, SOP_CLASS, STUDY_DATE,
-    STUDY_UID, SUV_TYPE, UNITS, clip,
+    ENERGY_UPPER, FRAME_OF_REFERENCE, IMAGE_TYPE, INJECTED_DOSE, INJECTION_TIME, INSTANCE_NUMBER,
+    MANUFACTURER, MODALITY, MODEL_NAME, NUCLIDE_MEANING, PATIENT_BIRTH_DATE, PATIENT_ID,
+    PATIENT_ID_ISSUER, PATIENT_NAME, PATIENT_POSITION, PATIENT_SEX, PET_ENERGY_LOWER,
+    PET_ENERGY_UPPER, PHARMACEUTICAL_MEANING, PHARMACEUTICAL_NAME, RANDOMS_METHOD,
+    RECONSTRUCTION_METHOD, RESCALE_TYPE, SCATTER_METHOD, SERIES_DESCRIPTION, SERIES_TYPE,
+    SOP_CLASS, STUDY_DATE, STUDY_UID, SUV_TYPE, UNITS, clip,
 };
 use super::rest_stress::rest_or_stress;
 use std::collections::BTreeMap;
@@ -162,7 +162,7 @@ const REST_OR_STRESS: Row = named(
 /// What one file says of the scan: a text for each row, if the file states one.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct ScanStatement {
-    /// Name of the file.
+    /// Name of the file, and its Instance Number, by which others know it.
     file: String,
     values: Vec<Option<String>>,
 }
@@ -179,7 +179,10 @@ impl ScanStatement {
             (!text.is_empty()).then(|| text.to_owned())
         };
         Self {
-            file: a.file.clone(),
+            file: match a.text(INSTANCE_NUMBER) {
+                Some(number) => format!("{} (Instance Number {})", a.file, clip(&number)),
+                None => a.file.clone(),
+            },
             values: TABLE.iter().map(stated).collect(),
         }
     }

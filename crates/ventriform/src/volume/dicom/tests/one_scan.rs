@@ -244,7 +244,10 @@ fn slices_of_two_scans_are_refused_by_the_attribute_that_tells() {
         let told = said(&slices_of(&says(one), &says(other)));
         is_refused_by(&told, name, [one, other]);
         let text = told.unwrap_err();
-        let of_files = ["files, such as 0, and", "files, such as 2"];
+        let of_files = [
+            "files, such as 0 (Instance Number 1), and",
+            "files, such as 2 (Instance Number 3)",
+        ];
         assert!(of_files.iter().all(|part| text.contains(part)), "{text}");
         for same in [says(one), says(spelled), Elements::new()] {
             let told = said(&slices_of(&says(one), &same));
