@@ -121,7 +121,7 @@ pub fn refusal(error: &clap::Error) -> String {
 }
 
 /// Messages of the system that may stand in any failure, and what they mean.
-const SYSTEM_MESSAGES: [(&str, &str); 9] = [
+const SYSTEM_MESSAGES: [(&str, &str); 10] = [
     (
         "No such file or directory (os error 2)",
         "there is no such file or folder",
@@ -144,6 +144,10 @@ const SYSTEM_MESSAGES: [(&str, &str); 9] = [
     ),
     ("No space left on device (os error 28)", "the disk is full"),
     ("Read-only file system (os error 30)", "it can only be read"),
+    (
+        "Connection refused (os error 111)",
+        "no program listens there",
+    ),
     (
         "Address already in use (os error 98)",
         "another program uses this address",

@@ -16,10 +16,10 @@ use ventriform::volume::ReadLimits;
 pub struct MeshArgs {
     /// Unit of meshes (STL, PLY, OBJ, VTK, VTP, glTF) that do not state theirs: mm, cm or m
     /// [default: mm, of glTF m]
-    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = "Meshes")]
     mesh_unit: Option<MeshUnit>,
     /// Frame of meshes that do not state theirs: lps (DICOM) or ras (NIfTI) [default: lps]
-    #[arg(long, value_name = "FRAME", value_parser = parse_frame)]
+    #[arg(long, value_name = "FRAME", value_parser = parse_frame, help_heading = "Meshes")]
     mesh_frame: Option<MeshFrame>,
 }
 

@@ -456,8 +456,12 @@ pub(super) fn listed_receipts(
         Columns::All => "sequence, receipt",
         Columns::Size => "sequence, CAST(octet_length(receipt) AS BIGINT)",
     };
-    let mut query = QueryBuilder::new(format!("SELECT {columns} FROM erasures WHERE tenant = "));
-    query.push_bind(tenant.to_string());
+    let mut query = QueryBuilder::new(format!("SELECT {columns} FROM erasures"));
+    if item.is_some() {
+        // In the order of the list, SQLite would read all receipts of the tenant.
+        query.push_sqlite(" INDEXED BY erasures_by_item");
+    }
+    query.push(" WHERE tenant = ").push_bind(tenant.to_string());
     if let Some(item) = item {
         query.push(" AND item IN (").push_bind(item.to_owned());
         query.push(", ").push_bind(SELECTED_VOLUMES);
