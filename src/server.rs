@@ -36,7 +36,8 @@ pub fn s3_location(settings: &Settings) -> Option<S3Location> {
     })
 }
 
-fn store_settings(settings: &Settings) -> StoreSettings {
+/// The settings of a store.
+pub fn store_settings(settings: &Settings) -> StoreSettings {
     StoreSettings {
         min_free: settings.min_free.0.map(|size| size.0),
         write_wait: settings.write_wait.0,

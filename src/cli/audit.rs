@@ -1,18 +1,24 @@
 //! `ventriform audit`: checks the audit trail of a data folder, also while the service runs on it.
 
 use super::data_args::DataArgs;
-use super::output::{json, say};
+use super::output::{json, note, say};
+use super::serve::variable;
+use crate::server::store_settings;
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
+use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
 use ventriform_service::records::ListRequest;
+use ventriform_store::{Store, apply, missed};
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform audit verify --data-dir data
   ventriform audit print --data-dir data > audit.ndjson
+  ventriform audit missed --from data.broken --data-dir data
+  ventriform audit missed --from data.broken --data-dir data --apply
 
 `verify` prints the newest hash. Keep it in another place: a trail that was written anew as a
 whole has other hashes.")]
@@ -25,8 +31,23 @@ pub struct AuditArgs {
 enum AuditCommand {
     /// Walk the chain of hashes and name the first break; fails if there is one
     Verify(DataArgs),
+    /// Say what a newer trail has and this one lacks: keys revoked, items erased and legal holds set after the backup that
+    /// was restored here; with --apply, do the same here (stop the service first)
+    Missed(MissedArgs),
     /// Print all events, newest first, one FHIR AuditEvent per line
     Print(DataArgs),
+}
+
+#[derive(Debug, Args)]
+struct MissedArgs {
+    /// Data folder with the newer trail, such as the one that was replaced; its database may be damaged
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Do here what was missed
+    #[arg(long)]
+    apply: bool,
+    #[command(flatten)]
+    data: DataArgs,
 }
 
 /// Runs the command.
@@ -37,6 +58,7 @@ pub fn run(args: &AuditArgs) -> Result<()> {
     Runtime::new()?.block_on(async {
         match &args.command {
             AuditCommand::Verify(args) => check(args).await,
+            AuditCommand::Missed(args) => catch_up(args).await,
             AuditCommand::Print(args) => print(args).await,
         }
     })
@@ -46,6 +68,14 @@ async fn check(args: &DataArgs) -> Result<()> {
     let store = args.open().await?;
     let report = verify(&*store).await?;
     if let Some(broken) = report.broken {
+        for row in &report.unconfirmed {
+            note!(
+                "{} names row {} with the hash {}",
+                row.place,
+                row.sequence,
+                row.hash
+            );
+        }
         bail!(
             "the audit trail is broken: {broken} ({} rows before it are in order)",
             report.rows
@@ -57,6 +87,45 @@ async fn check(args: &DataArgs) -> Result<()> {
         report.newest,
         report.head
     );
+    Ok(())
+}
+
+async fn catch_up(args: &MissedArgs) -> Result<()> {
+    let mut settings = args.data.settings()?;
+    settings.read_aws(variable);
+    ventriform_http::install_cryptography();
+    let folder = settings.data_dir.clone();
+    let mut store = Store::open_with(&folder, store_settings(&settings)).await?;
+    let told = tell_missed(args, &store).await;
+    store.close().await;
+    told
+}
+
+async fn tell_missed(args: &MissedArgs, store: &Store) -> Result<()> {
+    let missed = missed(&store.rows, &args.from).await?;
+    for act in &missed.acts {
+        say!("{act}");
+    }
+    let rows = missed.rows.len();
+    say!(
+        "{} acts are missed; {rows} rows of the newer trail follow those here",
+        missed.acts.len()
+    );
+    for table in &missed.unread {
+        note!("of the newer store could not be read: {table}");
+    }
+    if args.apply {
+        let left = apply(store, &missed).await?;
+        if !left.is_empty() {
+            bail!("not done:\n{}", left.join("\n"));
+        }
+        say!("all of them are done here");
+    } else if !missed.acts.is_empty() || rows > 0 {
+        say!("do the same here: give --apply");
+    }
+    if !missed.unread.is_empty() {
+        bail!("what the unreadable tables say may be missed still");
+    }
     Ok(())
 }
 

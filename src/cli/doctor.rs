@@ -7,20 +7,23 @@ use anyhow::{Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
-use ventriform_service::config::{BlobPlace, Flags, Settings};
+use ventriform_service::config::{BlobPlace, DatabaseUrl, Flags, Settings};
 use ventriform_service::records::Tenant;
-use ventriform_store::Examination;
+use ventriform_store::{Examination, Repair, examine, examine_on_server};
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   ventriform doctor --data-dir data
   ventriform doctor --data-dir data --repair
+  ventriform doctor --data-dir data --repair --tenant clinic-b
   ventriform doctor --data-dir data --json
+  ventriform doctor --data-dir data --database postgres://ventriform@db/ventriform
   ventriform doctor --data-dir data --blobs s3://hearts/prod
 
-The status is 0 if nothing is wrong or everything was repaired, else 1. A repair deletes no content:
-what is broken or has no record is moved into the folder `quarantine`.")]
+The status is 0 if nothing is wrong or everything was repaired, else 1; also 1 if a repair found that rows are
+lost. A repair deletes no content: what is broken or has no record is moved into the folder `quarantine`. What it
+lost, gave to somebody or closed is named here and written into the audit trail.")]
 pub struct DoctorArgs {
     /// Folder of the service
     #[arg(long, value_name = "DIR")]
@@ -32,9 +35,14 @@ pub struct DoctorArgs {
     /// Repair what can be repaired
     #[arg(long)]
     repair: bool,
-    /// Tenant that gets the items whose holder is unknown
-    #[arg(long, value_name = "NAME", default_value = "default")]
-    tenant: Tenant,
+    /// Tenant that gets the items whose holder is unknown, with a legal hold on volumes; unless given, they go to the
+    /// quarantine, where they stay
+    #[arg(long, value_name = "NAME", requires = "repair")]
+    tenant: Option<Tenant>,
+    /// Database of the service: `sqlite`, or the URL of a PostgreSQL database
+    /// [env: VENTRIFORM_DATABASE] [default: sqlite]
+    #[arg(long, value_name = "URL")]
+    database: Option<DatabaseUrl>,
     /// Print the findings as JSON
     #[arg(long)]
     json: bool,
@@ -60,17 +68,25 @@ pub struct BackupArgs {
 /// # Errors
 /// If the folder cannot be examined, or something is wrong that was not repaired.
 pub fn run(args: &DoctorArgs) -> Result<()> {
-    let heirs = args.repair.then_some(&args.tenant);
+    let repair = args.repair.then(|| Repair {
+        heir: args.tenant.clone(),
+    });
     let flags = Flags {
         blobs: args.blobs.clone(),
+        database: args.database.clone(),
         ..Flags::default()
     };
     let mut settings = Settings::load(&flags, variable)?.0;
     settings.read_aws(variable);
     ventriform_http::install_cryptography();
-    let s3 = s3_location(&settings);
-    let found = ventriform_store::examine(&args.data_dir, s3.as_ref(), heirs);
-    let found = Runtime::new()?.block_on(found)?;
+    let (s3, server) = (s3_location(&settings), settings.postgres());
+    let found = Runtime::new()?.block_on(async {
+        let (folder, s3, repair) = (&args.data_dir, s3.as_ref(), repair.as_ref());
+        match &server {
+            Some(server) => examine_on_server(folder, server, s3, repair).await,
+            None => examine(folder, s3, repair).await,
+        }
+    })?;
     if args.json {
         json(&serde_json::to_string_pretty(&found)?)
     } else {
@@ -78,6 +94,11 @@ pub fn run(args: &DoctorArgs) -> Result<()> {
     }
     if found.is_healthy() {
         return Ok(());
+    }
+    if args.repair {
+        bail!(
+            "not everything could be repaired: what is lost is named above and in the audit trail; a backup may have it"
+        )
     }
     bail!("the folder is not healthy; repair it with --repair, or restore a backup")
 }

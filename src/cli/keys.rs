@@ -20,8 +20,10 @@ use ventriform_service::records::{Clock, ListRequest, SystemClock, Tenant, Times
   ventriform keys create --name auditor --scope admin --tenant clinic-b --expires 90d
   ventriform keys list --data-dir data
   ventriform keys revoke 0123456789abcdef --data-dir data
+  ventriform keys open --data-dir data
 
-Once there is a key, the service answers only requests with `Authorization: Bearer KEY`.")]
+Once there is a key, the service answers only requests with `Authorization: Bearer KEY`, also when all keys have
+ended, and when a repair or a restored copy leaves in doubt whether there was one.")]
 pub struct KeysArgs {
     #[command(subcommand)]
     command: KeysCommand,
@@ -35,6 +37,9 @@ enum KeysCommand {
     List(DataArgs),
     /// Revoke a key; a running service refuses it within a second
     Revoke(RevokeArgs),
+    /// Admit callers without credentials again, though the service once had keys or may have had some; written to the
+    /// audit trail. Refused while a key is valid. A running service does so after its next start
+    Open(DataArgs),
 }
 
 #[derive(Debug, Args)]
@@ -85,6 +90,7 @@ pub fn run(args: &KeysArgs) -> Result<()> {
             KeysCommand::Create(args) => create(args).await,
             KeysCommand::List(args) => list(args).await,
             KeysCommand::Revoke(args) => revoke(args).await,
+            KeysCommand::Open(args) => open(args).await,
         }
     })
 }
@@ -156,6 +162,22 @@ async fn revoke(args: &RevokeArgs) -> Result<()> {
     let event = event(Activity::KeyRevoked, &key, now);
     store.revoke_key(&args.id, now, &event).await?;
     say!("{} is revoked", args.id);
+    Ok(())
+}
+
+async fn open(args: &DataArgs) -> Result<()> {
+    let store = args.open().await?;
+    let now = SystemClock.now();
+    let event = AuditEvent::new(
+        now,
+        Activity::AccessOpened,
+        Tenant::default(),
+        AUDIT_AGENT.into(),
+    );
+    if !store.open_access(now, &event).await? {
+        bail!("there are valid keys: `ventriform keys list` shows them; revoke them first");
+    }
+    say!("callers without credentials are admitted from the next start of the service on");
     Ok(())
 }
 

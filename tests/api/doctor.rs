@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use ventriform_service::records::Tenant;
-use ventriform_store::{backup, examine};
+use ventriform_store::{Repair, backup, examine};
 
 /// A volume and a model; returns the paths that must be served, and the folder's service.
 async fn filled(data: &Path) -> (Service, Vec<String>) {
@@ -24,6 +24,13 @@ async fn filled(data: &Path) -> (Service, Vec<String>) {
         text(&job["links"]["mesh"]) + ".stl",
     ];
     (service, paths)
+}
+
+/// A repair that gives what nobody is known to have to the default tenant.
+pub fn to_default() -> Repair {
+    Repair {
+        heir: Some(Tenant::default()),
+    }
 }
 
 async fn serves(data: &Path, paths: &[String]) {
@@ -57,7 +64,7 @@ async fn rows_are_made_anew_from_what_lies_beside_the_files() {
         ["database-missing", "unknown-item", "unknown-item"]
     );
     assert!(!lost.is_healthy());
-    let repaired = examine(data.path(), None, Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&to_default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
@@ -86,7 +93,7 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     fs::write(&database, content).unwrap();
     let found = examine(data.path(), None, None).await.unwrap();
     assert!(kinds(&found).contains(&"database-damaged"), "{found:?}");
-    let repaired = examine(data.path(), None, Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&to_default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
@@ -180,7 +187,7 @@ async fn received_objects_are_backed_up_checked_and_set_aside() {
         ["damaged-object", "damaged-object", "unknown-object"]
     );
     assert!(!sick.is_healthy());
-    let repaired = examine(data.path(), None, Some(&Tenant::default()))
+    let repaired = examine(data.path(), None, Some(&to_default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");

@@ -37,6 +37,7 @@ mod isolation;
 mod items;
 mod jobs;
 mod limits;
+mod losses;
 mod meshes;
 mod migrate;
 mod models;

@@ -139,7 +139,7 @@ async fn commands_beside_the_service_use_the_same_database() {
         .unwrap();
     assert!(made.status.success(), "{made:?}");
     let rows = open_database(data.path(), Some(&crate::postgres::reached(&url))).await;
-    assert!(rows.unwrap().any_key().await.unwrap());
+    assert!(rows.unwrap().is_closed().await.unwrap());
     assert!(!data.path().join("ventriform.db").exists());
     let bad = Command::new(env!("CARGO_BIN_EXE_ventriform"))
         .args(["serve", "--print-config"])

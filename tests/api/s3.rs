@@ -1,5 +1,6 @@
 //! The contract of the file store, over the folder and over S3 stores, and the service over S3.
 
+use crate::doctor::to_default;
 use crate::helpers::{TestApp, fake_engine, problem, text, volume};
 use crate::s3_server::{BUCKET_NAME, FaultProxy, Network, S3Server, variables};
 use futures::TryStreamExt;
@@ -16,7 +17,7 @@ use ventriform_service::config::{AwsVariables, Settings};
 use ventriform_service::intake::ReceivedFiles;
 use ventriform_service::records::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
-    StoredVolume, Tenant, random_id,
+    StoredVolume, random_id,
 };
 use ventriform_store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
 
@@ -588,7 +589,6 @@ async fn the_doctor_makes_rows_of_what_lies_in_the_bucket_and_sets_damaged_items
     let other = app.volume("other").await;
     let data = app.stop().await;
     let location = server.location(&prefix);
-    let heirs = Tenant::default();
     let healthy = examine(data.path(), Some(&location), None).await.unwrap();
     assert!(healthy.findings.is_empty(), "{healthy:?}");
     assert_eq!(healthy.items, 3);
@@ -600,7 +600,7 @@ async fn the_doctor_makes_rows_of_what_lies_in_the_bucket_and_sets_damaged_items
     let lost = examine(data.path(), Some(&location), None).await.unwrap();
     assert!(!lost.is_healthy());
     assert_eq!(lost.findings.len(), 4, "{lost:?}");
-    let repaired = examine(data.path(), Some(&location), Some(&heirs))
+    let repaired = examine(data.path(), Some(&location), Some(&to_default()))
         .await
         .unwrap();
     assert!(repaired.is_healthy(), "{repaired:?}");
@@ -616,7 +616,7 @@ async fn the_doctor_makes_rows_of_what_lies_in_the_bucket_and_sets_damaged_items
     let keys = server.keys(&format!("{prefix}/quarantine")).await;
     let file = keys.iter().find(|key| key.ends_with("volume.nii")).unwrap();
     server.write(file, b"VOLUME other").await;
-    let again = examine(data.path(), Some(&location), Some(&heirs))
+    let again = examine(data.path(), Some(&location), Some(&to_default()))
         .await
         .unwrap();
     assert!(again.is_healthy(), "{again:?}");

@@ -286,6 +286,10 @@ async fn guard(service: &Service, address: SocketAddr) -> Result<Guard, ServeErr
         };
         Issuer::new(tokens, &*service.http_clients)
     });
+    if issuer.is_some() {
+        // It stays closed without the setting too.
+        service.access.close_access().await?;
+    }
     // Whoever can reach a loopback address can usually read the data folder too.
     let anonymous = if loopback {
         Scope::Admin

@@ -522,9 +522,26 @@ pub(super) fn quarantine_shelf(folder: &Path, now: Timestamp) -> io::Result<Path
     Ok(shelf)
 }
 
+/// The file beside a damaged item's files that says who had it.
+pub(super) const HOLDERS_FILE: &str = "holders.json";
+
+/// The folder in the quarantine for items of which nobody knows whose they are. It is not emptied by age: one of them may be
+/// on legal hold.
+pub(super) const UNOWNED_SHELF: &str = "unowned";
+
 /// Moves the folder of an item into the quarantine of the day. Returns whether there was one.
 pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<bool> {
-    let shelf = quarantine_shelf(folder, now)?;
+    set_aside_in(folder, id, &quarantine_shelf(folder, now)?)
+}
+
+/// Moves the folder of an item whose holder is unknown into the quarantine. Returns whether there was one.
+pub(super) fn set_aside_unowned(folder: &Path, id: &str) -> io::Result<bool> {
+    let shelf = folder.join(QUARANTINE_FOLDER).join(UNOWNED_SHELF);
+    fs::create_dir_all(&shelf)?;
+    set_aside_in(folder, id, &shelf)
+}
+
+fn set_aside_in(folder: &Path, id: &str, shelf: &Path) -> io::Result<bool> {
     let mut place = shelf.join(id);
     if fs::exists(&place)? {
         place = shelf.join(random_id(&format!("{id}.")));
@@ -533,7 +550,7 @@ pub(super) fn set_aside(folder: &Path, id: &str, now: Timestamp) -> io::Result<b
         Err(error) if is_absent(&error) => Ok(false),
         other => {
             other?;
-            sync(&shelf)?;
+            sync(shelf)?;
             Ok(true)
         }
     }

@@ -6,6 +6,7 @@
 //! Beside that lock run single statements on one job that name its lease, or skip locked rows
 //! ([`Query::write_beside`]): claims, renewals of leases and progress.
 
+use super::note::Beside;
 use super::postgres::{self, PgTransaction, PgWriter};
 use super::query::{DbRow, Query, Target, query};
 use super::shared::Shared;
@@ -16,6 +17,7 @@ use sqlx::postgres::PgPool;
 use sqlx::sqlite::SqlitePool;
 use std::path::Path;
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::config::PostgresSettings;
@@ -162,6 +164,8 @@ pub struct SqlStore {
     gauge: DiskGauge,
     /// Whether the last check of the structure found defects.
     pub(super) damaged: AtomicBool,
+    /// Where notes about this database are kept.
+    beside: OnceLock<Beside>,
 }
 
 impl SqlStore {
@@ -179,6 +183,7 @@ impl SqlStore {
             run: random_id(RUN_PREFIX),
             gauge,
             damaged: AtomicBool::new(false),
+            beside: OnceLock::new(),
         })
     }
 
@@ -199,7 +204,19 @@ impl SqlStore {
             run,
             gauge,
             damaged: AtomicBool::new(false),
+            beside: OnceLock::new(),
         })
+    }
+
+    /// Where notes about this database are kept, if that is known.
+    pub(super) fn beside(&self) -> Option<&Beside> {
+        self.beside.get()
+    }
+
+    /// Keeps notes about this database there from now on.
+    pub(super) fn keep_beside(&self, beside: Beside) {
+        // Whoever was first has the same places.
+        let _ = self.beside.set(beside);
     }
 
     /// Whether the database is on a server, which other processes may use too.

@@ -2,9 +2,10 @@
 //!
 //! Steps, in this order:
 //!
-//! 1. The database: is it there, with its write-ahead log, and is its structure whole? Repair moves
-//!    a damaged one into the quarantine, makes a new one, and copies every row that can still be
-//!    read.
+//! 1. The database: is it there, with its write-ahead log, and is its structure whole? Repair makes a
+//!    new one, copies every row that can still be read, names each table that lost rows, and moves the
+//!    damaged one into the quarantine. What was closed stays closed ([`super::kept`]); new rows of the audit
+//!    trail follow the last one that is known. A database on a server is looked after by the server.
 //! 2. Every row of a volume or product: are its files there, with the right length and SHA-256?
 //!    Repair moves a broken item into the quarantine and removes its row.
 //! 3. Every folder of an item: does it have a row? Repair makes the row from the `record.json`
@@ -17,35 +18,52 @@
 //!
 //! If the files are in a bucket, steps 2 to 5 are done there ([`super::s3`]).
 //!
-//! Repair deletes no content that was ever published and not replaced. Rows that it makes anew belong to the tenant
-//! that the caller names, unless the database still says who holds the item: the record beside the
-//! files does not name tenants. Jobs, keys and receipts live in the database only.
+//! Repair deletes no content that was ever published and not replaced. An item whose ownership was lost goes back to the
+//! tenants whom other rows or an index name, else to the heir that the caller names, else into a part of the
+//! quarantine that is not emptied by age. A volume that is given back is on legal hold until that is lifted: nobody
+//! knows whether it was. Each of these is a row of the audit trail. Jobs, keys and receipts live in the database only.
 
 use super::blobs::{
-    self, DISCARDED_FOLDER, QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, STAGING_FOLDER,
+    self, DISCARDED_FOLDER, HOLDERS_FILE, QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE,
+    STAGING_FOLDER,
 };
 use super::content;
 use super::database::SqlStore;
-use super::findings::Examination;
+use super::findings::{
+    DAMAGED_SET_ASIDE, Examination, GIVEN_TO_HEIR, HELD_SET_ASIDE, NO_HOLDER, NO_ROW, Repair,
+    UNOWNED_SET_ASIDE, repaired,
+};
+use super::kept::{Doubt, HOW_TO_OPEN};
+use super::note::{Beside, NOTE_FILE};
 use super::received;
 use super::s3::{BucketDoctor, S3Blobs, S3Location};
 use super::sqlite;
+use super::sqlite_repair::{Salvage, Salvaged};
+use super::tables::{Holder, Holding, Marks, REPAIRER};
 use super::{
-    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, OpenError, StoreSettings, check_place,
-    require_file,
+    CLOSED_MARK, DATABASE_FILE, DiskGauge, FolderLock, MARKER_FILE, OpenError, StoreSettings,
+    check_place, locked, name_of, require_file,
 };
 use crate::faults;
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use ventriform_service::access::{AccessStore, Activity, Anchor, AuditEvent, KeptRow, verify};
+use ventriform_service::config::PostgresSettings;
 use ventriform_service::records::{
-    Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreError, SystemClock, Tenant,
-    random_id, volume_id,
+    Clock, Custody, FileRecord, ItemRecord, ListRequest, RecordPages, Resource, StoreError,
+    SystemClock, Tenant, Timestamp, random_id, volume_id,
 };
 
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;
+
+/// A new database while it is filled.
+const DRAFT_FILE: &str = "ventriform.db.repair";
+
+/// The ends of the names of a database's files.
+const ENDS: [&str; 3] = ["", "-wal", "-shm"];
 
 /// Why a data folder cannot be examined.
 #[derive(Debug, thiserror::Error)]
@@ -61,65 +79,150 @@ pub enum DoctorError {
     Io(#[from] io::Error),
 }
 
-/// Checks the data folder, and the bucket if its files are in one. With `heirs`, also repairs it: rows
-/// of items whose holder is unknown go to that tenant.
+/// Checks the data folder, and the bucket if its files are in one; with `repair`, also repairs it.
 ///
 /// # Errors
 /// If a service uses the folder, or the folder cannot be read (or written, for a repair).
 pub async fn examine(
     folder: &Path,
     s3: Option<&S3Location>,
-    heirs: Option<&Tenant>,
+    repair: Option<&Repair>,
 ) -> Result<Examination, DoctorError> {
-    if !folder.is_dir() {
-        return Err(OpenError::Unusable {
-            path: folder.to_owned(),
-            reason: "there is no such folder".into(),
-        }
-        .into());
-    }
+    require_folder(folder)?;
     check_place(folder, s3)?;
     require_file(folder)?;
     let mut lock = FolderLock::wait_for(|| FolderLock::take(folder)).await?;
-    let bucket = match s3 {
-        Some(location) => {
-            let gauge = DiskGauge::new(folder, Some(0));
-            let cache = StoreSettings::default().cache;
-            let opened = S3Blobs::open(location, folder, gauge, cache).await;
-            Some(opened.map_err(OpenError::from)?)
-        }
-        None => None,
-    };
-    let mut doctor = Doctor {
-        folder,
-        bucket,
-        heirs,
-        found: Examination::default(),
-    };
+    let mut doctor = Doctor::new(folder, s3, repair).await?;
     let rows = doctor.database(&mut lock).await?;
     let Some(rows) = rows else {
         doctor.shelves_without_rows().await?;
         return Ok(doctor.found);
     };
-    let examined = doctor.items(&rows).await;
+    let examined = doctor.all(&rows).await;
     rows.close().await;
     examined?;
-    if heirs.is_some() {
+    if repair.is_some() {
         lock.mark(CLOSED_MARK)?;
     }
     Ok(doctor.found)
 }
 
+/// The same for records in a database on a server, whose structure the server looks after itself.
+///
+/// # Errors
+/// As [`examine`], or if services run on the database, or its files are elsewhere.
+pub async fn examine_on_server(
+    folder: &Path,
+    server: &PostgresSettings,
+    s3: Option<&S3Location>,
+    repair: Option<&Repair>,
+) -> Result<Examination, DoctorError> {
+    if s3.is_none() {
+        require_folder(folder)?;
+    }
+    let _lock = FolderLock::wait_for(|| locked(folder)).await?;
+    let wait = StoreSettings::default().write_wait;
+    let rows = SqlStore::connect(server, wait, DiskGauge::new(folder, Some(0))).await;
+    let rows = rows.map_err(OpenError::from)?;
+    let examined: Result<Examination, DoctorError> = async {
+        require_place(&rows, folder, server, s3).await?;
+        let mut doctor = Doctor::new(folder, s3, repair).await?;
+        doctor.notes(&rows, false).await?;
+        doctor.all(&rows).await?;
+        Ok(doctor.found)
+    }
+    .await;
+    rows.close().await;
+    examined
+}
+
+fn require_folder(folder: &Path) -> Result<(), OpenError> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    Err(OpenError::Unusable {
+        path: folder.to_owned(),
+        reason: "there is no such folder".into(),
+    })
+}
+
+/// Refuses a database on a server that services use, or whose files are not at the place that is given.
+async fn require_place(
+    rows: &SqlStore,
+    folder: &Path,
+    server: &PostgresSettings,
+    s3: Option<&S3Location>,
+) -> Result<(), DoctorError> {
+    if rows.has_processes().await? {
+        return Err(OpenError::Unusable {
+            path: PathBuf::from(server.url.to_string()),
+            reason:
+                "services are running on it: stop all of them, or wait a minute if they were killed"
+                    .into(),
+        }
+        .into());
+    }
+    let own = match s3 {
+        Some(location) => Some(location.to_string()),
+        None => name_of(&folder.join(MARKER_FILE)),
+    };
+    let place = rows.place().await?;
+    if own.is_some() && place == own {
+        return Ok(());
+    }
+    Err(OpenError::OtherFiles {
+        url: server.url.clone(),
+        place: place.unwrap_or_else(|| "no place that is known".into()),
+        own: own.unwrap_or_else(|| folder.display().to_string()),
+    }
+    .into())
+}
+
 struct Doctor<'a> {
     folder: &'a Path,
     bucket: Option<S3Blobs>,
-    heirs: Option<&'a Tenant>,
+    repair: Option<&'a Repair>,
     found: Examination,
+    /// Items with a row that nobody has.
+    unowned: BTreeSet<String>,
+    /// Whether what products were made of has to be noted again.
+    sources_lost: bool,
+    /// What was repaired, for the audit trail.
+    events: Vec<AuditEvent>,
 }
 
-impl Doctor<'_> {
+impl<'a> Doctor<'a> {
+    async fn new(
+        folder: &'a Path,
+        s3: Option<&S3Location>,
+        repair: Option<&'a Repair>,
+    ) -> Result<Self, DoctorError> {
+        let bucket = match s3 {
+            Some(location) => {
+                let gauge = DiskGauge::new(folder, Some(0));
+                let cache = StoreSettings::default().cache;
+                let opened = S3Blobs::open(location, folder, gauge, cache).await;
+                Some(opened.map_err(OpenError::from)?)
+            }
+            None => None,
+        };
+        Ok(Self {
+            folder,
+            bucket,
+            repair,
+            found: Examination::default(),
+            unowned: BTreeSet::new(),
+            sources_lost: false,
+            events: Vec::new(),
+        })
+    }
+
     fn if_repairing(&self, what: &'static str) -> Option<&'static str> {
-        self.heirs.is_some().then_some(what)
+        self.repair.is_some().then_some(what)
+    }
+
+    fn heir(&self) -> Option<&'a Tenant> {
+        self.repair.and_then(|repair| repair.heir.as_ref())
     }
 
     /// Checks the database. `None` if there is none that can be read and none may be made.
@@ -140,6 +243,7 @@ impl Doctor<'_> {
             );
             return self.new_database(None).await;
         }
+
         if log_missing {
             self.found.note(
                 "log-missing",
@@ -151,7 +255,10 @@ impl Doctor<'_> {
         }
         let defects = match self.open_database().await {
             Ok(rows) => match rows.all_defects().await {
-                Ok(defects) if defects.is_empty() => return Ok(Some(rows)),
+                Ok(defects) if defects.is_empty() => {
+                    self.notes(&rows, false).await?;
+                    return Ok(Some(rows));
+                }
                 Ok(defects) => {
                     rows.close().await;
                     defects
@@ -170,33 +277,212 @@ impl Doctor<'_> {
     }
 
     async fn open_database(&self) -> Result<SqlStore, sqlx::Error> {
-        let settings = StoreSettings::default();
-        let gauge = DiskGauge::new(self.folder, Some(0));
-        SqlStore::open(&self.folder.join(DATABASE_FILE), settings.write_wait, gauge).await
+        self.open_rows(DATABASE_FILE).await
     }
 
-    /// Makes a new database, with the rows of the old one that can be read.
-    async fn new_database(&self, old: Option<PathBuf>) -> Result<Option<SqlStore>, DoctorError> {
-        if self.heirs.is_none() {
+    async fn open_rows(&self, name: &str) -> Result<SqlStore, sqlx::Error> {
+        let settings = StoreSettings::default();
+        let gauge = DiskGauge::new(self.folder, Some(0));
+        SqlStore::open(&self.folder.join(name), settings.write_wait, gauge).await
+    }
+
+    /// Makes a new database, with the rows of the old one that can be read. The old one stays in its place until the new
+    /// one is finished.
+    async fn new_database(
+        &mut self,
+        old: Option<PathBuf>,
+    ) -> Result<Option<SqlStore>, DoctorError> {
+        if self.repair.is_none() {
             return Ok(None);
         }
+        for end in ENDS {
+            remove(&self.folder.join(format!("{DRAFT_FILE}{end}")))?;
+        }
+        let draft = self
+            .open_rows(DRAFT_FILE)
+            .await
+            .map_err(faults::of_sqlite)?;
+        let salvage = match &old {
+            Some(old) => draft.salvage(old).await,
+            None => Ok(Salvage::default()),
+        };
+        let filled = match salvage {
+            Ok(salvage) => self.after_salvage(&draft, &salvage, old.is_some()).await,
+            Err(error) => Err(error.into()),
+        };
+        draft.close().await;
+        filled?;
+        blobs::sync(&self.folder.join(DRAFT_FILE))?;
+        self.replace_database()?;
+        let rows = self.open_database().await.map_err(faults::of_sqlite)?;
+        rows.keep_beside(self.beside());
+        Ok(Some(rows))
+    }
+
+    /// Moves the old database into the quarantine, and the draft into its place.
+    fn replace_database(&self) -> Result<(), DoctorError> {
         let aside = self
             .folder
             .join(QUARANTINE_FOLDER)
             .join(random_id("database-"));
         fs::create_dir_all(&aside)?;
-        for end in ["", "-wal", "-shm"] {
+        for end in ENDS {
             let name = format!("{DATABASE_FILE}{end}");
             match fs::rename(self.folder.join(&name), aside.join(&name)) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
                 _ => {}
             }
         }
-        let rows = self.open_database().await.map_err(faults::of_sqlite)?;
-        if old.is_some() {
-            rows.salvage(&aside.join(DATABASE_FILE)).await?;
+        blobs::sync(&aside)?;
+        fs::rename(
+            self.folder.join(DRAFT_FILE),
+            self.folder.join(DATABASE_FILE),
+        )?;
+        Ok(blobs::sync(self.folder)?)
+    }
+
+    /// Names what is lost, keeps closed what was closed, and writes what happened into the trail.
+    async fn after_salvage(
+        &mut self,
+        rows: &SqlStore,
+        salvage: &Salvage,
+        had_database: bool,
+    ) -> Result<(), DoctorError> {
+        let now = SystemClock.now();
+        let lacks = |table| !had_database || salvage.lacks(table);
+        self.sources_lost = lacks("sources") || lacks("holdings");
+        self.notes(rows, lacks("store_marks") || lacks("api_keys"))
+            .await?;
+        if lacks("erased") {
+            rows.restore_tombstones().await?;
         }
-        Ok(Some(rows))
+        if lacks("audit_anchors") {
+            rows.restore_anchor().await?;
+        }
+        let mut holders: BTreeSet<Holder> = salvage.holders.iter().cloned().collect();
+        holders.extend(rows.traces_of_holders().await?);
+        let holders: Vec<Holder> = holders.into_iter().collect();
+        rows.give_back(&holders, now).await?;
+        for holder in holders {
+            let (tenant, id) = (Some(&holder.tenant), &holder.id);
+            self.events.push(repaired(id, tenant, now));
+            let detail = format!(
+                "The record that tenant {} has it was lost, with its tags and with whether it is on legal hold.",
+                holder.tenant
+            );
+            let repair =
+                "it was given back to that tenant; a volume is on legal hold until that is lifted";
+            self.found.note("lost-holder", id, detail, Some(repair));
+        }
+        self.know_the_trail(rows).await?;
+        for table in &salvage.tables {
+            self.lost_rows(rows, table, now).await?;
+        }
+        rows.append(&std::mem::take(&mut self.events)).await?;
+        Ok(())
+    }
+
+    /// New rows of the trail get greater numbers than any that is known.
+    async fn know_the_trail(&self, rows: &SqlStore) -> Result<(), DoctorError> {
+        if let Some(newest) = rows.unconfirmed().await?.into_iter().next() {
+            let kept_head = Some(Anchor {
+                sequence: newest.sequence,
+                hash: newest.hash,
+            });
+            let marks = Marks {
+                kept_head,
+                ..Marks::default()
+            };
+            rows.mark(&marks).await?;
+        }
+        Ok(())
+    }
+
+    async fn lost_rows(
+        &mut self,
+        rows: &SqlStore,
+        table: &Salvaged,
+        now: Timestamp,
+    ) -> Result<(), DoctorError> {
+        if table.lost == Some(0) {
+            return Ok(());
+        }
+        let name = &table.table;
+        let how_many = match table.lost {
+            Some(1) => "1 row is lost".to_owned(),
+            Some(lost) => format!("{lost} rows are lost"),
+            None => "rows are lost, and nothing tells how many".to_owned(),
+        };
+        let mut detail = format!("{how_many}, {} could be read", table.kept);
+        let mut object = name.clone();
+        let known = if name == "audit" {
+            Some(last_known(rows).await?)
+        } else {
+            None
+        };
+        match (known, table.last) {
+            (Some(row), _) => {
+                detail += &format!(
+                    "; the last that is known is {} with the hash {}, by {}",
+                    row.sequence, row.hash, row.place
+                );
+                if let Some(last) = table.last {
+                    detail += &format!("; the last that was written is {last}");
+                }
+                object = format!("{name}:{}:{}", row.sequence, row.hash);
+            }
+            (None, Some(last)) => detail += &format!("; the last had the number {last}"),
+            (None, None) => {}
+        }
+        self.found
+            .note("rows-lost", name, format!("{detail}."), None);
+        let event = AuditEvent {
+            count: table.lost.unwrap_or(1).max(1),
+            ..AuditEvent::new(now, Activity::RowsLost, Tenant::default(), REPAIRER.into())
+        };
+        self.events.push(event.on(object));
+        Ok(())
+    }
+
+    /// The places of the notes about the database.
+    fn beside(&self) -> Beside {
+        Beside {
+            folder: Some(self.folder.to_owned()),
+            bucket: self.bucket.as_ref().map(S3Blobs::note),
+        }
+    }
+
+    /// Compares the database with the notes about it. `lost` if nothing in it tells whether it was closed.
+    async fn notes(&mut self, rows: &SqlStore, lost: bool) -> Result<(), DoctorError> {
+        let mut beside = self.beside();
+        if rows.on_server() && beside.bucket.is_some() {
+            beside.folder = None;
+        }
+        let settled = if self.repair.is_some() {
+            rows.settle(beside, lost).await?
+        } else {
+            let judged = rows.judge(&beside, lost).await?;
+            rows.keep_beside(beside);
+            judged.settled
+        };
+        if let Some(end) = &settled.restored {
+            let detail = format!(
+                "The database is a restored copy, which ends with row {} of the audit trail. What was revoked or erased since is \
+                 as it was before: `ventriform audit missed --from NEWER` says what.",
+                end.sequence
+            );
+            self.found
+                .remark("restored-copy", DATABASE_FILE, detail, None);
+        }
+        if let Some(Doubt(why)) = &settled.doubt {
+            let detail = format!(
+                "Callers without credentials are refused, since {why}. To go on, {HOW_TO_OPEN}."
+            );
+            let repair = self.if_repairing("the service is closed");
+            self.found
+                .remark("access-in-doubt", NOTE_FILE, detail, repair);
+        }
+        Ok(())
     }
 
     /// Without a database and without a repair: how many items wait for one.
@@ -224,12 +510,93 @@ impl Doctor<'_> {
         Ok(ids)
     }
 
+    /// Checks what the database says against itself, and against the files.
+    async fn all(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
+        self.unowned = rows.unowned().await?.into_iter().collect();
+        let examined = self.items(rows).await;
+        if examined.is_ok() {
+            self.without_item(rows).await?;
+            if self.repair.is_some() && !rows.on_server() {
+                for (table, dropped) in rows.drop_orphans().await? {
+                    let detail = format!("{dropped} rows name what nobody has any more.");
+                    let repair = Some("they were removed");
+                    self.found.note("orphaned-rows", table, detail, repair);
+                }
+            }
+        }
+        let events = std::mem::take(&mut self.events);
+        if !events.is_empty() {
+            rows.append(&events).await?;
+        }
+        examined?;
+        self.access(rows).await?;
+        self.trail(rows).await?;
+        if self.repair.is_some() {
+            rows.note_beside().await?;
+        }
+        Ok(())
+    }
+
+    /// What tenants have and the storage does not.
+    async fn without_item(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
+        let lost: BTreeSet<Holder> = rows.without_item().await?.into_iter().collect();
+        for holder in lost {
+            if self.repair.is_some() {
+                rows.forget(&holder.id).await?;
+                let now = SystemClock.now();
+                self.events
+                    .push(repaired(&holder.id, Some(&holder.tenant), now));
+            }
+            let detail = format!(
+                "Tenant {} has it, and it has neither row nor files.",
+                holder.tenant
+            );
+            let repair = self.if_repairing("the record that the tenant has it was removed");
+            self.found.note("lost-item", &holder.id, detail, repair);
+        }
+        Ok(())
+    }
+
+    /// Says if no key can open a closed service.
+    async fn access(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
+        let page = ListRequest {
+            before: None,
+            limit: 1,
+        };
+        let keys = rows.keys(None, page).await?;
+        if keys.items.is_empty() && rows.is_closed().await? {
+            let detail = format!(
+                "The service asks for credentials, and there is no key. Unless it has an issuer of tokens, {HOW_TO_OPEN}."
+            );
+            self.found.remark("keys-missing", "api_keys", detail, None);
+        }
+        Ok(())
+    }
+
+    /// Walks the audit trail.
+    async fn trail(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
+        let report = verify(rows).await?;
+        if let Some(broken) = report.broken {
+            let mut detail = format!("{broken}.");
+            for row in report.unconfirmed {
+                detail += &format!(
+                    " {} names row {} with the hash {}.",
+                    row.place, row.sequence, row.hash
+                );
+            }
+            self.found.remark("trail-broken", "audit", detail, None);
+        }
+        Ok(())
+    }
+
     async fn items(&mut self, rows: &SqlStore) -> Result<(), DoctorError> {
         if let Some(blobs) = &self.bucket {
             let doctor = BucketDoctor {
                 blobs,
                 rows,
-                heirs: self.heirs,
+                repair: self.repair,
+                unowned: &self.unowned,
+                events: &mut self.events,
                 found: &mut self.found,
             };
             return Ok(doctor.examine().await?);
@@ -247,8 +614,9 @@ impl Doctor<'_> {
         let mut pages = RecordPages::new(rows, PAGE_ROWS);
         while let Some(page) = pages.next().await? {
             for record in page {
-                self.row(rows, &record).await?;
-                known.insert(record.id().to_owned());
+                if self.row(rows, &record).await? {
+                    known.insert(record.id().to_owned());
+                }
             }
         }
         Ok(known)
@@ -269,7 +637,7 @@ impl Doctor<'_> {
                 Err(error) => return Err(error.into()),
             };
             if let Some(wrong) = wrong {
-                if self.heirs.is_some() {
+                if self.repair.is_some() {
                     received::set_aside(self.folder, &name, SystemClock.now())?;
                     rows.forget_received(&name).await?;
                 }
@@ -281,7 +649,7 @@ impl Doctor<'_> {
         }
         for name in names(&shelf)? {
             if !known.contains(&name) {
-                if self.heirs.is_some() {
+                if self.repair.is_some() {
                     received::set_aside(self.folder, &name, SystemClock.now())?;
                 }
                 let repair = self.if_repairing("it was moved into the quarantine");
@@ -292,27 +660,66 @@ impl Doctor<'_> {
         Ok(())
     }
 
-    async fn row(&mut self, rows: &SqlStore, record: &ItemRecord) -> Result<(), DoctorError> {
+    /// Checks one item. Returns whether its folder has been dealt with.
+    async fn row(&mut self, rows: &SqlStore, record: &ItemRecord) -> Result<bool, DoctorError> {
         self.found.items += 1;
         let id = record.id();
         let place = self.folder.join(blobs::shelf_path(id));
         let wrong = self.wrong_files(&place, record)?;
         if wrong.is_empty() {
-            if self.heirs.is_some() && !place.join(RECORD_FILE).exists() {
-                write_record(&place, record)?;
+            if self.repair.is_some() {
+                if !place.join(RECORD_FILE).exists() {
+                    write_record(&place, record)?;
+                }
+                if let (ItemRecord::Product(product), true) = (record, self.sources_lost) {
+                    rows.restore_sources(product).await?;
+                }
             }
-            return Ok(());
+            if self.unowned.contains(id) {
+                self.unowned(rows, record).await?;
+            }
+            return Ok(true);
         }
-        if self.heirs.is_some() {
-            blobs::set_aside(self.folder, id, SystemClock.now())?;
+        let holdings = rows.holdings(id).await?;
+        let on_hold = holdings.iter().any(Holding::is_on_hold);
+        if self.repair.is_some() {
+            if place.is_dir() {
+                let text = serde_json::to_vec_pretty(&holdings).map_err(io::Error::from)?;
+                fs::write(place.join(HOLDERS_FILE), text)?;
+            }
+            if on_hold {
+                blobs::set_aside_unowned(self.folder, id)?;
+            } else {
+                blobs::set_aside(self.folder, id, SystemClock.now())?;
+            }
             rows.forget(id).await?;
         }
-        self.found.note(
-            "damaged-item",
-            id,
-            wrong.join("; "),
-            self.if_repairing("its row was removed and its files moved into the quarantine"),
-        );
+        let repair = if on_hold {
+            HELD_SET_ASIDE
+        } else {
+            DAMAGED_SET_ASIDE
+        };
+        let repair = self.if_repairing(repair);
+        self.found
+            .note("damaged-item", id, wrong.join("; "), repair);
+        Ok(true)
+    }
+
+    /// An item that is whole and that nobody has.
+    async fn unowned(&mut self, rows: &SqlStore, record: &ItemRecord) -> Result<(), DoctorError> {
+        let (id, now, heir) = (record.id(), SystemClock.now(), self.heir());
+        let mut done = None;
+        if self.repair.is_some() {
+            done = Some(if rows.restore(record, heir, now).await? {
+                GIVEN_TO_HEIR
+            } else {
+                blobs::set_aside_unowned(self.folder, id)?;
+                rows.forget(id).await?;
+                UNOWNED_SET_ASIDE
+            });
+            self.events.push(repaired(id, heir, now));
+        }
+        self.found.note("unowned-item", id, NO_HOLDER, done);
         Ok(())
     }
 
@@ -365,19 +772,24 @@ impl Doctor<'_> {
             let place = self.folder.join(blobs::shelf_path(&id));
             let record = self.whole_record(&place, &id)?;
             let erased = rows.was_erased(&id).await?;
-            let repair = match (self.heirs, record) {
+            let (now, heir) = (SystemClock.now(), self.heir());
+            let repair = match (self.repair, record) {
                 (None, _) => None,
-                (Some(heirs), Some(record)) if !erased => {
-                    rows.restore(&record, heirs).await?;
-                    Some("its row was made from the record beside the files")
+                (Some(_), Some(record)) if !erased => {
+                    Some(if rows.restore(&record, heir, now).await? {
+                        self.events.push(repaired(&id, heir, now));
+                        "its row was made from the record beside the files"
+                    } else {
+                        blobs::set_aside_unowned(self.folder, &id)?;
+                        UNOWNED_SET_ASIDE
+                    })
                 }
                 (Some(_), _) => {
-                    blobs::set_aside(self.folder, &id, SystemClock.now())?;
+                    blobs::set_aside(self.folder, &id, now)?;
                     Some("its files were moved into the quarantine")
                 }
             };
-            self.found
-                .note("unknown-item", id, "It has files but no row.", repair);
+            self.found.note("unknown-item", id, NO_ROW, repair);
         }
         Ok(())
     }
@@ -413,10 +825,16 @@ impl Doctor<'_> {
                 let wanted = record.filter(|_| !shelved.exists());
                 let erased = rows.was_erased(&id).await?;
                 let mut repair = None;
-                if let (Some(heirs), Some(record), false) = (self.heirs, wanted, erased) {
+                let (now, heir) = (SystemClock.now(), self.heir());
+                let holdings = holdings_of(&place);
+                let owned = heir.is_some() || !holdings.is_empty() || rows.has_holder(&id).await?;
+                if let (Some(_), Some(record), true) = (self.repair, wanted, owned && !erased) {
                     fs::rename(&place, &shelved)?;
                     blobs::sync(shelved.parent().unwrap_or(&shelved))?;
-                    rows.restore(&record, heirs).await?;
+                    remove(&shelved.join(HOLDERS_FILE))?;
+                    rows.give_held(&id, &holdings).await?;
+                    rows.restore(&record, heir, now).await?;
+                    self.events.push(repaired(&id, heir, now));
                     repair = Some("it was brought back");
                 }
                 let subject = format!("{QUARANTINE_FOLDER}/{day}/{name}");
@@ -433,7 +851,7 @@ impl Doctor<'_> {
         for shelf in [STAGING_FOLDER, DISCARDED_FOLDER] {
             for name in names(&self.folder.join(shelf))? {
                 let place = self.folder.join(shelf).join(&name);
-                if self.heirs.is_some() {
+                if self.repair.is_some() {
                     if place.is_dir() {
                         fs::remove_dir_all(&place)?
                     } else {
@@ -455,6 +873,32 @@ fn write_record(place: &Path, record: &ItemRecord) -> io::Result<()> {
     fs::write(&draft, serde_json::to_vec_pretty(record)?)?;
     blobs::sync(&draft)?;
     fs::rename(&draft, place.join(RECORD_FILE))
+}
+
+/// The newest row of the trail that is there or that another place names.
+async fn last_known(rows: &SqlStore) -> Result<KeptRow, DoctorError> {
+    let end = rows.trail_end().await?;
+    let there = KeptRow {
+        place: "the trail itself".into(),
+        sequence: end.sequence,
+        hash: end.hash,
+    };
+    let elsewhere = rows.unconfirmed().await?.into_iter().next();
+    let elsewhere = elsewhere.filter(|row| row.sequence > there.sequence);
+    Ok(elsewhere.unwrap_or(there))
+}
+
+/// Who had an item that was set aside, if that is written beside it.
+fn holdings_of(place: &Path) -> Vec<Holding> {
+    let text = fs::read(place.join(HOLDERS_FILE)).unwrap_or_default();
+    serde_json::from_slice(&text).unwrap_or_default()
+}
+
+fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// The names in a folder, in order; none if it does not exist.

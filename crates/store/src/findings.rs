@@ -1,6 +1,38 @@
 //! Findings of a check of the storage, and their repair.
 
+use crate::tables::REPAIRER;
 use serde::Serialize;
+use ventriform_service::access::{Activity, AuditEvent};
+use ventriform_service::records::{Tenant, Timestamp};
+
+/// How to repair what is found.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Repair {
+    /// Who gets the items whose holder is unknown. With `None` they go to the quarantine.
+    pub heir: Option<Tenant>,
+}
+
+/// The finding about files without a row.
+pub(super) const NO_ROW: &str = "It has files but no row.";
+/// The finding about an item without a holder.
+pub(super) const NO_HOLDER: &str =
+    "No tenant has it: the record of who does is lost, and with it whether it is on legal hold.";
+/// The repair of an item without a holder, if an heir is named.
+pub(super) const GIVEN_TO_HEIR: &str = "it was given to the tenant that --tenant names; a volume is on legal hold until that is lifted";
+/// The same if none is named.
+pub(super) const UNOWNED_SET_ASIDE: &str = "it was moved into the quarantine, where it stays: `--repair --tenant NAME` gives it to that tenant";
+
+/// The repair of a damaged item.
+pub(super) const DAMAGED_SET_ASIDE: &str =
+    "its row was removed and its files moved into the quarantine";
+/// The same for one on legal hold.
+pub(super) const HELD_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine, where they stay: it is on legal hold";
+
+/// The event about the repair of an item.
+pub(super) fn repaired(id: &str, heir: Option<&Tenant>, now: Timestamp) -> AuditEvent {
+    let tenant = heir.cloned().unwrap_or_default();
+    AuditEvent::new(now, Activity::Repaired, tenant, REPAIRER.into()).on(id)
+}
 
 /// Something that is not as it should be.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

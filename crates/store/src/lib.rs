@@ -3,6 +3,7 @@
 //! ```text
 //! DATA_DIR/
 //!   lock              held by the process that uses this folder; says whether it was closed
+//!   kept.json         what must not be lost with the database ([`kept`])
 //!   ventriform.db     jobs, volumes, products (SQLite: WAL, synchronous=FULL)
 //!   database          instead of it, where they are on a server (PostgreSQL)
 //!   staging/          files not yet published; emptied at every start
@@ -33,8 +34,11 @@ mod database;
 mod doctor;
 mod faults;
 mod findings;
+mod kept;
 mod migrate;
+mod missed;
 mod news;
+mod note;
 mod postgres;
 mod query;
 mod received;
@@ -50,16 +54,18 @@ mod writer;
 pub use backup::{Backup, backup};
 pub use blobs::FileBlobs;
 pub use database::SqlStore;
-pub use doctor::{DoctorError, examine};
-pub use findings::{Examination, Finding};
+pub use doctor::{DoctorError, examine, examine_on_server};
+pub use findings::{Examination, Finding, Repair};
 pub use migrate::{
     Destination, MigrateError, Migrated, MovedFiles, Progress, TableCount, migrate,
     note_moved_files,
 };
+pub use missed::{Act, Missed, MissedError, apply, missed};
 pub use postgres::PostgresError;
 pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;
 
+use note::Beside;
 use std::fs::{File, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -264,12 +270,14 @@ impl Store {
         let mut lock = FolderLock::wait_for(|| locked(folder)).await?;
         check_place(folder, settings.s3.as_ref())?;
         let gauge = DiskGauge::new(folder, settings.min_free);
+        let mut beside = Beside::default();
         let (blobs, received, empty): (Arc<dyn BlobStore>, Arc<dyn ReceivedFiles>, bool) =
             match &settings.s3 {
                 None => {
                     let empty = !has_items(folder).map_err(|e| unusable(folder, &e))?;
                     let blobs = FileBlobs::open(folder, gauge.clone());
                     let blobs = Arc::new(blobs.map_err(|e| unusable(folder, &e))?);
+                    beside.folder = Some(folder.to_owned());
                     (blobs.clone(), blobs, empty)
                 }
                 Some(location) => {
@@ -283,6 +291,9 @@ impl Store {
                         return Err(OpenError::RowsMissing { blobs, database });
                     }
                     note_place(folder, location).map_err(|e| unusable(folder, &e))?;
+                    let in_folder = settings.database.is_none();
+                    beside.folder = in_folder.then(|| folder.to_owned());
+                    beside.bucket = Some(blobs.note());
                     let blobs = Arc::new(blobs);
                     (blobs.clone(), blobs, empty)
                 }
@@ -296,6 +307,8 @@ impl Store {
             None => in_file(folder, &mut lock, wait, gauge).await?,
         };
         let rows = Arc::new(rows);
+        let settled = rows.settle(beside, false).await;
+        settled.map_err(|e| unusable(folder, &e))?;
         Ok(Self {
             // A folder is used by one process.
             peers: settings.s3.and_then(|_| rows.peers()),
@@ -308,6 +321,9 @@ impl Store {
 
     /// Closes the database in order. Every use of it must have ended.
     pub async fn close(&mut self) {
+        if let Err(error) = self.rows.note_beside().await {
+            tracing::warn!(%error, "the note beside the database could not be written");
+        }
         self.lock.release();
         self.rows.close().await;
     }
@@ -315,6 +331,7 @@ impl Store {
     /// The stores of a service, which keep the folder locked until they are closed or dropped.
     pub fn into_stores(mut self) -> Stores {
         let rows = self.rows.clone();
+        let keeping = tokio::spawn(kept::keep(Arc::downgrade(&rows))).abort_handle();
         Stores {
             jobs: rows.clone(),
             catalogue: rows.clone(),
@@ -327,7 +344,12 @@ impl Store {
             blobs: self.blobs.clone(),
             received: self.received.clone(),
             peers: self.peers.clone(),
-            close: Box::new(move || Box::pin(async move { self.close().await })),
+            close: Box::new(move || {
+                Box::pin(async move {
+                    keeping.abort();
+                    self.close().await;
+                })
+            }),
         }
     }
 }
@@ -423,7 +445,11 @@ pub async fn open_database(
         Some(server) => {
             let wait = StoreSettings::default().write_wait;
             let gauge = DiskGauge::new(folder, None);
-            Ok(Arc::new(SqlStore::connect(server, wait, gauge).await?))
+            let rows = SqlStore::connect(server, wait, gauge).await?;
+            if name_of(&folder.join(MARKER_FILE)).is_some() {
+                rows.keep_beside(Beside::folder(folder));
+            }
+            Ok(Arc::new(rows))
         }
         None => open_rows(folder).await,
     }
@@ -448,6 +474,13 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqlStore>, OpenError> {
         match locked(folder) {
             Ok(mut lock) => {
                 let rows = in_file(folder, &mut lock, wait, gauge).await?;
+                if noted_place(folder)?.is_none() {
+                    let settled = rows.settle(Beside::folder(folder), false).await;
+                    settled.map_err(|e| unusable(folder, &e))?;
+                } else {
+                    // Without the note in the bucket, a missing one here tells nothing.
+                    rows.keep_beside(Beside::folder(folder));
+                }
                 return Ok(Arc::new(rows));
             }
             Err(OpenError::InUse(_)) => {}
@@ -457,7 +490,9 @@ pub async fn open_rows(folder: &Path) -> Result<Arc<SqlStore>, OpenError> {
         let migrated = is_migrated(&database).await;
         if matches!(migrated, Ok(true)) {
             let rows = SqlStore::open(&database, wait, gauge).await;
-            return rows.map(Arc::new).map_err(|e| unusable(&database, &e));
+            let rows = rows.map_err(|e| unusable(&database, &e))?;
+            rows.keep_beside(Beside::folder(folder));
+            return Ok(Arc::new(rows));
         }
         if Instant::now() >= deadline {
             return Err(match migrated {

@@ -64,17 +64,17 @@ pub struct Gate {
     /// The scope of a caller without credentials, and whether that holds although keys exist.
     anonymous: Scope,
     always_open: bool,
-    /// Set once there is a key, for ever.
-    keys_exist: AtomicBool,
-    /// When the database was last asked whether there is a key.
+    /// Set once the service is closed. Opening it takes a new start.
+    closed: AtomicBool,
+    /// When the database was last asked whether the service is closed.
     asked: Mutex<Option<Instant>>,
     kept: Mutex<HashMap<String, (ApiKey, Instant)>>,
 }
 
 impl Gate {
     /// A gate on these keys and tokens of this issuer. Callers without credentials get the scope
-    /// `anonymous`: for ever if `always_open`, else until the first key is made, and never if
-    /// there is an issuer.
+    /// `anonymous`: for ever if `always_open`, else until the service is closed (by its first key, by an issuer, or
+    /// because a repair or a restored copy leaves in doubt whether it was), and never if there is an issuer.
     pub fn new(
         store: Arc<dyn AccessStore>,
         clock: Arc<dyn Clock>,
@@ -88,7 +88,7 @@ impl Gate {
             issuer,
             anonymous,
             always_open,
-            keys_exist: AtomicBool::new(false),
+            closed: AtomicBool::new(false),
             asked: Mutex::new(None),
             kept: Mutex::default(),
         }
@@ -124,15 +124,15 @@ impl Gate {
         if self.always_open {
             return Ok(true);
         }
-        if self.issuer.is_some() || self.keys_exist.load(Ordering::Relaxed) {
+        if self.issuer.is_some() || self.closed.load(Ordering::Relaxed) {
             return Ok(false);
         }
         let fresh = lock(&self.asked).is_some_and(|at| at.elapsed() < FRESH_FOR);
         if !fresh {
             // The time is taken first: a key made while the database answers is seen next time.
             let now = Instant::now();
-            if self.store.any_key().await? {
-                self.keys_exist.store(true, Ordering::Relaxed);
+            if self.store.is_closed().await? {
+                self.closed.store(true, Ordering::Relaxed);
                 return Ok(false);
             }
             *lock(&self.asked) = Some(now);

@@ -1,6 +1,6 @@
 //! The interface to the tables of keys and of the audit trail.
 
-use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord};
+use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, KeptRow};
 use super::{ApiKey, Usage};
 use crate::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
@@ -22,8 +22,16 @@ pub trait AccessStore: Send + Sync + 'static {
         page: ListRequest,
     ) -> StoreResult<ListPage<ApiKey>>;
 
-    /// Whether there ever was a key, revoked ones included.
-    async fn any_key(&self) -> StoreResult<bool>;
+    /// Whether callers without credentials are refused: there was a key or an issuer of tokens once, or that is not
+    /// known for sure, and the operator has not opened the service since.
+    async fn is_closed(&self) -> StoreResult<bool>;
+
+    /// Notes that callers without credentials are refused from now on.
+    async fn close_access(&self) -> StoreResult<()>;
+
+    /// Admits callers without credentials again, and adds the event that says so. Does nothing and returns `false` while
+    /// there is a key that has not ended.
+    async fn open_access(&self, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
 
     /// Revokes a key, and adds the event that says so unless it was revoked already. Returns
     /// whether there is such a key.
@@ -53,6 +61,10 @@ pub trait AccessStore: Send + Sync + 'static {
 
     /// The greatest sequence number that was ever given to a row.
     async fn greatest_sequence(&self) -> StoreResult<i64>;
+
+    /// Rows of the trail that another place names and the trail lacks, or has with another hash; the newest of each
+    /// place. Receipts of erasures name rows, and so do the notes that a store keeps outside of the trail.
+    async fn unconfirmed(&self) -> StoreResult<Vec<KeptRow>>;
 
     /// Removes the rows that were recorded before a time, keeps their last hash as the anchor, and
     /// appends the event that says so. Returns how many were removed.

@@ -6,7 +6,8 @@
 //!    replaced, no service starts on the target, and only a migration from the same folder goes on.
 //! 3. Files are copied, item by item. Each is hashed on its way and again as the target gives it back; the
 //!    copy of the item's row is written last, so an item that has one is not copied again.
-//! 4. Rows are copied in one transaction, read back, and compared with the source before it commits. The same
+//! 4. The note about the database ([`super::kept`]) is written: what was closed, or in doubt, is so in the target.
+//! 5. Rows are copied in one transaction, read back, and compared with the source before it commits. The same
 //!    transaction replaces the note. A new file of SQLite gets its place in the same way, by a rename.
 //!
 //! So whenever it is killed, the target has all rows or none, and doing it again ends the same. A damaged
@@ -19,6 +20,7 @@ mod source;
 
 use super::content;
 use super::database::SqlStore;
+use super::note::Beside;
 use super::s3::{S3Blobs, S3Location};
 use super::{
     DATABASE_FILE, DiskGauge, FolderLock, MARKER_FILE, MIGRATION_MARK, OpenError, StoreSettings,
@@ -245,6 +247,7 @@ impl Move<'_> {
             (None, Some(folder)) => files::to_folder(self.source, folder, &mut done, tell).await?,
             (None, None) => {}
         }
+        self.place_note(bucket.as_ref()).await?;
         done.tables = self.place_rows(tell).await?;
         self.end_folder()?;
         Ok(done)
@@ -370,6 +373,18 @@ impl Move<'_> {
         let counted = rows::count(rows).await?;
         self.place_database().await?;
         Ok(counted)
+    }
+
+    /// Notes about the database where the target's service looks for them.
+    async fn place_note(&self, bucket: Option<&S3Blobs>) -> Result<(), MigrateError> {
+        let Some(note) = &self.source.note else {
+            return Ok(());
+        };
+        let beside = Beside {
+            folder: self.to.folder.clone(),
+            bucket: bucket.map(S3Blobs::note),
+        };
+        Ok(beside.write(note).await?)
     }
 
     /// Puts the snapshot into its place in the new data folder.

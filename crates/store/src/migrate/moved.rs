@@ -10,6 +10,7 @@ use super::source::PAGE_ROWS;
 use super::{MigrateError, write};
 use crate::blobs::{RECEIVED_FOLDER, STAGING_FOLDER, shelf_path};
 use crate::database::SqlStore;
+use crate::note::{Beside, NotePlace};
 use crate::s3::{S3Blobs, S3Location};
 use crate::{
     BLOB_PLACE_FILE, DATABASE_FILE, DiskGauge, FolderLock, MARKER_FILE, MIGRATION_MARK, OpenError,
@@ -20,6 +21,7 @@ use futures::{StreamExt, TryStreamExt, stream};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use ventriform_service::config::PostgresSettings;
 use ventriform_service::records::{BlobError, ItemRecord, RecordPages, random_id};
 
@@ -104,11 +106,15 @@ async fn note_bucket(
     let gauge = DiskGauge::new(folder, Some(0));
     let opened = S3Blobs::open(location, &scratch, gauge, 0).await;
     let checked = match opened {
-        Ok(blobs) => require_files(rows, &Files::Bucket(&blobs), &location.to_string()).await,
+        Ok(blobs) => {
+            let found = require_files(rows, &Files::Bucket(&blobs), &location.to_string()).await;
+            found.map(|items| (items, blobs.note()))
+        }
         Err(refusal) => Err(OpenError::from(refusal).into()),
     };
     fs::remove_dir_all(&scratch)?;
-    let items = checked?;
+    let (items, note) = checked?;
+    beside(rows, server, folder, Some(note)).await?;
     if server.is_some() {
         rows.change_place(&location.to_string()).await?;
     }
@@ -145,8 +151,26 @@ async fn note_folder(
     let items = require_files(rows, &Files::Folder(folder), &folder.display().to_string()).await?;
     let name = name_of(&marker).unwrap_or_else(|| random_id("folder "));
     write(&marker, &format!("{own}\n{name}\n"))?;
+    beside(rows, server, folder, None).await?;
     rows.change_place(&name).await?;
     Ok(items)
+}
+
+/// Compares the database with the note at the new place of the files, which is a copy at best: what was closed stays so, and
+/// what is in doubt is closed.
+async fn beside(
+    rows: &SqlStore,
+    server: Option<&PostgresSettings>,
+    folder: &Path,
+    bucket: Option<Arc<dyn NotePlace>>,
+) -> Result<(), MigrateError> {
+    let in_folder = server.is_none() || bucket.is_none();
+    let beside = Beside {
+        folder: in_folder.then(|| folder.to_owned()),
+        bucket,
+    };
+    rows.settle(beside, false).await?;
+    Ok(())
 }
 
 /// Refuses a database on a server that services use, or whose files have no place that could have changed.

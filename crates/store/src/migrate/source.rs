@@ -2,6 +2,7 @@
 
 use crate::blobs::STAGING_FOLDER;
 use crate::database::SqlStore;
+use crate::note::{Beside, Note};
 use crate::query::query;
 use crate::tables::to_json;
 use crate::{
@@ -23,6 +24,8 @@ pub(super) struct Source {
     pub scratch: PathBuf,
     /// The snapshot.
     pub rows: SqlStore,
+    /// The note about the database that the target gets; `None` if none was ever made.
+    pub note: Option<Note>,
     _lock: FolderLock,
 }
 
@@ -55,9 +58,12 @@ impl Source {
         taken.map_err(|e| unusable(&database, &e))?;
         let wait = StoreSettings::default().write_wait;
         let rows = SqlStore::open(&snapshot, wait, DiskGauge::new(folder, Some(0))).await;
+        let rows = rows.map_err(|e| unusable(&snapshot, &e))?;
+        let note = note_of(folder, &rows).await;
         Ok(Self {
             folder: folder.to_owned(),
-            rows: rows.map_err(|e| unusable(&snapshot, &e))?,
+            note: note.map_err(|e| unusable(&snapshot, &e))?,
+            rows,
             scratch,
             _lock: lock,
         })
@@ -108,6 +114,17 @@ impl Source {
             tracing::warn!(%error, "the snapshot is deleted by the next start on the folder");
         }
     }
+}
+
+/// Marks the snapshot as the folder and its note say, so that the target stays closed or in doubt, and makes the note for it.
+async fn note_of(folder: &Path, rows: &SqlStore) -> StoreResult<Option<Note>> {
+    let judged = rows.judge(&Beside::folder(folder), false).await?;
+    if rows.marks().await?.store.is_none() {
+        // No service of this version ever ran on it; the first one on the target finds out.
+        return Ok(None);
+    }
+    rows.mark(&judged.marks).await?;
+    rows.note_of(&judged.marks).await.map(Some)
 }
 
 fn place_of(id: &str) -> String {

@@ -171,6 +171,11 @@ impl Bucket {
         })
     }
 
+    /// Bucket and prefix, as the settings name them.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The key of a path below the prefix.
     fn key(&self, path: &str) -> Key {
         match self.prefix.as_str() {

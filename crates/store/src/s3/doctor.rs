@@ -7,14 +7,22 @@
 use super::bucket::Bucket;
 use super::files::S3Blobs;
 use super::shared::publication;
-use crate::blobs::{QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, is_plain, shelf_path};
+use crate::blobs::{
+    HOLDERS_FILE, QUARANTINE_FOLDER, RECEIVED_FOLDER, RECORD_FILE, UNOWNED_SHELF, is_plain,
+    shelf_name, shelf_path,
+};
 use crate::database::SqlStore;
-use crate::findings::Examination;
+use crate::findings::{
+    DAMAGED_SET_ASIDE, Examination, GIVEN_TO_HEIR, HELD_SET_ASIDE, NO_HOLDER, NO_ROW, Repair,
+    UNOWNED_SET_ASIDE, repaired,
+};
+use crate::tables::{Holding, to_json};
 use std::collections::{BTreeMap, BTreeSet};
+use ventriform_service::access::AuditEvent;
 use ventriform_service::intake::ReceivedFiles;
 use ventriform_service::records::{
     BlobStore, Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreResult,
-    SystemClock, Tenant,
+    SystemClock,
 };
 
 /// Rows read at a time.
@@ -24,8 +32,12 @@ const PAGE_ROWS: u32 = 200;
 pub(crate) struct BucketDoctor<'a> {
     pub blobs: &'a S3Blobs,
     pub rows: &'a SqlStore,
-    /// Who gets items whose holder is unknown; `None` repairs nothing.
-    pub heirs: Option<&'a Tenant>,
+    /// How to repair; `None` repairs nothing.
+    pub repair: Option<&'a Repair>,
+    /// Items with a row that nobody has.
+    pub unowned: &'a BTreeSet<String>,
+    /// What was repaired, for the audit trail.
+    pub events: &'a mut Vec<AuditEvent>,
     pub found: &'a mut Examination,
 }
 
@@ -46,7 +58,7 @@ impl BucketDoctor<'_> {
     }
 
     fn if_repairing(&self, what: &'static str) -> Option<&'static str> {
-        self.heirs.is_some().then_some(what)
+        self.repair.is_some().then_some(what)
     }
 
     /// Checks the files of every row. Returns the places that rows name, by item.
@@ -61,20 +73,36 @@ impl BucketDoctor<'_> {
                 let places: BTreeSet<String> = places.collect();
                 let wrong = self.wrong_files(&record, &shelf_path(id)).await?;
                 if wrong.is_empty() {
-                    if self.heirs.is_some() {
+                    if self.repair.is_some() {
                         self.blobs.describe(&record).await?;
+                    }
+                    if self.unowned.contains(id) && !self.unowned(&record, &places).await? {
+                        continue;
                     }
                     known.insert(id.to_owned(), places);
                     continue;
                 }
-                if self.heirs.is_some() {
+                let holdings = self.rows.holdings(id).await?;
+                let on_hold = holdings.iter().any(Holding::is_on_hold);
+                if self.repair.is_some() {
+                    let shelf = if on_hold {
+                        UNOWNED_SHELF.to_owned()
+                    } else {
+                        shelf_name(SystemClock.now())
+                    };
+                    let text = to_json(&holdings)?;
                     for place in &places {
-                        let now = SystemClock.now();
-                        self.blobs.set_publication_aside(id, place, now).await?;
+                        let path = format!("{}/{HOLDERS_FILE}", publication(id, place));
+                        self.bucket().put(&path, text.clone().into()).await?;
+                        self.blobs.set_publication_aside(id, place, &shelf).await?;
                     }
                     self.rows.forget(id).await?;
                 }
-                let repair = "its row was removed and its files moved into the quarantine";
+                let repair = if on_hold {
+                    HELD_SET_ASIDE
+                } else {
+                    DAMAGED_SET_ASIDE
+                };
                 let repair = self.if_repairing(repair);
                 self.found
                     .note("damaged-item", id, wrong.join("; "), repair);
@@ -153,7 +181,7 @@ impl BucketDoctor<'_> {
     }
 
     async fn superseded(&mut self, id: &str, place: &str) -> StoreResult<()> {
-        if self.heirs.is_some() {
+        if self.repair.is_some() {
             self.blobs.shared.delete_publication(id, place).await?;
         }
         let detail = "It is left over from a write that did not end, or was replaced.";
@@ -169,21 +197,61 @@ impl BucketDoctor<'_> {
         let record = self.whole_record(&shelf_path(id), id, place).await?;
         let erased = self.rows.was_erased(id).await?;
         let record = record.filter(|_| !erased && !restored);
-        let repair = match (self.heirs, &record) {
-            (None, _) => None,
-            (Some(heirs), Some(record)) => {
-                self.rows.restore(record, heirs).await?;
-                Some("its row was made from the record beside the files")
+        let Some(repair) = self.repair else {
+            self.found.note("unknown-item", id, NO_ROW, None);
+            return Ok(false);
+        };
+        let (now, heir) = (SystemClock.now(), repair.heir.as_ref());
+        let mut made = false;
+        let done = match &record {
+            Some(record) if self.rows.restore(record, heir, now).await? => {
+                self.events.push(repaired(id, heir, now));
+                made = true;
+                "its row was made from the record beside the files"
             }
-            (Some(_), None) => {
-                let now = SystemClock.now();
-                self.blobs.set_publication_aside(id, place, now).await?;
-                Some("its files were moved into the quarantine")
+            Some(_) => {
+                let shelf = UNOWNED_SHELF;
+                self.blobs.set_publication_aside(id, place, shelf).await?;
+                UNOWNED_SET_ASIDE
+            }
+            None => {
+                let shelf = shelf_name(now);
+                self.blobs.set_publication_aside(id, place, &shelf).await?;
+                "its files were moved into the quarantine"
             }
         };
-        let detail = "It has files but no row.";
-        self.found.note("unknown-item", id, detail, repair);
-        Ok(self.heirs.is_some() && record.is_some())
+        self.found.note("unknown-item", id, NO_ROW, Some(done));
+        Ok(made)
+    }
+
+    /// An item that is whole and that nobody has. Returns whether it keeps its row.
+    async fn unowned(
+        &mut self,
+        record: &ItemRecord,
+        places: &BTreeSet<String>,
+    ) -> StoreResult<bool> {
+        let id = record.id();
+        let Some(repair) = self.repair else {
+            self.found.note("unowned-item", id, NO_HOLDER, None);
+            return Ok(true);
+        };
+        let (now, heir) = (SystemClock.now(), repair.heir.as_ref());
+        let given = self.rows.restore(record, heir, now).await?;
+        self.events.push(repaired(id, heir, now));
+        if !given {
+            for place in places {
+                let shelf = UNOWNED_SHELF;
+                self.blobs.set_publication_aside(id, place, shelf).await?;
+            }
+            self.rows.forget(id).await?;
+        }
+        let done = if given {
+            GIVEN_TO_HEIR
+        } else {
+            UNOWNED_SET_ASIDE
+        };
+        self.found.note("unowned-item", id, NO_HOLDER, Some(done));
+        Ok(given)
     }
 
     /// Checks the files of received objects against their rows.
@@ -200,7 +268,7 @@ impl BucketDoctor<'_> {
                 None => Some("It is missing."),
             };
             if let Some(wrong) = wrong {
-                if self.heirs.is_some() {
+                if self.repair.is_some() {
                     self.blobs.quarantine(&name, SystemClock.now()).await?;
                     self.rows.forget_received(&name).await?;
                 }
@@ -215,7 +283,7 @@ impl BucketDoctor<'_> {
                 continue;
             }
             let name = path.rsplit('/').next().unwrap_or(&path).to_owned();
-            if self.heirs.is_some() {
+            if self.repair.is_some() {
                 self.blobs.quarantine(&name, SystemClock.now()).await?;
             }
             let repair = self.if_repairing("it was moved into the quarantine");
@@ -246,13 +314,22 @@ impl BucketDoctor<'_> {
             let record = self.whole_record(&shelf, id, place).await?;
             let wanted = !self.rows.was_erased(id).await? && self.rows.record(id).await?.is_none();
             let mut repair = None;
-            if let (Some(heirs), Some(record), true) = (self.heirs, record, wanted) {
-                for path in &paths {
-                    let back = path.splitn(3, '/').last().unwrap_or(path);
-                    self.bucket().shift(path, back).await?;
+            if let (Some(given), Some(record), true) = (self.repair, record, wanted) {
+                let (now, heir) = (SystemClock.now(), given.heir.as_ref());
+                let beside = format!("{folder}/{HOLDERS_FILE}");
+                let text = self.bucket().read(&beside).await?.unwrap_or_default();
+                let holdings: Vec<Holding> = serde_json::from_slice(&text).unwrap_or_default();
+                if heir.is_some() || !holdings.is_empty() || self.rows.has_holder(id).await? {
+                    for path in paths.iter().filter(|path| **path != beside) {
+                        let back = path.splitn(3, '/').last().unwrap_or(path);
+                        self.bucket().shift(path, back).await?;
+                    }
+                    self.bucket().delete([beside]).await?;
+                    self.rows.give_held(id, &holdings).await?;
+                    self.rows.restore(&record, heir, now).await?;
+                    self.events.push(repaired(id, heir, now));
+                    repair = Some("it was brought back");
                 }
-                self.rows.restore(&record, heirs).await?;
-                repair = Some("it was brought back");
             }
             let detail = "It was set aside, because it had no row or was damaged.";
             self.found

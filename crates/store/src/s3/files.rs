@@ -310,10 +310,10 @@ impl S3Blobs {
         &self,
         id: &str,
         place: &str,
-        now: Timestamp,
+        shelf: &str,
     ) -> Result<(), BlobError> {
         for path in self.shared.bucket.paths(&publication(id, place)).await? {
-            let to = format!("{QUARANTINE_FOLDER}/{}/{path}", shelf_name(now));
+            let to = format!("{QUARANTINE_FOLDER}/{shelf}/{path}");
             self.shared.bucket.shift(&path, &to).await?;
         }
         Ok(())
@@ -431,7 +431,8 @@ impl BlobStore for S3Blobs {
     async fn set_aside(&self, id: &str, now: Timestamp) -> Result<bool, BlobError> {
         let given_up = self.given_up(id).await?;
         for place in &given_up {
-            self.set_publication_aside(id, place, now).await?;
+            self.set_publication_aside(id, place, &shelf_name(now))
+                .await?;
         }
         Ok(!given_up.is_empty())
     }

@@ -6,6 +6,7 @@
 //!   models/mdl_.../PLACE/           likewise segmentations/, beats/, comparisons/, normals/, templates/, readers/
 //!   received/                       objects that are not volumes yet
 //!   quarantine/DAY/volumes/...      what was found without a row
+//!   kept.json                       the note about the database ([`crate::note`])
 //!   ready                           written and read by readiness checks
 //! ```
 //!
@@ -26,6 +27,7 @@
 mod bucket;
 mod doctor;
 mod files;
+mod note;
 mod received;
 mod shared;
 mod staged;

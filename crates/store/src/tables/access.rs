@@ -1,13 +1,14 @@
 //! The tables of keys and of the audit trail.
 
+use super::marks::{Access, kept_head, set_access};
 use super::pages::{Times, push_page, push_times};
 use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::access::{
-    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord, Maker,
-    NO_HASH, Quota, Usage, chain_hash,
+    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
+    KeptRow, Maker, NO_HASH, Quota, Usage, chain_hash,
 };
 use ventriform_service::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 
@@ -30,6 +31,30 @@ pub(super) async fn stored_bytes(of: &mut Transaction<'_>, tenant: &Tenant) -> S
         .await?;
     Ok(rows::unsigned(row.try_get(0)?))
 }
+
+/// Whether there is a key that was made after the operator opened the service at `$1`, or had not ended then. A program of an
+/// older version makes keys without closing the service.
+const KEYS_SINCE_OPENED: &str = "SELECT EXISTS (SELECT 1 FROM api_keys
+    WHERE created_at > $1 OR (revoked_at IS NULL AND (expires_at IS NULL OR expires_at > $1)))";
+
+/// The newest receipt that names a row of the trail which is not there, though no removal by age took it.
+const UNCONFIRMED_RECEIPT: &str = "
+    SELECT id, mark AS sequence, mark_hash AS hash FROM (
+        SELECT id, sequence AS place, CAST(json_extract(receipt, '$.audit.sequence') AS INTEGER) AS mark,
+               json_extract(receipt, '$.audit.hash') AS mark_hash FROM erasures) AS named
+    WHERE mark > coalesce((SELECT max(sequence) FROM audit_anchors), 0)
+      AND NOT EXISTS (SELECT 1 FROM audit WHERE audit.sequence = mark AND audit.hash = mark_hash)
+    ORDER BY mark DESC, place DESC LIMIT 1";
+
+/// The same for PostgreSQL.
+const UNCONFIRMED_RECEIPT_ON_POSTGRES: &str = "
+    SELECT id, mark AS sequence, mark_hash AS hash FROM (
+        SELECT id, sequence AS place,
+               CAST(json_field(json_field(receipt, 'audit'), 'sequence') AS BIGINT) AS mark,
+               json_field(json_field(receipt, 'audit'), 'hash') AS mark_hash FROM erasures) AS named
+    WHERE mark > coalesce((SELECT max(sequence) FROM audit_anchors), 0)
+      AND NOT EXISTS (SELECT 1 FROM audit WHERE audit.sequence = mark AND audit.hash = mark_hash)
+    ORDER BY mark DESC, place DESC LIMIT 1";
 
 #[async_trait]
 impl AccessStore for SqlStore {
@@ -57,9 +82,10 @@ impl AccessStore for SqlStore {
         })
         .execute(&mut transaction)
         .await?;
+        set_access(&mut transaction, Access::Closed).await?;
         append(&mut transaction, std::slice::from_ref(event)).await?;
         transaction.commit().await?;
-        Ok(())
+        self.note_beside().await
     }
 
     async fn key(&self, id: &str) -> StoreResult<Option<ApiKey>> {
@@ -80,11 +106,37 @@ impl AccessStore for SqlStore {
         rows::page(rows, page, read_key, |key| key.sequence)
     }
 
-    async fn any_key(&self) -> StoreResult<bool> {
-        let row = query("SELECT EXISTS (SELECT 1 FROM api_keys)")
-            .fetch_one(&self.readers)
-            .await?;
-        Ok(row.try_get(0)?)
+    async fn is_closed(&self) -> StoreResult<bool> {
+        let keys = match self.marks().await?.access {
+            Some(Access::Closed) => return Ok(true),
+            Some(Access::Opened(at)) => query(KEYS_SINCE_OPENED).bind(at),
+            Some(Access::Open) | None => query("SELECT EXISTS (SELECT 1 FROM api_keys)"),
+        };
+        keys.fetch_one(&self.readers).await?.try_get(0)
+    }
+
+    async fn close_access(&self) -> StoreResult<()> {
+        if self.marks().await?.access != Some(Access::Closed) {
+            let mut transaction = self.writer.begin().await?;
+            set_access(&mut transaction, Access::Closed).await?;
+            transaction.commit().await?;
+        }
+        self.note_beside().await
+    }
+
+    async fn open_access(&self, now: Timestamp, event: &AuditEvent) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let valid = "SELECT 1 FROM api_keys
+                     WHERE revoked_at IS NULL AND (expires_at IS NULL OR expires_at > $1) LIMIT 1";
+        let valid = query(valid).bind(now).fetch_optional(&mut transaction);
+        if valid.await?.is_some() {
+            return Ok(false);
+        }
+        set_access(&mut transaction, Access::Opened(now)).await?;
+        append(&mut transaction, std::slice::from_ref(event)).await?;
+        transaction.commit().await?;
+        self.note_beside().await?;
+        Ok(true)
     }
 
     async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool> {
@@ -171,6 +223,32 @@ impl AccessStore for SqlStore {
             .fetch_optional(&self.readers)
             .await?;
         row.map_or(Ok(0), |row| row.try_get(0))
+    }
+
+    async fn unconfirmed(&self) -> StoreResult<Vec<KeptRow>> {
+        let receipt = query(UNCONFIRMED_RECEIPT)
+            .on_postgres(UNCONFIRMED_RECEIPT_ON_POSTGRES)
+            .fetch_optional(&self.readers)
+            .await?;
+        let receipt = receipt.map(|row| -> StoreResult<KeptRow> {
+            Ok(KeptRow {
+                place: format!("receipt {}", row.try_get::<String, _>("id")?),
+                sequence: row.try_get("sequence")?,
+                hash: row.try_get("hash")?,
+            })
+        });
+        let mut found: Vec<KeptRow> = receipt.transpose()?.into_iter().collect();
+        for (place, head) in self.kept_heads().await? {
+            if !self.confirms(&head).await? {
+                found.push(KeptRow {
+                    place,
+                    sequence: head.sequence,
+                    hash: head.hash,
+                });
+            }
+        }
+        found.sort_by_key(|row| std::cmp::Reverse(row.sequence));
+        Ok(found)
     }
 
     async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64> {
@@ -263,17 +341,10 @@ pub(super) fn listed_events(filter: &AuditFilter, page: ListRequest) -> QueryBui
 /// Appends events to the chain, within a transaction that holds the database's write lock. Returns
 /// the end of the chain.
 pub(super) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> StoreResult<Anchor> {
-    let head = query(
-        "SELECT sequence, hash FROM (SELECT sequence, hash FROM audit
-                                     UNION ALL SELECT sequence, hash FROM audit_anchors) AS ends
-         ORDER BY sequence DESC LIMIT 1",
-    )
-    .fetch_optional(&mut *to)
-    .await?;
-    let (mut sequence, mut hash) = match head.map(read_anchor).transpose()? {
-        Some(head) => (head.sequence, head.hash),
-        None => (0, NO_HASH.to_owned()),
-    };
+    let Anchor {
+        mut sequence,
+        mut hash,
+    } = end_of_trail(to).await?;
     for event in events {
         let event = to_json(event)?;
         sequence += 1;
@@ -286,6 +357,90 @@ pub(super) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> S
             .await?;
     }
     Ok(Anchor { sequence, hash })
+}
+
+impl SqlStore {
+    /// The newest row of the trail, or the last one that was removed because of its age.
+    pub(crate) async fn trail_end(&self) -> StoreResult<Anchor> {
+        let end = query(NEWEST_ROW).fetch_optional(&self.readers).await?;
+        let end = end.map(read_anchor).transpose()?;
+        Ok(end.unwrap_or_else(no_row))
+    }
+
+    /// Whether the trail has a row with that hash, has removed it because of its age, or says that the end of another
+    /// trail was there.
+    pub(crate) async fn confirms(&self, head: &Anchor) -> StoreResult<bool> {
+        if head.sequence == 0 {
+            return Ok(true);
+        }
+        let row = query(
+            "SELECT EXISTS (SELECT 1 FROM audit WHERE sequence = $1 AND hash = $2)
+                 OR EXISTS (SELECT 1 FROM audit_anchors WHERE sequence = $1 AND hash = $2)
+                 OR $1 < coalesce((SELECT max(sequence) FROM audit_anchors), 0)
+                 OR EXISTS (SELECT 1 FROM audit WHERE object = $3
+                            AND json_extract(event, '$.activity') = 'trail-applied')",
+        )
+        .on_postgres(
+            "SELECT EXISTS (SELECT 1 FROM audit WHERE sequence = $1 AND hash = $2)
+                 OR EXISTS (SELECT 1 FROM audit_anchors WHERE sequence = $1 AND hash = $2)
+                 OR $1 < coalesce((SELECT max(sequence) FROM audit_anchors), 0)
+                 OR EXISTS (SELECT 1 FROM audit WHERE object = $3
+                            AND json_field(event, 'activity') = 'trail-applied')",
+        )
+        .bind(head.sequence)
+        .bind(&head.hash)
+        .bind(head.name())
+        .fetch_one(&self.readers)
+        .await?;
+        row.try_get(0)
+    }
+}
+
+/// The newest row of the trail or of the removals by age.
+const NEWEST_ROW: &str = "SELECT sequence, hash FROM (
+        SELECT sequence, hash FROM audit UNION ALL SELECT sequence, hash FROM audit_anchors) AS ends
+    ORDER BY sequence DESC LIMIT 1";
+
+fn no_row() -> Anchor {
+    Anchor {
+        sequence: 0,
+        hash: NO_HASH.to_owned(),
+    }
+}
+
+/// The row that the next one follows. If the newest rows are lost, their numbers are not given again: the next row follows
+/// the newest one that was ever written, with its hash if another place has kept that.
+async fn end_of_trail(of: &mut Transaction<'_>) -> StoreResult<Anchor> {
+    let ends = query(
+        "SELECT sequence, hash, 0 AS rank FROM (
+             SELECT sequence, hash FROM audit
+             UNION ALL SELECT sequence, hash FROM audit_anchors ORDER BY sequence DESC LIMIT 1)
+         UNION ALL SELECT seq, '', 1 FROM sqlite_sequence WHERE name = 'audit'
+         ORDER BY rank",
+    )
+    .on_postgres(
+        "SELECT sequence, hash, 0 AS rank FROM (
+             SELECT sequence, hash FROM audit
+             UNION ALL SELECT sequence, hash FROM audit_anchors ORDER BY sequence DESC LIMIT 1) AS ends
+         UNION ALL SELECT sequence, '', 1 FROM audit_greatest
+         ORDER BY rank",
+    )
+    .fetch_all(&mut *of)
+    .await?;
+    let mut end = no_row();
+    for found in rows::all(ends, read_anchor)? {
+        if !found.hash.is_empty() {
+            end = found;
+        } else if found.sequence > end.sequence {
+            let kept = kept_head(&mut *of).await?;
+            let kept = kept.filter(|kept| kept.sequence == found.sequence);
+            end = Anchor {
+                sequence: found.sequence,
+                hash: kept.map_or(end.hash, |kept| kept.hash),
+            };
+        }
+    }
+    Ok(end)
 }
 
 fn read_key(row: DbRow) -> StoreResult<ApiKey> {

@@ -605,7 +605,7 @@ pub(crate) async fn insert_content(to: &mut Transaction<'_>, product: &Product) 
 }
 
 /// The parameters that name further volumes which a product is made of.
-const OTHER_VOLUMES: [&str; 2] = ["expert", "rest"];
+pub(super) const OTHER_VOLUMES: [&str; 2] = ["expert", "rest"];
 
 /// Adds a product within a transaction, unless it is stored already, and gives it to a tenant.
 /// Returns whether it is new for the tenant.

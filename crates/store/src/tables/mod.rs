@@ -10,11 +10,14 @@ mod figures;
 mod hooks;
 mod intake;
 mod jobs;
+mod marks;
+mod owners;
 mod pages;
 mod peers;
 mod rows;
 mod scans;
 mod worklist;
 
-pub(super) use catalogue::insert_content;
+pub(crate) use marks::{Access, Marks, anchor_of};
+pub(crate) use owners::{Holder, Holding, REPAIRER};
 pub(super) use rows::to_json;

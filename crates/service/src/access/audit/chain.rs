@@ -1,6 +1,6 @@
 //! The chain of hashes, and its check.
 
-use super::event::{Activity, Anchor, AuditEvent};
+use super::event::{Activity, Anchor, AuditEvent, KeptRow};
 use crate::access::AccessStore;
 use crate::records::{StoreResult, hex};
 use sha2::{Digest, Sha256};
@@ -37,6 +37,29 @@ pub enum BrokenLink {
     /// Rows were removed, and no event of the chain says so.
     #[error("the rows up to {0} were removed, but no event of the trail says so")]
     UnrecordedRemoval(i64),
+    /// Another place names a row that the trail does not have.
+    #[error(
+        "{place} names row {sequence} with the hash {hash}, which the trail does not have: rows are lost, or the database \
+         is an older copy"
+    )]
+    Unconfirmed {
+        /// The place: the id of a receipt, or what keeps the newest row.
+        place: String,
+        /// Position of the row.
+        sequence: i64,
+        /// Its hash there.
+        hash: String,
+    },
+}
+
+impl From<&KeptRow> for BrokenLink {
+    fn from(kept: &KeptRow) -> Self {
+        Self::Unconfirmed {
+            place: kept.place.clone(),
+            sequence: kept.sequence,
+            hash: kept.hash.clone(),
+        }
+    }
 }
 
 /// The result of the check.
@@ -48,11 +71,13 @@ pub struct AuditReport {
     pub newest: i64,
     /// Hash of the newest row: to be kept in another place.
     pub head: String,
-    /// The first place where the chain is broken, if it is.
+    /// The first place where the chain is broken, if it is; else what other places say and the chain does not.
     pub broken: Option<BrokenLink>,
+    /// The rows that other places name and the trail lacks.
+    pub unconfirmed: Vec<KeptRow>,
 }
 
-/// Walks the chain from the oldest row that is kept to the newest.
+/// Walks the chain from the oldest row that is kept to the newest, and compares it with what other places say of it.
 ///
 /// # Errors
 /// If the database fails.
@@ -87,6 +112,7 @@ pub async fn verify(store: &dyn AccessStore) -> StoreResult<AuditReport> {
             rows += 1;
         }
     };
+    let unconfirmed = store.unconfirmed().await?;
     let greatest = store.greatest_sequence().await?;
     let broken = broken.or_else(|| {
         if greatest > sequence {
@@ -99,11 +125,13 @@ pub async fn verify(store: &dyn AccessStore) -> StoreResult<AuditReport> {
             Some(BrokenLink::UnrecordedRemoval(anchor.sequence))
         }
     });
+    let broken = broken.or_else(|| unconfirmed.first().map(BrokenLink::from));
     Ok(AuditReport {
         rows,
         newest: sequence,
         head,
         broken,
+        unconfirmed,
     })
 }
 

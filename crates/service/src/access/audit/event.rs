@@ -33,6 +33,16 @@ pub enum Activity {
     AuditPruned,
     /// Events could not be written and are lost; `count` says how many.
     AuditGap,
+    /// The operator admitted callers without credentials again.
+    AccessOpened,
+    /// A repair found that rows of a table are lost. The object is `TABLE` or, with the last row that was known,
+    /// `TABLE:SEQUENCE:HASH`; `count` says how many rows at least.
+    RowsLost,
+    /// A repair gave an item to a tenant, or put it on hold, because who had it is not known for sure.
+    Repaired,
+    /// What a newer trail says was revoked and erased was done here too. The object is `SEQUENCE:HASH`, the end of
+    /// that trail.
+    TrailApplied,
 }
 
 impl Activity {
@@ -140,6 +150,17 @@ pub struct AuditLink {
     /// The stored JSON.
     pub event: String,
     /// The stored hash.
+    pub hash: String,
+}
+
+/// A row of the trail as another place names it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeptRow {
+    /// The place: the id of a receipt, or a file.
+    pub place: String,
+    /// Position of the row.
+    pub sequence: i64,
+    /// Its hash.
     pub hash: String,
 }
 

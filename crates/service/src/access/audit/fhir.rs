@@ -62,6 +62,10 @@ impl Codes {
             Activity::AuditRead => dicom(trail, trail, "R"),
             Activity::AuditPruned => dicom(trail, trail, "D"),
             Activity::AuditGap => own("audit-gap", "Events are lost"),
+            Activity::AccessOpened => own("access-opened", "Callers need no credentials"),
+            Activity::RowsLost => own("rows-lost", "Rows of a table are lost"),
+            Activity::Repaired => own("repaired", "An item was repaired"),
+            Activity::TrailApplied => own("trail-applied", "A newer trail was applied"),
         }
     }
 }
