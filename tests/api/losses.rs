@@ -184,7 +184,8 @@ async fn whatever_page_is_lost_the_service_stays_closed_and_nothing_is_lost_in_s
             let folder = copied(ward.data.path());
             let database = folder.path().join("ventriform.db");
             lose(&database, page);
-            let repaired = examine(folder.path(), None, Some(&Repair::default()));
+            let repair = Repair::default();
+            let repaired = examine(folder.path(), None, Some(&repair));
             let repaired = repaired
                 .await
                 .unwrap_or_else(|error| panic!("{case}: {error}"));

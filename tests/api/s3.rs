@@ -17,7 +17,7 @@ use ventriform_service::config::{AwsVariables, Settings};
 use ventriform_service::intake::ReceivedFiles;
 use ventriform_service::records::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
-    StoredVolume, Tenant, random_id,
+    StoredVolume, random_id,
 };
 use ventriform_store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
 

@@ -303,6 +303,7 @@ impl<'a> Doctor<'a> {
         };
         draft.close().await;
         filled?;
+        blobs::sync(&self.folder.join(DRAFT_FILE))?;
         self.replace_database()?;
         let rows = self.open_database().await.map_err(faults::of_sqlite)?;
         rows.keep_beside(self.beside());

@@ -180,7 +180,9 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
         });
     }
     let readable = names(to, "old").await;
-    run(to, "BEGIN IMMEDIATE").await?;
+    // No transaction: after a statement that met the damage, SQLite lets none write that its transaction has begun. The new
+    // database takes its place as a whole, and is forced to disk before.
+    run(to, "PRAGMA synchronous = OFF").await?;
     let triggers: Vec<(String, String)> =
         sqlx::query_as("SELECT name, sql FROM main.sqlite_schema WHERE type = 'trigger'")
             .fetch_all(&mut *to)
@@ -215,7 +217,6 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
     for (_, sql) in &triggers {
         run(to, sql.clone()).await?;
     }
-    run(to, "COMMIT").await?;
     Ok(Salvage {
         tables: salvaged,
         holders,
