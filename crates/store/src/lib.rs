@@ -33,6 +33,7 @@ mod database;
 mod doctor;
 mod faults;
 mod findings;
+mod health;
 mod migrate;
 mod news;
 mod postgres;
@@ -323,7 +324,8 @@ impl Store {
             deliveries: rows.clone(),
             archives: rows.clone(),
             intake: rows.clone(),
-            figures: rows,
+            figures: rows.clone(),
+            time: rows,
             blobs: self.blobs.clone(),
             received: self.received.clone(),
             peers: self.peers.clone(),

@@ -6,7 +6,7 @@ use super::{
     Bounded, Custody, Erased, ErasureOrder, Expired, ItemFilter, LegalHold, ListPage, ListRequest,
     Owned, PagePlan, Product, Receipt, ScanFields, Scans, StoreResult, StoredVolume, Tags,
 };
-use super::{Resource, Tenant, Timestamp};
+use super::{Cutoff, Resource, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// The result of a request to delete a job.
@@ -198,7 +198,7 @@ pub trait Catalogue: Custody + Scans {
     async fn expired(
         &self,
         kind: Resource,
-        before: Timestamp,
+        before: Cutoff,
         after: Option<&Expired>,
         limit: u32,
     ) -> StoreResult<Vec<Expired>>;

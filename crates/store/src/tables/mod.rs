@@ -14,6 +14,7 @@ mod pages;
 mod peers;
 mod rows;
 mod scans;
+mod times;
 mod worklist;
 
 pub(super) use catalogue::insert_content;
