@@ -2,14 +2,13 @@
 //!
 //! A request is admitted once. Its answer may go on for hours: a stream of events, a download over a slow line, a wait
 //! for a job. [`CredentialWatch`] asks every [`LOOK_EVERY`] whether the credentials still open the service, so that
-//! such an answer ends soon after a key was revoked, or a key or token has expired. A stream of events ends in order; a
-//! download is broken off, so that its client does not take it for whole.
+//! such an answer ends soon after a key was revoked, or a key or token has expired. It is broken off, and its connection
+//! closed, so that no client takes it for whole.
 //!
 //! Uploads are not ended: what a request has begun with valid credentials it may finish.
 
 use crate::app::App;
 use axum::body::{Body, HttpBody};
-use axum::http::{HeaderMap, header};
 use axum::response::Response;
 use bytes::Bytes;
 use futures::future::BoxFuture;
@@ -72,22 +71,14 @@ impl CredentialWatch {
         if is_short {
             return response;
         }
-        let in_order = is_event_stream(response.headers());
         response.map(|body| {
             Body::new(WatchedBody {
                 body,
                 watch: Some(self),
                 ended: None,
-                in_order,
             })
         })
     }
-}
-
-fn is_event_stream(headers: &HeaderMap) -> bool {
-    headers
-        .get(header::CONTENT_TYPE)
-        .is_some_and(|kind| kind.as_bytes().starts_with(b"text/event-stream"))
 }
 
 /// A body that ends with the credentials of its request.
@@ -96,8 +87,6 @@ struct WatchedBody {
     /// Until the first look at the body.
     watch: Option<CredentialWatch>,
     ended: Option<BoxFuture<'static, ()>>,
-    /// Whether it may end at any place.
-    in_order: bool,
 }
 
 impl HttpBody for WatchedBody {
@@ -117,10 +106,8 @@ impl HttpBody for WatchedBody {
             self.ended = None;
             self.body = Body::empty();
             tracing::info!("an answer was ended because the credentials of its request have ended");
-            if !self.in_order {
-                let broken = std::io::Error::other("the credentials of the request have ended");
-                return Poll::Ready(Some(Err(axum::Error::new(broken))));
-            }
+            let broken = std::io::Error::other("the credentials of the request have ended");
+            return Poll::Ready(Some(Err(axum::Error::new(broken))));
         }
         Pin::new(&mut self.body).poll_frame(context)
     }

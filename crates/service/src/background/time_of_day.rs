@@ -3,11 +3,14 @@
 
 use crate::records::{Clock, ServiceClock, TimeStore};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio_util::sync::CancellationToken;
 
 /// How often the server of the database is asked for its time.
 const ASK_EVERY: Duration = Duration::from_secs(10);
+
+/// An answer that takes longer says too little about the time.
+const LONGEST_ANSWER: Duration = Duration::from_secs(1);
 
 /// Every so many rounds the trusted time is noted.
 const NOTE_ROUNDS: u32 = 3;
@@ -50,9 +53,10 @@ impl TimeOfDay {
 
     /// Asks the server for its time. While it does not answer, time goes on by the monotonic clock.
     async fn ask(&self) {
+        let asked = Instant::now();
         match self.store.server_time().await {
-            Ok(Some(now)) => self.clock.follow(now),
-            Ok(None) => {}
+            Ok(Some(now)) if asked.elapsed() <= LONGEST_ANSWER => self.clock.follow(now),
+            Ok(_) => {}
             Err(error) => tracing::warn!(%error, "the time of the database could not be read"),
         }
     }
