@@ -964,7 +964,7 @@ async fn streams_and_waits_end_soon_after_their_credentials() {
     .await;
     let quota = Quota::default();
     let (_, admin) = key(app.data.path(), Scope::Admin, "default", quota).await;
-    let file = app.post("/v1/models?name=x").bearer_auth(&admin);
+    let file = app.post("/v1/models").bearer_auth(&admin);
     let job: Value = file
         .body(volume("slow"))
         .send()
@@ -994,7 +994,7 @@ async fn streams_and_waits_end_soon_after_their_credentials() {
         open(&token).await,
     ];
     let wait = app
-        .post("/v1/models?name=y")
+        .post("/v1/models")
         .bearer_auth(&own)
         .header("prefer", "wait=60")
         .body(volume("slow"))
