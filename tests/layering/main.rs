@@ -352,6 +352,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
             "records",
             "http_client",
             "jobs",
+            "access",
             "hooks",
             "archive",
             "intake",

@@ -1,8 +1,8 @@
 //! Who sent a request: the layer [`super::guard`] puts the [`Caller`] into every request, and
 //! handlers take it as an extractor.
 
-use super::guard::CredentialWatch;
 use super::problem::{Answer, Problem};
+use super::watch::CredentialWatch;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};

@@ -15,7 +15,7 @@
 //!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event is on
 //!    disk.
 //!
-//! 7. An answer that lasts ends when the credentials of its request do ([`watch`]), and so does a wait for a job.
+//! 7. An answer that lasts ends when the credentials of its request do ([`CredentialWatch`]), and so does a wait for a job.
 //!
 //! `Authorization` decides alone; a caller's address or a forwarded header never does.
 
@@ -24,16 +24,15 @@ pub mod pages;
 pub mod state;
 
 mod trail;
-mod watch;
 
 pub use trail::AlreadyRecorded;
-pub use watch::CredentialWatch;
 
 use super::app::App;
 use super::caller::Caller;
 use super::client::ClientAddress;
 use super::memory::{Ledger, answered};
 use super::problem::{Answer, Problem};
+use super::watch::CredentialWatch;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};

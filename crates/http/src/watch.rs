@@ -7,7 +7,7 @@
 //!
 //! Uploads are not ended: what a request has begun with valid credentials it may finish.
 
-use crate::app::App;
+use super::app::App;
 use axum::body::{Body, HttpBody};
 use axum::response::Response;
 use bytes::Bytes;
