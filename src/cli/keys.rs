@@ -21,6 +21,7 @@ use ventriform_store::IfNone;
   ventriform keys create --name auditor --scope admin --tenant clinic-b --expires 90d
   ventriform keys list --data-dir data
   ventriform keys revoke 0123456789abcdef --data-dir data
+  ventriform keys revoke --owner contractor-7 --data-dir data
   ventriform keys open --data-dir data
 
 Once there is a key, the service answers only requests with `Authorization: Bearer KEY`, also when all keys have
@@ -73,7 +74,11 @@ struct CreateArgs {
 #[derive(Debug, Args)]
 struct RevokeArgs {
     /// The key's id, as `keys list` shows it
-    id: String,
+    #[arg(required_unless_present = "owner")]
+    id: Option<String>,
+    /// Instead: all keys of this subject of the OpenID Connect issuer, as `keys list` names it
+    #[arg(long, value_name = "SUBJECT", conflicts_with = "id")]
+    owner: Option<String>,
     #[command(flatten)]
     data: DataArgs,
 }
@@ -109,6 +114,7 @@ async fn create(args: &CreateArgs) -> Result<()> {
             jobs: args.queued_jobs,
         },
         maker: Maker::Operator,
+        owner: None,
         expires_at: args.expires.map(|s| now.saturating_add(span(s))),
     };
     let (key, text) = ApiKey::make(request, now)?;
@@ -129,12 +135,12 @@ async fn list(args: &DataArgs) -> Result<()> {
     let store = args.open(IfNone::Refuse).await?;
     let now = SystemClock.now();
     let mut before = None;
-    say!("id\tstate\tscope\ttenant\tcreated\texpires\tname");
+    say!("id\tstate\tscope\ttenant\tcreated\texpires\tname\towner");
     loop {
         let page = store.keys(None, ListRequest { before, limit: 100 }).await?;
         for key in &page.items {
             say!(
-                "{}\t{}\t{}\t{}\t{}\t{}\t{}",
+                "{}\t{}\t{}\t{}\t{}\t{}\t{}\t{}",
                 key.id,
                 key.state(now).as_str(),
                 key.scope,
@@ -142,6 +148,7 @@ async fn list(args: &DataArgs) -> Result<()> {
                 rfc3339(key.created_at),
                 key.expires_at.map_or_else(|| "never".to_owned(), rfc3339),
                 escaped(&key.name),
+                key.owner.as_deref().map_or_else(|| "-".into(), escaped),
             );
         }
         before = page.next;
@@ -153,16 +160,26 @@ async fn list(args: &DataArgs) -> Result<()> {
 
 async fn revoke(args: &RevokeArgs) -> Result<()> {
     let store = args.data.open(IfNone::Refuse).await?;
-    let Some(key) = store.key(&args.id).await? else {
-        bail!(
-            "there is no key {}; `ventriform keys list` shows all",
-            args.id
-        );
-    };
     let now = SystemClock.now();
+    if let Some(owner) = &args.owner {
+        let agent = AUDIT_AGENT.to_owned();
+        let event = AuditEvent::new(now, Activity::KeyRevoked, Tenant::default(), agent);
+        let revoked = store.revoke_keys_of(owner, None, now, &event).await?;
+        if revoked.is_empty() {
+            bail!("no key of {owner} is active; `ventriform keys list` shows all");
+        }
+        for id in revoked {
+            say!("{id} is revoked");
+        }
+        return Ok(());
+    }
+    let id = args.id.as_deref().unwrap_or_default();
+    let Some(key) = store.key(id).await? else {
+        bail!("there is no key {id}; `ventriform keys list` shows all");
+    };
     let event = event(Activity::KeyRevoked, &key, now);
-    store.revoke_key(&args.id, now, &event).await?;
-    say!("{} is revoked", args.id);
+    store.revoke_key(id, now, &event).await?;
+    say!("{id} is revoked");
     Ok(())
 }
 

@@ -17,7 +17,7 @@ use tokio::io::{AsyncWrite, AsyncWriteExt};
 use ventriform_service::items::{Custodian, Items};
 use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
 use ventriform_service::records::{
-    BlobError, BlobStore, BlobStream, BlobWriter, Erased, ErasureAgent, ErasureOrder,
+    BlobError, BlobStore, BlobStream, BlobWriter, Cutoff, Erased, ErasureAgent, ErasureOrder,
     ErasureReason, FileRecord, Filed, ItemRecord, JobState, LocalFile, NewJob, Resource, Shelved,
     StagedFiles, StagedFor, StoredVolume, SystemClock, Tags, Tenant, Timestamp,
 };
@@ -177,7 +177,7 @@ impl BlobStore for MemoryBlobs {
         Ok(())
     }
 
-    async fn tidy(&self, _: Option<Timestamp>) -> Result<(), BlobError> {
+    async fn tidy(&self, _: Option<Cutoff>) -> Result<(), BlobError> {
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 //! On PostgreSQL, `a` and `b` are two processes on one database; on SQLite, which one process uses, they
 //! are the same.
 
+use super::helpers::{cutoff, trusted};
 use super::postgres::{Server, reached, server};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,7 +18,7 @@ use ventriform_service::access::{
 use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
 use ventriform_service::hooks::{
     AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent, Lane,
-    Settlement, SigningSecret,
+    NextAttempt, Settlement, SigningSecret,
 };
 use ventriform_service::intake::{
     Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
@@ -29,7 +30,7 @@ use ventriform_service::records::{
     JobStore, JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product,
     ProductFile, ProductRoom, Resource, ScanErasureOrder, ScanErasures, ScanFields, ScanFilter,
     ScanSelection, Scans, ScansErased, SendOrder, SeriesSource, StoreFault, StoredVolume,
-    SystemClock, TagFilter, Tags, Tenant, Timestamp, random_id,
+    SystemClock, TagFilter, Tags, Tenant, TimeStore, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
@@ -275,6 +276,11 @@ contracts!(
     items_are_shared_by_tenants,
     the_audit_trail_is_one_chain,
     keys_are_kept,
+    keys_of_an_owner_are_revoked_together,
+    the_trusted_time_is_kept,
+    what_a_clock_that_was_ahead_put_off_is_due,
+    a_defect_is_told_until_it_is_mended,
+    the_trail_is_tried_without_a_row,
     ends_of_jobs_are_told,
     series_are_fetched_and_results_sent,
     errands_are_found_by_tenant_and_destination,
@@ -772,7 +778,7 @@ async fn holds_keep_what_they_name(on: &Stores) {
     }
     assert!(!on.b.erase_scan(&tenant(), &volume, now()).await.unwrap());
     for kind in Resource::ALL {
-        let expired = on.b.expired(kind, i64::MAX, None, 100);
+        let expired = on.b.expired(kind, cutoff(i64::MAX), None, 100);
         assert!(expired.await.unwrap().is_empty(), "{kind:?}");
     }
     assert!(on.a.set_legal_hold(&tenant(), &volume, None).await.unwrap());
@@ -1077,7 +1083,7 @@ async fn old_things_expire(on: &Stores) {
         assert!(found.is_sorted_by_key(|one| (one.since, one.sequence)));
         found.into_iter().map(|one| one.id).collect::<Vec<_>>()
     };
-    let (past, future) = (now() - 60_000, now() + 60_000);
+    let (past, future) = (cutoff(now() - 60_000), cutoff(now() + 60_000));
     for (kind, ids) in [
         (Resource::Volume, &[&volume, &other_volume][..]),
         (Resource::Model, &[&result.id]),
@@ -1088,12 +1094,6 @@ async fn old_things_expire(on: &Stores) {
         let found: BTreeSet<String> = expired(kind, future).await.into_iter().collect();
         assert_eq!(found, ids.iter().map(|id| (*id).clone()).collect());
     }
-    assert!(
-        on.a.last_change()
-            .await
-            .unwrap()
-            .is_some_and(|at| at <= now())
-    );
     let load = on.a.load().await.unwrap();
     assert!(load.mean_duration_ms.is_some_and(|mean| mean >= 0.0));
 }
@@ -1486,7 +1486,7 @@ async fn the_audit_trail_is_one_chain(on: &Stores) {
     ] {
         assert!(!on.tamper(forbidden).await, "{forbidden}");
     }
-    assert!(on.a.prune(20, 30).await.unwrap() > 0);
+    assert!(on.a.prune(cutoff(20), 30).await.unwrap() > 0);
     assert!(verify(&*on.b).await.unwrap().broken.is_none());
     assert!(!on.tamper("DELETE FROM audit_anchors").await);
     assert!(!on.tamper("UPDATE audit_anchors SET pruned_at = 0").await);
@@ -1517,6 +1517,7 @@ async fn keys_are_kept(on: &Stores) {
             jobs: Some(1),
         },
         maker: Maker::Caller(Some("0123456789abcdef".into())),
+        owner: Some("dr-who".into()),
         expires_at: Some(i64::MAX),
     };
     let (key, _) = ApiKey::make(request, now()).unwrap();
@@ -1556,6 +1557,176 @@ async fn keys_are_kept(on: &Stores) {
     let usage = on.b.usage(&other()).await.unwrap();
     assert_eq!(usage.jobs, 1);
     assert!((3000..4000).contains(&usage.bytes), "{}", usage.bytes);
+}
+
+async fn keys_of_an_owner_are_revoked_together(on: &Stores) {
+    let make = async |owner: Option<&str>, tenant: Tenant| {
+        let request = KeyRequest {
+            name: "made".into(),
+            tenant,
+            scope: Scope::Read,
+            quota: Quota::default(),
+            maker: Maker::Caller(None),
+            owner: owner.map(str::to_owned),
+            expires_at: None,
+        };
+        let (key, _) = ApiKey::make(request, now()).unwrap();
+        let event = event(Activity::KeyCreated);
+        on.a.add_key(&key, &event).await.unwrap();
+        key.id
+    };
+    let mut own = [
+        make(Some("dr-who"), tenant()).await,
+        make(Some("dr-who"), tenant()).await,
+    ];
+    own.sort();
+    let elsewhere = make(Some("dr-who"), other()).await;
+    for kept in [Some("dr-no"), None] {
+        make(kept, tenant()).await;
+    }
+    let rows = verify(&*on.a).await.unwrap().rows;
+    let revoke = async |tenant: Option<&Tenant>| {
+        let event = event(Activity::KeyRevoked);
+        on.b.revoke_keys_of("dr-who", tenant, now(), &event)
+            .await
+            .unwrap()
+    };
+    assert_eq!(revoke(Some(&tenant())).await, own);
+    assert!(revoke(Some(&tenant())).await.is_empty());
+    assert_eq!(revoke(None).await, [elsewhere.clone()]);
+    let key = on.a.key(&elsewhere).await.unwrap().unwrap();
+    assert_eq!(key.owner.as_deref(), Some("dr-who"));
+    assert!(key.revoked_at.is_some());
+    assert_eq!(verify(&*on.a).await.unwrap().rows, rows + 3);
+}
+
+fn event(activity: Activity) -> AuditEvent {
+    AuditEvent::new(now(), activity, tenant(), "test".into())
+}
+
+async fn the_trusted_time_is_kept(on: &Stores) {
+    let server = on.a.server_time().await.unwrap();
+    assert_eq!(server.is_some(), on.url.is_some());
+    assert!(server.is_none_or(|at| (at - now()).abs() < 60_000));
+    assert_eq!(
+        on.a.last_trusted().await.unwrap(),
+        None,
+        "nothing is stored"
+    );
+    on.volume(&tenant()).await;
+    let last = on.a.last_trusted().await.unwrap();
+    assert!(
+        last.is_some_and(|at| (at - now()).abs() < 60_000),
+        "{last:?}"
+    );
+    for at in [1_000, 2_000, 500] {
+        on.a.note_trusted(trusted(at)).await.unwrap();
+        assert_eq!(on.b.last_trusted().await.unwrap(), Some(at));
+    }
+}
+
+async fn what_a_clock_that_was_ahead_put_off_is_due(on: &Stores) {
+    let far = 400 * 86_400_000;
+    let source = SeriesSource {
+        archive: Some("pacs".into()),
+        dicomweb: None,
+        study: "1.2".into(),
+        series: "1.2.3".into(),
+    };
+    let job = on
+        .file(&NewJob {
+            kind: "model".into(),
+            source: Some(source),
+            ..NewJob::default()
+        })
+        .await;
+    let pacs = lane(&tenant(), "pacs");
+    let due = async || on.b.due_pulls(&pacs, now(), 10).await.unwrap();
+    assert_eq!(on.a.recall_pulls(now()).await.unwrap(), 0);
+    // An attempt of the future, in doubt: it does not count.
+    on.a.pull_begun(&job.id, now() + far).await.unwrap();
+    let again = NextAttempt {
+        at: now() + far + 60_000,
+        counts: false,
+    };
+    on.a.pull_failed(&job.id, "away", again, now() + far)
+        .await
+        .unwrap();
+    assert!(due().await.is_empty());
+    assert_eq!(on.a.recall_pulls(now()).await.unwrap(), 1);
+    let found = due().await;
+    assert_eq!((found.len(), found[0].attempts), (1, 0));
+    // A pause that this clock has set is kept.
+    on.a.pull_begun(&job.id, now()).await.unwrap();
+    let again = NextAttempt {
+        at: now() + 60_000,
+        counts: true,
+    };
+    on.a.pull_failed(&job.id, "away", again, now())
+        .await
+        .unwrap();
+    assert_eq!(on.a.recall_pulls(now()).await.unwrap(), 0);
+    assert!(due().await.is_empty());
+    assert_eq!(on.a.recall_sends(now()).await.unwrap(), 0);
+    assert_eq!(on.a.recall_deliveries(now()).await.unwrap(), 0);
+}
+
+async fn a_defect_is_told_until_it_is_mended(on: &Stores) {
+    on.a.check().await.unwrap();
+    let key = SeriesKey {
+        tenant: &tenant(),
+        base: "https://pacs.example",
+        study: "1.2",
+        series: "1.2.3",
+    };
+    let held = HeldSeries {
+        instances: "x".into(),
+        volume: "vol_none".into(),
+    };
+    assert!(on.tamper("ALTER TABLE pulled_series RENAME TO lost").await);
+    on.a.check().await.unwrap();
+    // A read and a write tell of it.
+    let read = on.a.held_series(key).await.unwrap_err();
+    let written = on.a.note_series(key, &held).await.unwrap_err();
+    for error in [read, written, on.a.check().await.unwrap_err()] {
+        assert_eq!(error.cause(), StoreFault::DamagedDatabase, "{error}");
+    }
+    on.a.recheck().await;
+    assert!(on.a.check().await.is_err(), "it is not mended");
+    assert!(on.tamper("ALTER TABLE lost RENAME TO pulled_series").await);
+    assert!(on.a.check().await.is_err(), "nobody has looked");
+    let begun = std::time::Instant::now();
+    while on.a.check().await.is_err() {
+        assert!(begun.elapsed() < Duration::from_secs(120));
+        tokio::time::sleep(Duration::from_millis(500)).await;
+        on.a.recheck().await;
+    }
+    assert!(on.a.held_series(key).await.unwrap().is_none());
+}
+
+async fn the_trail_is_tried_without_a_row(on: &Stores) {
+    on.a.append(&[event(Activity::Read)]).await.unwrap();
+    on.a.check_trail(now()).await.unwrap();
+    assert_eq!(verify(&*on.b).await.unwrap().rows, 1);
+    let (shut, open) = match on.url {
+        Some(_) => (
+            "CREATE FUNCTION no_rows() RETURNS TRIGGER LANGUAGE plpgsql
+                 AS 'BEGIN RAISE EXCEPTION ''no''; END';
+             CREATE TRIGGER shut BEFORE INSERT ON audit FOR EACH ROW EXECUTE FUNCTION no_rows()",
+            "DROP TRIGGER shut ON audit; DROP FUNCTION no_rows()",
+        ),
+        None => (
+            "CREATE TRIGGER shut BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'no'); END",
+            "DROP TRIGGER shut",
+        ),
+    };
+    assert!(on.tamper(shut).await);
+    assert!(on.a.check_trail(now()).await.is_err());
+    assert!(on.tamper(open).await);
+    on.a.check_trail(now()).await.unwrap();
+    on.a.append(&[event(Activity::Read)]).await.unwrap();
+    let report = verify(&*on.b).await.unwrap();
+    assert_eq!((report.rows, report.broken), (2, None));
 }
 
 async fn ends_of_jobs_are_told(on: &Stores) {
@@ -1628,7 +1799,11 @@ async fn ends_of_jobs_are_told(on: &Stores) {
         (2, Some("no-heart"))
     );
     // An attempt that fails is repeated, one that is taken is not.
-    let settle = |outcome, again_at| Settlement { outcome, again_at };
+    let settle = |outcome, again_at| Settlement {
+        outcome,
+        again_at,
+        counts: true,
+    };
     let again = settle(AttemptOutcome::Rejected(500), Some(now() + 60_000));
     assert_eq!(due[0].attempts, 0);
     // It counts from its beginning.
@@ -1690,8 +1865,8 @@ async fn ends_of_jobs_are_told(on: &Stores) {
     let left = on.b.backlog().await.unwrap();
     assert_eq!((left.pending, left.dead), (1, 3));
     let limits = |pending_since, backlog| DeliveryLimits {
-        pending_since,
-        ended_since: 0,
+        pending_since: Some(cutoff(pending_since)),
+        ended_since: Some(cutoff(0)),
         backlog,
     };
     assert_eq!(on.a.expire(limits(0, 1), now()).await.unwrap(), 0);
@@ -1749,7 +1924,11 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     let due = on.b.due_pulls(&pacs, now(), 10).await.unwrap();
     let begun = due.iter().find(|due| due.job == job.id).unwrap();
     assert_eq!(begun.attempts, 1);
-    on.a.pull_failed(&job.id, "away", now() + 60_000, now())
+    let again = NextAttempt {
+        at: now() + 60_000,
+        counts: true,
+    };
+    on.a.pull_failed(&job.id, "away", again, now())
         .await
         .unwrap();
     assert_eq!(on.b.due_pulls(&pacs, now(), 10).await.unwrap().len(), 1);
@@ -1810,6 +1989,7 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
         outcome: "stored",
         error: None,
         again_at: None,
+        counts: true,
     };
     on.a.send_begun(&due[0].id, now()).await.unwrap();
     let begun = on.b.due_sends(&pacs, now(), 10).await.unwrap();
@@ -1974,7 +2154,13 @@ async fn received_objects_become_volumes(on: &Stores) {
     on.a.failed(&group, 2, &failure("not-a-volume"), now())
         .await
         .unwrap();
-    assert_eq!(on.b.failed_before(now() + 1000).await.unwrap().len(), 1);
+    assert_eq!(
+        on.b.failed_before(cutoff(now() + 1000))
+            .await
+            .unwrap()
+            .len(),
+        1
+    );
     let Added::New(_, obsolete) = add("1", "bb").await else {
         panic!("it replaces the other")
     };
@@ -2085,7 +2271,12 @@ async fn work_items_change_once(on: &Stores) {
     let mut ended = on.a.workitem(&tenant(), "1.2.1").await.unwrap().unwrap();
     ended.state = WorkitemState::Completed;
     assert!(on.a.change_workitem(&ended).await.unwrap());
-    assert_eq!(on.b.delete_ended_workitems(now() + 1000).await.unwrap(), 1);
+    assert_eq!(
+        on.b.delete_ended_workitems(cutoff(now() + 1000))
+            .await
+            .unwrap(),
+        1
+    );
 }
 
 async fn figures_are_counted(on: &Stores) {

@@ -30,7 +30,8 @@ use ventriform_service::config::Settings;
 use ventriform_service::items::{OutputFile, StoredItem, WorkOutput};
 use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use ventriform_service::records::{
-    Clock, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock,
+    Clock, Cutoff, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock, Timestamp,
+    TrustedNow,
 };
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 use ventriform_store::{SqlStore, open_database, open_rows};
@@ -255,6 +256,34 @@ impl TestApp {
     }
 }
 
+/// A clock that stands still and is trusted.
+struct StandingClock(Timestamp);
+
+impl Clock for StandingClock {
+    fn now(&self) -> Timestamp {
+        self.0
+    }
+
+    fn is_trusted(&self) -> bool {
+        true
+    }
+
+    fn latest(&self) -> Timestamp {
+        self.0
+    }
+}
+
+/// That time as one by which ages count.
+pub fn trusted(now: Timestamp) -> TrustedNow {
+    let clock: &dyn Clock = &StandingClock(now);
+    clock.trusted().unwrap()
+}
+
+/// The moment before which things are too old.
+pub fn cutoff(moment: Timestamp) -> Cutoff {
+    trusted(moment).older_than(Duration::ZERO)
+}
+
 /// Makes a key as `ventriform keys create` does: beside the running service. Returns its id and the
 /// key.
 pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (String, String) {
@@ -265,6 +294,7 @@ pub async fn key(data: &Path, scope: Scope, tenant: &str, quota: Quota) -> (Stri
         scope,
         quota,
         maker: Maker::Operator,
+        owner: None,
         expires_at: None,
     };
     let (key, text) = ApiKey::make(request, now).unwrap();

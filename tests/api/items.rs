@@ -4,7 +4,7 @@ use crate::helpers::{TestApp, fake_engine, problem, text, volume};
 use reqwest::StatusCode;
 use serde_json::json;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
@@ -18,19 +18,31 @@ use ventriform_service::records::{
 };
 use ventriform_store::Store;
 
-/// A clock that a test sets.
+/// A clock that a test sets, and whether it is in doubt.
 #[derive(Default)]
-struct TestClock(AtomicI64);
+struct TestClock(AtomicI64, AtomicBool);
 
 impl Clock for TestClock {
     fn now(&self) -> Timestamp {
         self.0.load(Ordering::SeqCst)
+    }
+
+    fn is_trusted(&self) -> bool {
+        !self.1.load(Ordering::SeqCst)
+    }
+
+    fn latest(&self) -> Timestamp {
+        self.now()
     }
 }
 
 impl TestClock {
     fn set(&self, now: Timestamp) {
         self.0.store(now, Ordering::SeqCst);
+    }
+
+    fn doubt(&self, doubtful: bool) {
+        self.1.store(doubtful, Ordering::SeqCst);
     }
 }
 
@@ -181,6 +193,20 @@ async fn files_whose_record_could_not_be_written_are_deleted_by_the_upkeep() {
     bench.add("vol_1").await;
     upkeep.run_once().await.unwrap();
     assert!(bench.has_files("vol_1"));
+}
+
+#[tokio::test]
+async fn nothing_is_erased_by_age_while_the_time_is_in_doubt() {
+    let bench = Bench::new().await;
+    bench.add("vol_1").await;
+    let upkeep = bench.upkeep(Some(Duration::from_secs(1)));
+    bench.clock.doubt(true);
+    bench.clock.set(i64::from(i32::MAX) * 1000);
+    upkeep.run_once().await.unwrap();
+    assert!(bench.has_files("vol_1"));
+    bench.clock.doubt(false);
+    upkeep.run_once().await.unwrap();
+    assert!(!bench.has_files("vol_1"));
 }
 
 #[tokio::test]

@@ -10,13 +10,13 @@ async fn health_readiness_and_metrics_are_served() {
     assert_eq!(app.json("/healthz").await["status"], "ok");
     let ready = app.json("/readyz").await;
     assert_eq!(ready["status"], "ok");
-    let names = ["database", "files", "disk", "workers"];
+    let names = ["database", "audit", "files", "disk", "workers", "clock"];
     for (check, name) in ready["checks"].as_array().unwrap().iter().zip(names) {
         assert_eq!(
             (&check["name"], &check["status"]),
             (&name.into(), &"ok".into())
         );
-        assert_eq!(check["required"], name != "workers");
+        assert_eq!(check["required"], !["workers", "clock"].contains(&name));
     }
     assert_eq!(ready["checks"].as_array().unwrap().len(), names.len());
     app.finished("sphere").await;

@@ -1,6 +1,6 @@
 //! Several processes on one PostgreSQL database and one S3 store.
 
-use crate::helpers::{TestApp, fake_engine, problem, text, volume};
+use crate::helpers::{TestApp, cutoff, fake_engine, problem, text, trusted, volume};
 use crate::postgres::{reached, server};
 use crate::s3::in_bucket;
 use crate::s3_server::S3Server;
@@ -302,7 +302,7 @@ async fn one_process_has_the_duty_and_all_hear_the_news() {
     a.heartbeat(2, Duration::ZERO).await.unwrap();
     assert!(!b.pinned_by_others(&item).await.unwrap());
     a.heartbeat(2, long).await.unwrap();
-    b.tidy().await.unwrap();
+    b.tidy(trusted(1)).await.unwrap();
     assert!(b.pinned_by_others(&item).await.unwrap());
     a.unpin("token").await.unwrap();
     assert!(!b.pinned_by_others(&item).await.unwrap());
@@ -331,7 +331,7 @@ async fn one_process_has_the_duty_and_all_hear_the_news() {
         tenant: tenant.clone(),
         id: item[0].clone(),
         cascade: false,
-        renewed_before: Some(1),
+        renewed_before: Some(cutoff(1)),
         by: ErasureAgent::default(),
         reason: ErasureReason::Retention,
     };

@@ -1,7 +1,7 @@
 //! The contract of the file store, over the folder and over S3 stores, and the service over S3.
 
 use crate::doctor::to_default;
-use crate::helpers::{TestApp, fake_engine, problem, text, volume};
+use crate::helpers::{TestApp, cutoff, fake_engine, problem, text, trusted, volume};
 use crate::s3_server::{BUCKET_NAME, FaultProxy, Network, S3Server, variables};
 use futures::TryStreamExt;
 use futures::future::join_all;
@@ -244,12 +244,18 @@ async fn contract(subject: &Subject) {
     assert!(!blobs.set_aside("vol_b", 0).await.unwrap());
     assert!(subject.ids().await.is_empty());
     assert!(subject.read("vol_b", &orphans[0]).await.is_err());
-    blobs.tidy(Some(1)).await.unwrap();
-    blobs.tidy(Some(i64::from(i32::MAX) * 1000)).await.unwrap();
+    blobs.tidy(Some(cutoff(1))).await.unwrap();
+    blobs
+        .tidy(Some(cutoff(i64::from(i32::MAX) * 1000)))
+        .await
+        .unwrap();
     blobs.delete("vol_b", &orphans).await.unwrap();
 
     received_contract(&*subject.received).await;
-    blobs.tidy(Some(i64::from(i32::MAX) * 1000)).await.unwrap();
+    blobs
+        .tidy(Some(cutoff(i64::from(i32::MAX) * 1000)))
+        .await
+        .unwrap();
 }
 
 async fn received_contract(received: &dyn ReceivedFiles) {
@@ -265,12 +271,12 @@ async fn received_contract(received: &dyn ReceivedFiles) {
         assert_eq!(std::fs::read(&*kept).unwrap(), content);
     }
     drop(received.begin().await.unwrap());
-    let mut kept = received.kept(Duration::ZERO).await.unwrap();
+    let mut kept = received.kept(Duration::ZERO, trusted(1)).await.unwrap();
     kept.sort();
     assert_eq!(kept, ["obj_1.dcm", "obj_2.dcm"]);
     assert!(
         received
-            .kept(Duration::from_secs(3600))
+            .kept(Duration::from_secs(3600), trusted(1))
             .await
             .unwrap()
             .is_empty()

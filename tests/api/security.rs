@@ -1,7 +1,7 @@
 //! Credentials, scopes, quotas, the audit trail, and what browsers may do. `docs/security.md` lists
 //! these tests beside the OWASP API Security Top 10 (2023).
 
-use crate::helpers::{TestApp, closed, fake_engine, key, problem, text, volume};
+use crate::helpers::{TestApp, closed, cutoff, fake_engine, key, problem, text, volume};
 use axum::Router;
 use axum::routing::get;
 use jsonwebtoken::{Algorithm, EncodingKey, Header, encode};
@@ -20,7 +20,7 @@ use ventriform_service::access::{
     AccessStore, Activity, Agent, AuditEvent, BrokenLink, Quota, Recorder, Scope, verify,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::records::{Clock, StoreError, SystemClock, Tenant};
+use ventriform_service::records::{Clock, StoreError, SystemClock, Tenant, rfc3339};
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {
@@ -711,10 +711,10 @@ async fn the_trail_cannot_be_changed_unseen() {
 #[tokio::test]
 async fn old_rows_are_removed_without_breaking_the_chain() {
     let (folder, store) = trail(5).await;
-    assert_eq!(store.prune(4, 10).await.unwrap(), 3);
+    assert_eq!(store.prune(cutoff(4), 10).await.unwrap(), 3);
     let report = verify(&*store).await.unwrap();
     assert_eq!((report.rows, report.newest, report.broken), (3, 6, None));
-    assert_eq!(store.prune(100, 200).await.unwrap(), 3);
+    assert_eq!(store.prune(cutoff(100), 200).await.unwrap(), 3);
     store.append(&[event(300)]).await.unwrap();
     let report = verify(&*store).await.unwrap();
     assert_eq!((report.rows, report.broken), (2, None));
@@ -884,6 +884,135 @@ async fn tokens_of_the_issuer_open_the_service_and_forged_ones_do_not() {
         problem(list(&token).await.unwrap(), 401, "unauthorized").await;
     }
     assert!(issuer.reads.load(Ordering::Relaxed) <= 2);
+}
+
+/// Makes a key by those credentials.
+async fn made_by(app: &TestApp, credentials: &str, wanted: Value) -> reqwest::Response {
+    let make = app.post("/v1/keys").bearer_auth(credentials);
+    make.json(&wanted).send().await.unwrap()
+}
+
+#[tokio::test]
+async fn a_key_that_a_token_makes_ends_with_it_unless_more_is_asked_and_allowed() {
+    let issuer = TestIssuer::start().await;
+    for (life, allowed) in [("0s", false), ("10m", true)] {
+        let url = issuer.url.clone();
+        let app = TestApp::with(move |settings| {
+            settings.oidc_issuer = url;
+            settings.oidc_leeway = "0s".parse().unwrap();
+            settings.oidc_key_life = life.parse().unwrap();
+        })
+        .await;
+        let mut claims = issuer.claims();
+        claims["scope"] = json!("admin");
+        let ends = SystemClock.now() / 1000 + 3;
+        claims["exp"] = json!(ends);
+        let token = issuer.sign(Algorithm::ES256, "ec", &claims);
+        let unasked = made_by(&app, &token, json!({"name": "stays", "scope": "admin"})).await;
+        let unasked: Value = unasked.json().await.unwrap();
+        assert_eq!(unasked["owner"], "dr-who");
+        assert_eq!(unasked["expires_at"], rfc3339(ends * 1000));
+        let later = rfc3339((ends + 60) * 1000);
+        let asked = made_by(
+            &app,
+            &token,
+            json!({"name": "asked", "scope": "admin", "expires_at": later}),
+        )
+        .await;
+        assert_eq!(asked.status().is_success(), allowed, "{life}");
+        let secret = text(&unasked["key"]);
+        let child = made_by(&app, &secret, json!({"name": "child", "scope": "read"})).await;
+        let child: Value = child.json().await.unwrap();
+        assert_eq!(child["owner"], "dr-who");
+        assert_eq!(child["expires_at"], unasked["expires_at"]);
+        tokio::time::sleep(Duration::from_secs(4)).await;
+        for ended in [&token, &secret, &text(&child["key"])] {
+            let answer = app.get("/v1/volumes").bearer_auth(ended).send().await;
+            problem(answer.unwrap(), 401, "unauthorized").await;
+        }
+        if allowed {
+            let asked: Value = asked.json().await.unwrap();
+            let list = app.get("/v1/keys").bearer_auth(text(&asked["key"]));
+            assert_eq!(status(list).await, StatusCode::OK);
+            // It is revoked with its owner.
+            let revoke = app.delete("/v1/keys?owner=dr-who");
+            let revoke = revoke
+                .bearer_auth(text(&asked["key"]))
+                .send()
+                .await
+                .unwrap();
+            let revoked: Value = revoke.json().await.unwrap();
+            assert_eq!(revoked["revoked"].as_array().unwrap().len(), 3, "{revoked}");
+            let list = app.get("/v1/keys").bearer_auth(text(&asked["key"]));
+            assert_eq!(status(list).await, StatusCode::UNAUTHORIZED);
+        }
+    }
+}
+
+/// Longest time from the end of credentials to that of what they have opened, with room for a busy machine.
+const ENDS_WITHIN: Duration = Duration::from_secs(15);
+
+#[tokio::test]
+async fn streams_and_waits_end_soon_after_their_credentials() {
+    let issuer = TestIssuer::start().await;
+    let url = issuer.url.clone();
+    let app = TestApp::with(move |settings| {
+        settings.oidc_issuer = url;
+        settings.oidc_tenant_claim = String::new();
+        settings.wait_limit = "60s".parse().unwrap();
+    })
+    .await;
+    let quota = Quota::default();
+    let (_, admin) = key(app.data.path(), Scope::Admin, "default", quota).await;
+    let file = app.post("/v1/models").bearer_auth(&admin);
+    let job: Value = file
+        .body(volume("slow"))
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let events = format!("/v1/jobs/{}/events", text(&job["id"]));
+    // Revoked keys, keys of a revoked maker, and tokens whose time is over.
+    let (id, own) = key(app.data.path(), Scope::Admin, "default", quota).await;
+    let child = made_by(&app, &own, json!({"name": "child", "scope": "submit"})).await;
+    let child: Value = child.json().await.unwrap();
+    let mut claims = issuer.claims();
+    claims["exp"] = json!(SystemClock.now() / 1000 + 8);
+    let token = issuer.sign(Algorithm::ES256, "ec", &claims);
+    let open = async |credentials: &str| {
+        let stream = app.get(&events).bearer_auth(credentials).send();
+        let stream = stream.await.unwrap();
+        assert_eq!(stream.status(), StatusCode::OK);
+        stream.text()
+    };
+    let kept = open(&admin).await;
+    let streams = [
+        open(&own).await,
+        open(&text(&child["key"])).await,
+        open(&token).await,
+    ];
+    let wait = app
+        .post("/v1/models")
+        .bearer_auth(&own)
+        .header("prefer", "wait=60")
+        .body(volume("slow"))
+        .send();
+    let begun = Instant::now();
+    let revoke = async {
+        tokio::time::sleep(Duration::from_secs(2)).await;
+        let revoke = app.delete(&format!("/v1/keys/{id}")).bearer_auth(&admin);
+        assert_eq!(status(revoke).await, StatusCode::NO_CONTENT);
+    };
+    let ended = futures::future::join_all(streams);
+    let (_, waited, ended) = tokio::join!(revoke, wait, ended);
+    assert!(begun.elapsed() < Duration::from_secs(8) + ENDS_WITHIN);
+    assert!(ended.iter().all(Result::is_err), "they are broken off");
+    let waited = waited.unwrap();
+    assert_eq!(waited.status(), StatusCode::ACCEPTED, "the job was filed");
+    let early = tokio::time::timeout(Duration::from_secs(1), kept).await;
+    assert!(early.is_err(), "a valid key's stream goes on");
 }
 
 #[tokio::test]

@@ -1,6 +1,7 @@
 //! Who may use whom: the imports of the sources against the order of ARCHITECTURE.md. Between crates the compiler
 //! watches; here are the folders of a crate, and what may not be named by whom.
 
+mod ages;
 mod imports;
 
 use imports::{ModulePath, Sources, circles, rust_files};
@@ -386,6 +387,7 @@ const SERVICE_USES: &[(&str, &[&str])] = &[
             "records",
             "http_client",
             "jobs",
+            "access",
             "hooks",
             "archive",
             "intake",

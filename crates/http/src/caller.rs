@@ -2,6 +2,7 @@
 //! handlers take it as an extractor.
 
 use super::problem::{Answer, Problem};
+use super::watch::CredentialWatch;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
@@ -21,12 +22,16 @@ pub struct Caller {
     pub scope: Scope,
     /// Limits on what its tenant may store and queue by its requests; those of its key, or the general limits.
     pub quota: Quota,
-    /// Limits of its own key, and when that expires.
+    /// Limits of its own key, and when that or its token expires.
     pub own: (Quota, Option<Timestamp>),
     /// The id of its key.
     pub key: Option<String>,
+    /// The subject of the issuer that sends it, or whose key it is.
+    pub owner: Option<String>,
     /// The number of keys that have made that key, one the other.
     pub makers: usize,
+    /// Tells when its credentials end while it waits.
+    pub watch: CredentialWatch,
 }
 
 impl Caller {
@@ -60,7 +65,7 @@ impl Caller {
 
 impl Caller {
     /// The caller of that identity, with the limits that apply to it.
-    pub fn of(identity: &Identity, quota: Quota, by: Agent) -> Self {
+    pub fn of(identity: &Identity, quota: Quota, by: Agent, watch: CredentialWatch) -> Self {
         Self {
             by,
             tenant: identity.tenant.clone(),
@@ -69,7 +74,9 @@ impl Caller {
             quota,
             own: (identity.quota, identity.expires_at),
             key: identity.key.clone(),
+            owner: identity.owner.clone(),
             makers: identity.makers.keys.len(),
+            watch,
         }
     }
 }

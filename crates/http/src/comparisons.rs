@@ -194,7 +194,7 @@ pub async fn create_comparison(
         .file_job(work, Some(stress.volume), parameters, order, &counting)
         .await
         .map_err(|error| error.naming("volume", WhichScan::Stress.as_str()))?;
-    filing::answer(&app, filed, patience, &headers, &offers()).await
+    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
 }
 
 /// Refuses a query beside a JSON body, in which everything is: what is wrong in it first.

@@ -48,7 +48,8 @@ pub struct NotReady {
 /// Something that the service depends on.
 #[derive(Serialize, ToSchema)]
 pub struct Dependency {
-    /// `database`, `files`, `disk`, or `workers`: processes that compute jobs.
+    /// `database`, `audit` (the audit trail), `files`, `disk`, `workers` (processes that compute jobs), or `clock`
+    /// (whether ages count by the time of day).
     #[schema(example = "database")]
     name: &'static str,
     /// `ok` or `failing`.
@@ -92,14 +93,19 @@ pub async fn alive(_: NoQuery) -> Answer<Json<Health>> {
 /// Check that the service can accept work
 ///
 /// Names everything that the service depends on, with its own status. 503 if something is failing without which
-/// no work can be accepted; jobs are accepted while no worker runs.
+/// no work can be accepted, or if a check cannot be made; jobs are accepted while no worker runs, and while the time
+/// of day is in doubt.
 #[utoipa::path(get, path = "/readyz", tag = "operations",
     responses((status = 200, description = "It can", body = Ready),
         (status = 503, description = "It cannot", body = NotReady,
             content_type = "application/problem+json"),
         ListProblems))]
 pub async fn ready(State(app): State<App>, _: NoQuery) -> Answer {
-    let found = app.service.readiness.check(app.service.queue()).await;
+    let found = app
+        .service
+        .readiness
+        .check(app.service.dependencies())
+        .await;
     let checks = found.iter().map(Dependency::from).collect();
     let closing = app.service.closing.is_cancelled();
     let why = closing.then_some("The service is shutting down.");
@@ -137,7 +143,11 @@ pub async fn metrics(State(app): State<App>, _: NoQuery) -> Answer {
         backlog: app.service.hooks.store.backlog().await?,
         sent: app.service.hooks.dispatcher.counts(),
         archives: app.service.archives.read().await?,
-        ready: app.service.readiness.is_ready(app.service.queue()).await,
+        ready: app
+            .service
+            .readiness
+            .is_ready(app.service.dependencies())
+            .await,
         space: app.service.items().blobs().space(),
         settings: &app.service.settings,
         now: app.service.now(),

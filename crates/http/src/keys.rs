@@ -17,10 +17,10 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fmt::Display;
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 use ventriform_service::access::{
     Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
 };
@@ -47,6 +47,10 @@ pub struct KeyBody {
     #[schema(example = "fedcba9876543210")]
     #[serde(skip_serializing_if = "Option::is_none")]
     made_by: Option<String>,
+    /// The subject of the OpenID Connect issuer whose key it is: that made it with a token, or with a key of its own.
+    #[schema(example = "contractor-7")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    owner: Option<String>,
     /// When it was made (RFC 3339).
     #[schema(format = DateTime)]
     created_at: String,
@@ -103,7 +107,8 @@ pub struct NewKey {
     /// The acts that it allows: `read`, `submit` or `admin`.
     #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
     scope: String,
-    /// From when on it is refused (RFC 3339); never if absent.
+    /// From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
+    /// never ends.
     #[schema(format = DateTime)]
     expires_at: Option<String>,
     /// Requests per minute; the service's general limit if absent.
@@ -126,7 +131,9 @@ const KEY_FIELDS: [&str; 6] = [
 /// Make a key
 ///
 /// For the caller's tenant. The answer is the only place where the key itself is shown. Requests with it count as
-/// requests of the caller's key too, so that all keys that a key makes have together what it has.
+/// requests of the caller's key too, so that all keys that a key makes have together what it has. A key does not outlive
+/// the key that makes it. One that is made with a token ends with the token, unless `expires_at` asks for more and the
+/// operator allows it (`oidc_key_life`).
 #[utoipa::path(post, path = "/v1/keys", tag = "access", operation_id = "create_key",
     request_body(content = NewKey, content_type = "application/json"),
     responses(
@@ -140,7 +147,8 @@ pub async fn create_key(
     request: Request,
 ) -> Answer {
     let now = app.service.now();
-    let wanted = read(&json_object(&app, request).await?, &caller)?;
+    let ends = Ends::of(&app, &caller, now);
+    let wanted = read(&json_object(&app, request).await?, &caller, ends)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
     let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
     app.service.access.add_key(&key, &event).await?;
@@ -213,7 +221,69 @@ pub async fn revoke_key(
     Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())
 }
 
-fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
+/// When a key ends that a caller makes.
+#[derive(Clone, Copy)]
+struct Ends {
+    /// If it does not ask.
+    unasked: Option<Timestamp>,
+    /// At the latest.
+    last: Option<Timestamp>,
+}
+
+impl Ends {
+    fn of(app: &App, caller: &Caller, now: Timestamp) -> Self {
+        let (_, unasked) = caller.own;
+        let is_token = caller.key.is_none() && caller.owner.is_some();
+        let life = app.service.settings.oidc_key_life.0;
+        let life = Timestamp::try_from(life.as_millis()).unwrap_or(Timestamp::MAX);
+        let asked = is_token.then(|| now.saturating_add(life));
+        Self {
+            unasked,
+            last: unasked.map(|end| asked.map_or(end, |asked| asked.max(end))),
+        }
+    }
+}
+
+/// Keys to revoke.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct OwnerQuery {
+    /// The subject whose keys they are: `owner` in the list of keys
+    #[param(min_length = 1, example = "contractor-7")]
+    owner: String,
+}
+
+/// The keys that were revoked.
+#[derive(Serialize, ToSchema)]
+pub struct RevokedKeys {
+    /// Their ids; those that had been revoked before are none of them.
+    #[schema(example = json!(["0123456789abcdef"]))]
+    revoked: Vec<String>,
+}
+
+/// Revoke the keys of a subject
+///
+/// All keys of the caller's tenant that a subject of the OpenID Connect issuer has made with its tokens, and those that
+/// were made with these. From now on they are refused. They stay in the list.
+#[utoipa::path(delete, path = "/v1/keys", tag = "access", operation_id = "revoke_keys_of_owner",
+    params(OwnerQuery),
+    responses((status = 200, description = "Revoked", body = RevokedKeys), ListProblems))]
+pub async fn revoke_keys_of_owner(
+    State(app): State<App>,
+    caller: Caller,
+    Query(OwnerQuery { owner }): Query<OwnerQuery>,
+) -> Answer {
+    let now = app.service.now();
+    let event = caller.by.event(Activity::KeyRevoked, now);
+    let access = &app.service.access;
+    let revoked = access
+        .revoke_keys_of(&owner, Some(&caller.tenant), now, &event)
+        .await?;
+    app.guard.gate.refresh();
+    Ok((Extension(AlreadyRecorded), Json(RevokedKeys { revoked })).into_response())
+}
+
+fn read(object: &Map<String, Value>, caller: &Caller, ends: Ends) -> Answer<KeyRequest> {
     if let Some(name) = object
         .keys()
         .find(|name| !KEY_FIELDS.contains(&name.as_str()))
@@ -259,7 +329,7 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
         return Err(beyond("scope", Scope::Submit));
     }
     // What the maker has itself, and what the operator allows everybody.
-    let (own, own_end) = caller.own;
+    let (own, _) = caller.own;
     let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
         let asked = number(field)?;
         match (asked, allowed) {
@@ -268,11 +338,11 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
             (asked, _) => Ok(asked),
         }
     };
-    let expires_at = match (expires_at, own_end) {
-        (Some(asked), Some(end)) if asked > end => {
-            return Err(beyond("expires_at", rfc3339(end)));
+    let expires_at = match (expires_at, ends.last) {
+        (Some(asked), Some(last)) if asked > last => {
+            return Err(beyond("expires_at", rfc3339(last)));
         }
-        (asked, end) => asked.or(end),
+        (asked, _) => asked.or(ends.unasked),
     };
     Ok(KeyRequest {
         name: text("name", "Give a text.")?.unwrap_or_default(),
@@ -284,6 +354,7 @@ fn read(object: &Map<String, Value>, caller: &Caller) -> Answer<KeyRequest> {
             jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
         },
         maker: Maker::Caller(caller.key.clone()),
+        owner: caller.owner.clone(),
         expires_at,
     })
 }
@@ -325,6 +396,7 @@ impl KeyBody {
                 Maker::Operator => None,
                 Maker::Caller(key) => key,
             },
+            owner: key.owner,
             created_at: rfc3339(key.created_at),
             expires_at: key.expires_at.map(rfc3339),
             revoked_at: key.revoked_at.map(rfc3339),

@@ -83,6 +83,7 @@ mod validators;
 mod volume_download;
 mod volumes;
 mod voxels;
+mod watch;
 mod webhook_request;
 mod webhooks;
 mod words;

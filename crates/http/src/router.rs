@@ -87,7 +87,12 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(jobs::get_job, jobs::delete_job),
         routes!(jobs::update_job).layer(json(settings.json_limit)),
         routes!(jobs::events::follow_job),
-        routes!(keys::create_key, keys::list_keys).layer(json(settings.json_limit)),
+        routes!(
+            keys::create_key,
+            keys::list_keys,
+            keys::revoke_keys_of_owner
+        )
+        .layer(json(settings.json_limit)),
         routes!(keys::revoke_key),
         routes!(audit::list_audit_events),
         routes!(webhooks::create_webhook, webhooks::list_webhooks).layer(json(settings.json_limit)),

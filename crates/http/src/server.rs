@@ -16,7 +16,7 @@ use ventriform_service::config::{Role, Settings};
 use ventriform_service::http_client::ClientFactory;
 use ventriform_service::intake::{Listener, ScpSettings, TlsConfiguration};
 use ventriform_service::jobs::Queue;
-use ventriform_service::records::{StoreError, SystemClock};
+use ventriform_service::records::StoreError;
 use ventriform_service::service::Service;
 use ventriform_service::start::{OpenError, RunningService, open, scp_settings};
 use ventriform_service::stores::Stores;
@@ -272,7 +272,6 @@ fn serve_dicom(
 /// If the service could be used by strangers and the settings do not say that it shall.
 async fn guard(service: &Service, address: SocketAddr) -> Result<Guard, ServeError> {
     let settings = &service.settings;
-    let clock = Arc::new(SystemClock);
     let loopback = address.ip().to_canonical().is_loopback();
     let text = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
     let issuer = text(&settings.oidc_issuer).map(|issuer| {
@@ -298,7 +297,7 @@ async fn guard(service: &Service, address: SocketAddr) -> Result<Guard, ServeErr
     };
     let gate = Gate::new(
         service.access.clone(),
-        clock,
+        service.clock().clone(),
         issuer.transpose()?,
         anonymous,
         settings.allow_anonymous,

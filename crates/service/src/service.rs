@@ -25,7 +25,7 @@ use crate::jobs::Queue;
 use crate::memory::MemoryBudget;
 use crate::quotas::Quotas;
 use crate::records::{Clock, FigureStore, Ownership, Resource, Tenant, Timestamp};
-use crate::telemetry::{Metrics, Readiness, Spans};
+use crate::telemetry::{Dependencies, Metrics, Readiness, Spans};
 use crate::work::Engine;
 use crate::worklist::Worklist;
 use std::sync::Arc;
@@ -102,6 +102,14 @@ impl Service {
     /// The time now.
     pub fn now(&self) -> Timestamp {
         self.queue.now()
+    }
+
+    /// What readiness depends on.
+    pub fn dependencies(&self) -> Dependencies<'_> {
+        Dependencies {
+            queue: &self.queue,
+            access: &*self.access,
+        }
     }
 
     /// The agent of that name, for acts of no caller.

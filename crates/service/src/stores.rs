@@ -4,7 +4,7 @@ use crate::access::AccessStore;
 use crate::archive::ArchiveStore;
 use crate::hooks::DeliveryStore;
 use crate::intake::{IntakeStore, ReceivedFiles};
-use crate::records::{BlobStore, Catalogue, FigureStore, JobStore, Peers};
+use crate::records::{BlobStore, Catalogue, FigureStore, JobStore, Peers, TimeStore};
 use crate::worklist::Worklist;
 use futures::future::BoxFuture;
 use std::sync::Arc;
@@ -27,6 +27,8 @@ pub struct Stores {
     pub intake: Arc<dyn IntakeStore>,
     /// Figures that only the database knows.
     pub figures: Arc<dyn FigureStore>,
+    /// The times that outlive a process.
+    pub time: Arc<dyn TimeStore>,
     /// The files of items.
     pub blobs: Arc<dyn BlobStore>,
     /// The files of received objects.

@@ -25,8 +25,8 @@ use time::{Date, OffsetDateTime};
 use tokio::io::AsyncWrite;
 use ventriform_service::places::Places;
 use ventriform_service::records::{
-    BlobError, BlobStore, BlobStream, BlobWriter, DiskSpace, FileRecord, ItemRecord, LocalFile,
-    Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
+    BlobError, BlobStore, BlobStream, BlobWriter, Cutoff, DiskSpace, FileRecord, ItemRecord,
+    LocalFile, Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };
 
 /// The name of the copy of an item's row.
@@ -74,11 +74,7 @@ impl FileBlobs {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
             _ => {}
         }
-        let kinds = Resource::WITH_FILES.map(Resource::plural);
-        for name in kinds
-            .into_iter()
-            .chain([STAGING_FOLDER, QUARANTINE_FOLDER, RECEIVED_FOLDER])
-        {
+        for name in kept_folders().chain([STAGING_FOLDER, QUARANTINE_FOLDER]) {
             fs::create_dir_all(folder.join(name))?;
         }
         sync(folder)?;
@@ -106,6 +102,29 @@ impl FileBlobs {
             .map_err(|error| BlobError::new(StoreFault::Other, error.to_string()))?
     }
 }
+
+/// The folders of what is kept.
+fn kept_folders() -> impl Iterator<Item = &'static str> {
+    let kinds = Resource::WITH_FILES.map(Resource::plural);
+    kinds.into_iter().chain([RECEIVED_FOLDER])
+}
+
+/// Checks that a folder exists and that its entries can be changed.
+fn check_writable(folder: &Path) -> io::Result<()> {
+    if !fs::metadata(folder)?.is_dir() {
+        return Err(io::Error::from_raw_os_error(NOT_A_FOLDER));
+    }
+    #[cfg(unix)]
+    {
+        use rustix::fs::{Access, access};
+        let rights = Access::READ_OK | Access::WRITE_OK | Access::EXEC_OK;
+        access(folder, rights)?;
+    }
+    Ok(())
+}
+
+/// `ENOTDIR`.
+const NOT_A_FOLDER: i32 = 20;
 
 /// The path of an item below the data folder.
 pub(super) fn shelf_path(id: &str) -> String {
@@ -431,12 +450,12 @@ impl BlobStore for FileBlobs {
         hashed.await
     }
 
-    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError> {
+    async fn tidy(&self, set_aside_before: Option<Cutoff>) -> Result<(), BlobError> {
         let tidied = self.blocking(move |folder, _| {
             for entry in fs::read_dir(folder.join(DISCARDED_FOLDER))? {
                 fs::remove_dir_all(entry?.path())?;
             }
-            let Some(first_kept) = set_aside_before else {
+            let Some(first_kept) = set_aside_before.map(Cutoff::moment) else {
                 return Ok(());
             };
             for entry in fs::read_dir(folder.join(QUARANTINE_FOLDER))? {
@@ -457,10 +476,14 @@ impl BlobStore for FileBlobs {
     async fn check(&self) -> Result<(), BlobError> {
         self.require_room(0)?;
         let path = self.new_staging_folder();
-        let checked = self.blocking(move |_, _| {
+        let checked = self.blocking(move |folder, _| {
             fs::write(&path, PROBE_BYTES)?;
             let read = fs::read(&path);
             fs::remove_file(&path)?;
+            // What is accepted is moved there. Nothing is written there, where it would be taken for an item.
+            for name in kept_folders() {
+                check_writable(&folder.join(name))?;
+            }
             if read? == PROBE_BYTES {
                 Ok(())
             } else {

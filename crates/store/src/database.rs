@@ -6,6 +6,7 @@
 //! Beside that lock run single statements on one job that name its lease, or skip locked rows
 //! ([`Query::write_beside`]): claims, renewals of leases and progress.
 
+use super::health::Health;
 use super::note::Beside;
 use super::postgres::{self, PgTransaction, PgWriter};
 use super::query::{DbRow, Query, Target, query};
@@ -18,11 +19,10 @@ use sqlx::sqlite::SqlitePool;
 use std::path::Path;
 
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use ventriform_service::config::PostgresSettings;
 
-use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
+use ventriform_service::records::{StoreError, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
@@ -60,8 +60,14 @@ pub(super) enum Transaction<'a> {
 impl<'a> From<&'a mut Transaction<'_>> for Target<'a> {
     fn from(transaction: &'a mut Transaction<'_>) -> Self {
         match transaction {
-            Transaction::Sqlite(transaction) => Target::Sqlite(transaction),
-            Transaction::Postgres(transaction) => Target::Postgres(transaction),
+            Transaction::Sqlite(transaction) => {
+                let (connection, writer) = transaction.parts();
+                Target::Sqlite(connection, writer)
+            }
+            Transaction::Postgres(transaction) => {
+                let (connection, health) = transaction.parts();
+                Target::Postgres(connection, health)
+            }
         }
     }
 }
@@ -145,7 +151,8 @@ impl Query {
             Writing::Sqlite(_) => self.write_optional(writing).await,
             Writing::Postgres(writer) => {
                 let mut connection = writer.acquire().await?;
-                Ok(self.fetch_alone(&mut connection).await?.into_iter().next())
+                let rows = self.fetch_alone(&mut connection, writer.health()).await?;
+                Ok(rows.into_iter().next())
             }
         }
     }
@@ -162,8 +169,6 @@ pub struct SqlStore {
     /// Names this process among those on the same database.
     pub(super) run: String,
     gauge: DiskGauge,
-    /// Whether the last check of the structure found defects.
-    pub(super) damaged: AtomicBool,
     /// Where notes about this database are kept.
     beside: OnceLock<Beside>,
 }
@@ -182,7 +187,6 @@ impl SqlStore {
             readers: Readers::Sqlite(readers),
             run: random_id(RUN_PREFIX),
             gauge,
-            damaged: AtomicBool::new(false),
             beside: OnceLock::new(),
         })
     }
@@ -203,7 +207,6 @@ impl SqlStore {
             readers: Readers::Postgres(readers),
             run,
             gauge,
-            damaged: AtomicBool::new(false),
             beside: OnceLock::new(),
         })
     }
@@ -217,6 +220,25 @@ impl SqlStore {
     pub(super) fn keep_beside(&self, beside: Beside) {
         // Whoever was first has the same places.
         let _ = self.beside.set(beside);
+    }
+
+    /// What statements have told of the state of the database.
+    pub(super) fn health(&self) -> &Health {
+        match &self.readers {
+            Readers::Sqlite(shared) => &shared.health,
+            Readers::Postgres(shared) => &shared.health,
+        }
+    }
+
+    /// Reads the whole database once more if a statement has told of a defect, so that a mended database is used
+    /// again.
+    pub(super) async fn read_again(&self) {
+        let Some(told) = self.health().check_due() else {
+            return;
+        };
+        let begun = Instant::now();
+        let outcome = self.read_all().await;
+        self.health().checked(told, begun.elapsed(), outcome);
     }
 
     /// Whether the database is on a server, which other processes may use too.
@@ -262,12 +284,7 @@ impl SqlStore {
         query("SELECT count(*) FROM probe")
             .fetch_one(&self.readers)
             .await?;
-        if self.damaged.load(Ordering::Relaxed) {
-            return Err(StoreError::Database {
-                cause: StoreFault::DamagedDatabase,
-                message: "a check of its structure found defects".into(),
-            });
-        }
+        self.health().sound()?;
         let suspect = match &self.writer {
             Writing::Sqlite(writer) => writer.is_suspect(),
             Writing::Postgres(writer) => return writer.check().await,

@@ -4,6 +4,8 @@ use sqlx::postgres::PgPool;
 use ventriform_service::records::{StoreError, StoreFault};
 
 /// Primary result codes of SQLite (<https://sqlite.org/rescode.html>).
+const SQLITE_ERROR: i32 = 1;
+const NOT_PERMITTED: i32 = 3;
 const SQLITE_BUSY: i32 = 5;
 const SQLITE_LOCKED: i32 = 6;
 const READ_ONLY: i32 = 8;
@@ -11,6 +13,7 @@ const IO_ERROR: i32 = 10;
 const SQLITE_CORRUPT: i32 = 11;
 const SQLITE_FULL: i32 = 13;
 const CANNOT_OPEN: i32 = 14;
+const WRONG_FORMAT: i32 = 24;
 const NOT_A_DATABASE: i32 = 26;
 
 /// An error of SQLite.
@@ -28,8 +31,9 @@ fn cause(error: &sqlx::Error) -> StoreFault {
             match extended & 0xff {
                 SQLITE_FULL => StoreFault::Full,
                 SQLITE_BUSY | SQLITE_LOCKED => StoreFault::Busy,
-                IO_ERROR | READ_ONLY | CANNOT_OPEN => StoreFault::Disk,
-                SQLITE_CORRUPT | NOT_A_DATABASE => StoreFault::DamagedDatabase,
+                IO_ERROR | READ_ONLY | CANNOT_OPEN | NOT_PERMITTED => StoreFault::Disk,
+                SQLITE_CORRUPT | WRONG_FORMAT | NOT_A_DATABASE => StoreFault::DamagedDatabase,
+                SQLITE_ERROR if lacks_table(error.message()) => StoreFault::DamagedDatabase,
                 _ => StoreFault::Other,
             }
         }
@@ -37,6 +41,13 @@ fn cause(error: &sqlx::Error) -> StoreFault {
         sqlx::Error::Io(_) => StoreFault::Disk,
         _ => StoreFault::Other,
     }
+}
+
+/// Whether SQLite says that a table or a column is gone, which every statement of this program names rightly.
+fn lacks_table(message: &str) -> bool {
+    ["no such table: ", "no such column: "]
+        .iter()
+        .any(|said| message.starts_with(said))
 }
 
 /// An error of PostgreSQL.
@@ -80,6 +91,10 @@ fn cause_of(code: &str) -> StoreFault {
         // read_only_sql_transaction: a standby, which may be promoted
         "25006" => StoreFault::Away,
         _ if code.starts_with("58") => StoreFault::Disk,
+        // undefined_table, undefined_column: every statement of this program names them rightly
+        "42P01" | "42703" => StoreFault::DamagedDatabase,
+        // insufficient_privilege
+        "42501" => StoreFault::Away,
         // data_corrupted, index_corrupted
         _ if code.starts_with("XX00") && code != "XX000" => StoreFault::DamagedDatabase,
         _ => StoreFault::Other,
@@ -125,6 +140,11 @@ mod tests {
         assert_eq!(cause_of("40001"), StoreFault::Busy);
         assert_eq!(cause_of("53100"), StoreFault::Full);
         assert_eq!(cause_of("XX001"), StoreFault::DamagedDatabase);
+        assert_eq!(cause_of("XX002"), StoreFault::DamagedDatabase);
+        assert_eq!(cause_of("42P01"), StoreFault::DamagedDatabase);
+        assert_eq!(cause_of("42501"), StoreFault::Away);
+        assert_eq!(cause_of("58030"), StoreFault::Disk);
+        assert!(lacks_table("no such table: holdings") && !lacks_table("near x: no such table"));
         assert_eq!(cause_of("XX000"), StoreFault::Other);
         assert_eq!(cause_of("42601"), StoreFault::Other);
     }

@@ -35,6 +35,7 @@ mod database;
 mod doctor;
 mod faults;
 mod findings;
+mod health;
 mod kept;
 mod migrate;
 mod missed;
@@ -350,7 +351,8 @@ impl Store {
             deliveries: rows.clone(),
             archives: rows.clone(),
             intake: rows.clone(),
-            figures: rows,
+            figures: rows.clone(),
+            time: rows,
             blobs: self.blobs.clone(),
             received: self.received.clone(),
             peers: self.peers.clone(),

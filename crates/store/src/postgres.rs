@@ -24,6 +24,7 @@
 //! and a read whose connection breaks is done again.
 
 use super::faults;
+use super::health::Health;
 use super::query::jitter;
 use super::schema;
 use super::shared::Shared;
@@ -151,10 +152,11 @@ pub(super) async fn open(
             Box::pin(async move { set_session(connection, &session).await })
         })
         .connect_lazy_with(options);
-    let writing = Shared::new(pool.clone(), WRITE_CONNECTIONS, wait);
+    let health = Arc::new(Health::default());
+    let writing = Shared::new(pool.clone(), health.clone(), WRITE_CONNECTIONS, wait);
     // The rest is for single statements beside the lock.
     let reading = settings.connections as usize / 4 * 3;
-    let readers = Shared::new(pool, reading.max(1), wait);
+    let readers = Shared::new(pool, health, reading.max(1), wait);
     Ok((PgWriter { shared: writing }, readers))
 }
 
@@ -477,6 +479,11 @@ pub(super) struct PgWriter {
 }
 
 impl PgWriter {
+    /// What statements tell.
+    pub fn health(&self) -> &Health {
+        &self.shared.health
+    }
+
     /// A connection for single statements.
     pub async fn acquire(&self) -> StoreResult<PoolConnection<Postgres>> {
         let pool = &self.shared.pool;
@@ -489,13 +496,14 @@ impl PgWriter {
         let turn = self.shared.turn().await?;
         let mut transaction = PgTransaction {
             connection: self.acquire().await?,
+            health: self.shared.health.clone(),
             ended: false,
             _turn: turn,
         };
         sqlx::raw_sql(BEGIN_WRITING)
             .execute(&mut *transaction)
             .await
-            .map_err(faults::of_postgres)?;
+            .map_err(|error| self.shared.health.noted(faults::of_postgres(error)))?;
         Ok(transaction)
     }
 
@@ -523,6 +531,8 @@ impl PgWriter {
 /// back.
 pub(super) struct PgTransaction {
     connection: PoolConnection<Postgres>,
+    /// What its statements tell.
+    health: Arc<Health>,
     ended: bool,
     _turn: Place,
 }
@@ -537,9 +547,16 @@ impl PgTransaction {
         sqlx::raw_sql("SELECT; COMMIT")
             .execute(&mut *self.connection)
             .await
-            .map_err(faults::of_postgres)?;
+            .map_err(|error| self.health.noted(faults::of_postgres(error)))?;
         self.ended = true;
         Ok(())
+    }
+}
+
+impl PgTransaction {
+    /// Where its statements run, and who notes what they tell.
+    pub fn parts(&mut self) -> (&mut PgConnection, &Health) {
+        (&mut self.connection, &self.health)
     }
 }
 

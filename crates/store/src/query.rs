@@ -7,7 +7,9 @@
 //! columns and knows neither the settings nor the error codes of an engine.
 
 use super::faults;
+use super::health::Health;
 use super::shared::Shared;
+use super::writer::Writer;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow};
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
@@ -83,12 +85,12 @@ where
 pub(super) enum Target<'a> {
     /// A pool of SQLite's readers, in turn.
     SqlitePool(&'a Shared<SqlitePool>),
-    /// A connection to SQLite.
-    Sqlite(&'a mut SqliteConnection),
+    /// A transaction of SQLite, and who notes what its statements tell.
+    Sqlite(&'a mut SqliteConnection, &'a Writer),
     /// A pool of connections to PostgreSQL; in turn, and for reading only, as it may be tried twice.
     PgPool(&'a Shared<PgPool>),
-    /// A connection to PostgreSQL.
-    Postgres(&'a mut PgConnection),
+    /// A connection to PostgreSQL, and who notes what its statements tell.
+    Postgres(&'a mut PgConnection, &'a Health),
 }
 
 /// A statement with its values.
@@ -166,34 +168,38 @@ impl Query {
             Target::SqlitePool(shared) => {
                 let _turn = shared.turn().await?;
                 let rows = self.sqlite().fetch_all(&shared.pool).await;
-                sqlite_rows(rows.map_err(faults::of_sqlite)?)
+                sqlite_rows(rows.map_err(|error| shared.health.noted(faults::of_sqlite(error)))?)
             }
-            Target::Sqlite(connection) => sqlite_rows(
-                self.sqlite()
-                    .fetch_all(connection)
-                    .await
-                    .map_err(faults::of_sqlite)?,
-            ),
+            Target::Sqlite(connection, writer) => {
+                let rows = self.sqlite().fetch_all(connection).await;
+                sqlite_rows(rows.map_err(|error| writer.noted(faults::of_sqlite(error)))?)
+            }
             Target::PgPool(shared) => {
                 let _turn = shared.turn().await?;
                 let pool = &shared.pool;
-                pg_rows(again(pool, self, |q| q.fetch_all(pool)).await?)
+                pg_rows(again(shared, self, |q| q.fetch_all(pool)).await?)
             }
-            Target::Postgres(connection) => {
+            Target::Postgres(connection, health) => {
                 let rows = self.postgres().fetch_all(connection).await;
-                pg_rows(rows.map_err(faults::of_postgres)?)
+                pg_rows(rows.map_err(|error| health.noted(faults::of_postgres(error)))?)
             }
         })
     }
 
     /// Runs it outside a transaction; returns all rows. Prepared anew if it has to be.
-    pub async fn fetch_alone(mut self, connection: &mut PgConnection) -> StoreResult<Vec<DbRow>> {
+    pub async fn fetch_alone(
+        mut self,
+        connection: &mut PgConnection,
+        health: &Health,
+    ) -> StoreResult<Vec<DbRow>> {
         let mut rows = self.clone().postgres().fetch_all(&mut *connection).await;
         if rows.as_ref().is_err_and(faults::plan_is_stale) {
             self.anew = true;
             rows = self.postgres().fetch_all(connection).await;
         }
-        Ok(pg_rows(rows.map_err(faults::of_postgres)?))
+        Ok(pg_rows(rows.map_err(|error| {
+            health.noted(faults::of_postgres(error))
+        })?))
     }
 
     /// Runs it; returns the first row.
@@ -205,25 +211,24 @@ impl Query {
             Target::SqlitePool(shared) => {
                 let _turn = shared.turn().await?;
                 let row = self.sqlite().fetch_optional(&shared.pool).await;
-                row.map_err(faults::of_sqlite)?.map(DbRow::Sqlite)
+                row.map_err(|error| shared.health.noted(faults::of_sqlite(error)))?
+                    .map(DbRow::Sqlite)
             }
-            Target::Sqlite(connection) => {
-                let row = self
-                    .sqlite()
-                    .fetch_optional(connection)
-                    .await
-                    .map_err(faults::of_sqlite)?;
-                row.map(DbRow::Sqlite)
+            Target::Sqlite(connection, writer) => {
+                let row = self.sqlite().fetch_optional(connection).await;
+                row.map_err(|error| writer.noted(faults::of_sqlite(error)))?
+                    .map(DbRow::Sqlite)
             }
             Target::PgPool(shared) => {
                 let _turn = shared.turn().await?;
                 let pool = &shared.pool;
-                let row = again(pool, self, |q| q.fetch_optional(pool)).await?;
+                let row = again(shared, self, |q| q.fetch_optional(pool)).await?;
                 row.map(DbRow::Postgres)
             }
-            Target::Postgres(connection) => {
+            Target::Postgres(connection, health) => {
                 let row = self.postgres().fetch_optional(connection).await;
-                row.map_err(faults::of_postgres)?.map(DbRow::Postgres)
+                row.map_err(|error| health.noted(faults::of_postgres(error)))?
+                    .map(DbRow::Postgres)
             }
         })
     }
@@ -240,24 +245,25 @@ impl Query {
             Target::SqlitePool(shared) => {
                 let _turn = shared.turn().await?;
                 let done = self.sqlite().execute(&shared.pool).await;
-                done.map_err(faults::of_sqlite)?.rows_affected()
+                done.map_err(|error| shared.health.noted(faults::of_sqlite(error)))?
+                    .rows_affected()
             }
-            Target::Sqlite(connection) => self
-                .sqlite()
-                .execute(connection)
-                .await
-                .map_err(faults::of_sqlite)?
-                .rows_affected(),
+            Target::Sqlite(connection, writer) => {
+                let done = self.sqlite().execute(connection).await;
+                done.map_err(|error| writer.noted(faults::of_sqlite(error)))?
+                    .rows_affected()
+            }
             Target::PgPool(shared) => {
                 let _turn = shared.turn().await?;
                 let pool = &shared.pool;
                 let done = self.postgres().execute(pool).await;
-                let done = done.map_err(|error| faults::of_pool(pool, error))?;
-                done.rows_affected()
+                let noted = |error| shared.health.noted(faults::of_pool(pool, error));
+                done.map_err(noted)?.rows_affected()
             }
-            Target::Postgres(connection) => {
+            Target::Postgres(connection, health) => {
                 let done = self.postgres().execute(connection).await;
-                done.map_err(faults::of_postgres)?.rows_affected()
+                done.map_err(|error| health.noted(faults::of_postgres(error)))?
+                    .rows_affected()
             }
         })
     }
@@ -268,7 +274,11 @@ type PgQuery = sqlx::query::Query<'static, Postgres, PgArguments>;
 
 /// Reads; again if the connection was lost, as all are when the server is started anew, or if the server has to
 /// prepare the statement anew.
-async fn again<T, F>(pool: &PgPool, mut query: Query, read: impl Fn(PgQuery) -> F) -> StoreResult<T>
+async fn again<T, F>(
+    shared: &Shared<PgPool>,
+    mut query: Query,
+    read: impl Fn(PgQuery) -> F,
+) -> StoreResult<T>
 where
     F: Future<Output = Result<T, sqlx::Error>>,
 {
@@ -281,7 +291,9 @@ where
                 tries += 1;
                 tokio::time::sleep(jitter(Duration::from_millis(50) * tries)).await;
             }
-            Err(error) => return Err(faults::of_pool(pool, error)),
+            Err(error) => {
+                return Err(shared.health.noted(faults::of_pool(&shared.pool, error)));
+            }
         }
     }
 }

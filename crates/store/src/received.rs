@@ -11,7 +11,9 @@ use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::intake::{IncomingFile, ReceivedFiles};
 use ventriform_service::places::Places;
-use ventriform_service::records::{BlobError, BlobWriter, LocalFile, Timestamp, random_id};
+use ventriform_service::records::{
+    BlobError, BlobWriter, LocalFile, Timestamp, TrustedNow, random_id,
+};
 
 /// A file on the local disk into which an object is received; deleted on drop.
 pub(super) struct Receiving {
@@ -97,7 +99,7 @@ impl ReceivedFiles for FileBlobs {
         Ok(())
     }
 
-    async fn kept(&self, age: Duration) -> Result<Vec<String>, BlobError> {
+    async fn kept(&self, age: Duration, _: TrustedNow) -> Result<Vec<String>, BlobError> {
         let folder = self.folder.join(RECEIVED_FOLDER);
         let listed = tokio::task::spawn_blocking(move || {
             let mut names = Vec::new();

@@ -1,5 +1,6 @@
 //! Connections to the database, shared out in turn.
 
+use super::health::Health;
 use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::places::{Place, Places};
@@ -9,6 +10,8 @@ use ventriform_service::records::{StoreError, StoreFault, StoreResult};
 pub(super) struct Shared<P> {
     /// The connections.
     pub pool: P,
+    /// What their statements tell.
+    pub health: Arc<Health>,
     places: Arc<Places>,
     /// Longest time for which a place is waited for.
     wait: Duration,
@@ -16,9 +19,10 @@ pub(super) struct Shared<P> {
 
 impl<P> Shared<P> {
     /// Connections of which at most `places` are used at the same time, and for one of which nobody waits longer than `wait`.
-    pub fn new(pool: P, places: usize, wait: Duration) -> Self {
+    pub fn new(pool: P, health: Arc<Health>, places: usize, wait: Duration) -> Self {
         Self {
             pool,
+            health,
             places: Places::new(places),
             wait,
         }

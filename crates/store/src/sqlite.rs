@@ -1,5 +1,6 @@
 //! The database file: one connection for writing, a few for reading.
 
+use super::health::Health;
 use super::schema;
 use super::shared::Shared;
 use super::writer::Writer;
@@ -8,6 +9,7 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 const READ_CONNECTIONS: u32 = 4;
@@ -38,8 +40,9 @@ pub(super) async fn open(
         .await?;
     schema::sqlite().run(&readers).await?;
     let places = READ_CONNECTIONS as usize;
-    let readers = Shared::new(readers, places, wait);
-    Ok((Writer::new(&options, wait), readers))
+    let health = Arc::new(Health::default());
+    let readers = Shared::new(readers, health.clone(), places, wait);
+    Ok((Writer::new(&options, health, wait), readers))
 }
 
 /// Whether there is a database at `path` in which this program once made its tables. A file that is

@@ -21,6 +21,7 @@
 //! it, and the driver ignores errors of that commit.
 
 use crate::faults;
+use crate::health::Health;
 use sqlx::query::Query;
 use sqlx::sqlite::{SqliteArguments, SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions, Row, Sqlite, SqliteConnection};
@@ -48,6 +49,8 @@ pub(super) struct Writer {
     /// `None` before the first write, and after one that failed.
     connection: Mutex<Option<SqliteConnection>>,
     wait: Duration,
+    /// What its statements tell.
+    health: Arc<Health>,
     /// Whether the last write did not end with a commit.
     suspect: AtomicBool,
     /// Even when nothing is being written. Odd from the beginning of a write to the end of its
@@ -59,12 +62,13 @@ pub(super) struct Writer {
 impl Writer {
     /// Connects when the first write comes. `wait` is the longest time that a write waits for its
     /// turn.
-    pub fn new(options: &SqliteConnectOptions, wait: Duration) -> Self {
+    pub fn new(options: &SqliteConnectOptions, health: Arc<Health>, wait: Duration) -> Self {
         Self {
             options: options.clone().busy_timeout(LOCK_POLL.min(wait)),
             turn: Places::new(1),
             connection: Mutex::new(None),
             wait,
+            health,
             suspect: AtomicBool::new(false),
             version: AtomicU64::new(0),
         }
@@ -106,7 +110,7 @@ impl Writer {
                     let error = faults::of_sqlite(error);
                     if error.cause() != StoreFault::Busy {
                         self.suspect.store(true, Ordering::Relaxed);
-                        return Err(error);
+                        return Err(self.noted(error));
                     }
                     // No transaction was begun, so the connection is as it was.
                     *place = Some(connection);
@@ -115,6 +119,15 @@ impl Writer {
                     }
                 }
             }
+        }
+    }
+
+    /// Notes what an error tells of the database. That it cannot be written shows at the next write; see
+    /// [`Writer::is_suspect`].
+    pub fn noted(&self, error: StoreError) -> StoreError {
+        match error.cause() {
+            StoreFault::DamagedDatabase => self.health.noted(error),
+            _ => error,
         }
     }
 
@@ -163,7 +176,7 @@ impl Writer {
         let row = sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
             .fetch_one(&mut connection)
             .await
-            .map_err(faults::of_sqlite)?;
+            .map_err(|error| self.noted(faults::of_sqlite(error)))?;
         *place = Some(connection);
         Ok(row.try_get::<i64, _>(0).map_err(faults::of_sqlite)? == 0)
     }
@@ -211,11 +224,18 @@ impl WriteTransaction<'_> {
         sqlx::query("COMMIT")
             .execute(&mut self.connection)
             .await
-            .map_err(faults::of_sqlite)?;
+            .map_err(|error| self.writer.noted(faults::of_sqlite(error)))?;
         self.writer.suspect.store(false, Ordering::Relaxed);
         self.writer.version.fetch_add(1, Ordering::SeqCst);
         *self.place = Some(self.connection);
         Ok(())
+    }
+}
+
+impl<'a> WriteTransaction<'a> {
+    /// Where its statements run, and who notes what they tell.
+    pub fn parts(&mut self) -> (&mut SqliteConnection, &'a Writer) {
+        (&mut self.connection, self.writer)
     }
 }
 
@@ -248,7 +268,7 @@ impl Write for Query<'_, Sqlite, SqliteArguments> {
         let rows = self
             .fetch_all(&mut *transaction)
             .await
-            .map_err(faults::of_sqlite)?;
+            .map_err(|error| writer.noted(faults::of_sqlite(error)))?;
         transaction.commit().await?;
         Ok(rows)
     }
@@ -258,7 +278,7 @@ impl Write for Query<'_, Sqlite, SqliteArguments> {
         let done = self
             .execute(&mut *transaction)
             .await
-            .map_err(faults::of_sqlite)?;
+            .map_err(|error| writer.noted(faults::of_sqlite(error)))?;
         transaction.commit().await?;
         Ok(done.rows_affected())
     }
@@ -275,7 +295,7 @@ mod tests {
             .filename(folder.join("test.db"))
             .create_if_missing(true)
             .journal_mode(sqlx::sqlite::SqliteJournalMode::Wal);
-        let writer = Writer::new(&options, Duration::from_millis(wait));
+        let writer = Writer::new(&options, Arc::default(), Duration::from_millis(wait));
         sqlx::query("CREATE TABLE IF NOT EXISTS t (x)")
             .write(&writer)
             .await
@@ -330,10 +350,10 @@ mod tests {
             .execute(&mut other)
             .await
             .unwrap();
-        let impatient = Writer::new(&seed.options, Duration::from_millis(300));
+        let impatient = Writer::new(&seed.options, Arc::default(), Duration::from_millis(300));
         let refused = impatient.begin().await.err().unwrap();
         assert_eq!(refused.cause(), StoreFault::Busy);
-        let waiting = Writer::new(&seed.options, Duration::from_secs(60));
+        let waiting = Writer::new(&seed.options, Arc::default(), Duration::from_secs(60));
         let write = sqlx::query("INSERT INTO t VALUES (2)").write(&waiting);
         let end = async {
             sleep(Duration::from_millis(500)).await;

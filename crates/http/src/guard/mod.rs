@@ -15,6 +15,8 @@
 //!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event is on
 //!    disk.
 //!
+//! 7. An answer that lasts ends when the credentials of its request do ([`CredentialWatch`]), and so does a wait for a job.
+//!
 //! `Authorization` decides alone; a caller's address or a forwarded header never does.
 
 pub mod hosts;
@@ -30,6 +32,7 @@ use super::caller::Caller;
 use super::client::ClientAddress;
 use super::memory::{Ledger, answered};
 use super::problem::{Answer, Problem};
+use super::watch::CredentialWatch;
 use axum::extract::{MatchedPath, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
@@ -152,7 +155,7 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
     if let Some(allowance) = allowance {
         add_limits(&mut response, &allowance);
     }
-    response
+    CredentialWatch::new(&app, &identity).over(response)
 }
 
 /// Who sends the request.
@@ -190,7 +193,8 @@ async fn admit(
 ) -> Answer<trail::Act> {
     let quota = identity.limits(app.service.quotas.general);
     let act = trail::Act::of(app, request, identity, address.to_owned());
-    let caller = Caller::of(identity, quota, act.agent());
+    let watch = CredentialWatch::new(app, identity);
+    let caller = Caller::of(identity, quota, act.agent(), watch);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
     }

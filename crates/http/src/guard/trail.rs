@@ -137,6 +137,7 @@ pub async fn sign_in_refused(app: &App, request: &Parts, address: &str, refusal:
         quota: ventriform_service::access::Quota::default(),
         makers: ventriform_service::access::Makers::default(),
         expires_at: None,
+        owner: None,
         account: None,
     };
     let refused = event(

@@ -88,7 +88,7 @@ pub async fn file_upload(
     }
     let mut pairs = stated.parameters;
     if let Some(filed) = filed_earlier(app, work, &pairs, &mut upload, &order).await? {
-        return answer(app, filed, patience, &headers, &job.offers).await;
+        return answer(app, caller, filed, patience, &headers, &job.offers).await;
     }
     // Pinned until the job is filed: from then on the job keeps them.
     let mut pins = Vec::new();
@@ -110,7 +110,7 @@ pub async fn file_upload(
         .file_job(work, volume, parameters, order, &counting)
         .await?;
     drop(pins);
-    answer(app, filed, patience, &headers, &job.offers).await
+    answer(app, caller, filed, patience, &headers, &job.offers).await
 }
 
 /// The statements of an upload about its job, in the query or the form.
@@ -157,19 +157,21 @@ async fn filed_earlier(
 /// The answer about a filed job, after waiting for its end if the client prefers that.
 pub async fn answer(
     app: &App,
+    caller: &Caller,
     filed: Job,
     patience: Option<Duration>,
     headers: &HeaderMap,
     offers: &[Offer],
 ) -> Answer {
     match patience {
-        Some(patience) => wait(app, filed, patience, headers, offers).await,
+        Some(patience) => wait(app, caller, filed, patience, headers, offers).await,
         None => accepted(app, filed).await,
     }
 }
 
 async fn wait(
     app: &App,
+    caller: &Caller,
     job: Job,
     patience: Duration,
     headers: &HeaderMap,
@@ -179,6 +181,8 @@ async fn wait(
     let waited = tokio::select! {
         job = app.service.queue().wait(&job.id, patience) => job?,
         () = app.service.closing.cancelled() => None,
+        // The job was filed with valid credentials. What has become of it is not for those who have them no more.
+        () = caller.watch.ended() => None,
     };
     let job = waited.unwrap_or(job);
     let applied = HeaderValue::from_str(&format!("wait={}", patience.as_secs()))

@@ -4,7 +4,7 @@ use super::{
     AccessStore, ApiKey, Identity, Issuer, IssuerError, KeyState, Maker, Makers, PresentedKey,
     Quota, Scope,
 };
-use crate::records::{Clock, StoreError, Tenant};
+use crate::records::{Clock, StoreError, Tenant, Timestamp};
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -111,8 +111,40 @@ impl Gate {
             return self.owner(key).await;
         }
         match &self.issuer {
-            Some(issuer) => issuer.subject(credential).await.map_err(Refusal::from),
+            Some(issuer) => issuer
+                .subject(credential, &*self.clock)
+                .await
+                .map_err(Refusal::from),
             None => Err(Refusal::UnknownKey),
+        }
+    }
+
+    /// Whether the credentials of an identity that was admitted still open the service: its key and those that made
+    /// it have not ended, its token has not expired; without credentials, whether the service still needs none.
+    ///
+    /// # Errors
+    /// If the database fails.
+    pub async fn still_admits(&self, identity: &Identity) -> Result<bool, StoreError> {
+        let expired = |end: Timestamp| end <= self.clock.latest();
+        if identity.expires_at.is_some_and(expired) {
+            return Ok(false);
+        }
+        let Some(id) = &identity.key else {
+            return match identity.account {
+                Some(_) => Ok(true),
+                None => self.is_open().await,
+            };
+        };
+        let Some(key) = self.key(id).await? else {
+            return Ok(false);
+        };
+        if key.state(self.clock.latest()) != KeyState::Active {
+            return Ok(false);
+        }
+        match self.makers(&key).await {
+            Ok(_) => Ok(true),
+            Err(Refusal::Store(error)) => Err(error),
+            Err(_) => Ok(false),
         }
     }
 
@@ -155,6 +187,7 @@ impl Gate {
             quota: Quota::default(),
             makers: Makers::default(),
             expires_at: None,
+            owner: None,
             account: None,
         }
     }
@@ -164,7 +197,7 @@ impl Gate {
         if !key.has_secret(presented.secret) {
             return Err(Refusal::UnknownKey);
         }
-        match key.state(self.clock.now()) {
+        match key.state(self.clock.latest()) {
             KeyState::Active => Ok(Identity {
                 makers: self.makers(&key).await?,
                 account: Some(account(&key.id)),
@@ -174,6 +207,7 @@ impl Gate {
                 key: Some(key.id),
                 quota: key.quota,
                 expires_at: key.expires_at,
+                owner: key.owner,
             }),
             state => Err(Refusal::EndedKey {
                 key: key.id,
@@ -192,7 +226,7 @@ impl Gate {
             any: made.maker != Maker::Operator,
             keys: Vec::new(),
         };
-        let now = self.clock.now();
+        let now = self.clock.latest();
         let mut maker = made.maker.clone();
         while let Maker::Caller(Some(id)) = maker {
             // Rows of keys are never deleted, and a key is made before those that it makes.

@@ -18,8 +18,10 @@ pub struct Identity {
     pub quota: Quota,
     /// The keys that have made its key, its own maker first.
     pub makers: Makers,
-    /// When its key expires.
+    /// When its key or its token expires.
     pub expires_at: Option<Timestamp>,
+    /// The subject of the issuer that sends it, or whose key it is.
+    pub owner: Option<String>,
     /// Tells callers apart where requests are counted; `None` for the anonymous caller.
     pub account: Option<String>,
 }

@@ -48,6 +48,8 @@ pub struct ApiKey {
     pub quota: Quota,
     /// Who made it.
     pub maker: Maker,
+    /// The subject of the issuer whose key it is: that made it with a token, or with a key of its own.
+    pub owner: Option<String>,
     /// When it was made.
     pub created_at: Timestamp,
     /// From when on it is refused.
@@ -71,6 +73,8 @@ pub struct KeyRequest {
     pub quota: Quota,
     /// See [`ApiKey::maker`].
     pub maker: Maker,
+    /// See [`ApiKey::owner`].
+    pub owner: Option<String>,
     /// See [`ApiKey::expires_at`].
     pub expires_at: Option<Timestamp>,
 }
@@ -136,6 +140,7 @@ impl ApiKey {
             scope: request.scope,
             quota: request.quota,
             maker: request.maker,
+            owner: request.owner,
             created_at: now,
             expires_at: request.expires_at,
             revoked_at: None,
@@ -205,6 +210,7 @@ mod tests {
             scope: Scope::Read,
             quota: Quota::default(),
             maker: Maker::Operator,
+            owner: None,
             expires_at: Some(100),
         }
     }

@@ -5,7 +5,8 @@
 //!    EdDSA are read, and only with a key made for that algorithm. So neither `none` nor a token
 //!    "signed" with a public key as an HMAC secret is accepted. A header with `crit` is refused: it names
 //!    extensions that a reader must understand (RFC 7515, 4.1.11), and none is known here.
-//! 2. Signature, issuer, audience, expiry (required) and `nbf` are checked, with a leeway.
+//! 2. Signature, issuer, audience, expiry (required) and `nbf` are checked, with a leeway: the expiry by the latest
+//!    time that it may be ([`Clock::latest`]), so that no token becomes valid again when the clock is set back.
 //! 3. Claims give tenant and scope. The setting is the claim's name, or a path of names with dots
 //!    between them (`realm_access.roles`).
 //!
@@ -17,7 +18,7 @@ use super::{Identity, Makers, Quota, Scope};
 use crate::http_client::{
     ClientFactory, ClientOptions, HttpClient, Redirects, bounded_body, request_uri,
 };
-use crate::records::{Tenant, content_id};
+use crate::records::{Clock, Tenant, Timestamp, content_id, milliseconds};
 use base64::Engine;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use bytes::Bytes;
@@ -128,7 +129,7 @@ impl Issuer {
     ///
     /// # Errors
     /// If it is not valid, or cannot be checked.
-    pub async fn subject(&self, token: &str) -> Result<Identity, IssuerError> {
+    pub async fn subject(&self, token: &str, clock: &dyn Clock) -> Result<Identity, IssuerError> {
         let header = decode_header(token).map_err(|_| refused("it is no JWT of a known kind"))?;
         if matches!(
             header.alg,
@@ -150,7 +151,10 @@ impl Issuer {
         let mut reason = refused("its signature is wrong");
         for key in candidates {
             match decode::<Map<String, Value>>(token, &key.key, &validation) {
-                Ok(token) => return self.0.identity(&token.claims),
+                Ok(token) => {
+                    let expires_at = self.0.expiry(&token.claims, clock)?;
+                    return self.0.identity(&token.claims, expires_at);
+                }
                 Err(error) => reason = why(&error),
             }
         }
@@ -164,12 +168,34 @@ impl Known {
         validation.set_issuer(&[&self.settings.issuer]);
         validation.set_audience(&[&self.settings.audience]);
         validation.set_required_spec_claims(&["exp", "iss", "aud", "sub"]);
-        validation.validate_nbf = true;
-        validation.leeway = self.settings.leeway.as_secs();
+        // Both by the clock of the service.
+        (validation.validate_exp, validation.validate_nbf) = (false, false);
         validation
     }
 
-    fn identity(&self, claims: &Map<String, Value>) -> Result<Identity, IssuerError> {
+    /// When a token expires, which is valid now.
+    fn expiry(
+        &self,
+        claims: &Map<String, Value>,
+        clock: &dyn Clock,
+    ) -> Result<Timestamp, IssuerError> {
+        let leeway = milliseconds(self.settings.leeway);
+        let time = |name: &str| claims.get(name).and_then(milliseconds_of);
+        let expires_at = time("exp").ok_or_else(|| refused(LACKS_CLAIM))?;
+        if expires_at.saturating_add(leeway) < clock.latest() {
+            return Err(refused(EXPIRED));
+        }
+        if time("nbf").is_some_and(|begins| begins > clock.now().saturating_add(leeway)) {
+            return Err(refused(NOT_YET));
+        }
+        Ok(expires_at)
+    }
+
+    fn identity(
+        &self,
+        claims: &Map<String, Value>,
+        expires_at: Timestamp,
+    ) -> Result<Identity, IssuerError> {
         let text = |name: &str| claims.get(name).and_then(Value::as_str);
         let subject = text("sub").unwrap_or_default();
         let tenant = match &self.settings.tenant_claim {
@@ -193,12 +219,13 @@ impl Known {
                 [self.settings.issuer.as_bytes(), subject.as_bytes()],
             )),
             tenant,
+            owner: Some(name.clone()),
             name,
             scope,
             key: None,
             quota: Quota::default(),
             makers: Makers::default(),
-            expires_at: None,
+            expires_at: Some(expires_at),
         })
     }
 
@@ -385,6 +412,17 @@ fn widest_scope(claim: Option<&Value>) -> Option<Scope> {
     }
 }
 
+/// Milliseconds since 1970 of a NumericDate (RFC 7519, 2); `None` if the claim is none.
+fn milliseconds_of(claim: &Value) -> Option<Timestamp> {
+    let seconds = claim.as_f64().filter(|seconds| *seconds >= 0.0)?;
+    // Saturates.
+    Some((seconds * 1000.0).round() as Timestamp)
+}
+
+const EXPIRED: &str = "it has expired";
+const NOT_YET: &str = "it is not valid yet";
+const LACKS_CLAIM: &str = "it lacks one of exp, iss, aud and sub";
+
 fn refused(reason: &str) -> IssuerError {
     IssuerError::Token(reason.to_owned())
 }
@@ -392,11 +430,9 @@ fn refused(reason: &str) -> IssuerError {
 fn why(error: &jsonwebtoken::errors::Error) -> IssuerError {
     use jsonwebtoken::errors::ErrorKind;
     refused(match error.kind() {
-        ErrorKind::ExpiredSignature => "it has expired",
-        ErrorKind::ImmatureSignature => "it is not valid yet",
         ErrorKind::InvalidIssuer => "it is of another issuer",
         ErrorKind::InvalidAudience => "it is for another audience",
-        ErrorKind::MissingRequiredClaim(_) => "it lacks one of exp, iss, aud and sub",
+        ErrorKind::MissingRequiredClaim(_) => LACKS_CLAIM,
         ErrorKind::InvalidSignature => "its signature is wrong",
         _ => "it cannot be read",
     })
@@ -428,6 +464,7 @@ fn check_address(address: &str) -> Result<(), IssuerError> {
 mod tests {
     use super::*;
     use crate::http_client::fake::FakeClient;
+    use crate::records::SystemClock;
     use serde_json::json;
     use std::sync::atomic::Ordering;
 
@@ -535,10 +572,10 @@ mod tests {
             read: Instant::now(),
         });
         let lacks = refused("it lacks one of exp, iss, aud and sub");
-        assert_eq!(issuer.subject(token).await, Err(lacks));
+        assert_eq!(issuer.subject(token, &SystemClock).await, Err(lacks));
         let forged = token.replace("cC4hiU", "cC4hiV");
         let wrong = refused("its signature is wrong");
-        assert_eq!(issuer.subject(&forged).await, Err(wrong));
+        assert_eq!(issuer.subject(&forged, &SystemClock).await, Err(wrong));
     }
 
     #[test]
@@ -596,7 +633,10 @@ mod tests {
         let (issuer, token) = slow_issuer(2 * REFRESH_AFTER, &client);
         let begun = Instant::now();
         for _ in 0..20 {
-            assert_eq!(issuer.subject(&token).await.unwrap().name, "me");
+            assert_eq!(
+                issuer.subject(&token, &SystemClock).await.unwrap().name,
+                "me"
+            );
         }
         assert!(begun.elapsed() < ISSUER_TIMEOUT, "{:?}", begun.elapsed());
         // One of them made the service ask, and no other did.
@@ -611,7 +651,7 @@ mod tests {
             ..FakeClient::default()
         };
         let (issuer, token) = slow_issuer(STALE_AFTER, &client);
-        let refused = issuer.subject(&token).await.unwrap_err();
+        let refused = issuer.subject(&token, &SystemClock).await.unwrap_err();
         assert!(matches!(refused, IssuerError::Unavailable(_)), "{refused}");
     }
 }

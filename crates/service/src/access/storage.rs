@@ -2,7 +2,7 @@
 
 use super::audit::{Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, KeptRow};
 use super::{ApiKey, Usage};
-use crate::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use crate::records::{Cutoff, ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Keys and audit trail. Every method is one transaction and fails only if the database does.
@@ -37,6 +37,16 @@ pub trait AccessStore: Send + Sync + 'static {
     /// whether there is such a key.
     async fn revoke_key(&self, id: &str, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
 
+    /// Revokes all keys of an owner, of one tenant or of all, with one `event` for each. Returns the ids of those that
+    /// were not revoked before.
+    async fn revoke_keys_of(
+        &self,
+        owner: &str,
+        tenant: Option<&Tenant>,
+        now: Timestamp,
+        event: &AuditEvent,
+    ) -> StoreResult<Vec<String>>;
+
     /// Use of the service by a tenant.
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage>;
 
@@ -66,7 +76,10 @@ pub trait AccessStore: Send + Sync + 'static {
     /// place. Receipts of erasures name rows, and so do the notes that a store keeps outside of the trail.
     async fn unconfirmed(&self) -> StoreResult<Vec<KeptRow>>;
 
+    /// Checks, for readiness, that a row can be appended to the trail, without leaving one.
+    async fn check_trail(&self, now: Timestamp) -> StoreResult<()>;
+
     /// Removes the rows that were recorded before a time, keeps their last hash as the anchor, and
     /// appends the event that says so. Returns how many were removed.
-    async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64>;
+    async fn prune(&self, before: Cutoff, now: Timestamp) -> StoreResult<u64>;
 }

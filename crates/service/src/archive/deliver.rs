@@ -80,6 +80,7 @@ impl Deliverer {
                 outcome,
                 error: None,
                 again_at: None,
+                counts: true,
             };
             (settlement, end, AttemptEnd::Fine)
         };
@@ -89,14 +90,14 @@ impl Deliverer {
             Err(trouble) => trouble,
         };
         let meaning = means(&trouble);
-        let again_after = |asked| self.exchange.again_at(attempts, due.since, asked);
-        let again_at = match &trouble {
+        let again_after = |asked| self.exchange.again(attempts, due.since, asked);
+        let again = match &trouble {
             Trouble::Passing { asked, .. } => again_after(*asked),
             // The operator may correct the credentials.
             Trouble::Final(failure) if failure.code == "archive-credentials" => again_after(None),
             Trouble::Final(_) => None,
         };
-        let (state, end) = match again_at {
+        let (state, end) = match again {
             Some(_) => (DeliveryState::Pending, ExchangeEnd::Failed),
             None => (DeliveryState::Dead, ExchangeEnd::GivenUp),
         };
@@ -107,7 +108,8 @@ impl Deliverer {
                 Trouble::Final(_) => "refused",
             },
             error: Some(trouble.what().to_owned()),
-            again_at,
+            again_at: again.map(|again| again.at),
+            counts: again.is_none_or(|again| again.counts),
         };
         (settlement, end, meaning)
     }
@@ -163,6 +165,10 @@ impl Errands for Deliverer {
                 AttemptEnd::NotWritten
             }
         }
+    }
+
+    async fn recall(&self, now: Timestamp) -> StoreResult<u64> {
+        self.exchange.store.recall_sends(now).await
     }
 
     async fn expire(&self) {}

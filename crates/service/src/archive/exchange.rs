@@ -3,7 +3,7 @@
 use super::trouble::Trouble;
 use super::web::WebClients;
 use super::{Archive, ArchiveStore, Archives, ExchangeHost};
-use crate::hooks::{AttemptEnd, Lanes, RetrySchedule, UrlGuard, random_share};
+use crate::hooks::{AttemptEnd, Lanes, NextAttempt, RetrySchedule, UrlGuard, random_share};
 use crate::http_client::ClientFactory;
 use crate::jobs::Queue;
 use crate::records::{Clock, Tenant, Timestamp};
@@ -75,13 +75,13 @@ impl Exchange {
     }
 
     /// When to try again after attempt number `attempts` failed; `None` if that was the last.
-    pub(super) fn again_at(
+    pub(super) fn again(
         &self,
         attempts: u32,
         since: Timestamp,
         asked: Option<Duration>,
-    ) -> Option<Timestamp> {
-        let now = self.clock().now();
+    ) -> Option<NextAttempt> {
+        let now = (self.clock().now(), self.clock().trusted());
         let retries = self.settings.retries;
         retries.next(attempts, since, now, asked, random_share())
     }

@@ -108,15 +108,13 @@ impl Puller {
         let meaning = means(&trouble);
         tracing::info!(job = %due.job, error = trouble.what(), "a series was not fetched");
         let failure = match trouble {
-            Trouble::Passing { what, asked } => {
-                match exchange.again_at(attempts, due.since, asked) {
-                    Some(again_at) => {
-                        store.pull_failed(&due.job, &what, again_at, now).await?;
-                        return Ok((ExchangeEnd::Failed, meaning));
-                    }
-                    None => unavailable(attempts, &what),
+            Trouble::Passing { what, asked } => match exchange.again(attempts, due.since, asked) {
+                Some(again) => {
+                    store.pull_failed(&due.job, &what, again, now).await?;
+                    return Ok((ExchangeEnd::Failed, meaning));
                 }
-            }
+                None => unavailable(attempts, &what),
+            },
             Trouble::Final(failure) => failure,
         };
         if let Some(job) = store.pull_given_up(&due.job, &failure, now).await? {
@@ -207,6 +205,10 @@ impl Errands for Puller {
                 AttemptEnd::NotWritten
             }
         }
+    }
+
+    async fn recall(&self, now: Timestamp) -> StoreResult<u64> {
+        self.exchange.store.recall_pulls(now).await
     }
 
     async fn expire(&self) {}

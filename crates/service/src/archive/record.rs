@@ -1,6 +1,6 @@
 //! Fetches and deliveries, and the trait that a database implements.
 
-use crate::hooks::{Backlog, DeliveryState, Lane};
+use crate::hooks::{Backlog, DeliveryState, Lane, NextAttempt};
 use crate::records::{Failure, Job, SeriesSource, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
@@ -110,6 +110,8 @@ pub struct SendSettlement {
     pub error: Option<String>,
     /// When to try again, if it is pending.
     pub again_at: Option<Timestamp>,
+    /// Whether the attempt, which has been counted, counts towards the most that are made.
+    pub counts: bool,
 }
 
 /// The tables of archives. Every method is one transaction and fails only if the database does.
@@ -132,14 +134,17 @@ pub trait ArchiveStore: Send + Sync + 'static {
     /// Gives a waiting job its volume. `None` if the job waits no more.
     async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>>;
 
-    /// Writes down that an attempt to fetch failed, which has been counted.
+    /// Writes down that an attempt to fetch failed, which has been counted; `again.counts` says whether that stays so.
     async fn pull_failed(
         &self,
         job: &str,
         error: &str,
-        again_at: Timestamp,
+        again: NextAttempt,
         now: Timestamp,
     ) -> StoreResult<()>;
+
+    /// Makes those fetches due that a clock which was ahead has put off.
+    async fn recall_pulls(&self, now: Timestamp) -> StoreResult<u64>;
 
     /// Fails a job whose volume cannot be fetched. `None` if it waits no more.
     async fn pull_given_up(
@@ -179,6 +184,9 @@ pub trait ArchiveStore: Send + Sync + 'static {
         settled: &SendSettlement,
         now: Timestamp,
     ) -> StoreResult<()>;
+
+    /// Makes those deliveries due that a clock which was ahead has put off.
+    async fn recall_sends(&self, now: Timestamp) -> StoreResult<u64>;
 
     /// The outcome of the deliveries of those jobs, in the order of the job's list.
     async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>>;

@@ -2,7 +2,9 @@
 
 mod exchange;
 mod tasks;
+mod time_of_day;
 mod upkeep;
 
 pub(crate) use tasks::{UPKEEP_EVERY, gatherer, run};
+pub use time_of_day::TimeOfDay;
 pub use upkeep::Upkeep;

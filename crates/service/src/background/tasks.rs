@@ -6,11 +6,9 @@
 //! filed by an idempotency key.
 
 use super::{Upkeep, exchange};
-use crate::access::AccessStore;
 use crate::intake::{GatherSettings, Gatherer};
 use crate::items::Custodian;
 use crate::procedures;
-use crate::records::{Clock, SystemClock};
 use crate::service::{Service, retention_ages};
 use std::sync::Arc;
 use std::time::Duration;
@@ -60,7 +58,7 @@ async fn perform(service: &Arc<Service>, end: CancellationToken) {
         others.spawn(prune_workitems(service.clone(), age, end.clone()));
     }
     if let Some(age) = settings.audit_retention.0 {
-        others.spawn(prune_audit(service.access.clone(), age.0, end));
+        others.spawn(prune_audit(service.clone(), age.0, end));
     }
     while let Some(ended) = sending.join_next().await {
         if let Err(error) = ended {
@@ -85,24 +83,29 @@ pub(crate) fn gatherer(service: &Arc<Service>) -> Gatherer {
     }
 }
 
-async fn prune_audit(store: Arc<dyn AccessStore>, age: Duration, end: CancellationToken) {
+/// Removes rows of the audit trail that are older than `age`, while ages count.
+async fn prune_audit(service: Arc<Service>, age: Duration, end: CancellationToken) {
     let mut round = tokio::time::interval(PRUNE_EVERY);
-    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     while end.run_until_cancelled(round.tick()).await.is_some() {
-        let now = SystemClock.now();
-        if let Err(error) = store.prune(now.saturating_sub(age), now).await {
+        let Some(now) = service.clock().trusted() else {
+            continue;
+        };
+        let pruned = service.access.prune(now.older_than(age), now.moment());
+        if let Err(error) = pruned.await {
             tracing::error!(%error, "old rows of the audit trail could not be removed");
         }
     }
 }
 
-/// Deletes work items that ended as long ago as jobs are kept.
+/// Deletes work items that ended as long ago as jobs are kept, while ages count.
 async fn prune_workitems(service: Arc<Service>, age: Duration, end: CancellationToken) {
     let mut round = tokio::time::interval(PRUNE_EVERY);
-    let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     while end.run_until_cancelled(round.tick()).await.is_some() {
-        let before = service.now().saturating_sub(age);
-        if let Err(error) = service.worklist.delete_ended_workitems(before).await {
+        let Some(now) = service.clock().trusted() else {
+            continue;
+        };
+        let deleted = service.worklist.delete_ended_workitems(now.older_than(age));
+        if let Err(error) = deleted.await {
             tracing::error!(%error, "ended work items could not be deleted");
         }
     }

@@ -500,6 +500,9 @@ settings! {
     oidc_scope_claim: String = "scope";
     /// How far the clocks of issuer and service may differ
     oidc_leeway: Span = "60s";
+    /// How long an API key may live that a subject of the issuer makes, if it asks for more than its token has left;
+    /// `0s` lets it end with the token
+    oidc_key_life: Span = "0s";
     /// Age at which rows of the audit trail are removed; `off` keeps them
     audit_retention: Retention = "off";
 

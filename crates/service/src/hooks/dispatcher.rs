@@ -1,7 +1,6 @@
 //! Sends webhooks that are due, and writes down how that ended.
 
 use super::rounds::random_share;
-use super::schedule::milliseconds;
 use super::{
     AttemptEnd, AttemptOutcome, DeliveryLimits, DeliveryStore, DueDelivery, Errands, Lane, Lanes,
     RetrySchedule, Rounds, Sender, Settlement, SigningSecret, UrlGuard,
@@ -143,11 +142,12 @@ impl Dispatcher {
         };
         self.counts.attempts[outcome.index()].fetch_add(1, Ordering::Relaxed);
         let now = self.clock.now();
-        let again_at = match outcome {
+        let again = match outcome {
             AttemptOutcome::Delivered(_) | AttemptOutcome::Gone => None,
             _ => {
+                let time = (now, self.clock.trusted());
                 let retries = self.settings.retries;
-                retries.next(attempts, delivery.since, now, asked, random_share())
+                retries.next(attempts, delivery.since, time, asked, random_share())
             }
         };
         tracing::debug!(
@@ -155,14 +155,18 @@ impl Dispatcher {
             outcome = outcome.as_str(), status = outcome.status(), "webhook sent"
         );
         let delivered = matches!(outcome, AttemptOutcome::Delivered(_));
-        if again_at.is_none() && !delivered {
+        if again.is_none() && !delivered {
             self.counts.given_up.fetch_add(1, Ordering::Relaxed);
             tracing::warn!(
                 delivery = %delivery.id, job = %delivery.job, attempts,
                 outcome = outcome.as_str(), "webhook given up"
             );
         }
-        let settled = Settlement { outcome, again_at };
+        let settled = Settlement {
+            outcome,
+            again_at: again.map(|again| again.at),
+            counts: again.is_none_or(|again| again.counts),
+        };
         self.store.settle(&delivery.id, settled, now).await?;
         Ok((outcome, asked))
     }
@@ -206,11 +210,16 @@ impl Errands for Dispatcher {
         }
     }
 
+    async fn recall(&self, now: Timestamp) -> StoreResult<u64> {
+        self.store.recall_deliveries(now).await
+    }
+
     async fn expire(&self) {
-        let now = self.clock.now();
+        let (now, trusted) = (self.clock.now(), self.clock.trusted());
+        let older_than = |age| trusted.map(|now| now.older_than(age));
         let limits = DeliveryLimits {
-            pending_since: now.saturating_sub(milliseconds(self.settings.retries.age)),
-            ended_since: now.saturating_sub(milliseconds(self.settings.history)),
+            pending_since: older_than(self.settings.retries.age),
+            ended_since: older_than(self.settings.history),
             backlog: self.settings.backlog,
         };
         match self.store.expire(limits, now).await {

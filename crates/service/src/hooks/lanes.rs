@@ -10,8 +10,7 @@
 //! places, shared in the same way, so that receivers that hang leave the other half to those that answer.
 
 use super::RetrySchedule;
-use super::schedule::milliseconds;
-use crate::records::{Tenant, Timestamp};
+use crate::records::{Tenant, Timestamp, milliseconds};
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
@@ -47,6 +46,8 @@ struct Traffic {
     on_the_way: BTreeSet<String>,
     failures: u32,
     not_before: Timestamp,
+    /// The length of that rest.
+    rest: Duration,
 }
 
 impl Lanes {
@@ -69,6 +70,11 @@ impl Lanes {
         let known: BTreeSet<&Lane> = pending.iter().map(|(lane, _)| lane).collect();
         self.traffic
             .retain(|lane, traffic| !traffic.on_the_way.is_empty() || known.contains(lane));
+        for traffic in self.traffic.values_mut() {
+            // After the clock was set back, no lane rests for longer than it was to.
+            let latest = now.saturating_add(milliseconds(traffic.rest));
+            traffic.not_before = traffic.not_before.min(latest);
+        }
         self.due.clear();
         self.due_anywhere.clear();
         for (lane, due_at) in pending {
@@ -174,6 +180,7 @@ impl Lanes {
                 traffic.failures = traffic.failures.saturating_add(1);
                 let rest = self.pauses.pause(traffic.failures).min(LONGEST_REST);
                 let rest = rest.max(asked.unwrap_or_default());
+                traffic.rest = rest;
                 traffic.not_before = now.saturating_add(milliseconds(rest));
             }
         }

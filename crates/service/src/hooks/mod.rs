@@ -56,6 +56,6 @@ pub use record::{
     Settlement,
 };
 pub use rounds::{AttemptEnd, Errands, Rounds, random_share};
-pub use schedule::RetrySchedule;
+pub use schedule::{NextAttempt, RetrySchedule};
 pub use secret::{InvalidSecret, SigningSecret, signature_header};
 pub use sender::{Sender, retry_after};

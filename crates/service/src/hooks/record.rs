@@ -1,7 +1,7 @@
 //! Deliveries and endpoints, and the trait that a database implements.
 
 use super::{AttemptOutcome, HookEvent, Lane, SigningSecret};
-use crate::records::{StoreResult, Tenant, Timestamp};
+use crate::records::{Cutoff, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// The state of a delivery.
@@ -105,6 +105,8 @@ pub struct Settlement {
     pub outcome: AttemptOutcome,
     /// When to try again; `None` if this was the last attempt.
     pub again_at: Option<Timestamp>,
+    /// Whether the attempt, which has been counted, counts towards the most that are made.
+    pub counts: bool,
 }
 
 /// A receiver that is told about every job of its tenant.
@@ -129,10 +131,10 @@ pub struct HookEndpoint {
 /// How much is kept of deliveries.
 #[derive(Debug, Clone, Copy)]
 pub struct DeliveryLimits {
-    /// Pending deliveries that happened before this are given up.
-    pub pending_since: Timestamp,
-    /// Deliveries that ended before this are deleted.
-    pub ended_since: Timestamp,
+    /// Pending deliveries that happened before this are given up; none while no ages count.
+    pub pending_since: Option<Cutoff>,
+    /// Deliveries that ended before this are deleted; none while no ages count.
+    pub ended_since: Option<Cutoff>,
     /// Most pending deliveries of one lane; the oldest beyond that are given up.
     pub backlog: u32,
 }
@@ -168,6 +170,9 @@ pub trait DeliveryStore: Send + Sync + 'static {
     /// Writes down how an attempt ended, which has been counted. After [`AttemptOutcome::Gone`] the endpoint is not told
     /// any more, and what it has not been told is given up.
     async fn settle(&self, id: &str, settled: Settlement, now: Timestamp) -> StoreResult<()>;
+
+    /// Makes those due that a clock which was ahead has put off; see [`Errands::recall`](super::Errands::recall).
+    async fn recall_deliveries(&self, now: Timestamp) -> StoreResult<u64>;
 
     /// Gives up and deletes deliveries beyond the limits; returns how many were given up.
     async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64>;

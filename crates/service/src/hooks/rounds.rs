@@ -3,9 +3,8 @@
 //! The table is the queue, so nothing is lost with the process: what was on the way when it ended
 //! is done again. In memory there are only the errands on the way, whose number is limited.
 
-use super::schedule::milliseconds;
 use super::{Lane, Lanes};
-use crate::records::{Clock, Job, StoreResult, Timestamp};
+use crate::records::{Clock, Job, StoreResult, Timestamp, milliseconds};
 use async_trait::async_trait;
 use std::sync::Arc;
 use std::time::Duration;
@@ -38,6 +37,10 @@ pub trait Errands: Send + Sync + 'static {
 
     /// Makes one attempt and writes down how it ended.
     async fn attempt(&self, due: Self::Due) -> AttemptEnd;
+
+    /// Makes the rows due that a clock which was ahead has put off: those that were tried last, or began, later than
+    /// `now`. Returns how many these are.
+    async fn recall(&self, now: Timestamp) -> StoreResult<u64>;
 
     /// Gives up what is too old, deletes what ended long ago.
     async fn expire(&self);
@@ -86,6 +89,7 @@ impl<E: Errands> Rounds<E> {
     ) {
         let mut on_the_way = JoinSet::new();
         let mut expiry = tokio::time::interval_at(Instant::now() + EXPIRE_EVERY, EXPIRE_EVERY);
+        self.recall().await;
         loop {
             let pause = match self.start_due(&mut on_the_way).await {
                 Ok(pause) => pause,
@@ -114,12 +118,26 @@ impl<E: Errands> Rounds<E> {
                         Ok(_) | Err(RecvError::Lagged(_)) => {}
                         Err(RecvError::Closed) => return,
                     },
-                    _ = expiry.tick() => self.errands.expire().await,
+                    _ = expiry.tick() => {
+                        self.recall().await;
+                        self.errands.expire().await;
+                    }
                     () = self.woken.notified() => {}
                     () = &mut idle => {}
                 }
                 break;
             }
+        }
+    }
+
+    async fn recall(&self) {
+        match self.errands.recall(self.clock.now()).await {
+            Ok(0) => {}
+            Ok(recalled) => tracing::warn!(
+                recalled,
+                "what a clock that was ahead had put off is tried now"
+            ),
+            Err(error) => tracing::error!(%error, "what was put off could not be read"),
         }
     }
 

@@ -2,7 +2,7 @@
 //! and the files that keep them.
 
 use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
-use crate::records::{BlobWriter, ErasureAgent, Timestamp};
+use crate::records::{BlobWriter, Cutoff, ErasureAgent, Timestamp, TrustedNow};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -256,7 +256,7 @@ pub trait IntakeStore: Send + Sync + 'static {
     ) -> StoreResult<Option<Vec<String>>>;
 
     /// The failed groups that have not changed since `before`.
-    async fn failed_before(&self, before: Timestamp) -> StoreResult<Vec<(Tenant, String)>>;
+    async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>>;
 
     /// The names of all files that objects have.
     async fn files(&self) -> StoreResult<BTreeSet<String>>;
@@ -298,8 +298,9 @@ pub trait ReceivedFiles: Send + Sync + 'static {
     /// Deletes kept files; those that do not exist are none.
     async fn discard(&self, names: &[String]) -> Result<(), BlobError>;
 
-    /// The names of the files that were written at least `age` ago.
-    async fn kept(&self, age: Duration) -> Result<Vec<String>, BlobError>;
+    /// The names of the files that were written at least `age` ago, by the clock that has stamped them. To be called
+    /// while the time is trusted.
+    async fn kept(&self, age: Duration, now: TrustedNow) -> Result<Vec<String>, BlobError>;
 
     /// Moves a kept file to where nobody sees it but the operator can restore it.
     async fn quarantine(&self, name: &str, now: Timestamp) -> Result<(), BlobError>;

@@ -7,8 +7,8 @@
 
 use super::{Items, to_its_end};
 use crate::records::{
-    Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, FileRecord, Receipt,
-    Resource, StoreError, Tenant, Timestamp,
+    Catalogue, Cutoff, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, FileRecord,
+    Receipt, Resource, StoreError, Tenant, Timestamp, milliseconds,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -59,10 +59,6 @@ impl RetentionAges {
             Resource::Template | Resource::Reader | Resource::Normals => None,
         }
     }
-}
-
-pub(crate) fn milliseconds(age: Duration) -> i64 {
-    i64::try_from(age.as_millis()).unwrap_or(i64::MAX)
 }
 
 impl Items {
@@ -206,16 +202,16 @@ impl Items {
         }
     }
 
-    /// Erases items that are too old, page by page.
+    /// Erases items that are too old, page by page; none while no ages count.
     ///
     /// # Errors
     /// If the database fails.
     pub async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
         for kind in Resource::WITH_FILES {
-            let Some(age) = ages.of(kind) else {
+            let Some((age, now)) = ages.of(kind).zip(self.clock.trusted()) else {
                 continue;
             };
-            let before = self.clock.now().saturating_sub(milliseconds(age));
+            let before = now.older_than(age);
             let mut pages = ExpiredPages::new(kind, before);
             while let Some(page) = pages.next(self.catalogue()).await? {
                 for found in page {
@@ -245,14 +241,14 @@ impl Items {
 /// in the next round only.
 pub(crate) struct ExpiredPages {
     kind: Resource,
-    before: Timestamp,
+    before: Cutoff,
     last: Option<Expired>,
     ended: bool,
 }
 
 impl ExpiredPages {
     /// Those last renewed before `before`.
-    pub fn new(kind: Resource, before: Timestamp) -> Self {
+    pub fn new(kind: Resource, before: Cutoff) -> Self {
         Self {
             kind,
             before,
@@ -281,7 +277,7 @@ impl ExpiredPages {
     }
 }
 
-fn by_retention(tenant: Tenant, id: String, before: Option<Timestamp>) -> ErasureOrder {
+fn by_retention(tenant: Tenant, id: String, before: Option<Cutoff>) -> ErasureOrder {
     ErasureOrder {
         tenant,
         id,

@@ -24,8 +24,8 @@ mod sweep;
 
 pub use add::{NotAdded, TemplateSource, check_name};
 pub use content::{OutputFile, StoredItem, StoredResult, StoredSource, WorkOutput};
+pub(crate) use erase::ExpiredPages;
 pub use erase::RetentionAges;
-pub(crate) use erase::{ExpiredPages, milliseconds};
 pub use pins::Pin;
 pub use sweep::{Custodian, Swept};
 

@@ -99,14 +99,12 @@ impl Custodian {
                 tokio::time::sleep(BATCH_PAUSE).await;
             }
         }
-        let age = self.quarantine_keep.map(|age| age.as_millis());
-        let before = age.map(|age| {
-            let age = i64::try_from(age).unwrap_or(i64::MAX);
-            items.clock.now().saturating_sub(age)
-        });
+        let trusted = items.clock.trusted();
+        let before = self.quarantine_keep.zip(trusted);
+        let before = before.map(|(age, now)| now.older_than(age));
         items.blobs.tidy(before).await?;
-        if let Some(peers) = &items.peers {
-            peers.tidy().await?;
+        if let Some((peers, now)) = items.peers.as_ref().zip(trusted) {
+            peers.tidy(now).await?;
         }
         if swept.set_aside > 0 {
             tracing::error!(

@@ -7,7 +7,7 @@
 //! may keep its files elsewhere than on a disk.
 
 use super::{BlobError, FileRecord, ItemRecord, StoreFault};
-use super::{Resource, Timestamp};
+use super::{Cutoff, Resource, Timestamp};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::stream::BoxStream;
@@ -219,7 +219,7 @@ pub trait BlobStore: Send + Sync + 'static {
 
     /// Deletes what was discarded, and what was set aside before `set_aside_before`; never what has
     /// a row.
-    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError>;
+    async fn tidy(&self, set_aside_before: Option<Cutoff>) -> Result<(), BlobError>;
 
     /// Checks, for readiness, that there is room and that a small file can be written, read and
     /// deleted.

@@ -7,7 +7,7 @@ use super::{
     Owned, PagePlan, Product, Receipt, ScanErasures, ScanFields, Scans, StoreResult, StoredVolume,
     Tags,
 };
-use super::{Resource, Tenant, Timestamp};
+use super::{Cutoff, Resource, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// The result of a request to delete a job.
@@ -199,7 +199,7 @@ pub trait Catalogue: Custody + Scans + ScanErasures {
     async fn expired(
         &self,
         kind: Resource,
-        before: Timestamp,
+        before: Cutoff,
         after: Option<&Expired>,
         limit: u32,
     ) -> StoreResult<Vec<Expired>>;

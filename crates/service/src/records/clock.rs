@@ -1,13 +1,15 @@
-//! The time of day, injected so that tests can set it.
+//! The time of day, and the ages that may be counted by it.
 //!
-//! [`SteadyClock`] is the system's clock without its steps. Somebody who sets the clock to a wrong
-//! year for five minutes must not expire every stored item, and a step back must not turn the
-//! order of a job's stamps. Small corrections are followed at once. A step is followed only after
-//! it has lasted for [`SETTLING_TIME`]; until then time goes on as the monotonic clock says.
+//! What was stamped is older than an age only by a clock that is trusted: a machine that starts with a dead battery
+//! is years off until it has asked the network, and what is erased by age then cannot be had back. So an age is never
+//! a difference of two numbers. [`dyn Clock::trusted`](trait.Clock.html) gives the time by which ages count, or
+//! nothing while it is in doubt; only that makes a [`Cutoff`]; and every method of a store that erases, gives up or
+//! forgets what is old takes a [`Cutoff`] or a [`TrustedNow`].
+//!
+//! What ends at a moment that was promised, as credentials do, ends by [`Clock::latest`], the strict side.
 
 use std::num::NonZero;
-use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use time::OffsetDateTime;
 use time::format_description::well_known::iso8601::{Config, EncodedConfig, TimePrecision};
 use time::format_description::well_known::{Iso8601, Rfc3339};
@@ -17,11 +19,63 @@ pub type Timestamp = i64;
 
 /// A source of the current time.
 pub trait Clock: Send + Sync + 'static {
-    /// The current time.
+    /// The current time, for stamps and pauses.
     fn now(&self) -> Timestamp;
+
+    /// Whether ages may be counted by it.
+    fn is_trusted(&self) -> bool;
+
+    /// The latest time that it may be. What ends at a moment, as a credential does, has ended if that moment is not
+    /// later.
+    fn latest(&self) -> Timestamp;
 }
 
-/// The system clock.
+impl dyn Clock {
+    /// The time by which ages count; `None` while the time of day is in doubt.
+    pub fn trusted(&self) -> Option<TrustedNow> {
+        self.is_trusted().then(|| TrustedNow(self.now()))
+    }
+}
+
+/// A time by which ages count. Only [`dyn Clock::trusted`](trait.Clock.html) makes one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TrustedNow(Timestamp);
+
+impl TrustedNow {
+    /// The moment.
+    pub fn moment(self) -> Timestamp {
+        self.0
+    }
+
+    /// The moment before which everything is older than `age`.
+    pub fn older_than(self, age: Duration) -> Cutoff {
+        Cutoff(self.0.saturating_sub(milliseconds(age)))
+    }
+
+    /// Whether what began at `since` will be older than `age` at `moment`.
+    pub fn is_too_old(self, since: Timestamp, age: Duration, moment: Timestamp) -> bool {
+        moment > since.saturating_add(milliseconds(age))
+    }
+}
+
+/// The moment before which everything is older than an age. Only [`TrustedNow::older_than`] makes one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cutoff(Timestamp);
+
+impl Cutoff {
+    /// The moment.
+    pub fn moment(self) -> Timestamp {
+        self.0
+    }
+}
+
+/// A length of time in the unit of [`Timestamp`].
+pub(crate) fn milliseconds(span: Duration) -> i64 {
+    i64::try_from(span.as_millis()).unwrap_or(i64::MAX)
+}
+
+/// The clock of the machine as it is. For stamps of commands, and for [`ServiceClock`](super::ServiceClock); no ages
+/// are counted by it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SystemClock;
 
@@ -32,6 +86,14 @@ impl Clock for SystemClock {
             .map_or(0, |since| {
                 Timestamp::try_from(since.as_millis()).unwrap_or(Timestamp::MAX)
             })
+    }
+
+    fn is_trusted(&self) -> bool {
+        false
+    }
+
+    fn latest(&self) -> Timestamp {
+        self.now()
     }
 }
 
@@ -57,94 +119,9 @@ pub fn parse_rfc3339(text: &str) -> Option<Timestamp> {
     Timestamp::try_from(time.unix_timestamp_nanos() / 1_000_000).ok()
 }
 
-/// Greatest correction that is followed at once.
-const CLOCK_STEP_MS: i64 = 2_000;
-
-/// How long a step of the system's clock must last until it is followed.
-pub const SETTLING_TIME: Duration = Duration::from_secs(600);
-
-/// The system clock without its steps.
-pub struct SteadyClock {
-    started: Instant,
-    course: Mutex<Option<Course>>,
-}
-
-impl Default for SteadyClock {
-    fn default() -> Self {
-        Self {
-            started: Instant::now(),
-            course: Mutex::default(),
-        }
-    }
-}
-
-impl Clock for SteadyClock {
-    fn now(&self) -> Timestamp {
-        let monotonic = i64::try_from(self.started.elapsed().as_millis()).unwrap_or(i64::MAX);
-        let wall = SystemClock.now();
-        // A panic cannot leave the course half changed: it is a few numbers.
-        let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-        course
-            .get_or_insert_with(|| Course::new(wall, monotonic))
-            .now(wall, monotonic)
-    }
-}
-
-/// How the served time follows the wall clock; all in milliseconds.
-#[derive(Debug)]
-struct Course {
-    /// Served time minus monotonic time.
-    offset: i64,
-    /// Another offset that the wall clock has shown, and since when on the monotonic clock.
-    doubt: Option<(i64, i64)>,
-    last: Timestamp,
-}
-
-impl Course {
-    fn new(wall: Timestamp, monotonic: i64) -> Self {
-        Self {
-            offset: wall - monotonic,
-            doubt: None,
-            last: wall,
-        }
-    }
-
-    fn now(&mut self, wall: Timestamp, monotonic: i64) -> Timestamp {
-        let shown = wall - monotonic;
-        let settling = SETTLING_TIME.as_millis() as i64;
-        if (shown - self.offset).abs() <= CLOCK_STEP_MS {
-            (self.offset, self.doubt) = (shown, None);
-            self.last = self.last.max(wall);
-            return self.last;
-        }
-        match self.doubt {
-            Some((offset, since)) if (shown - offset).abs() <= CLOCK_STEP_MS => {
-                if monotonic - since >= settling {
-                    tracing::warn!(
-                        milliseconds = shown - self.offset,
-                        "the system's clock was set, and has stayed so: following it"
-                    );
-                    *self = Self::new(wall, monotonic);
-                    return wall;
-                }
-            }
-            _ => self.doubt = Some((shown, monotonic)),
-        }
-        self.last = self.last.max(monotonic + self.offset);
-        self.last
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const HOUR_MS: i64 = 3_600_000;
-    const START_MS: i64 = 1_000 * HOUR_MS;
-
-    fn course() -> Course {
-        Course::new(START_MS, 0)
-    }
 
     #[test]
     fn texts_of_times_sort_as_the_times_do_and_read_back() {
@@ -158,8 +135,8 @@ mod tests {
             123,
             999,
             1_000,
-            START_MS,
-            START_MS + 5,
+            3_600_000_000,
+            3_600_000_005,
         ];
         let texts = times.map(rfc3339);
         assert!(texts.is_sorted(), "{texts:?}");
@@ -169,36 +146,8 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_does_not_last_changes_nothing() {
-        for step in [-500 * HOUR_MS, 9 * HOUR_MS, 100_000 * HOUR_MS] {
-            let mut course = course();
-            for minute in 0..30 {
-                let monotonic = minute * 60_000;
-                let stepped = (5..14).contains(&minute);
-                let wall = START_MS + monotonic + if stepped { step } else { 0 };
-                assert_eq!(course.now(wall, monotonic), START_MS + monotonic);
-            }
-        }
-    }
-
-    #[test]
-    fn a_step_that_lasts_is_followed() {
-        for step in [-500 * HOUR_MS, 9 * HOUR_MS] {
-            let mut course = course();
-            for minute in 1..=30 {
-                let monotonic = minute * 60_000;
-                let now = course.now(START_MS + monotonic + step, monotonic);
-                let followed = if minute > 10 { step } else { 0 };
-                assert_eq!(now, START_MS + monotonic + followed, "minute {minute}");
-            }
-        }
-    }
-
-    #[test]
-    fn small_corrections_are_followed_and_never_go_back() {
-        let mut course = course();
-        assert_eq!(course.now(START_MS + 1_500, 1_000), START_MS + 1_500);
-        assert_eq!(course.now(START_MS + 1_000, 1_100), START_MS + 1_500);
-        assert_eq!(course.now(START_MS + 2_000, 2_100), START_MS + 2_000);
+    fn the_clock_of_the_machine_counts_no_ages() {
+        let clock: &dyn Clock = &SystemClock;
+        assert_eq!(clock.trusted(), None);
     }
 }

@@ -65,4 +65,8 @@ pub trait Custody: Send + Sync + 'static {
 
     /// The faults of the database's own structure; empty if nothing is.
     async fn defects(&self) -> StoreResult<Vec<String>>;
+
+    /// Reads the whole database again if a statement has told that it is damaged or cannot be read, so that a mended
+    /// one is used again. Takes as long as that takes; does nothing if the last time was a moment ago.
+    async fn recheck(&self);
 }

@@ -1,6 +1,6 @@
 //! Erasing items, and the receipts that stay.
 
-use super::{Tenant, Timestamp};
+use super::{Cutoff, Tenant, Timestamp};
 use serde::{Deserialize, Serialize};
 
 /// An item to be erased.
@@ -13,7 +13,7 @@ pub struct ErasureOrder {
     /// Whether to erase also what was made of it, and the jobs that worked on it.
     pub cascade: bool,
     /// Nothing is erased unless the item was last renewed before then.
-    pub renewed_before: Option<Timestamp>,
+    pub renewed_before: Option<Cutoff>,
     /// Who asks.
     pub by: ErasureAgent,
     /// Why it is erased.

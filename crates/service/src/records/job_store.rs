@@ -129,9 +129,6 @@ pub trait JobStore: Send + Sync + 'static {
     /// before it.
     async fn ahead_of(&self, sequences: &[i64]) -> StoreResult<BTreeMap<i64, u64>>;
 
-    /// When a job was last filed or ended, or a volume last used; `None` if there are none.
-    async fn last_change(&self) -> StoreResult<Option<Timestamp>>;
-
     /// The load of the queue.
     async fn load(&self) -> StoreResult<QueueLoad>;
 

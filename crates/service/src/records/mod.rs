@@ -7,6 +7,8 @@
 //!   legal hold keeps it.
 //! - **Jobs.** A [`Job`] is one row of the jobs table, which is also the queue.
 //! - **Erasures.** What is erased leaves a [`Receipt`].
+//! - **Time.** A [`Clock`] gives the time of day; ages count by a trusted one only ([`TrustedNow`], [`Cutoff`]). The
+//!   clock of a service is the [`ServiceClock`].
 //! - **Errors.** A [`Failure`] is a reason with advice, a [`StoreError`] a failure of the database or the files.
 //!
 //! [`JobStore`] keeps jobs, [`Catalogue`] items and whose they are, [`BlobStore`] their files, [`Scans`] whose scans
@@ -34,15 +36,18 @@ mod product;
 mod resource;
 mod scan;
 mod scan_erasure;
+mod service_clock;
 mod store_error;
 mod tenant;
+mod time_store;
 mod volume;
 
 pub use blobs::{
     BlobStore, BlobStream, BlobWriter, DiskSpace, LocalFile, Shelved, StagedFiles, StagedFor,
 };
 pub use catalogue::{AddedProduct, Catalogue, Deleted, ProductRoom};
-pub use clock::{Clock, SteadyClock, SystemClock, Timestamp, parse_rfc3339, rfc3339};
+pub(crate) use clock::milliseconds;
+pub use clock::{Clock, Cutoff, SystemClock, Timestamp, TrustedNow, parse_rfc3339, rfc3339};
 pub use custody::{Custody, RecordPages};
 pub use erasure::{
     AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason, Expired,
@@ -65,7 +70,9 @@ pub use scan::{ScanFields, ScanFilter, ScanIdentity, Scans, UnreadScan};
 pub use scan_erasure::{
     SELECTED_VOLUMES, ScanErasureOrder, ScanErasurePlan, ScanErasures, ScanSelection, ScansErased,
 };
+pub use service_clock::{DOUBT_LASTS, ServiceClock};
 pub use store_error::{BlobError, StoreError, StoreFault, StoreResult};
 pub use tenant::{InvalidTenant, Tenant};
+pub use time_store::TimeStore;
 pub use ventriform::advice::{Failure, Fault};
 pub use volume::{FileRecord, StoredVolume};

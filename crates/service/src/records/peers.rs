@@ -11,7 +11,7 @@
 //! - **News** tell the others at once of a change that this one has committed. They may be lost, so
 //!   whoever waits for them looks from time to time too.
 
-use super::StoreResult;
+use super::{StoreResult, TrustedNow};
 use async_trait::async_trait;
 use std::time::Duration;
 
@@ -63,9 +63,9 @@ pub trait Peers: Send + Sync + 'static {
     /// Takes the lease of that name, or renews it, for `length` from now. `false` if another process has it.
     async fn lead(&self, lease: &str, length: Duration) -> StoreResult<bool>;
 
-    /// Deletes what ended processes have left, and what was remembered for processes that stood
-    /// still.
-    async fn tidy(&self) -> StoreResult<()>;
+    /// Deletes what ended processes have left, and what was remembered for processes that stood still for as long
+    /// as none stands still. To be called while the time is trusted.
+    async fn tidy(&self, now: TrustedNow) -> StoreResult<()>;
 
     /// The news from now on. To be called in a runtime.
     fn news(&self) -> Box<dyn NewsFeed>;

@@ -11,7 +11,7 @@ pub use intake::scp_settings;
 
 use crate::access::{Quota, Recorder};
 use crate::archive::ArchiveDesk;
-use crate::background::{self, UPKEEP_EVERY, Upkeep};
+use crate::background::{self, TimeOfDay, UPKEEP_EVERY, Upkeep};
 use crate::config::Settings;
 use crate::decoding::Decoding;
 use crate::hooks::{Dispatcher, HookSettings, Hooks, RetrySchedule, UrlGuard};
@@ -21,7 +21,7 @@ use crate::items::{Items, RetentionAges};
 use crate::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
 use crate::memory::MemoryBudget;
 use crate::quotas::Quotas;
-use crate::records::{Clock, DeathLimit, Failure, Fault, SteadyClock, StoreError, SystemClock};
+use crate::records::{Clock, DeathLimit, Failure, Fault, ServiceClock, StoreError};
 use crate::service::Service;
 use crate::stores::Stores;
 use crate::telemetry::{JobWatch, Metrics, OtlpError, Readiness, Spans};
@@ -52,6 +52,7 @@ pub enum OpenError {
 pub struct OpenedService {
     /// The service.
     pub service: Arc<Service>,
+    time: Arc<TimeOfDay>,
     close_stores: CloseStores,
 }
 
@@ -67,7 +68,12 @@ pub async fn open(
     stores: Stores,
     http_clients: Arc<dyn ClientFactory>,
 ) -> Result<OpenedService, OpenError> {
-    let queue = queue(&settings, &stores);
+    let time = Arc::new(TimeOfDay {
+        clock: Arc::new(ServiceClock::default()),
+        store: stores.time.clone(),
+    });
+    time.begin().await?;
+    let queue = queue(&settings, &stores, time.clock.clone());
     queue.heartbeat().await?;
     let limit = death_limit(&settings);
     let limit = Some(&limit).filter(|_| engine.works.isolation().is_none());
@@ -84,7 +90,7 @@ pub async fn open(
         access: stores.access.clone(),
         recorder: Arc::new(Recorder::start(
             stores.access.clone(),
-            Arc::new(SystemClock),
+            queue.clock().clone(),
         )),
         worklist: stores.worklist.clone(),
         scheduled: Notify::new(),
@@ -109,6 +115,7 @@ pub async fn open(
     service.check_rules().map_err(OpenError::Rules)?;
     Ok(OpenedService {
         service: Arc::new(service),
+        time,
         close_stores: stores.close,
     })
 }
@@ -119,6 +126,7 @@ pub struct RunningService {
     pub service: Arc<Service>,
     workers: Workers,
     tasks: Option<JoinHandle<()>>,
+    time: JoinHandle<()>,
     heartbeat: JoinHandle<()>,
     // Dropping it unlocks the data folder, so it is kept to the end.
     close_stores: CloseStores,
@@ -132,6 +140,7 @@ impl RunningService {
     pub fn start(opened: OpenedService) -> io::Result<Self> {
         let service = opened.service;
         let (queue, closing) = (service.queue.clone(), service.closing.clone());
+        let time = tokio::spawn(opened.time.run(closing.clone()));
         let heartbeat = tokio::spawn(queue.clone().run_heartbeat());
         let scheduled = {
             let service = service.clone();
@@ -156,6 +165,7 @@ impl RunningService {
             service,
             workers,
             tasks,
+            time,
             heartbeat,
             close_stores: opened.close_stores,
         })
@@ -175,7 +185,8 @@ impl RunningService {
             }
         };
         let grace = self.service.settings.shutdown_grace.0;
-        let (answered, (), ended) = tokio::join!(answers, self.workers.stop(grace), ended);
+        let (answered, (), ended, _) =
+            tokio::join!(answers, self.workers.stop(grace), ended, self.time);
         self.service.recorder.flush().await;
         self.service.spans.flush().await;
         self.heartbeat.abort();
@@ -185,8 +196,7 @@ impl RunningService {
     }
 }
 
-fn queue(settings: &Settings, stores: &Stores) -> Arc<Queue> {
-    let clock: Arc<dyn Clock> = Arc::new(SteadyClock::default());
+fn queue(settings: &Settings, stores: &Stores, clock: Arc<dyn Clock>) -> Arc<Queue> {
     let items = Items::new(
         stores.catalogue.clone(),
         stores.blobs.clone(),

@@ -9,5 +9,5 @@ mod spans;
 
 pub use job_watch::JobWatch;
 pub use metrics::{IntakeMetrics, JobMetrics, MetricReadings, Metrics, RequestMetrics};
-pub use readiness::{Check, Readiness, why_unready};
+pub use readiness::{Check, Dependencies, Readiness, why_unready};
 pub use spans::{JobSpan, OtlpError, ServerSpan, Spans};

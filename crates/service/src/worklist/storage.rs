@@ -1,7 +1,7 @@
 //! The interface to the table of work items.
 
 use super::{Workitem, WorkitemState};
-use crate::records::{Bounded, StoreResult, Tenant, Timestamp};
+use crate::records::{Bounded, Cutoff, StoreResult, Tenant};
 use async_trait::async_trait;
 
 /// Bytes of work items that are read at a time.
@@ -57,5 +57,5 @@ pub trait Worklist: Send + Sync + 'static {
     async fn performed_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>>;
 
     /// Deletes the items that ended before that moment. Returns how many.
-    async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64>;
+    async fn delete_ended_workitems(&self, before: Cutoff) -> StoreResult<u64>;
 }

@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::records::{
-    BlobError, BlobStore, BlobStream, DiskSpace, FileRecord, ItemRecord, LocalFile, Resource,
-    Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
+    BlobError, BlobStore, BlobStream, Cutoff, DiskSpace, FileRecord, ItemRecord, LocalFile,
+    Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
 };
 
 /// The folder of local copies.
@@ -467,8 +467,8 @@ impl BlobStore for S3Blobs {
         Ok(())
     }
 
-    async fn tidy(&self, set_aside_before: Option<Timestamp>) -> Result<(), BlobError> {
-        let Some(first_kept) = set_aside_before else {
+    async fn tidy(&self, set_aside_before: Option<Cutoff>) -> Result<(), BlobError> {
+        let Some(first_kept) = set_aside_before.map(Cutoff::moment) else {
             return Ok(());
         };
         let old = |paths: &mut Vec<String>, path: &str, _: &ObjectMeta| {

@@ -9,7 +9,9 @@ use object_store::ObjectMeta;
 use std::sync::Arc;
 use std::time::Duration;
 use ventriform_service::intake::{IncomingFile, ReceivedFiles};
-use ventriform_service::records::{BlobError, BlobWriter, FileRecord, LocalFile, Timestamp};
+use ventriform_service::records::{
+    BlobError, BlobWriter, FileRecord, LocalFile, Timestamp, TrustedNow,
+};
 
 /// A file on its way to the bucket.
 struct Incoming {
@@ -72,7 +74,7 @@ impl ReceivedFiles for S3Blobs {
         Ok(())
     }
 
-    async fn kept(&self, age: Duration) -> Result<Vec<String>, BlobError> {
+    async fn kept(&self, age: Duration, _: TrustedNow) -> Result<Vec<String>, BlobError> {
         let first_kept = self.shared.before(age).await?;
         let old = |names: &mut Vec<String>, path: &str, facts: &ObjectMeta| {
             if facts.last_modified.timestamp_millis() <= first_kept {

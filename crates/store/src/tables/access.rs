@@ -10,7 +10,7 @@ use ventriform_service::access::{
     AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
     KeptRow, Maker, NO_HASH, Quota, Usage, chain_hash,
 };
-use ventriform_service::records::{ListPage, ListRequest, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{Cutoff, ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 
 /// The bytes of everything that tenant `$1` stores: volumes, products (results, templates, readers), received
 /// objects that are not part of a volume, work items, and the records of jobs.
@@ -62,8 +62,8 @@ impl AccessStore for SqlStore {
         let mut transaction = self.writer.begin().await?;
         query(
             "INSERT INTO api_keys (id, name, tenant, scope, requests, bytes, jobs, created_at,
-                                   expires_at, revoked_at, digest, maker)
-             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
+                                   expires_at, revoked_at, digest, maker, owner)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13)",
         )
         .bind(&key.id)
         .bind(&key.name)
@@ -80,6 +80,7 @@ impl AccessStore for SqlStore {
             Maker::Operator => None,
             Maker::Caller(key) => Some(key.as_deref().unwrap_or_default()),
         })
+        .bind(&key.owner)
         .execute(&mut transaction)
         .await?;
         set_access(&mut transaction, Access::Closed).await?;
@@ -152,6 +153,46 @@ impl AccessStore for SqlStore {
         }
         transaction.commit().await?;
         Ok(done > 0 || self.key(id).await?.is_some())
+    }
+
+    async fn revoke_keys_of(
+        &self,
+        owner: &str,
+        tenant: Option<&Tenant>,
+        now: Timestamp,
+        event: &AuditEvent,
+    ) -> StoreResult<Vec<String>> {
+        let mut transaction = self.writer.begin().await?;
+        let rows = query(
+            "UPDATE api_keys SET revoked_at = $1
+             WHERE owner = $2 AND revoked_at IS NULL AND ($3 IS NULL OR tenant = $3)
+             RETURNING id, tenant",
+        )
+        .on_postgres(
+            "UPDATE api_keys SET revoked_at = $1
+             WHERE owner = $2 AND revoked_at IS NULL AND ($3::text IS NULL OR tenant = $3)
+             RETURNING id, tenant",
+        )
+        .bind(now)
+        .bind(owner)
+        .bind(tenant.map(Tenant::to_string))
+        .fetch_all(&mut transaction)
+        .await?;
+        let mut revoked = Vec::with_capacity(rows.len());
+        let mut events = Vec::with_capacity(rows.len());
+        for row in rows {
+            let id: String = row.try_get("id")?;
+            let tenant = rows::tenant(&row)?;
+            events.push(AuditEvent {
+                tenant,
+                ..event.clone().on(&id)
+            });
+            revoked.push(id);
+        }
+        append(&mut transaction, &events).await?;
+        transaction.commit().await?;
+        revoked.sort();
+        Ok(revoked)
     }
 
     async fn usage(&self, tenant: &Tenant) -> StoreResult<Usage> {
@@ -251,7 +292,17 @@ impl AccessStore for SqlStore {
         Ok(found)
     }
 
-    async fn prune(&self, before: Timestamp, now: Timestamp) -> StoreResult<u64> {
+    async fn check_trail(&self, now: Timestamp) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        query("SAVEPOINT trail").execute(&mut transaction).await?;
+        let agent = "ventriform".to_owned();
+        let event = AuditEvent::new(now, Activity::AuditRead, Tenant::default(), agent);
+        append(&mut transaction, &[event]).await?;
+        query("ROLLBACK TO trail").execute(&mut transaction).await?;
+        transaction.commit().await
+    }
+
+    async fn prune(&self, before: Cutoff, now: Timestamp) -> StoreResult<u64> {
         let mut transaction = self.writer.begin().await?;
         // The event that records the removal remains, so the chain is never empty.
         let last = query(
@@ -260,7 +311,7 @@ impl AccessStore for SqlStore {
                                        9223372036854775807)
              ORDER BY sequence DESC LIMIT 1",
         )
-        .bind(before)
+        .bind(before.moment())
         .fetch_optional(&mut transaction)
         .await?;
         let Some(last) = last.map(read_anchor).transpose()? else {
@@ -457,6 +508,7 @@ fn read_key(row: DbRow) -> StoreResult<ApiKey> {
             None => Maker::Operator,
             Some(key) => Maker::Caller(Some(key).filter(|key| !key.is_empty())),
         },
+        owner: row.try_get("owner")?,
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
         name: row.try_get("name")?,

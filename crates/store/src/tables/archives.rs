@@ -11,7 +11,7 @@ use ventriform_service::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
-use ventriform_service::hooks::{DeliveryState, Lane};
+use ventriform_service::hooks::{DeliveryState, Lane, NextAttempt};
 use ventriform_service::records::{Failure, Job, StoreResult, Tenant, Timestamp};
 
 #[async_trait]
@@ -91,20 +91,26 @@ impl ArchiveStore for SqlStore {
         &self,
         job: &str,
         error: &str,
-        again_at: Timestamp,
+        again: NextAttempt,
         now: Timestamp,
     ) -> StoreResult<()> {
         query(
-            "UPDATE pulls SET last_attempt_at = $1, last_error = $2, next_attempt_at = $3
+            "UPDATE pulls SET last_attempt_at = $1, last_error = $2, next_attempt_at = $3,
+                    attempts = attempts - $5
              WHERE job = $4 AND state = 'pending' RETURNING job",
         )
         .bind(now)
         .bind(error)
-        .bind(again_at)
+        .bind(again.at)
         .bind(job)
+        .bind(errands::taken_back(again.counts))
         .write_optional(&self.writer)
         .await?;
         Ok(())
+    }
+
+    async fn recall_pulls(&self, now: Timestamp) -> StoreResult<u64> {
+        self.recall(Errands::Pulls, now).await
     }
 
     async fn pull_given_up(
@@ -247,7 +253,7 @@ impl ArchiveStore for SqlStore {
         query(
             "UPDATE sends SET state = $1, last_attempt_at = $2, last_outcome = $3,
                     last_error = $4, ended_at = $5,
-                    next_attempt_at = coalesce($6, next_attempt_at)
+                    next_attempt_at = coalesce($6, next_attempt_at), attempts = attempts - $8
              WHERE id = $7 AND state = 'pending'",
         )
         .bind(settled.state.as_str())
@@ -257,6 +263,7 @@ impl ArchiveStore for SqlStore {
         .bind(ended)
         .bind(settled.again_at)
         .bind(id)
+        .bind(errands::taken_back(settled.counts))
         .execute(&mut transaction)
         .await?;
         // Nobody can ask about the deliveries of a job that was erased.
@@ -269,6 +276,10 @@ impl ArchiveStore for SqlStore {
         .await?;
         transaction.commit().await?;
         Ok(())
+    }
+
+    async fn recall_sends(&self, now: Timestamp) -> StoreResult<u64> {
+        self.recall(Errands::Sends, now).await
     }
 
     async fn sends(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Vec<ObjectDelivery>>> {

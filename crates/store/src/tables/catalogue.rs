@@ -9,7 +9,7 @@ use crate::database::{SqlStore, Transaction};
 use crate::query::{Query, QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::records::{
-    AddedProduct, Bounded, Catalogue, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
+    AddedProduct, Bounded, Catalogue, Cutoff, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
     ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource,
     SELECTED_VOLUMES, ScanFields, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
@@ -371,7 +371,7 @@ impl Catalogue for SqlStore {
     async fn expired(
         &self,
         kind: Resource,
-        before: Timestamp,
+        before: Cutoff,
         after: Option<&Expired>,
         limit: u32,
     ) -> StoreResult<Vec<Expired>> {
@@ -480,7 +480,7 @@ pub(super) fn listed_receipts(
 /// however much is beyond it.
 pub(super) fn expired(
     kind: Resource,
-    before: Timestamp,
+    before: Cutoff,
     after: Option<&Expired>,
     limit: u32,
 ) -> QueryBuilder {
@@ -503,7 +503,7 @@ pub(super) fn expired(
     let mut query = QueryBuilder::new(format!(
         "SELECT x.tenant, x.id, {since} AS since, x.sequence FROM {table} AS x WHERE {since} < "
     ));
-    query.push_bind(before);
+    query.push_bind(before.moment());
     if let Some(after) = after {
         query.push(" AND (").push(since).push(", x.sequence) > (");
         query.push_bind(after.since).push(", ");

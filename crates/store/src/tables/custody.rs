@@ -5,8 +5,35 @@ use crate::database::SqlStore;
 use crate::query::query;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
-use std::sync::atomic::Ordering;
-use ventriform_service::records::{Custody, ItemRecord, Resource, StoreResult};
+use ventriform_service::records::{
+    Custody, ItemRecord, Resource, StoreError, StoreFault, StoreResult,
+};
+
+/// The tables that every database has.
+const TABLES: [&str; 22] = [
+    "api_keys",
+    "audit",
+    "audit_anchors",
+    "deidentification_secrets",
+    "deliveries",
+    "erased",
+    "erasures",
+    "holdings",
+    "intake_groups",
+    "intake_objects",
+    "jobs",
+    "label_index",
+    "probe",
+    "products",
+    "pulled_series",
+    "pulls",
+    "scans",
+    "sends",
+    "sources",
+    "trusted_time",
+    "volumes",
+    "workitems",
+];
 
 /// Defects named at most.
 const QUICK_CHECK: &str = "PRAGMA quick_check(20)";
@@ -108,7 +135,47 @@ impl Custody for SqlStore {
         let found = query(QUICK_CHECK).fetch_all(&self.readers).await?;
         let lines: Vec<String> = rows::all(found, |row| row.try_get(0))?;
         let defects: Vec<String> = lines.into_iter().filter(|line| line != "ok").collect();
-        self.damaged.store(!defects.is_empty(), Ordering::Relaxed);
+        if let Some(first) = defects.first() {
+            let told = format!("a check of its structure found defects: {first}");
+            self.health().note(StoreFault::DamagedDatabase, told);
+        }
         Ok(defects)
+    }
+
+    async fn recheck(&self) {
+        self.read_again().await;
+    }
+}
+
+impl SqlStore {
+    /// Reads the whole database: its structure, and on a server, which has no check of that for everybody, each row of
+    /// each table.
+    pub(crate) async fn read_all(&self) -> StoreResult<()> {
+        for table in TABLES {
+            let first = query(format!("SELECT 1 FROM {table} LIMIT 1"));
+            first.fetch_optional(&self.readers).await?;
+        }
+        if !self.on_server() {
+            let defects = self.defects().await?;
+            return match defects.into_iter().next() {
+                None => Ok(()),
+                Some(message) => Err(StoreError::Database {
+                    cause: StoreFault::DamagedDatabase,
+                    message,
+                }),
+            };
+        }
+        let tables = query(
+            "SELECT quote_ident(tablename) FROM pg_tables WHERE schemaname = current_schema()",
+        )
+        .fetch_all(&self.readers)
+        .await?;
+        for row in tables {
+            let table: String = row.try_get(0)?;
+            // A row is taken apart to be put into text, so values out of line are read too.
+            let read = format!("SELECT CAST(count(one::text) AS BIGINT) FROM {table} AS one");
+            query(read).fetch_one(&self.readers).await?;
+        }
+        Ok(())
     }
 }

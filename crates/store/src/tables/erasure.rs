@@ -13,8 +13,8 @@ use crate::database::Transaction;
 use crate::query::{Target, query};
 use ventriform_service::access::{Activity, AuditEvent};
 use ventriform_service::records::{
-    AuditMark, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, Receipt, Resource,
-    StoreResult, Tenant, Timestamp, random_id,
+    AuditMark, Cutoff, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, Receipt,
+    Resource, StoreResult, Tenant, Timestamp, random_id,
 };
 
 /// The prefix of the ids of receipts.
@@ -129,12 +129,12 @@ async fn has(
     from: &mut Transaction<'_>,
     tenant: &Tenant,
     id: &str,
-    renewed_before: Option<Timestamp>,
+    renewed_before: Option<Cutoff>,
 ) -> StoreResult<bool> {
     let row = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2 AND renewed_at < $3")
         .bind(tenant.as_str())
         .bind(id)
-        .bind(renewed_before.unwrap_or(Timestamp::MAX))
+        .bind(renewed_before.map_or(Timestamp::MAX, Cutoff::moment))
         .fetch_optional(from)
         .await?;
     Ok(row.is_some())

@@ -8,6 +8,9 @@ use crate::query::{DbRow, query};
 use ventriform_service::hooks::{Backlog, DeliveryState, Lane};
 use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
+/// A stamp may be so far ahead of the clock that reads it, ms: processes on one database ask for its time in turn.
+const CLOCK_NOISE_MS: i64 = 60_000;
+
 /// A table of errands.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Errands {
@@ -109,6 +112,33 @@ impl SqlStore {
         Ok(())
     }
 
+    /// Makes the waiting errands due whose pause was set by a clock that was ahead: they were tried last, or began, later
+    /// than `now`. Returns how many these are.
+    pub(super) async fn recall(&self, errands: Errands, now: Timestamp) -> StoreResult<u64> {
+        let table = errands.table();
+        let put_off = format!(
+            "state = 'pending' AND next_attempt_at > $1
+                 AND (since > $2 OR (last_attempt_at IS NOT NULL AND last_attempt_at > $2))"
+        );
+        let latest = now.saturating_add(CLOCK_NOISE_MS);
+        let found = query(format!("SELECT 1 FROM {table} WHERE {put_off} LIMIT 1"))
+            .bind(now)
+            .bind(latest);
+        if found.fetch_optional(&self.readers).await?.is_none() {
+            return Ok(0);
+        }
+        query(format!(
+            "UPDATE {table} SET next_attempt_at = $1,
+                    since = CASE WHEN since > $1 THEN $1 ELSE since END,
+                    last_attempt_at = CASE WHEN last_attempt_at > $1 THEN $1 ELSE last_attempt_at END
+             WHERE {put_off}"
+        ))
+        .bind(now)
+        .bind(latest)
+        .write(&self.writer)
+        .await
+    }
+
     /// Lets an ended errand of a job wait again, unless what it would deliver was erased. Returns its row as
     /// it is then, or nothing if the job has no such errand.
     pub(super) async fn run_again(
@@ -141,6 +171,11 @@ impl SqlStore {
         transaction.commit().await?;
         Ok(row)
     }
+}
+
+/// How many attempts are taken back of those that were counted.
+pub(super) fn taken_back(counts: bool) -> i64 {
+    i64::from(!counts)
 }
 
 /// The state of an errand's row.

@@ -63,7 +63,7 @@ impl DeliveryStore for SqlStore {
         query(
             "UPDATE deliveries SET state = $1, last_attempt_at = $2, last_status = $3,
                     last_outcome = $4, ended_at = $5,
-                    next_attempt_at = coalesce($6, next_attempt_at)
+                    next_attempt_at = coalesce($6, next_attempt_at), attempts = attempts - $8
              WHERE id = $7 AND state = 'pending'",
         )
         .bind(state.as_str())
@@ -73,6 +73,7 @@ impl DeliveryStore for SqlStore {
         .bind(ended)
         .bind(settled.again_at)
         .bind(id)
+        .bind(errands::taken_back(settled.counts))
         .execute(&mut transaction)
         .await?;
         if settled.outcome == AttemptOutcome::Gone {
@@ -94,18 +95,25 @@ impl DeliveryStore for SqlStore {
         Ok(())
     }
 
+    async fn recall_deliveries(&self, now: Timestamp) -> StoreResult<u64> {
+        self.recall(Errands::Deliveries, now).await
+    }
+
     async fn expire(&self, limits: DeliveryLimits, now: Timestamp) -> StoreResult<u64> {
         let mut transaction = self.writer.begin().await?;
-        let old = query(
-            "UPDATE deliveries SET state = 'dead', ended_at = $1,
-                    last_outcome = coalesce(last_outcome, $2)
-             WHERE state = 'pending' AND since < $3",
-        )
-        .bind(now)
-        .bind(TOO_OLD)
-        .bind(limits.pending_since)
-        .execute(&mut transaction)
-        .await?;
+        let mut old = 0;
+        if let Some(before) = limits.pending_since {
+            old = query(
+                "UPDATE deliveries SET state = 'dead', ended_at = $1,
+                        last_outcome = coalesce(last_outcome, $2)
+                 WHERE state = 'pending' AND since < $3",
+            )
+            .bind(now)
+            .bind(TOO_OLD)
+            .bind(before.moment())
+            .execute(&mut transaction)
+            .await?;
+        }
         let many = query(
             "UPDATE deliveries SET state = 'dead', ended_at = $1,
                     last_outcome = coalesce(last_outcome, $2)
@@ -121,10 +129,12 @@ impl DeliveryStore for SqlStore {
         .bind(limits.backlog)
         .execute(&mut transaction)
         .await?;
-        query("DELETE FROM deliveries WHERE state != 'pending' AND ended_at < $1")
-            .bind(limits.ended_since)
-            .execute(&mut transaction)
-            .await?;
+        if let Some(before) = limits.ended_since {
+            query("DELETE FROM deliveries WHERE state != 'pending' AND ended_at < $1")
+                .bind(before.moment())
+                .execute(&mut transaction)
+                .await?;
+        }
         transaction.commit().await?;
         Ok(old + many)
     }

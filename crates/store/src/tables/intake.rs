@@ -13,8 +13,8 @@ use ventriform_service::intake::{
     Protocol, ReceivedObject,
 };
 use ventriform_service::records::{
-    ErasureAgent, Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant, Timestamp,
-    random_id,
+    Cutoff, ErasureAgent, Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant,
+    Timestamp, random_id,
 };
 
 /// The columns of a group, with what is counted of its objects.
@@ -233,11 +233,11 @@ impl IntakeStore for SqlStore {
         Ok(Some(files))
     }
 
-    async fn failed_before(&self, before: Timestamp) -> StoreResult<Vec<(Tenant, String)>> {
+    async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>> {
         let rows = query(
             "SELECT tenant, id FROM intake_groups WHERE state = 'failed' AND changed_at < $1",
         )
-        .bind(before)
+        .bind(before.moment())
         .fetch_all(&self.readers)
         .await?;
         rows::all(rows, |row| Ok((rows::tenant(&row)?, row.try_get("id")?)))

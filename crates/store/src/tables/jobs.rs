@@ -290,18 +290,6 @@ impl JobStore for SqlStore {
         Ok(ahead.into_iter().collect())
     }
 
-    async fn last_change(&self) -> StoreResult<Option<Timestamp>> {
-        let row = query(
-            "SELECT max(at) FROM (
-                 SELECT (SELECT created_at FROM jobs ORDER BY sequence DESC LIMIT 1) AS at
-                 UNION ALL SELECT (SELECT max(finished_at) FROM jobs WHERE finished_at IS NOT NULL)
-                 UNION ALL SELECT (SELECT max(renewed_at) FROM holdings WHERE kind = 'volume')) AS moments",
-        )
-        .fetch_one(&self.readers)
-        .await?;
-        row.try_get(0)
-    }
-
     async fn load(&self) -> StoreResult<QueueLoad> {
         let row = query(
             "SELECT (SELECT count(*) FROM jobs WHERE state = 'queued'),

@@ -17,6 +17,7 @@ mod peers;
 mod rows;
 mod scan_erasure;
 mod scans;
+mod times;
 mod worklist;
 
 pub(crate) use marks::{Access, Marks, anchor_of};

@@ -9,7 +9,7 @@ use async_trait::async_trait;
 use sqlx::postgres::PgPool;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::records::{NewsFeed, Peers, StoreResult};
+use ventriform_service::records::{NewsFeed, Peers, StoreResult, TrustedNow};
 
 /// How long is remembered which places of files were given up: longer than any process may stand still
 /// between writing files and their row.
@@ -120,7 +120,7 @@ impl Peers for PgPeers {
         Ok(taken.is_some())
     }
 
-    async fn tidy(&self) -> StoreResult<()> {
+    async fn tidy(&self, _: TrustedNow) -> StoreResult<()> {
         let mut transaction = self.store.writer.begin().await?;
         query("DELETE FROM runs WHERE expires_at < database_now()")
             .execute(&mut transaction)

@@ -4,7 +4,7 @@ use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::records::{Bounded, StoreError, StoreResult, Tenant, Timestamp};
+use ventriform_service::records::{Bounded, Cutoff, StoreError, StoreResult, Tenant};
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
@@ -114,12 +114,12 @@ impl Worklist for SqlStore {
         rows::all(items.await?, item_of)
     }
 
-    async fn delete_ended_workitems(&self, before: Timestamp) -> StoreResult<u64> {
+    async fn delete_ended_workitems(&self, before: Cutoff) -> StoreResult<u64> {
         query(
             "DELETE FROM workitems
              WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < $1",
         )
-        .bind(before)
+        .bind(before.moment())
         .write(&self.writer)
         .await
     }
