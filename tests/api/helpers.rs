@@ -380,8 +380,8 @@ impl Work for StandIn {
         self.real.page_files()
     }
 
-    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        self.real.page(product, scan)
+    fn page(&self, product: &StoredItem, scans: &[Map<String, Value>]) -> Result<String, Failure> {
+        self.real.page(product, scans)
     }
 }
 

@@ -15,7 +15,7 @@ use super::{negotiate, validators};
 use crate::public_base::public_path;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -29,7 +29,7 @@ pub struct ReceiptBody {
     /// The receipt's id.
     #[schema(example = "ers_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// The item that was to be erased.
+    /// The item that was to be erased: its id, that of what was received, or the UID of a work item.
     #[schema(example = "vol_9f86d081884c7d659a2feaa0c55ad015")]
     item: String,
     /// When it was erased (RFC 3339).
@@ -197,16 +197,7 @@ pub async fn erase(
         Erased::Unknown
     };
     match erased {
-        Erased::Done(receipt) => {
-            let location = [(header::LOCATION, path(&receipt.id))];
-            if !negotiate::prefers_representation(headers) {
-                let answer = (StatusCode::NO_CONTENT, location, Extension(AlreadyRecorded));
-                return Ok(answer.into_response());
-            }
-            let applied = [("preference-applied", "return=representation")];
-            let body = Json(ReceiptBody::from(*receipt));
-            Ok((location, applied, Extension(AlreadyRecorded), body).into_response())
-        }
+        Erased::Done(receipt) => Ok(acknowledged(*receipt, headers)),
         Erased::Unknown => {
             Err(missing(app.service.items().catalogue(), &caller.tenant, kind, &id).await)
         }
@@ -218,6 +209,19 @@ pub async fn erase(
         .fix("Wait for the job to end, or DELETE it; GET /v1/jobs lists the jobs.")),
         Erased::OnHold { id } => Err(on_hold(&id, kind.label())),
     }
+}
+
+/// 204, or 200 with the receipt if the client prefers it; `Location` is the receipt's path. The row of the audit trail was
+/// written with the receipt.
+pub fn acknowledged(receipt: Receipt, headers: &HeaderMap) -> Response {
+    let location = [(header::LOCATION, path(&receipt.id))];
+    if !negotiate::prefers_representation(headers) {
+        let answer = (StatusCode::NO_CONTENT, location, Extension(AlreadyRecorded));
+        return answer.into_response();
+    }
+    let applied = [("preference-applied", "return=representation")];
+    let body = Json(ReceiptBody::from(receipt));
+    (location, applied, Extension(AlreadyRecorded), body).into_response()
 }
 
 /// 409: a legal hold on the item `id` keeps what was to be erased.

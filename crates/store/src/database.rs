@@ -8,6 +8,7 @@
 
 use super::postgres::{self, PgTransaction, PgWriter};
 use super::query::{DbRow, Query, Target, query};
+use super::reserve::Reserve;
 use super::shared::Shared;
 use super::space::DiskGauge;
 use super::sqlite;
@@ -58,7 +59,10 @@ pub(super) enum Transaction<'a> {
 impl<'a> From<&'a mut Transaction<'_>> for Target<'a> {
     fn from(transaction: &'a mut Transaction<'_>) -> Self {
         match transaction {
-            Transaction::Sqlite(transaction) => Target::Sqlite(transaction),
+            Transaction::Sqlite(transaction) => {
+                let (connection, erased) = transaction.parts();
+                Target::Sqlite(connection, erased)
+            }
             Transaction::Postgres(transaction) => Target::Postgres(transaction),
         }
     }
@@ -95,11 +99,11 @@ impl Writing {
         }
     }
 
-    /// Overwrites what was deleted, as far as that is this program's business: PostgreSQL does so by
+    /// Overwrites what was deleted since the last time, as far as that is this program's business: PostgreSQL does so by
     /// itself in time. `false` if a reader was in the way.
     pub async fn overwrite_deleted(&self) -> StoreResult<bool> {
         match self {
-            Writing::Sqlite(writer) => writer.truncate_log().await,
+            Writing::Sqlite(writer) => writer.overwrite_erased().await,
             Writing::Postgres(_) => Ok(true),
         }
     }
@@ -110,6 +114,7 @@ impl Query {
     pub async fn write_all(self, writing: &Writing) -> StoreResult<Vec<DbRow>> {
         let mut transaction = match writing {
             Writing::Sqlite(writer) => {
+                self.mark(&writer.erased);
                 let rows = self.sqlite().write_all(writer).await?;
                 return Ok(rows.into_iter().map(DbRow::Sqlite).collect());
             }
@@ -128,7 +133,10 @@ impl Query {
     /// Runs it as a transaction of its own; returns the number of rows it changed.
     pub async fn write(self, writing: &Writing) -> StoreResult<u64> {
         let mut transaction = match writing {
-            Writing::Sqlite(writer) => return self.sqlite().write(writer).await,
+            Writing::Sqlite(writer) => {
+                self.mark(&writer.erased);
+                return self.sqlite().write(writer).await;
+            }
             Writing::Postgres(_) => writing.begin().await?,
         };
         let changed = self.execute(&mut transaction).await?;
@@ -160,6 +168,8 @@ pub struct SqlStore {
     /// Names this process among those on the same database.
     pub(super) run: String,
     gauge: DiskGauge,
+    /// Space for erasures on a full disk.
+    pub(super) reserve: Reserve,
     /// Whether the last check of the structure found defects.
     pub(super) damaged: AtomicBool,
 }
@@ -178,6 +188,7 @@ impl SqlStore {
             readers: Readers::Sqlite(readers),
             run: random_id(RUN_PREFIX),
             gauge,
+            reserve: Reserve::default(),
             damaged: AtomicBool::new(false),
         })
     }
@@ -198,6 +209,7 @@ impl SqlStore {
             readers: Readers::Postgres(readers),
             run,
             gauge,
+            reserve: Reserve::default(),
             damaged: AtomicBool::new(false),
         })
     }
@@ -229,6 +241,29 @@ impl SqlStore {
         .fetch_one(&self.readers)
         .await?;
         Ok(!row.try_get::<bool, _>(0)?)
+    }
+
+    /// Runs an erasure; again with the space that is kept for it if the disk is full. An erasure that fails has changed
+    /// nothing.
+    pub(super) async fn making_room<T, F>(&self, erase: impl Fn() -> F + Send) -> StoreResult<T>
+    where
+        T: Send,
+        F: Future<Output = StoreResult<T>> + Send,
+    {
+        match erase().await {
+            Err(error) if error.cause() == StoreFault::Full && self.reserve.release() => {
+                erase().await
+            }
+            done => done,
+        }
+    }
+
+    /// Overwrites what was deleted, and takes the space that an erasure needs again where there is room.
+    pub(super) async fn overwrite(&self) -> StoreResult<bool> {
+        let overwritten = self.writer.overwrite_deleted().await;
+        self.reserve
+            .refill(self.gauge.space().map(|space| space.free));
+        overwritten
     }
 
     /// Checks that there is room for another job.

@@ -12,6 +12,7 @@ use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow};
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
 use std::borrow::Cow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::records::StoreResult;
 
@@ -83,8 +84,8 @@ where
 pub(super) enum Target<'a> {
     /// A pool of SQLite's readers, in turn.
     SqlitePool(&'a Shared<SqlitePool>),
-    /// A connection to SQLite.
-    Sqlite(&'a mut SqliteConnection),
+    /// The connection to SQLite that writes, and its mark of what is to be overwritten.
+    Sqlite(&'a mut SqliteConnection, &'a AtomicBool),
     /// A pool of connections to PostgreSQL; in turn, and for reading only, as it may be tried twice.
     PgPool(&'a Shared<PgPool>),
     /// A connection to PostgreSQL.
@@ -99,12 +100,16 @@ pub(super) struct Query {
     values: Vec<Value>,
     /// Whether PostgreSQL is to prepare it anew.
     anew: bool,
+    /// Whether what was in the rows before may not be read in the database's files any more.
+    erases: bool,
 }
 
 /// A statement of that text.
 pub(super) fn query(text: impl Into<Cow<'static, str>>) -> Query {
+    let text = text.into();
     Query {
-        text: text.into(),
+        erases: text.trim_start().starts_with("DELETE"),
+        text,
         postgres: None,
         values: Vec::new(),
         anew: false,
@@ -116,6 +121,20 @@ impl Query {
     pub fn on_postgres(mut self, text: impl Into<Cow<'static, str>>) -> Self {
         self.postgres = Some(text.into());
         self
+    }
+
+    /// It replaces or removes what people wrote or what a header says, which is to be overwritten in the database's files,
+    /// as what a `DELETE` removes is.
+    pub fn erasing(mut self) -> Self {
+        self.erases = true;
+        self
+    }
+
+    /// Marks that the rows before are to be overwritten, if they are.
+    pub fn mark(&self, erased: &AtomicBool) {
+        if self.erases {
+            erased.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Sets the next placeholder.
@@ -168,12 +187,11 @@ impl Query {
                 let rows = self.sqlite().fetch_all(&shared.pool).await;
                 sqlite_rows(rows.map_err(faults::of_sqlite)?)
             }
-            Target::Sqlite(connection) => sqlite_rows(
-                self.sqlite()
-                    .fetch_all(connection)
-                    .await
-                    .map_err(faults::of_sqlite)?,
-            ),
+            Target::Sqlite(connection, erased) => {
+                self.mark(erased);
+                let rows = self.sqlite().fetch_all(connection).await;
+                sqlite_rows(rows.map_err(faults::of_sqlite)?)
+            }
             Target::PgPool(shared) => {
                 let _turn = shared.turn().await?;
                 let pool = &shared.pool;
@@ -207,7 +225,8 @@ impl Query {
                 let row = self.sqlite().fetch_optional(&shared.pool).await;
                 row.map_err(faults::of_sqlite)?.map(DbRow::Sqlite)
             }
-            Target::Sqlite(connection) => {
+            Target::Sqlite(connection, erased) => {
+                self.mark(erased);
                 let row = self
                     .sqlite()
                     .fetch_optional(connection)
@@ -242,12 +261,11 @@ impl Query {
                 let done = self.sqlite().execute(&shared.pool).await;
                 done.map_err(faults::of_sqlite)?.rows_affected()
             }
-            Target::Sqlite(connection) => self
-                .sqlite()
-                .execute(connection)
-                .await
-                .map_err(faults::of_sqlite)?
-                .rows_affected(),
+            Target::Sqlite(connection, erased) => {
+                self.mark(erased);
+                let done = self.sqlite().execute(connection).await;
+                done.map_err(faults::of_sqlite)?.rows_affected()
+            }
             Target::PgPool(shared) => {
                 let _turn = shared.turn().await?;
                 let pool = &shared.pool;
@@ -377,10 +395,9 @@ impl QueryBuilder {
     /// The statement.
     pub fn build(&mut self) -> Query {
         Query {
-            text: std::mem::take(&mut self.text).into(),
             postgres: self.postgres.take().map(Cow::from),
             values: std::mem::take(&mut self.values),
-            anew: false,
+            ..query(std::mem::take(&mut self.text))
         }
     }
 }

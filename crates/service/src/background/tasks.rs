@@ -101,8 +101,13 @@ async fn prune_workitems(service: Arc<Service>, age: Duration, end: Cancellation
     let mut round = tokio::time::interval(PRUNE_EVERY);
     let age = i64::try_from(age.as_millis()).unwrap_or(i64::MAX);
     while end.run_until_cancelled(round.tick()).await.is_some() {
-        let before = service.now().saturating_sub(age);
-        if let Err(error) = service.worklist.delete_ended_workitems(before).await {
+        let now = service.now();
+        let before = now.saturating_sub(age);
+        let deleted = async {
+            service.worklist.delete_ended_workitems(before, now).await?;
+            service.items().overwrite_if_due().await
+        };
+        if let Err(error) = deleted.await {
             tracing::error!(%error, "ended work items could not be deleted");
         }
     }

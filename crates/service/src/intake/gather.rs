@@ -14,8 +14,8 @@ use super::session::Sessions;
 use crate::error::ServiceError;
 use crate::jobs::Queue;
 use crate::records::{
-    BlobError, ErasureAgent, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult,
-    Timestamp,
+    BlobError, ErasureAgent, ErasureReason, Failure, Fault, LocalFile, StoreError, StoreFault,
+    StoreResult, Timestamp,
 };
 use async_trait::async_trait;
 use futures::StreamExt;
@@ -408,11 +408,13 @@ impl Gatherer {
             let failed = self.store.failed_before(now.saturating_sub(age)).await?;
             let by = ErasureAgent::retention();
             for (tenant, id) in failed {
-                let removed = self.store.remove(&tenant, &id, Some(&by), now).await?;
-                if let Some(files) = removed {
+                let reason = ErasureReason::Retention;
+                let removed = self.store.remove(&tenant, &id, &by, reason, now).await?;
+                if let Some((files, _)) = removed {
                     self.files.discard(&files).await?;
                 }
             }
+            self.queue.items().overwrite_if_due().await?;
         }
         // Listed before the rows are: a file that gets its row meanwhile is among the rows.
         let kept = self.files.kept(ABANDONED_AFTER).await?;

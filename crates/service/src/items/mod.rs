@@ -28,11 +28,11 @@ pub(crate) use erase::{ExpiredPages, milliseconds};
 pub use pins::Pin;
 pub use sweep::{Custodian, Swept};
 
+use crate::access::Agent;
 use crate::memory::Requester;
 use crate::records::{BlobStore, Catalogue, Clock, Peers, StoreError, Timestamp};
 use pins::ItemLocks;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use tracing::Instrument;
 
 /// The volumes and products of one service.
@@ -41,8 +41,6 @@ pub struct Items {
     blobs: Arc<dyn BlobStore>,
     clock: Arc<dyn Clock>,
     locks: ItemLocks,
-    /// Whether deleted rows may still be read in the database's files.
-    overwrite_due: AtomicBool,
     /// The other processes on the store, if it can be shared.
     peers: Option<Arc<dyn Peers>>,
 }
@@ -60,7 +58,6 @@ impl Items {
             blobs,
             clock,
             locks: ItemLocks::default(),
-            overwrite_due: AtomicBool::new(false),
             peers,
         }
     }
@@ -104,10 +101,11 @@ impl Items {
     }
 }
 
-/// Runs a section to its end even if the caller is dropped meanwhile.
+/// Runs a section to its end even if the caller is dropped meanwhile, for whoever the caller acts.
 async fn to_its_end<T: Send + 'static>(
     section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
 ) -> Result<T, StoreError> {
+    let section = Agent::scope(Agent::acting(), section);
     let section = Requester::current().scope(section);
     tokio::spawn(section.in_current_span())
         .await
