@@ -5,7 +5,7 @@ use crate::helpers::{fake_engine, volume};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt};
-use serde_json::{Map, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::io;
 use std::ops::Range;

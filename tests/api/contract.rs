@@ -1929,13 +1929,14 @@ async fn work_items_change_once(on: &Stores) {
         name: "clerk".into(),
         ..ErasureAgent::default()
     };
-    let erase = |uid| on.b.erase_workitem(uid, "1.2.2", &by, now());
-    assert_eq!(erase(&other()).await.unwrap(), Erased::Unknown);
-    let Erased::Done(receipt) = erase(&tenant()).await.unwrap() else {
+    let (own, others) = (tenant(), other());
+    let erase = |of| on.b.erase_workitem(of, "1.2.2", &by, now());
+    assert_eq!(erase(&others).await.unwrap(), Erased::Unknown);
+    let Erased::Done(receipt) = erase(&own).await.unwrap() else {
         panic!("the item is there");
     };
     assert_eq!((&*receipt.item, &*receipt.erased_by), ("1.2.2", "clerk"));
-    assert_eq!(erase(&tenant()).await.unwrap(), Erased::Unknown);
+    assert_eq!(erase(&own).await.unwrap(), Erased::Unknown);
     // It exists again.
     let again = on.a.add_workitem(&item("1.2.2"), 2).await.unwrap();
     assert_eq!(again, AddedWorkitem::Done);
@@ -1944,7 +1945,7 @@ async fn work_items_change_once(on: &Stores) {
     performed.state = WorkitemState::InProgress;
     performed.performer = Performer::Claimed;
     assert!(on.a.change_workitem(&performed).await.unwrap());
-    assert_eq!(erase(&tenant()).await.unwrap(), Erased::InUse);
+    assert_eq!(erase(&own).await.unwrap(), Erased::InUse);
 }
 
 /// A change that somebody makes: its name, the act and the item of its row, and how it is made; `true` if it was.

@@ -578,7 +578,7 @@ impl Work for FakeWork {
     fn page(
         &self,
         stored: &StoredItem,
-        _scan: &serde_json::Map<String, serde_json::Value>,
+        _scans: &[serde_json::Map<String, serde_json::Value>],
     ) -> Result<String, Failure> {
         let mut names = ["report.json", "beat.json", "comparison.json"].into_iter();
         let report = names.find_map(|name| stored.read(name).unwrap()).unwrap();
