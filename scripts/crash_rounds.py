@@ -6,8 +6,9 @@
 Of every ten rounds, eight are kills under mixed load (uploads, models, segmentations, deletions,
 cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while an
 old database is migrated. Loopback only; stops by itself; needs Python 3 and nothing else. Takes about
-1.5 s a round on two cores. The last line is a JSON object; the exit status is 0 if nothing was lost,
-corrupt, orphaned or made twice.
+1.5 s a round on two cores. After each kill under load, every stored volume, filed job, cancellation and erasure
+has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
+corrupt, orphaned, made twice or without its row.
 """
 import argparse, gzip, hashlib, http.client, json, os, random, shutil, socket, sqlite3, struct, subprocess
 import sys, tempfile, threading, time
@@ -76,7 +77,7 @@ class Rounds:
         self.folder = tempfile.mkdtemp(prefix="ventriform-crash-")
         self.figures = dict.fromkeys(
             ("rounds", "acknowledged", "lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans",
-             "dangling", "files_checked", "erased_by_age", "migrations"), 0)
+             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "migrations"), 0)
         self.ready, self.number, self.lock = [], 0, threading.Lock()
         self.fresh()
 
@@ -180,6 +181,23 @@ class Rounds:
         files = {name for shelf in SHELVES for name in os.listdir(f"{self.data}/{shelf}")}
         return files - rows, rows - files
 
+    def check_trail(self):
+        """A change and its row of the audit trail are there both, whether it was acknowledged or not."""
+        changes = {
+            "create": "SELECT id FROM holdings WHERE kind = 'volume'",
+            "execute": "SELECT id FROM jobs",
+            "delete": "SELECT id FROM jobs WHERE cancel_requested UNION SELECT id FROM erased WHERE id LIKE 'vol_%'",
+        }
+        database = sqlite3.connect(f"file:{self.data}/ventriform.db?mode=ro", uri=True, timeout=30)
+        for activity, ids in changes.items():
+            rows = database.execute(f"""SELECT id, EXISTS (SELECT 1 FROM audit WHERE object = id
+                AND json_extract(event, '$.activity') = ?) FROM ({ids})""", (activity,)).fetchall()
+            self.figures["recorded"] += sum(known for _, known in rows)
+            for item, known in rows:
+                if not known:
+                    self.note("unrecorded", f"{activity} {item}")
+        database.close()
+
     def check_volumes(self, ids):
         for volume in ids:
             self.figures["acknowledged"] += 1
@@ -272,6 +290,7 @@ class Rounds:
             self.load()
             self.start()
             self.check()
+            self.check_trail()
             self.figures["rounds"] += 1
         self.finish()
 
@@ -389,7 +408,7 @@ def main():
     rounds.figures |= {"ready_ms_median": round(ready[len(ready) // 2]),
                        "ready_ms_p99": round(ready[min(len(ready) * 99 // 100, len(ready) - 1)])}
     print(json.dumps(rounds.figures))
-    faults = ("lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans", "dangling")
+    faults = ("lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans", "dangling", "unrecorded")
     return int(any(rounds.figures[fault] for fault in faults))
 
 

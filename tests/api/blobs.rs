@@ -5,7 +5,7 @@ use crate::helpers::{fake_engine, volume};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt};
-use serde_json::{Map, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::io;
 use std::ops::Range;
@@ -278,7 +278,7 @@ async fn jobs_run_on_a_file_store_without_a_folder() {
         .with_files(model, work.page_files())
         .await
         .unwrap();
-    assert!(work.page(&stored, &Map::new()).unwrap().contains("<title>"));
+    assert!(work.page(&stored, &[]).unwrap().contains("<title>"));
     let path = stored.files[0].to_path_buf();
     assert!(path.exists());
     drop(stored);

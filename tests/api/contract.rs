@@ -5,6 +5,7 @@
 
 use super::helpers::{cutoff, trusted};
 use super::postgres::{Server, reached, server};
+use futures::future::BoxFuture;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -12,8 +13,8 @@ use std::time::Duration;
 use tempfile::TempDir;
 use ventriform::volume::dicom::DicomHeader;
 use ventriform_service::access::{
-    AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, AuditRecord, KeyRequest, Maker, Quota,
-    Scope, verify,
+    AccessStore, Activity, Agent, ApiKey, AuditEvent, AuditFilter, AuditRecord, KeyRequest, Maker,
+    Quota, Recorder, Scope, verify,
 };
 use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
 use ventriform_service::hooks::{
@@ -21,7 +22,7 @@ use ventriform_service::hooks::{
     NextAttempt, Settlement, SigningSecret,
 };
 use ventriform_service::intake::{
-    Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol,
+    Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, RecordedGroups,
 };
 use ventriform_service::records::{
     AddedProduct, Bounded, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased,
@@ -29,8 +30,8 @@ use ventriform_service::records::{
     Idempotency, Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState,
     JobStore, JobWebhook, Lease, LegalHold, ListRequest, NewJob, PAGE_BYTES, Priority, Product,
     ProductFile, ProductRoom, Resource, ScanErasureOrder, ScanErasures, ScanFields, ScanFilter,
-    ScanSelection, Scans, ScansErased, SendOrder, SeriesSource, StoreFault, StoredVolume,
-    SystemClock, TagFilter, Tags, Tenant, TimeStore, Timestamp, random_id,
+    ScanSelection, Scans, ScansErased, SendOrder, SeriesSource, StoreFault, StoreResult,
+    StoredVolume, SystemClock, TagFilter, Tags, Tenant, TimeStore, Timestamp, random_id,
 };
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
@@ -103,6 +104,26 @@ impl Stores {
                 let mut connection = options.connect().await.unwrap();
                 connection.execute(sqlx::raw_sql(sql)).await.is_ok()
             }
+        }
+    }
+
+    /// What makes every row of the audit trail fail.
+    fn without_trail(&self) -> &'static str {
+        match self.url {
+            Some(_) => {
+                "CREATE OR REPLACE FUNCTION no_trail() RETURNS trigger LANGUAGE plpgsql AS
+                     $$ BEGIN RAISE EXCEPTION 'no trail'; END $$;
+                 CREATE TRIGGER no_trail BEFORE INSERT ON audit FOR EACH ROW EXECUTE FUNCTION no_trail()"
+            }
+            None => "CREATE TRIGGER no_trail BEFORE INSERT ON audit BEGIN SELECT RAISE(ABORT, 'no trail'); END",
+        }
+    }
+
+    /// What ends that.
+    fn with_trail(&self) -> &'static str {
+        match self.url {
+            Some(_) => "DROP TRIGGER no_trail ON audit",
+            None => "DROP TRIGGER no_trail",
         }
     }
 
@@ -287,6 +308,7 @@ contracts!(
     received_objects_become_volumes,
     work_items_change_once,
     figures_are_counted,
+    changes_and_their_rows_are_one,
     everything_stored_counts_for_its_tenant,
     a_full_queue_and_a_full_intake_keep_a_share_for_others,
     work_items_are_read_in_batches_of_few_bytes,
@@ -2195,10 +2217,14 @@ async fn received_objects_become_volumes(on: &Stores) {
         panic!("it is new again")
     };
     let by = ErasureAgent::retention();
-    let of_other = on.b.remove(&other(), &group, Some(&by), now()).await;
+    let reason = ErasureReason::Retention;
+    let of_other = on.b.remove(&other(), &group, &by, reason, now()).await;
     assert_eq!(of_other.unwrap(), None);
-    let removed = on.b.remove(&tenant(), &group, Some(&by), now()).await;
-    assert_eq!(removed.unwrap().unwrap(), ["file-1-aa"]);
+    let removed = on.b.remove(&tenant(), &group, &by, reason, now()).await;
+    let (files, receipt) = removed.unwrap().unwrap();
+    assert_eq!(files, ["file-1-aa"]);
+    assert_eq!((receipt.item, receipt.reason), (group.clone(), reason));
+    assert_eq!(receipt.items[0].files[0].name, "file-1-aa");
     assert_eq!(rows_about(&on.a, &group).await, 1);
     assert_eq!(on.b.waiting().await.unwrap(), (0, 0));
 }
@@ -2271,12 +2297,319 @@ async fn work_items_change_once(on: &Stores) {
     let mut ended = on.a.workitem(&tenant(), "1.2.1").await.unwrap().unwrap();
     ended.state = WorkitemState::Completed;
     assert!(on.a.change_workitem(&ended).await.unwrap());
-    assert_eq!(
-        on.b.delete_ended_workitems(cutoff(now() + 1000))
-            .await
-            .unwrap(),
-        1
+    let deleted =
+        on.b.delete_ended_workitems(cutoff(now() + 1000), now())
+            .await;
+    assert_eq!(deleted.unwrap(), 1);
+    assert_eq!(rows_about(&on.a, "1.2.1").await, 1);
+    assert!(on.a.erased_at(&tenant(), "1.2.1").await.unwrap().is_some());
+    let by = ErasureAgent {
+        name: "clerk".into(),
+        ..ErasureAgent::default()
+    };
+    let (own, others) = (tenant(), other());
+    let erase = |of| on.b.erase_workitem(of, "1.2.2", &by, now());
+    assert_eq!(erase(&others).await.unwrap(), Erased::Unknown);
+    let Erased::Done(receipt) = erase(&own).await.unwrap() else {
+        panic!("the item is there");
+    };
+    assert_eq!((&*receipt.item, &*receipt.erased_by), ("1.2.2", "clerk"));
+    assert_eq!(erase(&own).await.unwrap(), Erased::Unknown);
+    // It exists again.
+    let again = on.a.add_workitem(&item("1.2.2"), 2).await.unwrap();
+    assert_eq!(again, AddedWorkitem::Done);
+    assert_eq!(on.a.erased_at(&tenant(), "1.2.2").await.unwrap(), None);
+    let mut performed = on.a.workitem(&tenant(), "1.2.2").await.unwrap().unwrap();
+    performed.state = WorkitemState::InProgress;
+    performed.performer = Performer::Claimed;
+    assert!(on.a.change_workitem(&performed).await.unwrap());
+    assert_eq!(erase(&own).await.unwrap(), Erased::InUse);
+}
+
+/// A change that somebody makes: its name, the act and the item of its row, and how it is made; `true` if it was.
+struct Act<'a> {
+    name: &'static str,
+    activity: Activity,
+    object: String,
+    make: Box<dyn Fn() -> BoxFuture<'a, StoreResult<bool>> + 'a>,
+}
+
+fn act<'a, F>(
+    name: &'static str,
+    (activity, object): (Activity, &str),
+    make: impl Fn() -> F + 'a,
+) -> Act<'a>
+where
+    F: Future<Output = StoreResult<bool>> + Send + 'a,
+{
+    Act {
+        name,
+        activity,
+        object: object.to_owned(),
+        make: Box::new(move || Box::pin(make())),
+    }
+}
+
+/// Every change of a store that is made for somebody: with the trail broken it is undone, else it leaves one row.
+async fn changes_and_their_rows_are_one(on: &Stores) {
+    let (store, t) = (&on.a, &tenant());
+    let held = on.volume(t).await;
+    let (volume, product) = (stored_volume("vol_new", 10), model(&held));
+    let queued = on.file(&new_job(&held)).await.id;
+    let mut keyed = new_job(&held);
+    keyed.idempotency = Some(Idempotency {
+        key: "once".into(),
+        fingerprint: "f".into(),
+    });
+    let ended = on.file(&new_job(&held)).await.id;
+    store.interrupt(&ended, now()).await.unwrap();
+    let mut sourced = new_job("");
+    (sourced.volume, sourced.source) = (None, Some(series_source()));
+    let (pulled, lost) = (on.file(&sourced).await.id, on.file(&sourced).await.id);
+    let template = product_of_kind(Resource::Template);
+    store
+        .add_product(&template, t, None, AMPLE_ROOM)
+        .await
+        .unwrap();
+    let hook = |id: &str| HookEndpoint {
+        id: id.into(),
+        tenant: t.clone(),
+        created_at: now(),
+        url: "https://ward.example/hook".into(),
+        destination: "https://ward.example:443".into(),
+        events: HookEvent::ALL.to_vec(),
+        gone_at: None,
+    };
+    let (first, second, secret) = (hook("whk_1"), hook("whk_2"), SigningSecret::random());
+    store.add_endpoint(&first, &secret, 9).await.unwrap();
+    let item = |uid: &str| Workitem {
+        tenant: t.clone(),
+        uid: uid.into(),
+        sequence: 0,
+        revision: 0,
+        state: WorkitemState::Scheduled,
+        transaction: None,
+        performer: Performer::None,
+        attributes: DataSetJson::of(object(json!({}))).unwrap(),
+        changed_at: now(),
+    };
+    store.add_workitem(&item("1.1"), 9).await.unwrap();
+    let changed = store.workitem(t, "1.1").await.unwrap().unwrap();
+    let (added, erased) = (item("1.2"), item("1.3"));
+    store.add_workitem(&erased, 9).await.unwrap();
+    let room = IntakeRoom {
+        objects: 99,
+        bytes: 9999,
+        tenant_bytes: None,
+    };
+    let received = received_object(t, "7");
+    let group = store.add(&received_object(t, "8"), room, now()).await;
+    let Added::New(group, _) = group.unwrap() else {
+        panic!("the object is new");
+    };
+    let (before, after) = (
+        Tags::default(),
+        Tags {
+            external_id: Some("A".into()),
+            ..Tags::default()
+        },
     );
+    let hold = LegalHold {
+        reason: "case".into(),
+        since: now(),
+        by: "clerk".into(),
+    };
+    let fields = ScanFields(object(json!({"patient_id": "7"})));
+    let by = ErasureAgent::default();
+    let (erased_volume, order) = {
+        let id = on.volume(t).await;
+        let order = ErasureOrder {
+            tenant: t.clone(),
+            id: id.clone(),
+            cascade: false,
+            renewed_before: None,
+            by: by.clone(),
+            reason: ErasureReason::Request,
+        };
+        (id, order)
+    };
+    let expected = [erased_volume.clone()];
+    let why = failure("no-series");
+    let new_key = KeyRequest {
+        name: "k".into(),
+        tenant: t.clone(),
+        scope: Scope::Read,
+        quota: Quota::default(),
+        expires_at: None,
+        maker: Maker::Operator,
+    };
+    let (api_key, _) = ApiKey::make(new_key, now()).unwrap();
+    let event = |activity| AuditEvent::new(now(), activity, t.clone(), "clerk".into());
+    let (made, revoked) = (
+        event(Activity::KeyCreated).on(&*api_key.id),
+        event(Activity::KeyRevoked).on(&*api_key.id),
+    );
+    use Activity::{Create, Delete, Execute, KeyCreated, KeyRevoked, Update};
+    // In this order: some change what an earlier one has made. The id of a new job is not known before.
+    let acts = [
+        act("add_volume", (Create, "vol_new"), || {
+            store.add_volume(&volume, t, &before, None)
+        }),
+        act("renew_volume", (Update, "vol_new"), || async {
+            let renewed = store
+                .renew_volume(t, "vol_new", &before, None, now())
+                .await?;
+            Ok(renewed.is_some_and(|(_, new)| !new))
+        }),
+        act("add_product", (Create, &product.id), || async {
+            let added = store.add_product(&product, t, None, AMPLE_ROOM).await?;
+            Ok(matches!(added, AddedProduct::New))
+        }),
+        act("change_tags", (Update, &held), || {
+            store.change_tags(t, &held, &before, &after)
+        }),
+        act("change_tags of a job", (Update, &queued), || {
+            store.change_tags(t, &queued, &before, &after)
+        }),
+        act("set_library", (Update, &template.id), || {
+            store.set_library(t, &template.id, true)
+        }),
+        act("set_legal_hold", (Update, &held), || {
+            store.set_legal_hold(t, &held, Some(&hold))
+        }),
+        act("set_legal_hold, lifted", (Update, &held), || {
+            store.set_legal_hold(t, &held, None)
+        }),
+        act("state_scan", (Update, &held), || {
+            store.state_scan(t, &held, &fields)
+        }),
+        act("erase_scan", (Delete, &held), || {
+            store.erase_scan(t, &held, now())
+        }),
+        act("file", (Execute, ""), || async {
+            Ok(matches!(
+                store.file(&keyed, 99, now()).await?,
+                Filed::New(_)
+            ))
+        }),
+        act("interrupt", (Delete, &queued), || async {
+            Ok(matches!(
+                store.interrupt(&queued, now()).await?,
+                Interrupted::Cancelled(_)
+            ))
+        }),
+        act("delete_job", (Delete, &ended), || async {
+            Ok(store.delete_job(&ended, None, now()).await? == Deleted::Done)
+        }),
+        act("pulled", (Create, &pulled), || async {
+            Ok(store.pulled(&pulled, &held, now()).await?.is_some())
+        }),
+        act("pull_given_up", (Create, &lost), || async {
+            Ok(store.pull_given_up(&lost, &why, now()).await?.is_some())
+        }),
+        act("add_endpoint", (Create, "whk_2"), || {
+            store.add_endpoint(&second, &secret, 9)
+        }),
+        act("remove_endpoint", (Delete, "whk_1"), || {
+            store.remove_endpoint(t, "whk_1", now())
+        }),
+        act("replace_secret", (Update, "webhooks/secret"), || async {
+            store.replace_secret(t, &secret, now()).await.map(|()| true)
+        }),
+        act("add_workitem", (Create, "1.2"), || async {
+            Ok(store.add_workitem(&added, 9).await? == AddedWorkitem::Done)
+        }),
+        act("change_workitem", (Update, "1.1"), || {
+            store.change_workitem(&changed)
+        }),
+        act("erase_workitem", (Delete, "1.3"), || async {
+            Ok(matches!(
+                store.erase_workitem(t, "1.3", &by, now()).await?,
+                Erased::Done(_)
+            ))
+        }),
+        act("add a received object", (Create, &group), || async {
+            Ok(matches!(
+                store.add(&received, room, now()).await?,
+                Added::New(..)
+            ))
+        }),
+        act("remove", (Delete, &group), || async {
+            let removed = store
+                .remove(t, &group, &by, ErasureReason::Request, now())
+                .await?;
+            Ok(removed.is_some())
+        }),
+        act("erase", (Delete, &erased_volume), || async {
+            Ok(matches!(
+                store.erase(&order, &expected, now()).await?,
+                Erased::Done(_)
+            ))
+        }),
+        act("add_key", (KeyCreated, &api_key.id), || async {
+            store.add_key(&api_key, &made).await.map(|()| true)
+        }),
+        act("revoke_key", (KeyRevoked, &api_key.id), || {
+            store.revoke_key(&api_key.id, now(), &revoked)
+        }),
+    ];
+    let recorder = Arc::new(Recorder::start(store.clone(), Arc::new(SystemClock)));
+    let agent = Agent::new(recorder, Arc::new(SystemClock), t.clone(), "clerk");
+    for act in acts {
+        let made = || Agent::scope(Some(agent.clone()), (act.make)());
+        let rows = newest_row(store).await.0;
+        assert!(on.tamper(on.without_trail()).await);
+        assert!(made().await.is_err(), "{}: there can be no row", act.name);
+        assert!(on.tamper(on.with_trail()).await);
+        assert_eq!(newest_row(store).await.0, rows, "{}", act.name);
+        assert!(
+            made().await.unwrap(),
+            "{}: the change was not undone",
+            act.name
+        );
+        let (sequence, event) = newest_row(store).await;
+        assert_eq!(sequence, rows + 1, "{}: one row", act.name);
+        assert_eq!(
+            (event.activity, &*event.agent),
+            (act.activity, "clerk"),
+            "{}",
+            act.name
+        );
+        if !act.object.is_empty() {
+            assert_eq!(event.object.as_ref(), Some(&act.object), "{}", act.name);
+        }
+    }
+    assert_eq!(verify(&**store).await.unwrap().broken, None);
+}
+
+/// The position of the newest row of the trail, and what it says.
+async fn newest_row(store: &SqlStore) -> (i64, AuditEvent) {
+    let page = ListRequest {
+        before: None,
+        limit: 1,
+    };
+    let rows = store
+        .audit(&AuditFilter::default(), page)
+        .await
+        .unwrap()
+        .items;
+    let nothing = || AuditEvent::new(0, Activity::Read, tenant(), String::new());
+    rows.into_iter()
+        .next()
+        .map_or_else(|| (0, nothing()), |row| (row.sequence, row.event))
+}
+
+fn series_source() -> SeriesSource {
+    SeriesSource {
+        archive: Some("pacs".into()),
+        dicomweb: None,
+        study: "1.2".into(),
+        series: "1.2.3".into(),
+    }
+}
+
+fn product_of_kind(kind: Resource) -> Product {
+    product(random_id(kind.prefix()), None)
 }
 
 async fn figures_are_counted(on: &Stores) {
@@ -2811,6 +3144,7 @@ fn object_of(tenant: &Tenant, instance: &str, data: &str) -> NewObject {
         file_sha256: data.into(),
         file: format!("file-{instance}-{data}"),
         bytes: 10,
+        recorded: RecordedGroups::default(),
     }
 }
 

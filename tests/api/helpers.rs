@@ -410,8 +410,8 @@ impl Work for StandIn {
         self.real.page_files()
     }
 
-    fn page(&self, product: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        self.real.page(product, scan)
+    fn page(&self, product: &StoredItem, scans: &[Map<String, Value>]) -> Result<String, Failure> {
+        self.real.page(product, scans)
     }
 }
 
@@ -608,7 +608,7 @@ impl Work for FakeWork {
     fn page(
         &self,
         stored: &StoredItem,
-        _scan: &serde_json::Map<String, serde_json::Value>,
+        _scans: &[serde_json::Map<String, serde_json::Value>],
     ) -> Result<String, Failure> {
         let mut names = ["report.json", "beat.json", "comparison.json"].into_iter();
         let report = names.find_map(|name| stored.read(name).unwrap()).unwrap();

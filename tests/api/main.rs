@@ -8,6 +8,7 @@
     reason = "tests state their expectations by panicking"
 )]
 
+mod header_text;
 mod helpers;
 
 mod archives;

@@ -26,8 +26,8 @@ export interface Upload {
   existed?: boolean;
 }
 
-/** Whether the name of a file is stored as the label `name`; it may name a patient. */
-export const keepNames = new Watched<boolean>(localStorage.getItem("ventriform.names") !== "no");
+/** Whether a file's name becomes the label `name` of its volume. Exports name files after patients, so not unless a person asks for it. */
+export const keepNames = new Watched<boolean>(localStorage.getItem("ventriform.names") === "yes");
 keepNames.watch(() => localStorage.setItem("ventriform.names", keepNames.value ? "yes" : "no"));
 
 export const uploads = new Watched<Upload[]>([]);

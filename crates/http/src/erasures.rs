@@ -29,7 +29,8 @@ pub struct ReceiptBody {
     /// The receipt's id.
     #[schema(example = "ers_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// The item that was to be erased; `volumes` if volumes were selected by a filter.
+    /// The item that was to be erased: its id, that of what was received, or the UID of a work item; `volumes` if volumes were
+    /// selected by a filter.
     #[schema(example = "vol_9f86d081884c7d659a2feaa0c55ad015")]
     item: String,
     /// By what volumes were selected, such as `study`; never a value.
@@ -202,7 +203,7 @@ pub async fn erase(
         Erased::Unknown
     };
     match erased {
-        Erased::Done(receipt) => Ok(answered(*receipt, headers)),
+        Erased::Done(receipt) => Ok(acknowledged(*receipt, headers)),
         Erased::Unknown => {
             Err(missing(app.service.items().catalogue(), &caller.tenant, kind, &id).await)
         }
@@ -216,8 +217,9 @@ pub async fn erase(
     }
 }
 
-/// 204, or 200 with the receipt if the client prefers it; `Location` is the receipt's path.
-pub fn answered(receipt: Receipt, headers: &HeaderMap) -> Response {
+/// 204, or 200 with the receipt if the client prefers it; `Location` is the receipt's path. The row of the audit trail was
+/// written with the receipt.
+pub fn acknowledged(receipt: Receipt, headers: &HeaderMap) -> Response {
     let location = [(header::LOCATION, path(&receipt.id))];
     if !negotiate::prefers_representation(headers) {
         let answer = (StatusCode::NO_CONTENT, location, Extension(AlreadyRecorded));

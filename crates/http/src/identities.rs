@@ -16,7 +16,6 @@ use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode};
 use serde_json::{Map, Value};
-use ventriform_service::access::Activity;
 use ventriform_service::records::ScanFields;
 use ventriform_service::work::dicom;
 
@@ -72,14 +71,13 @@ pub async fn state_identity(
         if differs { problem.conflict() } else { problem }
     })?;
     let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let (volume, stated_of) = (id.clone(), id.clone());
+    let volume = id.clone();
     let state = async move {
         let catalogue = items.catalogue();
         let scan = ScanFields(stated);
         catalogue.state_scan(&tenant, &volume, &scan).await
     };
-    let done = move |_: &_| Some((Activity::Update, stated_of));
-    caller.by.change(state, done).await?;
+    caller.by.change(state).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
     Ok(Json(volume.ownership.scan.whole()))
 }
@@ -102,10 +100,9 @@ pub async fn erase_identity(
 ) -> Answer<StatusCode> {
     find::<Volumes>(&app, &caller.tenant, &id).await?;
     let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let (volume, erased_of) = (id.clone(), id.clone());
+    let volume = id.clone();
     let erase = async move { items.erase_scan(&tenant, &volume).await };
-    let done = move |erased: &bool| erased.then_some((Activity::Delete, erased_of));
-    if caller.by.change(erase, done).await? {
+    if caller.by.change(erase).await? {
         return Ok(StatusCode::NO_CONTENT);
     }
     // It was erased after it was looked up, or it is on hold.

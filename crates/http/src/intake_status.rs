@@ -3,8 +3,9 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::erasures::{ReceiptBody, acknowledged};
 use super::links::{path_of, rfc3339};
-use super::openapi::{ListProblems, LookupProblems};
+use super::openapi::{self, ListProblems, LookupProblems};
 use super::pagination::{PageQuery, next_cursor};
 use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::query::{NoQuery, Query};
@@ -13,10 +14,9 @@ use super::words::{ReceivedState, Word};
 use crate::public_base::public_path;
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
-use ventriform_service::access::Activity;
 use ventriform_service::intake::IntakeGroup;
 
 /// Objects that make up one volume.
@@ -156,23 +156,23 @@ pub async fn list_received(
 /// Forget what was sent
 ///
 /// Erases the objects that are not part of a volume, and what is known of those that are: sent again, they
-/// are stored again. The volume stays.
+/// are stored again. The volume stays. The receipt is at the path in `Location`.
 #[utoipa::path(delete, path = "/v1/intake/{id}", tag = "dicomweb", operation_id = "forget_received",
-    params(("id" = String, Path, description = "The entry's id")),
-    responses((status = 204, description = "It is forgotten"), LookupProblems))]
+    params(("id" = String, Path, description = "The entry's id"), openapi::ErasureHeader),
+    responses((status = 200, description = "Erased; the receipt", body = ReceiptBody),
+        (status = 204, description = "Erased"), LookupProblems))]
 pub async fn forget_received(
     State(app): State<App>,
     caller: Caller,
     PathSegments(id): PathSegments<String>,
     _: NoQuery,
-) -> Answer<StatusCode> {
-    let store = app.service.intake.store.clone();
-    let (tenant, group, forgotten) = (caller.tenant.clone(), id.clone(), id.clone());
-    let now = app.service.now();
-    let remove = async move { store.remove(&tenant, &group, None, now).await };
-    let done = move |removed: &Option<_>| removed.as_ref().map(|_| (Activity::Delete, forgotten));
-    let removed = caller.by.change(remove, done).await?;
-    let files = removed.ok_or_else(|| {
+    headers: HeaderMap,
+) -> Answer {
+    let erased = app
+        .service
+        .forget_received(&caller.by, &caller.tenant, &id)
+        .await?;
+    let receipt = erased.ok_or_else(|| {
         Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
@@ -180,6 +180,5 @@ pub async fn forget_received(
         )
         .fix("List what was received by GET /v1/intake.")
     })?;
-    app.service.intake.files.discard(&files).await?;
-    Ok(StatusCode::NO_CONTENT)
+    Ok(acknowledged(receipt, &headers))
 }

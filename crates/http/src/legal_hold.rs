@@ -14,7 +14,6 @@ use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use serde_json::Value;
 use ventriform::text::is_printable;
-use ventriform_service::access::Activity;
 use ventriform_service::records::LegalHold;
 
 /// Put a volume on legal hold
@@ -44,7 +43,7 @@ pub async fn hold_volume(
         by: caller.name.clone(),
     };
     set(&app, &caller, &id, Some(hold.clone())).await?;
-    Ok(Json(hold.into()))
+    Ok(Json(LegalHoldBody::of(hold, caller.scope)))
 }
 
 /// Lift the legal hold of a volume
@@ -68,15 +67,14 @@ pub async fn release_volume(
 
 async fn set(app: &App, caller: &Caller, id: &str, hold: Option<LegalHold>) -> Answer<()> {
     let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-    let (volume, held) = (id.to_owned(), id.to_owned());
+    let volume = id.to_owned();
     let set = async move {
         let catalogue = items.catalogue();
         catalogue
             .set_legal_hold(&tenant, &volume, hold.as_ref())
             .await
     };
-    let done = move |set: &bool| set.then_some((Activity::Update, held));
-    if caller.by.change(set, done).await? {
+    if caller.by.change(set).await? {
         Ok(())
     } else {
         find::<Volumes>(app, &caller.tenant, id).await.map(|_| ())

@@ -38,11 +38,13 @@ use utoipa::{IntoParams, IntoResponses, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
+use ventriform::report::header_text;
 use ventriform_service::access::Scope;
 use ventriform_service::decoding::LITTLE_MEMORY;
+use ventriform_service::items::OutputFile;
 use ventriform_service::records::{
-    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError,
-    Tenant,
+    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, ProductFile, Resource,
+    StoreError, Tenant,
 };
 use ventriform_service::work::dicom::{self, ResultObject};
 use ventriform_service::work::{UploadFacts, part};
@@ -133,7 +135,9 @@ pub struct Presented {
 
 impl Presented {
     /// A product as its tenant has it.
-    pub fn of(app: &App, held: Owned<Product>) -> Self {
+    pub fn of(app: &App, mut held: Owned<Product>) -> Self {
+        // What earlier versions have stored.
+        header_text::withhold(&mut held.item.summary);
         Self {
             expires_at: app.expires_at(held.item.resource(), &held.ownership),
             scan: ScanUidsBody::of(&held.ownership.scan),
@@ -495,7 +499,7 @@ async fn send_part(
     let stored = app
         .service
         .items()
-        .with_files(product.clone(), &[source.as_str()])
+        .whole(product.clone(), &[source.as_str()])
         .await?;
     let memory = LITTLE_MEMORY + MEMORY_PER_MESH_BYTE * size;
     let make = move |_: &Monitor<'_>| part::part_file(&stored, &stem, part, format);
@@ -644,7 +648,7 @@ pub fn object_paths(product: &Product) -> Vec<String> {
 }
 
 /// 409: whose scan a result is of went with its volume.
-fn volume_erased(id: &str) -> Problem {
+pub fn volume_erased(id: &str) -> Problem {
     Problem::new(
         StatusCode::CONFLICT,
         "volume-erased",
@@ -681,19 +685,21 @@ impl<'a> Asker<'a> {
         }
     }
 
-    /// The fields of the scan that the page of `product` names.
-    async fn sees(self, app: &App, product: &Product) -> Answer<Map<String, Value>> {
-        let Some(volume) = product.volume.as_deref().filter(|_| !self.deidentify) else {
-            return Ok(Map::new());
-        };
-        let scan = app
-            .service
-            .items()
-            .catalogue()
-            .scan(self.tenant, volume)
-            .await?;
-        let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
-        Ok(shown.unwrap_or_default())
+    /// The fields of the scans that the page of `product` names: that of its volume, of a comparison then the one at rest.
+    async fn sees(self, app: &App, product: &Product) -> Answer<Vec<Map<String, Value>>> {
+        let rest = product.parameters.get(REST_FIELD).and_then(Value::as_str);
+        let rest = rest.filter(|_| product.resource() == Resource::Comparison);
+        let catalogue = app.service.items().catalogue();
+        let mut scans = Vec::new();
+        for volume in product.volume.as_deref().into_iter().chain(rest) {
+            let scan = match self.deidentify {
+                true => None,
+                false => catalogue.scan(self.tenant, volume).await?,
+            };
+            let shown = scan.and_then(|scan| scans::shown(&scan, self.scope));
+            scans.push(shown.unwrap_or_default());
+        }
+        Ok(scans)
     }
 }
 
@@ -705,6 +711,9 @@ async fn send_named(
     headers: &HeaderMap,
 ) -> Answer {
     if let Some(file) = product.file(name) {
+        if let Some(document) = older_document(app, product, file).await? {
+            return files::send_derived(product, document, headers).await;
+        }
         return files::send(app, product, file, headers).await;
     }
     let work = app.service.engine.work(product.resource().noun());
@@ -720,10 +729,10 @@ async fn send_named(
             let stored = app
                 .service
                 .items()
-                .with_files(product.clone(), work.page_files())
+                .whole(product.clone(), work.page_files())
                 .await?;
-            let scan = asker.sees(app, product).await?;
-            let draw = move |_: &Monitor<'_>| work.page(&stored, &scan);
+            let scans = asker.sees(app, product).await?;
+            let draw = move |_: &Monitor<'_>| work.page(&stored, &scans);
             let page = app.service.decoding.run_on(size, LITTLE_MEMORY, draw);
             let page = page.await??;
             files::send_page(product, page, headers).await
@@ -734,6 +743,42 @@ async fn send_named(
         }
     }
 }
+
+/// The parameter of a comparison that names the volume at rest.
+const REST_FIELD: &str = "rest";
+
+/// The names of documents in which earlier versions have stored text of headers.
+const DOCUMENTS: [&str; 3] = ["report.json", "beat.json", "comparison.json"];
+
+/// A stored document that holds text of headers, without it; `None` if it holds none.
+async fn older_document(
+    app: &App,
+    product: &Product,
+    file: &ProductFile,
+) -> Answer<Option<OutputFile>> {
+    if !DOCUMENTS.contains(&file.name.as_str()) {
+        return Ok(None);
+    }
+    charge(DOCUMENT_MEMORY_PER_BYTE * file.bytes).await?;
+    let wanted = [file.name.as_str()];
+    let stored = app.service.items().whole(product.clone(), &wanted).await?;
+    let (name, media_type) = (file.name.clone(), file.media_type.clone());
+    let read = move |_: &Monitor<'_>| {
+        let bytes = stored.read_whole(&name)?;
+        let withheld = bytes.and_then(|bytes| header_text::withheld(&bytes));
+        Ok::<_, std::io::Error>(withheld.map(|bytes| OutputFile {
+            name,
+            media_type: media_type.into(),
+            bytes,
+        }))
+    };
+    let decoding = &app.service.decoding;
+    let read = decoding.run_on(file.bytes, LITTLE_MEMORY, read).await?;
+    read.map_err(Problem::internal)
+}
+
+/// Memory for a byte of a document: its text, parsed, and its text again.
+const DOCUMENT_MEMORY_PER_BYTE: u64 = 8;
 
 /// Whether a product of that kind may have a mesh of this name.
 fn is_mesh<P: ProductCollection>(name: &str) -> bool {

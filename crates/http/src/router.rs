@@ -106,8 +106,12 @@ fn routes(settings: &Settings) -> OpenApiRouter<App> {
         routes!(intake_status::forget_received),
         routes!(workitems::create_workitem, workitems::search_workitems)
             .layer(json(settings.json_limit)),
-        routes!(workitems::get_workitem, workitems::update_workitem)
-            .layer(json(settings.json_limit)),
+        routes!(
+            workitems::get_workitem,
+            workitems::update_workitem,
+            workitems::delete_workitem
+        )
+        .layer(json(settings.json_limit)),
         routes!(workitems::change_workitem_state).layer(json(settings.json_limit)),
         routes!(workitems::cancel_workitem).layer(json(settings.json_limit)),
     ];

@@ -6,7 +6,7 @@
 
 use super::app::App;
 use super::caller::Caller;
-use super::erasures::{ReceiptBody, answered};
+use super::erasures::{ReceiptBody, acknowledged};
 use super::guard::AlreadyRecorded;
 use super::links::path_of;
 use super::memory::charge;
@@ -199,7 +199,7 @@ pub async fn erase_volumes(
         return Ok((unkept, Extension(AlreadyRecorded), body).into_response());
     }
     match items.erase_scans(order).await? {
-        ScansErased::Done(receipt) => Ok(answered(*receipt, &headers)),
+        ScansErased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
         ScansErased::Kept(plan) => Err(kept(&plan)),
         ScansErased::Differs(plan) => Err(Problem::new(
             StatusCode::CONFLICT,

@@ -100,7 +100,11 @@ pub struct ScanUidsBody {
 impl ScanUidsBody {
     /// Those that are known; `None` if nothing is.
     pub fn of(scan: &ScanIdentity) -> Option<Self> {
-        let text = |name| scan.text(name).map(str::to_owned);
+        let text = |name| {
+            scan.text(name)
+                .filter(|uid| is_formed(uid))
+                .map(str::to_owned)
+        };
         (!scan.is_empty()).then(|| Self {
             study_uid: text("study_uid"),
             series_uid: text("series_uid"),
@@ -117,9 +121,18 @@ pub fn shown(scan: &ScanIdentity, scope: Scope) -> Option<Map<String, Value>> {
     let mut shown = scan.whole();
     shown.remove(INSTANCES_FIELD);
     if !sees_patients(scope) {
-        shown.retain(|name, _| READABLE_FIELDS.contains(&name.as_str()));
+        shown.retain(|name, value| {
+            let is_uid = name.ends_with("_uid");
+            READABLE_FIELDS.contains(&name.as_str())
+                && (!is_uid || value.as_str().is_some_and(is_formed))
+        });
     }
     Some(shown)
+}
+
+/// Whether a UID is one, and no text in its place.
+fn is_formed(uid: &str) -> bool {
+    uid.len() <= VALUE_LENGTH && uid.bytes().all(|b| b.is_ascii_digit() || b == b'.')
 }
 
 /// Whether callers of that scope see whose scan a volume is.

@@ -2,13 +2,14 @@
 //! changed by a JSON merge patch (RFC 7396), and searched by.
 //!
 //! In a query string or a form: `external_id=A1` and `labels=study:42`, the latter repeated. In
-//! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`.
+//! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`. Shown to callers who see whose scan a volume is ([`shown`]).
 
 use super::app::App;
 use super::caller::Caller;
 use super::memory::end_rows;
 use super::problem::{Answer, Problem, shorten};
 use super::request::{merge_patch, unknown};
+use super::scans;
 use axum::extract::Request;
 use futures::future::BoxFuture;
 use serde::Deserialize;
@@ -16,7 +17,7 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
 use ventriform::text::is_printable;
-use ventriform_service::access::Activity;
+use ventriform_service::access::Scope;
 use ventriform_service::records::{TagFilter, Tags};
 
 /// Longest external id, characters.
@@ -87,6 +88,15 @@ impl TagQuery {
     }
 }
 
+/// The tags that callers of that scope see. People name volumes after patients and their files, so these go with whose scan
+/// a volume is; who does not see them may search by them.
+pub fn shown(tags: Tags, scope: Scope) -> Tags {
+    match scans::sees_patients(scope) {
+        true => tags,
+        false => Tags::default(),
+    }
+}
+
 /// The tags of a JSON object that may have other fields.
 ///
 /// # Errors
@@ -126,15 +136,14 @@ pub async fn change<'a>(
         // The tags are a small part of the row.
         end_rows(0).await;
         let (items, tenant) = (app.service.items().clone(), caller.tenant.clone());
-        let (item, id) = (id.to_owned(), id.to_owned());
+        let item = id.to_owned();
         let change = async move {
             let changed = items
                 .catalogue()
                 .change_tags(&tenant, &item, &before, &after);
             changed.await
         };
-        let done = move |changed: &bool| changed.then_some((Activity::Update, id));
-        if caller.by.change(change, done).await? {
+        if caller.by.change(change).await? {
             return Ok(());
         }
     }

@@ -21,7 +21,6 @@ use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
 use ventriform::mesh_files::MeshStatement;
 use ventriform::model::Organ;
-use ventriform_service::access::Activity;
 use ventriform_service::config::Size;
 use ventriform_service::error::ServiceError;
 use ventriform_service::items::{TemplateSource, check_name};
@@ -225,13 +224,12 @@ pub async fn update_template(
             (other, _) => return Err(unknown("field", other, &[LIBRARY_FIELD])),
         };
         let items = app.service.items().clone();
-        let (tenant, template, id) = (tenant.clone(), id.clone(), id.clone());
+        let (tenant, template) = (tenant.clone(), id.clone());
         let set = async move {
             let catalogue = items.catalogue();
             catalogue.set_library(&tenant, &template, library).await
         };
-        let done = move |set: &bool| set.then_some((Activity::Update, id));
-        caller.by.change(set, done).await?;
+        caller.by.change(set).await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
     Ok(Json(Presented::of(&app, template).into()))

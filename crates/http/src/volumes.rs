@@ -22,8 +22,10 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
+use ventriform::report::header_text;
 use ventriform::volume::GateFacts;
 use ventriform_service::access::Scope;
+use ventriform_service::error::ServiceError;
 use ventriform_service::records::{
     BlobError, Bounded, Catalogue, FileRecord, ItemFilter, LegalHold, ListPage, ListRequest,
     LocalFile, Owned, Resource, StoreError, StoreFault, StoredVolume, Tenant, content_id,
@@ -79,10 +81,10 @@ pub struct VolumeBody {
     /// When it was stored (RFC 3339).
     #[schema(format = DateTime)]
     created_at: String,
-    /// The caller's own id for it.
+    /// The caller's own id for it; not shown to the scope `read`.
     #[schema(max_length = 128)]
     external_id: Option<String>,
-    /// The caller's own names and values for it.
+    /// The caller's own names and values for it; none are shown to the scope `read`.
     labels: BTreeMap<String, String>,
     /// When it will be erased unless it is uploaded or used again (RFC 3339); absent if it is kept.
     #[schema(format = DateTime)]
@@ -152,8 +154,9 @@ struct IntensityBody {
 #[derive(Serialize, ToSchema)]
 #[schema(as = LegalHold)]
 pub struct LegalHoldBody {
-    /// The reason that was given.
-    reason: String,
+    /// The reason that was given; not shown to the scope `read`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<String>,
     /// Since when (RFC 3339).
     #[schema(format = DateTime)]
     since: String,
@@ -161,10 +164,11 @@ pub struct LegalHoldBody {
     by: String,
 }
 
-impl From<LegalHold> for LegalHoldBody {
-    fn from(hold: LegalHold) -> Self {
+impl LegalHoldBody {
+    /// The JSON of a legal hold for a caller of that scope.
+    pub fn of(hold: LegalHold, scope: Scope) -> Self {
         Self {
-            reason: hold.reason,
+            reason: Some(hold.reason).filter(|_| scans::sees_patients(scope)),
             since: rfc3339(hold.since),
             by: hold.by,
         }
@@ -243,12 +247,15 @@ impl VolumeBody {
         } = volume;
         let itself = path_of(&volume.id);
         let facts = UploadFacts::of(&volume)?;
+        let tags = tags::shown(ownership.tags, scope);
         Ok(Self {
             created_at: rfc3339(ownership.created_at),
-            external_id: ownership.tags.external_id,
-            labels: ownership.tags.labels,
+            external_id: tags.external_id,
+            labels: tags.labels,
             expires_at,
-            legal_hold: ownership.legal_hold.map(LegalHoldBody::from),
+            legal_hold: ownership
+                .legal_hold
+                .map(|hold| LegalHoldBody::of(hold, scope)),
             originals: OriginalBody::all(&volume),
             bytes: volume.bytes,
             files: volume.files.len(),
@@ -269,7 +276,10 @@ impl VolumeBody {
             },
             label_values: facts.labels,
             gates: facts.gates,
-            warnings: facts.warnings,
+            // Earlier versions have stored values of headers in them.
+            warnings: (facts.warnings.iter())
+                .map(|text| header_text::warning(text).into_owned())
+                .collect(),
             dicom: scans::shown(&ownership.scan, scope),
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),
@@ -320,7 +330,7 @@ pub async fn create_volume(
     let stored = app
         .service
         .store_volume(&caller.by, &caller.tenant, upload.volume, &tags);
-    let stored = stored.await?;
+    let stored = stored.await.map_err(ServiceError::for_sender)?;
     let volume = stored.volume;
     let body = VolumeBody::of(&app, caller.scope, volume)?;
     Ok(added(stored.new, &body.id, &body))

@@ -20,7 +20,6 @@ use axum::response::IntoResponse;
 use serde::Serialize;
 use std::time::Duration;
 use utoipa::ToSchema;
-use ventriform_service::access::{Activity, Done};
 use ventriform_service::hooks::{Delivery, HookEndpoint, SigningSecret};
 use ventriform_service::records::{Timestamp, random_id};
 
@@ -125,10 +124,9 @@ pub async fn create_webhook(
     };
     let limit = app.service.settings.webhook_endpoint_limit;
     let store = app.service.hooks.store.clone();
-    let (made, signed, id) = (endpoint.clone(), secret.clone(), endpoint.id.clone());
+    let (made, signed) = (endpoint.clone(), secret.clone());
     let add = async move { store.add_endpoint(&made, &signed, limit).await };
-    let done = move |added: &bool| added.then_some((Activity::Create, id));
-    if !caller.by.change(add, done).await? {
+    if !caller.by.change(add).await? {
         return Err(Problem::new(
             StatusCode::UNPROCESSABLE_ENTITY,
             "too-many-webhooks",
@@ -174,10 +172,9 @@ pub async fn delete_webhook(
 ) -> Answer<StatusCode> {
     let now = app.service.now();
     let store = app.service.hooks.store.clone();
-    let (tenant, webhook, removed) = (caller.tenant.clone(), id.clone(), id.clone());
+    let (tenant, webhook) = (caller.tenant.clone(), id.clone());
     let remove = async move { store.remove_endpoint(&tenant, &webhook, now).await };
-    let done = move |found: &bool| found.then_some((Activity::Delete, removed));
-    if caller.by.change(remove, done).await? {
+    if caller.by.change(remove).await? {
         Ok(StatusCode::NO_CONTENT)
     } else {
         Err(nothing_here("webhook", &id, "GET /v1/webhooks"))
@@ -196,8 +193,7 @@ pub async fn create_webhook_secret(State(app): State<App>, caller: Caller, _: No
     let store = app.service.hooks.store.clone();
     let (tenant, new) = (caller.tenant.clone(), secret.clone());
     let replace = async move { store.replace_secret(&tenant, &new, until).await };
-    let done = |_: &_| Some((Activity::Update, "webhooks/secret".to_owned()));
-    caller.by.change(replace, done).await?;
+    caller.by.change(replace).await?;
     let body = WebhookSecret {
         secret: secret.reveal(),
         former_until: rfc3339(until),
@@ -324,7 +320,7 @@ pub async fn redeliver(
     let store = app.service.hooks.store.clone();
     let (tenant, job, message) = (caller.tenant.clone(), id.clone(), delivery.clone());
     let again = async move { store.redeliver(&tenant, &job, &message, now).await };
-    let found = caller.by.change(again, redelivered(&id)).await?;
+    let found = caller.by.change(again).await?;
     let list = format!("GET /v1/jobs/{}/deliveries", shorten(&id));
     let found = found.ok_or_else(|| nothing_here("delivery", &delivery, &list))?;
     app.service.hooks.dispatcher.wake();
@@ -333,12 +329,6 @@ pub async fn redeliver(
         Json(RedeliveredBody::Message(found.into())),
     )
         .into_response())
-}
-
-/// The act of delivering something of a job again, if there is that.
-fn redelivered<T>(job: &str) -> impl FnOnce(&Option<T>) -> Option<Done> + Send + use<T> {
-    let job = job.to_owned();
-    move |found| found.as_ref().map(|_| (Activity::Update, job))
 }
 
 /// Sends a DICOM object to its archive again.
@@ -352,7 +342,7 @@ async fn redeliver_object(
     let store = app.service.archives.store.clone();
     let (tenant, of, object) = (caller.tenant.clone(), job.to_owned(), id.to_owned());
     let again = async move { store.redeliver_object(&tenant, &of, &object, now).await };
-    let found = caller.by.change(again, redelivered(job)).await?;
+    let found = caller.by.change(again).await?;
     let list = format!("GET /v1/jobs/{}", shorten(job));
     let found = found.ok_or_else(|| nothing_here("delivery", id, &list))?;
     app.service.archives.woken.notify_one();

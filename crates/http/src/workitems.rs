@@ -7,6 +7,8 @@
 
 use super::app::App;
 use super::caller::Caller;
+use super::erasures::{ReceiptBody, acknowledged};
+use super::links::rfc3339;
 use super::memory::{charge, end_rows, read_row};
 use super::openapi::{self, LookupProblems};
 use super::problem::{Answer, Problem, ProblemBody, body, shorten};
@@ -24,12 +26,11 @@ use std::time::{Duration, Instant};
 use utoipa::IntoParams;
 use ventriform::export::dicom::is_uid;
 use ventriform::progress::{Monitor, Stage};
-use ventriform_service::access::Activity;
 use ventriform_service::dicom_tags::{
     PROCEDURE_STEP_STATE, SOP_INSTANCE_UID, TRANSACTION_UID,
     UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
 };
-use ventriform_service::records::Timestamp;
+use ventriform_service::records::{Erased, Timestamp};
 use ventriform_service::worklist::{
     AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
     new_uid,
@@ -116,12 +117,9 @@ pub async fn create_workitem(
     let moment = now(&app);
     let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
     let (item, completed) = made.map_err(refused)?;
-    let (worklist, created) = (app.service.worklist.clone(), uid.clone());
+    let worklist = app.service.worklist.clone();
     let add = async move { worklist.add_workitem(&item, MAX_WORKITEMS).await };
-    let done = move |added: &AddedWorkitem| {
-        (*added == AddedWorkitem::Done).then_some((Activity::Create, created))
-    };
-    match caller.by.change(add, done).await? {
+    match caller.by.change(add).await? {
         AddedWorkitem::Done => {}
         AddedWorkitem::Exists => {
             return Err(Problem::new(
@@ -167,6 +165,43 @@ pub async fn get_workitem(
 ) -> Answer {
     let item = find(&app, &caller, &uid).await?;
     Ok(shown(StatusCode::OK, &[item.shown()]))
+}
+
+/// Erase a work item
+///
+/// With all that it says of the patient, in whatever state it is; whoever has claimed it finds it gone. Refused while this
+/// service performs it. The receipt is at the path in `Location`; `Prefer: return=representation` asks for it in the answer.
+#[utoipa::path(delete, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "delete_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        openapi::ErasureHeader),
+    responses(
+        (status = 200, description = "Erased; the receipt", body = ReceiptBody),
+        (status = 204, description = "Erased"),
+        (status = 409, description = "This service performs it",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::ScopeProblems, LookupProblems))]
+pub async fn delete_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    _: NoQuery,
+    headers: HeaderMap,
+) -> Answer {
+    let erased = app
+        .service
+        .erase_workitem(&caller.by, &caller.tenant, &uid)
+        .await?;
+    match erased {
+        Erased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
+        Erased::InUse | Erased::OnHold { .. } => Err(Problem::new(
+            StatusCode::CONFLICT,
+            "in-use",
+            "This service performs the work item.",
+        )
+        .fix("Wait for its job to end, or DELETE the job; GET /v1/jobs lists the jobs.")),
+        Erased::Unknown => Err(missing(&app, &caller, &uid).await),
+    }
 }
 
 /// A search for work items, besides the attributes that are matched.
@@ -441,10 +476,9 @@ async fn change(
         if done == Change::Already {
             return Ok(done);
         }
-        let (worklist, uid) = (app.service.worklist.clone(), item.uid.clone());
+        let worklist = app.service.worklist.clone();
         let change = async move { worklist.change_workitem(&item).await };
-        let recorded = move |changed: &bool| changed.then_some((Activity::Update, uid));
-        if caller.by.change(change, recorded).await? {
+        if caller.by.change(change).await? {
             return Ok(done);
         }
         // It is read anew.
@@ -460,15 +494,30 @@ fn text_of(attributes: &DataSetJson) -> Answer<String> {
 
 async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
     let worklist = &app.service.worklist;
-    let item = read_row(|bytes| worklist.workitem_within(&caller.tenant, uid, bytes)).await?;
-    item.ok_or_else(|| {
-        Problem::new(
+    match read_row(|bytes| worklist.workitem_within(&caller.tenant, uid, bytes)).await? {
+        Some(item) => Ok(item),
+        None => Err(missing(app, caller, uid).await),
+    }
+}
+
+/// 410 if the item was erased, else 404.
+async fn missing(app: &App, caller: &Caller, uid: &str) -> Problem {
+    let catalogue = app.service.items().catalogue();
+    match catalogue.erased_at(&caller.tenant, uid).await {
+        Ok(Some(at)) if is_uid(uid) => Problem::new(
+            StatusCode::GONE,
+            "gone",
+            format!("The work item `{uid}` was erased at {}.", rfc3339(at)),
+        )
+        .fix("Create the work item again if it is still needed."),
+        Ok(_) => Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
             format!("There is no work item `{}`.", shorten(uid)),
         )
-        .fix("Take a UID from the list at GET /dicom-web/workitems.")
-    })
+        .fix("Take a UID from the list at GET /dicom-web/workitems."),
+        Err(error) => error.into(),
+    }
 }
 
 /// The time, also as DICOM writes it.

@@ -25,7 +25,7 @@ pub fn stopped(error: &impl Explain) -> Stopped {
     if error.is_cancelled() {
         Stopped::Cancelled
     } else {
-        Stopped::Failed(error.explain())
+        Stopped::Failed(error.explain().for_sender())
     }
 }
 

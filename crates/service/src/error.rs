@@ -76,6 +76,13 @@ impl ServiceError {
         )
     }
 
+    /// Tells whoever sent a file its texts ([`Failure::for_sender`]).
+    #[must_use]
+    pub fn for_sender(mut self) -> Self {
+        *self.failure = self.failure.for_sender();
+        self
+    }
+
     /// Says that the field concerned is `field`.
     #[must_use]
     pub fn at(mut self, field: impl Into<String>) -> Self {

@@ -3,7 +3,7 @@
 //! In: a [`JobOrder`]. Out: a job that is on disk. The tenant's quotas and the limit of the queue are checked here, and
 //! an order under the same idempotency key gets the same job.
 
-use crate::access::{Activity, Agent, Done, Quota};
+use crate::access::{Agent, Quota};
 use crate::error::{Refusal, ServiceError, shorten};
 use crate::jobs::Work;
 use crate::quotas::{Addition, Counting};
@@ -160,11 +160,11 @@ impl Service {
         self.accepted(&tenant, filed).await
     }
 
-    /// Writes the row of a job, and that of its filing.
+    /// Writes the row of a job, with that of its filing.
     async fn file(&self, by: &Agent, job: NewJob) -> Result<Filed, StoreError> {
         let queue = self.queue.clone();
         let file = async move { queue.file(&job).await };
-        by.change(file, filed_by).await
+        by.change(file).await
     }
 
     /// Cancels a waiting job for `by`, or asks a running one to stop.
@@ -174,7 +174,7 @@ impl Service {
     pub async fn interrupt_job(&self, by: &Agent, id: &str) -> Result<Interrupted, StoreError> {
         let (queue, id) = (self.queue.clone(), id.to_owned());
         let interrupt = async move { queue.interrupt(&id).await };
-        by.change(interrupt, interrupted_by).await
+        by.change(interrupt).await
     }
 
     /// Erases the record of a job that has ended, for `by`.
@@ -182,11 +182,13 @@ impl Service {
     /// # Errors
     /// If the database fails.
     pub async fn delete_job(&self, by: &Agent, id: &str) -> Result<Deleted, StoreError> {
-        let (queue, job, id) = (self.queue.clone(), id.to_owned(), id.to_owned());
-        let delete = async move { queue.delete_job(&job).await };
-        let done =
-            move |deleted: &Deleted| (*deleted == Deleted::Done).then_some((Activity::Delete, id));
-        by.change(delete, done).await
+        let (queue, id) = (self.queue.clone(), id.to_owned());
+        let delete = async move {
+            let deleted = queue.delete_job(&id).await?;
+            queue.items().overwrite_erased().await;
+            Ok(deleted)
+        };
+        by.change(delete).await
     }
 
     /// Counts the texts of a job that is about to be filed. Those of one that is filed already, told by its
@@ -318,24 +320,6 @@ impl Service {
         };
         let failure = Failure::new(Fault::Request, "invalid-field", detail);
         Ok(failure.at(field).fix(fix).into())
-    }
-}
-
-/// The act of filing a job, unless it was filed before.
-fn filed_by(filed: &Filed) -> Option<Done> {
-    match filed {
-        Filed::New(job) => Some((Activity::Execute, job.id.clone())),
-        _ => None,
-    }
-}
-
-/// The act of cancelling a job, unless it has ended.
-fn interrupted_by(outcome: &Interrupted) -> Option<Done> {
-    match outcome {
-        Interrupted::Cancelled(job) | Interrupted::Asked(job) => {
-            Some((Activity::Delete, job.id.clone()))
-        }
-        Interrupted::Finished(_) | Interrupted::Unknown => None,
     }
 }
 

@@ -14,6 +14,7 @@ pub mod client;
 pub mod config;
 pub mod decoding;
 pub mod dicom_tags;
+pub mod erasures;
 pub mod error;
 pub mod filing;
 pub mod hooks;

@@ -3,7 +3,7 @@
 //! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets the
 //! same limits; here they are refused before the body is read, and read under the budget of decoding.
 
-use crate::access::{Activity, Agent, Done, Quota};
+use crate::access::{Agent, Quota};
 use crate::decoding::LITTLE_MEMORY;
 use crate::error::{Refusal, ServiceError};
 use crate::items::{NotAdded, TemplateSource, WorkOutput};
@@ -31,11 +31,6 @@ pub struct GivenMesh {
     pub bytes: Bytes,
     /// What is stated of it where the file does not say it.
     pub stated: MeshStatement,
-}
-
-/// The act of adding a product.
-fn added_by((product, new): &Added) -> Option<Done> {
-    Some((Activity::of_added(*new), product.item.id.clone()))
 }
 
 impl From<NotAdded> for ServiceError {
@@ -80,7 +75,7 @@ impl Service {
             };
             items.add_template(source, &organ, output, room).await
         };
-        Ok(by.change(add, added_by).await?)
+        Ok(by.change(add).await?)
     }
 
     /// Adds a reader's profile, for `by`.
@@ -142,7 +137,7 @@ impl Service {
             let added = items.add_named((&tenant, made), &name, output, room);
             added.await
         };
-        Ok(by.change(add, added_by).await?)
+        Ok(by.change(add).await?)
     }
 
     /// Refuses another template, reader or set of normal limits where the tenant has as many as it may have, before it is sent.

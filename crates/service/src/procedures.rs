@@ -8,7 +8,7 @@
 //!
 //! Each step is written down before the next one begins and is found again after a restart.
 
-use crate::access::{Activity, Agent};
+use crate::access::Agent;
 use crate::archive::{ExchangeHost, ObjectDelivery};
 use crate::error::ServiceError;
 use crate::filing::UnattendedJob;
@@ -293,10 +293,9 @@ async fn change(
     match how(item, (now, &dicom_time(now))) {
         Ok(()) => {
             let (worklist, item) = (service.worklist.clone(), item.clone());
-            let (by, uid) = (agent(service, &item), item.uid.clone());
+            let by = agent(service, &item);
             let change = async move { worklist.change_workitem(&item).await };
-            let done = move |changed: &bool| changed.then_some((Activity::Update, uid));
-            by.change(change, done).await
+            by.change(change).await
         }
         Err(refusal) => {
             tracing::warn!(workitem = item.sequence, %refusal, "a work item could not be changed");

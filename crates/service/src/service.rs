@@ -7,6 +7,7 @@
 //! |---|---|
 //! | store a volume | [`crate::uploads`] |
 //! | file a job | [`crate::filing`], its archives [`crate::series`] |
+//! | erase what was received, or a work item | [`crate::erasures`] |
 //! | add a template or a reader | [`crate::library`] |
 //! | read whose scan a volume is | [`crate::scans`] |
 //! | serve rules for received series | [`crate::rules`] |

@@ -8,7 +8,7 @@
 //! Guaranteed: what arrives counts against the tenant's quota as it comes. Not guaranteed: that a refused upload has
 //! not been written to the disk; its files are deleted.
 
-use crate::access::{Activity, Agent, Done};
+use crate::access::Agent;
 use crate::error::ServiceError;
 use crate::items::Pin;
 use crate::memory::{HeldMemory, MemoryBudget};
@@ -352,8 +352,7 @@ impl Service {
                     renewed.await
                 }
             };
-            let done = |renewed: &Option<_>| renewed.as_ref().map(stored_by);
-            if let Some((volume, new)) = by.change(renewed, done).await? {
+            if let Some((volume, new)) = by.change(renewed).await? {
                 return Ok(Stored { volume, new, pin });
             }
         }
@@ -388,15 +387,9 @@ impl Service {
             let added = items.add_volume(volume, staged, &tenant, &tags, scan);
             added.await
         };
-        let added = by.change(add, |added| Some(stored_by(added)));
-        let (volume, new) = added.await?;
+        let (volume, new) = by.change(add).await?;
         Ok(Stored { volume, new, pin })
     }
-}
-
-/// The act of storing a volume, which is new for the tenant or not.
-fn stored_by((volume, new): &(Owned<StoredVolume>, bool)) -> Done {
-    (Activity::of_added(*new), volume.item.id.clone())
 }
 
 /// An upload of no file.

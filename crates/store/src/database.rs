@@ -10,6 +10,7 @@ use super::health::Health;
 use super::note::Beside;
 use super::postgres::{self, PgTransaction, PgWriter};
 use super::query::{DbRow, Query, Target, query};
+use super::reserve::Reserve;
 use super::shared::Shared;
 use super::space::DiskGauge;
 use super::sqlite;
@@ -22,7 +23,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use ventriform_service::config::PostgresSettings;
 
-use ventriform_service::records::{StoreError, StoreResult, random_id};
+use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
@@ -103,11 +104,11 @@ impl Writing {
         }
     }
 
-    /// Overwrites what was deleted, as far as that is this program's business: PostgreSQL does so by
+    /// Overwrites what was deleted since the last time, as far as that is this program's business: PostgreSQL does so by
     /// itself in time. `false` if a reader was in the way.
     pub async fn overwrite_deleted(&self) -> StoreResult<bool> {
         match self {
-            Writing::Sqlite(writer) => writer.truncate_log().await,
+            Writing::Sqlite(writer) => writer.overwrite_erased().await,
             Writing::Postgres(_) => Ok(true),
         }
     }
@@ -118,6 +119,7 @@ impl Query {
     pub async fn write_all(self, writing: &Writing) -> StoreResult<Vec<DbRow>> {
         let mut transaction = match writing {
             Writing::Sqlite(writer) => {
+                self.mark(&writer.erased);
                 let rows = self.sqlite().write_all(writer).await?;
                 return Ok(rows.into_iter().map(DbRow::Sqlite).collect());
             }
@@ -136,7 +138,10 @@ impl Query {
     /// Runs it as a transaction of its own; returns the number of rows it changed.
     pub async fn write(self, writing: &Writing) -> StoreResult<u64> {
         let mut transaction = match writing {
-            Writing::Sqlite(writer) => return self.sqlite().write(writer).await,
+            Writing::Sqlite(writer) => {
+                self.mark(&writer.erased);
+                return self.sqlite().write(writer).await;
+            }
             Writing::Postgres(_) => writing.begin().await?,
         };
         let changed = self.execute(&mut transaction).await?;
@@ -171,6 +176,8 @@ pub struct SqlStore {
     gauge: DiskGauge,
     /// Where notes about this database are kept.
     beside: OnceLock<Beside>,
+    /// Space for erasures on a full disk.
+    pub(super) reserve: Reserve,
 }
 
 impl SqlStore {
@@ -188,6 +195,7 @@ impl SqlStore {
             run: random_id(RUN_PREFIX),
             gauge,
             beside: OnceLock::new(),
+            reserve: Reserve::default(),
         })
     }
 
@@ -208,6 +216,7 @@ impl SqlStore {
             run,
             gauge,
             beside: OnceLock::new(),
+            reserve: Reserve::default(),
         })
     }
 
@@ -268,6 +277,29 @@ impl SqlStore {
         .fetch_one(&self.readers)
         .await?;
         Ok(!row.try_get::<bool, _>(0)?)
+    }
+
+    /// Runs an erasure; again with the space that is kept for it if the disk is full. An erasure that fails has changed
+    /// nothing.
+    pub(super) async fn making_room<T, F>(&self, erase: impl Fn() -> F + Send) -> StoreResult<T>
+    where
+        T: Send,
+        F: Future<Output = StoreResult<T>> + Send,
+    {
+        match erase().await {
+            Err(error) if error.cause() == StoreFault::Full && self.reserve.release() => {
+                erase().await
+            }
+            done => done,
+        }
+    }
+
+    /// Overwrites what was deleted, and takes the space that an erasure needs again where there is room.
+    pub(super) async fn overwrite(&self) -> StoreResult<bool> {
+        let overwritten = self.writer.overwrite_deleted().await;
+        self.reserve
+            .refill(self.gauge.space().map(|space| space.free));
+        overwritten
     }
 
     /// Checks that there is room for another job.

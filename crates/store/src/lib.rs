@@ -8,6 +8,7 @@
 //!   database          instead of it, where they are on a server (PostgreSQL)
 //!   staging/          files not yet published; emptied at every start
 //!   discarded/        files that are being deleted
+//!   reserve           space for erasures on a full disk ([`reserve`])
 //!   quarantine/DAY/   files that were found without a record
 //!   received/         objects that came by C-STORE or STOW-RS and are not volumes yet
 //!   volumes/vol_.../  files of a volume
@@ -44,6 +45,7 @@ mod note;
 mod postgres;
 mod query;
 mod received;
+mod reserve;
 mod s3;
 mod schema;
 mod shared;
@@ -315,7 +317,11 @@ impl Store {
                 let bucket = settings.s3.as_ref();
                 on_server(folder, (bucket, empty), server, wait, gauge).await?
             }
-            None => in_file(folder, &mut lock, wait, gauge).await?,
+            None => {
+                let rows = in_file(folder, &mut lock, wait, gauge).await?;
+                rows.reserve.keep_in(folder);
+                rows
+            }
         };
         let rows = Arc::new(rows);
         let settled = rows.settle(beside, false).await;

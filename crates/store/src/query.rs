@@ -14,6 +14,7 @@ use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow};
 use sqlx::sqlite::{SqliteArguments, SqliteConnection, SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
 use std::borrow::Cow;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use ventriform_service::records::StoreResult;
 
@@ -101,12 +102,16 @@ pub(super) struct Query {
     values: Vec<Value>,
     /// Whether PostgreSQL is to prepare it anew.
     anew: bool,
+    /// Whether what was in the rows before may not be read in the database's files any more.
+    erases: bool,
 }
 
 /// A statement of that text.
 pub(super) fn query(text: impl Into<Cow<'static, str>>) -> Query {
+    let text = text.into();
     Query {
-        text: text.into(),
+        erases: text.trim_start().starts_with("DELETE"),
+        text,
         postgres: None,
         values: Vec::new(),
         anew: false,
@@ -118,6 +123,20 @@ impl Query {
     pub fn on_postgres(mut self, text: impl Into<Cow<'static, str>>) -> Self {
         self.postgres = Some(text.into());
         self
+    }
+
+    /// It replaces or removes what people wrote or what a header says, which is to be overwritten in the database's files,
+    /// as what a `DELETE` removes is.
+    pub fn erasing(mut self) -> Self {
+        self.erases = true;
+        self
+    }
+
+    /// Marks that the rows before are to be overwritten, if they are.
+    pub fn mark(&self, erased: &AtomicBool) {
+        if self.erases {
+            erased.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Sets the next placeholder.
@@ -171,6 +190,7 @@ impl Query {
                 sqlite_rows(rows.map_err(|error| shared.health.noted(faults::of_sqlite(error)))?)
             }
             Target::Sqlite(connection, writer) => {
+                self.mark(&writer.erased);
                 let rows = self.sqlite().fetch_all(connection).await;
                 sqlite_rows(rows.map_err(|error| writer.noted(faults::of_sqlite(error)))?)
             }
@@ -215,6 +235,7 @@ impl Query {
                     .map(DbRow::Sqlite)
             }
             Target::Sqlite(connection, writer) => {
+                self.mark(&writer.erased);
                 let row = self.sqlite().fetch_optional(connection).await;
                 row.map_err(|error| writer.noted(faults::of_sqlite(error)))?
                     .map(DbRow::Sqlite)
@@ -249,6 +270,7 @@ impl Query {
                     .rows_affected()
             }
             Target::Sqlite(connection, writer) => {
+                self.mark(&writer.erased);
                 let done = self.sqlite().execute(connection).await;
                 done.map_err(|error| writer.noted(faults::of_sqlite(error)))?
                     .rows_affected()
@@ -389,10 +411,9 @@ impl QueryBuilder {
     /// The statement.
     pub fn build(&mut self) -> Query {
         Query {
-            text: std::mem::take(&mut self.text).into(),
             postgres: self.postgres.take().map(Cow::from),
             values: std::mem::take(&mut self.values),
-            anew: false,
+            ..query(std::mem::take(&mut self.text))
         }
     }
 }

@@ -57,6 +57,8 @@ pub(super) struct Writer {
     /// commit; without a commit, to the beginning of the next write, which waits for the lock of the
     /// one before: until then the changes of that one may still reach the disk.
     version: AtomicU64,
+    /// Whether the log may still hold rows that were deleted. So it may after a start: the process before may have been killed.
+    pub erased: AtomicBool,
 }
 
 impl Writer {
@@ -71,6 +73,7 @@ impl Writer {
             health,
             suspect: AtomicBool::new(false),
             version: AtomicU64::new(0),
+            erased: AtomicBool::new(true),
         }
     }
 
@@ -164,6 +167,20 @@ impl Writer {
         }
     }
 
+    /// Overwrites the rows that were deleted since the last time: their pages in the database are overwritten as they are
+    /// freed, and those in the log by moving it into the database. `false` if a reader was in the way; then the next call
+    /// tries again.
+    pub async fn overwrite_erased(&self) -> StoreResult<bool> {
+        if !self.erased.swap(false, Ordering::Relaxed) {
+            return Ok(true);
+        }
+        let emptied = self.truncate_log().await;
+        if !matches!(emptied, Ok(true)) {
+            self.erased.store(true, Ordering::Relaxed);
+        }
+        emptied
+    }
+
     /// Moves the write-ahead log into the database and empties it. `false` if a reader was in the
     /// way.
     pub async fn truncate_log(&self) -> StoreResult<bool> {
@@ -233,7 +250,7 @@ impl WriteTransaction<'_> {
 }
 
 impl<'a> WriteTransaction<'a> {
-    /// Where its statements run, and who notes what they tell.
+    /// Where its statements run, and the writer, which notes what they tell and what is to be overwritten.
     pub fn parts(&mut self) -> (&mut SqliteConnection, &'a Writer) {
         (&mut self.connection, self.writer)
     }

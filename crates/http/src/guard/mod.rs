@@ -23,6 +23,7 @@ pub mod hosts;
 pub mod pages;
 pub mod state;
 
+mod erased;
 mod trail;
 
 pub use trail::AlreadyRecorded;
@@ -146,7 +147,11 @@ pub async fn guard(State(app): State<App>, request: Request, next: Next) -> Resp
             let answer = next.run(Request::from_parts(request, body));
             let response = ledger.clone().scope(answer).await;
             match answered(&ledger, response).await {
-                Ok(response) => act.record(&app, response).await,
+                Ok(response) => {
+                    let item = act.object();
+                    let response = erased::settled(&app, &identity.tenant, item, response).await;
+                    act.record(&app, response).await
+                }
                 Err(problem) => problem.into_response(),
             }
         }

@@ -49,6 +49,11 @@ impl Act {
         }
     }
 
+    /// The id that the path names.
+    pub fn object(&self) -> Option<&str> {
+        self.object.as_deref()
+    }
+
     /// Who sends the request.
     pub fn agent(&self) -> Agent {
         self.agent.clone()

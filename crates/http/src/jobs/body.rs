@@ -4,11 +4,13 @@ use crate::app::App;
 use crate::links::{path_of, rfc3339};
 use crate::openapi::JobParameters;
 use crate::problem::{Answer, Problem, ProblemBody};
+use crate::tags;
 use crate::words::{JobStateName, PriorityName, Word};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
+use ventriform_service::access::Scope;
 use ventriform_service::archive::{ObjectDelivery, Pull};
 use ventriform_service::hooks::DeliveryState;
 use ventriform_service::jobs::QueuePosition;
@@ -21,10 +23,10 @@ pub struct JobBody {
     /// The job's id.
     #[schema(example = "job_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f")]
     id: String,
-    /// The caller's own id for it.
+    /// The caller's own id for it; not shown to the scope `read`.
     #[schema(max_length = 128)]
     external_id: Option<String>,
-    /// The caller's own names and values for it.
+    /// The caller's own names and values for it; none are shown to the scope `read`.
     labels: BTreeMap<String, String>,
     /// The kind of work.
     #[schema(example = "model")]
@@ -245,10 +247,10 @@ struct JobLinks {
     report: Option<String>,
 }
 
-/// The JSON of a job, with its place in the queue if it waits.
-pub async fn describe(app: &App, job: Job) -> Answer<JobBody> {
+/// The JSON of a job for a caller of that scope, with its place in the queue if it waits.
+pub async fn describe(app: &App, scope: Scope, job: Job) -> Answer<JobBody> {
     let context = Context::of(app, std::slice::from_ref(&job)).await?;
-    Ok(body(job, &context))
+    Ok(body(job, scope, &context))
 }
 
 /// Facts about jobs beside their rows.
@@ -285,14 +287,15 @@ impl Context {
     }
 }
 
-/// The JSON of each job, with the places in the queue of those that wait.
-pub async fn describe_all(app: &App, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
+/// The JSON of each job for a caller of that scope, with the places in the queue of those that wait.
+pub async fn describe_all(app: &App, scope: Scope, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
     let context = Context::of(app, &jobs).await?;
-    let bodies = jobs.into_iter().map(|job| body(job, &context));
+    let bodies = jobs.into_iter().map(|job| body(job, scope, &context));
     Ok(bodies.collect())
 }
 
-fn body(job: Job, context: &Context) -> JobBody {
+fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
+    let tags = tags::shown(job.tags, scope);
     let standing = context.positions.get(&job.sequence);
     let made = |resource: Resource| {
         let id = job.result.clone();
@@ -338,8 +341,8 @@ fn body(job: Job, context: &Context) -> JobBody {
             report: below("report").filter(|_| shown),
         },
         id: job.id,
-        external_id: job.tags.external_id,
-        labels: job.tags.labels,
+        external_id: tags.external_id,
+        labels: tags.labels,
         kind: job.kind,
         priority: Word(job.priority),
         volume: job.volume,

@@ -25,6 +25,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
+use ventriform_service::access::Scope;
 use ventriform_service::records::Job;
 
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
@@ -59,7 +60,7 @@ pub async fn follow_job(
     let place = app.streams.enter()?;
     // The stream holds the job, or what tells of it, as long as its client reads nothing.
     end_rows(2).await;
-    Ok(stream(app, job, seen, changes, place))
+    Ok(stream(app, caller.scope, job, seen, changes, place))
 }
 
 fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
@@ -79,6 +80,7 @@ fn last_event_id(headers: &HeaderMap) -> Answer<i64> {
 
 fn stream(
     app: App,
+    scope: Scope,
     job: Job,
     seen: i64,
     changes: Receiver<Arc<Job>>,
@@ -88,6 +90,7 @@ fn stream(
         id: job.id.clone(),
         next: Some(job),
         app,
+        scope,
         seen,
         changes,
         base: PublicBase::current(),
@@ -100,6 +103,8 @@ fn stream(
 
 struct Follower {
     app: App,
+    /// What its client may see.
+    scope: Scope,
     id: String,
     next: Option<Job>,
     seen: i64,
@@ -117,7 +122,7 @@ impl Follower {
             follower.seen = job.revision;
             let last = job.state.is_final();
             let event = Event::default().event("job").id(job.revision.to_string());
-            let wire = describe(&follower.app, job);
+            let wire = describe(&follower.app, follower.scope, job);
             let wire = match &follower.base {
                 Some(base) => base.clone().scope(wire).await,
                 None => wire.await,

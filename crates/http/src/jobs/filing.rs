@@ -21,6 +21,8 @@ use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use std::time::Duration;
+use ventriform_service::access::Scope;
+use ventriform_service::error::ServiceError;
 use ventriform_service::filing::JobOrder;
 use ventriform_service::jobs::Work;
 use ventriform_service::records::{Job, JobState, Priority, Resource, Tags};
@@ -94,7 +96,7 @@ pub async fn file_upload(
     let mut pins = Vec::new();
     for (name, files) in upload.others {
         let stored = service.store_volume(&caller.by, tenant, files, &order.tags);
-        let stored = stored.await.map_err(|error| error.at(name))?;
+        let stored = stored.await.map_err(|error| error.for_sender().at(name))?;
         pairs.push((name.to_owned(), stored.volume.id.clone()));
         pins.push(stored.pin);
     }
@@ -103,7 +105,8 @@ pub async fn file_upload(
     }
     let stored = service
         .store_volume(&caller.by, tenant, upload.volume, &order.tags)
-        .await?;
+        .await
+        .map_err(ServiceError::for_sender)?;
     pins.push(stored.pin);
     let volume = Some(stored.volume.item.id);
     let filed = service
@@ -231,7 +234,7 @@ pub async fn accepted(app: &App, job: Job) -> Answer {
             retry_after(starts_in_ms.unwrap_or_default() / 1000.0),
         ),
     ];
-    let body = Json(describe(app, job).await?);
+    let body = Json(describe(app, Scope::Submit, job).await?);
     Ok((StatusCode::ACCEPTED, headers, body).into_response())
 }
 

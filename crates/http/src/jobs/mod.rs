@@ -22,7 +22,7 @@ use super::problem::{Answer, Problem, ProblemBody};
 use super::query::{NoQuery, Query, moment};
 use super::quota::reserve_job;
 use super::request::{PathSegments, json_object, parameters_of, text, unknown};
-use super::scans::ScanQuery;
+use super::scans::{self, ScanQuery};
 use super::tags::{self, TagQuery};
 use super::validators::ValidatedJson;
 use super::webhook_request::webhook_of;
@@ -192,7 +192,7 @@ pub async fn list_jobs(
     let page = charged_by_bytes(page, plan).await?;
     let page = table.jobs(&filter, page).await?;
     let next_cursor = next_cursor(&page);
-    let jobs = describe_all(&app, page.items).await?;
+    let jobs = describe_all(&app, caller.scope, page.items).await?;
     Ok(Json(JobList { jobs, next_cursor }))
 }
 
@@ -214,7 +214,7 @@ pub async fn get_job(
     let read = async || {
         let job = find(&app, &caller.tenant, &id).await?;
         let ended = job.state.is_final();
-        let body = describe(&app, job).await?;
+        let body = describe(&app, caller.scope, job).await?;
         Ok(if ended {
             ControlFlow::Continue(ValidatedJson::of(&body)?)
         } else {
@@ -226,8 +226,7 @@ pub async fn get_job(
         })
     };
     let catalogue = app.service.items().catalogue();
-    // A job says the same to all callers of its tenant.
-    let asker = (&caller.tenant, false);
+    let asker = (&caller.tenant, scans::sees_patients(caller.scope));
     let kept = app.answers.get(catalogue, asker, Resource::Job, &id, read);
     Ok(match kept.await? {
         ControlFlow::Continue(answer) => answer.answer(&headers),
@@ -260,7 +259,7 @@ pub async fn update_job(
     };
     tags::change(&app, &caller, &id, request, tags_of).await?;
     let job = find(&app, &caller.tenant, &id).await?;
-    Ok(Json(describe(&app, job).await?))
+    Ok(Json(describe(&app, caller.scope, job).await?))
 }
 
 /// Whether a job is erased.
@@ -321,7 +320,7 @@ pub async fn delete_job(
             };
         }
     };
-    Ok((status, Json(describe(&app, job).await?)).into_response())
+    Ok((status, Json(describe(&app, caller.scope, job).await?)).into_response())
 }
 
 /// The tenant's job of that id, for which the request is charged, or the 404 or 410 that says why there is none.

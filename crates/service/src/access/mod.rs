@@ -34,7 +34,7 @@ mod storage;
 
 pub use audit::{
     Activity, Agent, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, AuditReport,
-    BrokenLink, Done, KeptRow, NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
+    BrokenLink, KeptRow, NO_HASH, NotRecorded, Outcome, Recorder, chain_hash, fhir, verify,
 };
 pub use gate::{FRESH_FOR, Gate, MOST_MAKERS, Refusal};
 pub use identity::{Identity, Makers};

@@ -2,7 +2,8 @@
 
 use super::parts::SeriesParts;
 use super::trouble::Trouble;
-use super::{ArchiveObject, DuePull, DueSend, ExchangeEnd};
+use super::{ArchiveObject, DueSend, ExchangeEnd};
+use crate::access::Agent;
 use crate::items::Pin;
 use crate::records::Tenant;
 use async_trait::async_trait;
@@ -32,8 +33,8 @@ pub trait ExchangeHost: Send + Sync + 'static {
         name: &str,
     ) -> Result<ArchiveObject, Trouble>;
 
-    /// A fetch has ended.
-    async fn fetched(&self, pull: &DuePull, end: ExchangeEnd);
+    /// Who fetches for `tenant`, by the audit trail.
+    fn agent(&self, tenant: &Tenant) -> Agent;
 
     /// A delivery has ended.
     async fn delivered(&self, send: &DueSend, end: ExchangeEnd);

@@ -7,6 +7,7 @@ use super::parts::PartLimits;
 use super::trouble::Trouble;
 use super::web::DicomWeb;
 use super::{DuePull, HeldSeries, SeriesKey};
+use crate::access::Agent;
 use crate::hooks::{AttemptEnd, Errands, Lane, Rounds};
 use crate::records::{Failure, Fault, Job, StoreResult, Timestamp, content_id};
 use async_trait::async_trait;
@@ -96,7 +97,8 @@ impl Puller {
         let trouble = match fetched {
             Ok((stored, end)) => {
                 // The volume is held until the job has it.
-                let job = store.pulled(&due.job, &stored.volume, now).await?;
+                let pulled = store.pulled(&due.job, &stored.volume, now);
+                let job = Agent::scope(self.agent(due), pulled).await?;
                 drop(stored.pin);
                 if let Some(job) = job {
                     exchange.queue.supplied(&job);
@@ -117,10 +119,16 @@ impl Puller {
             },
             Trouble::Final(failure) => failure,
         };
-        if let Some(job) = store.pull_given_up(&due.job, &failure, now).await? {
+        let given_up = store.pull_given_up(&due.job, &failure, now);
+        if let Some(job) = Agent::scope(self.agent(due), given_up).await? {
             exchange.queue.supplied(&job);
         }
         Ok((ExchangeEnd::GivenUp, meaning))
+    }
+
+    /// Who fetches, by the audit trail.
+    fn agent(&self, due: &DuePull) -> Option<Agent> {
+        Some(self.exchange.host.agent(&due.tenant))
     }
 
     /// Waits until the job is cancelled.
@@ -197,7 +205,6 @@ impl Errands for Puller {
         match self.settle(&due, attempts, fetched).await {
             Ok((end, meaning)) => {
                 self.counts.add(end);
-                self.exchange.host.fetched(&due, end).await;
                 meaning
             }
             Err(error) => {

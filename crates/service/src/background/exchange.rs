@@ -1,9 +1,9 @@
 //! The exchange with archives: series are fetched and stored as uploads are, objects of results are made and delivered.
 
-use crate::access::{Activity, Outcome};
+use crate::access::{Activity, Agent, Outcome};
 use crate::archive::{
-    ArchiveObject, Deliverer, DuePull, DueSend, Exchange, ExchangeEnd, ExchangeHost,
-    ExchangeSettings, Puller, SeriesParts, StoredSeries, Trouble,
+    ArchiveObject, Deliverer, DueSend, Exchange, ExchangeEnd, ExchangeHost, ExchangeSettings,
+    Puller, SeriesParts, StoredSeries, Trouble,
 };
 use crate::error::{Refusal, ServiceError};
 use crate::hooks::RetrySchedule;
@@ -94,7 +94,7 @@ impl ExchangeHost for Service {
             written.map_err(trouble)?;
             upload.join_repeated().await.map_err(trouble)?;
         }
-        let (by, tags) = (self.agent(tenant, AUDIT_AGENT), Tags::default());
+        let (by, tags) = (Service::agent(self, tenant, AUDIT_AGENT), Tags::default());
         let stored = self.store_volume(&by, tenant, upload, &tags);
         let stored = stored.await;
         let stored = stored.map_err(trouble)?;
@@ -163,29 +163,21 @@ impl ExchangeHost for Service {
         })
     }
 
-    async fn fetched(&self, pull: &DuePull, end: ExchangeEnd) {
-        self.recorded(&pull.tenant, Activity::Create, &pull.job, end)
-            .await;
+    fn agent(&self, tenant: &Tenant) -> Agent {
+        Service::agent(self, tenant, AUDIT_AGENT)
     }
 
     async fn delivered(&self, send: &DueSend, end: ExchangeEnd) {
-        self.recorded(&send.tenant, Activity::Read, &send.result, end)
-            .await;
-    }
-}
-
-impl Service {
-    /// Writes to the audit trail what left or entered the service without a request. Attempts that
-    /// will be repeated are not noted.
-    async fn recorded(&self, tenant: &Tenant, activity: Activity, object: &str, end: ExchangeEnd) {
+        // Attempts that will be repeated are not noted.
         let outcome = match end {
             ExchangeEnd::Failed => return,
             ExchangeEnd::Done | ExchangeEnd::Present => Outcome::Success,
             ExchangeEnd::GivenUp => Outcome::Refused,
         };
-        let by = self.agent(tenant, AUDIT_AGENT);
+        let by = Service::agent(self, &send.tenant, AUDIT_AGENT);
         // One that cannot be written now is written later.
-        let _ = by.record(activity, outcome, object.to_owned()).await;
+        let result = send.result.clone();
+        let _ = by.record(Activity::Read, outcome, result).await;
     }
 }
 

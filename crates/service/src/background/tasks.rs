@@ -104,7 +104,14 @@ async fn prune_workitems(service: Arc<Service>, age: Duration, end: Cancellation
         let Some(now) = service.clock().trusted() else {
             continue;
         };
-        let deleted = service.worklist.delete_ended_workitems(now.older_than(age));
+        let before = now.older_than(age);
+        let deleted = async {
+            service
+                .worklist
+                .delete_ended_workitems(before, now.moment())
+                .await?;
+            service.items().overwrite_if_due().await
+        };
         if let Err(error) = deleted.await {
             tracing::error!(%error, "ended work items could not be deleted");
         }

@@ -14,8 +14,8 @@ use super::session::Sessions;
 use crate::error::ServiceError;
 use crate::jobs::Queue;
 use crate::records::{
-    BlobError, ErasureAgent, Failure, Fault, LocalFile, StoreError, StoreFault, StoreResult,
-    milliseconds,
+    BlobError, ErasureAgent, ErasureReason, Failure, Fault, LocalFile, StoreError, StoreFault,
+    StoreResult, milliseconds,
 };
 use async_trait::async_trait;
 use futures::StreamExt;
@@ -412,11 +412,13 @@ impl Gatherer {
             let failed = self.store.failed_before(trusted.older_than(age)).await?;
             let by = ErasureAgent::retention();
             for (tenant, id) in failed {
-                let removed = self.store.remove(&tenant, &id, Some(&by), now).await?;
-                if let Some(files) = removed {
+                let reason = ErasureReason::Retention;
+                let removed = self.store.remove(&tenant, &id, &by, reason, now).await?;
+                if let Some((files, _)) = removed {
                     self.files.discard(&files).await?;
                 }
             }
+            self.queue.items().overwrite_if_due().await?;
         }
         // Listed before the rows are: a file that gets its row meanwhile is among the rows.
         let kept = self.files.kept(ABANDONED_AFTER, trusted).await?;

@@ -63,5 +63,5 @@ pub use record::{
 pub use rules::Rule;
 pub use senders::{AeTitle, Sender, Senders};
 pub use service::ScpSettings;
-pub use session::{Session, Sessions, Waits};
+pub use session::{RecordedGroups, Session, Sessions, Waits};
 pub use wire::{WireError, decode};

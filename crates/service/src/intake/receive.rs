@@ -368,7 +368,7 @@ struct Keeping {
 }
 
 impl Keeping {
-    /// Forces an object to the disk, commits its row, and records that. Returns its group.
+    /// Forces an object to the disk, commits its row with that of the audit trail. Returns its group.
     async fn keep(
         self,
         incoming: Incoming,
@@ -376,14 +376,12 @@ impl Keeping {
         origin: Origin,
     ) -> Result<String, ReceiveError> {
         let group = self.store(incoming, examined, origin).await?;
-        // The first object of a group waits for its row; further ones of the session are counted each second.
+        // The row of the first object of a group was written with it; further ones of the session are counted each second.
         if self.recorded.contains(&group) {
             self.by.note(Activity::Create, group.clone()).await;
-            return Ok(group);
+        } else {
+            self.recorded.insert(&group);
         }
-        let recorded = self.by.did(Activity::Create, group.clone()).await;
-        recorded.map_err(|error| ReceiveError::Storage(error.to_string()))?;
-        self.recorded.insert(&group);
         Ok(group)
     }
 
@@ -402,9 +400,11 @@ impl Keeping {
             file_sha256: examined.file_sha256,
             file: name.clone(),
             bytes: incoming.bytes,
+            recorded: self.recorded.clone(),
         };
         let now = self.clock.now();
-        let added = self.store.add(&object, self.room, now).await;
+        let adding = self.store.add(&object, self.room, now);
+        let added = Agent::scope(Some(self.by.clone()), adding).await;
         let (group, useless) = match added {
             Ok(Added::New(group, obsolete)) => (Ok(group), obsolete),
             Ok(Added::Known(group)) => (Ok(group), Some(name)),

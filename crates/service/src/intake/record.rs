@@ -1,8 +1,11 @@
 //! Received objects: groups of objects that become a volume each, and the interfaces to the database
 //! and the files that keep them.
 
+use super::session::RecordedGroups;
 use crate::records::{BlobError, Failure, ListPage, ListRequest, LocalFile, StoreResult, Tenant};
-use crate::records::{BlobWriter, Cutoff, ErasureAgent, Timestamp, TrustedNow};
+use crate::records::{
+    BlobWriter, Cutoff, ErasureAgent, ErasureReason, Receipt, Timestamp, TrustedNow,
+};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -149,6 +152,8 @@ pub struct NewObject {
     pub file: String,
     /// Its length, bytes.
     pub bytes: u64,
+    /// The groups of which the audit trail has a row of the same session.
+    pub recorded: RecordedGroups,
 }
 
 /// An object of a group.
@@ -245,15 +250,16 @@ pub trait IntakeStore: Send + Sync + 'static {
         page: ListRequest,
     ) -> StoreResult<ListPage<IntakeGroup>>;
 
-    /// Removes a tenant's group and returns the files of its objects; `None` if it has none with that
-    /// id. With `by`, a row of the audit trail says so, in the same transaction.
+    /// Erases a tenant's group. Returns the files of its objects, which are yet to be deleted, and the receipt, which was
+    /// written in the same transaction with the row of the audit trail; `None` if it has none with that id.
     async fn remove(
         &self,
         tenant: &Tenant,
         id: &str,
-        by: Option<&ErasureAgent>,
+        by: &ErasureAgent,
+        reason: ErasureReason,
         now: Timestamp,
-    ) -> StoreResult<Option<Vec<String>>>;
+    ) -> StoreResult<Option<(Vec<String>, Receipt)>>;
 
     /// The failed groups that have not changed since `before`.
     async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>>;

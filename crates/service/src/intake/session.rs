@@ -157,8 +157,8 @@ pub struct Session {
 }
 
 /// The groups of a session of which the audit trail has a row that names them.
-#[derive(Clone, Default)]
-pub(super) struct RecordedGroups(Arc<Mutex<BTreeSet<String>>>);
+#[derive(Debug, Clone, Default)]
+pub struct RecordedGroups(Arc<Mutex<BTreeSet<String>>>);
 
 impl RecordedGroups {
     fn groups(&self) -> MutexGuard<'_, BTreeSet<String>> {
@@ -167,7 +167,7 @@ impl RecordedGroups {
     }
 
     /// Whether there is a row of that group.
-    pub(super) fn contains(&self, group: &str) -> bool {
+    pub fn contains(&self, group: &str) -> bool {
         self.groups().contains(group)
     }
 

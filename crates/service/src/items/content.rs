@@ -4,6 +4,7 @@ use crate::records::{LocalFile, ScanIdentity, StoredVolume, Timestamp};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::io::ErrorKind;
+use ventriform::report::header_text;
 
 /// The output of a job.
 #[derive(Debug, Clone, Default)]
@@ -23,6 +24,20 @@ pub struct OutputFile {
     pub media_type: Cow<'static, str>,
     /// Its content.
     pub bytes: Vec<u8>,
+}
+
+impl WorkOutput {
+    /// What was made without text of the scans' headers, which is kept with whose scan a volume is and nowhere else.
+    pub fn without_header_text(mut self) -> Self {
+        header_text::withhold(&mut self.summary);
+        let documents = self.files.iter_mut();
+        for file in documents.filter(|file| file.media_type == "application/json") {
+            if let Some(bytes) = header_text::withheld(&file.bytes) {
+                file.bytes = bytes;
+            }
+        }
+        self
+    }
 }
 
 /// A stored volume or product, with local copies of its files.
@@ -52,6 +67,17 @@ impl StoredItem {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error),
         }
+    }
+}
+
+impl StoredItem {
+    /// As [`StoredItem::read`], for what is made of a whole item: `None` only if the item has no file of that name.
+    ///
+    /// # Errors
+    /// If the file cannot be read, also because the item was erased meanwhile.
+    pub fn read_whole(&self, name: &str) -> std::io::Result<Option<Vec<u8>>> {
+        let file = self.files.iter().find(|file| file.ends_with(name));
+        file.map(std::fs::read).transpose()
     }
 }
 

@@ -12,7 +12,6 @@ use crate::records::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Items beyond their age that are read at a time.
@@ -71,7 +70,7 @@ impl Items {
         let items = self.clone();
         to_its_end(async move {
             let erased = items.erase_item(&order).await?;
-            items.overwrite_if_due().await?;
+            items.overwrite_erased().await;
             Ok(erased)
         })
         .await
@@ -123,11 +122,6 @@ impl Items {
         Ok(())
     }
 
-    /// Notes that rows were deleted, which are to be overwritten in the database's files.
-    pub(crate) fn note_deleted_rows(&self) {
-        self.overwrite_due.store(true, Ordering::Relaxed);
-    }
-
     /// Erases whose scan a volume is; the volume stays. `false` if there is no such volume, or it is
     /// on legal hold.
     ///
@@ -142,8 +136,7 @@ impl Items {
         to_its_end(async move {
             let now = items.clock.now();
             let erased = items.catalogue.erase_scan(&tenant, &volume, now).await?;
-            items.overwrite_due.store(true, Ordering::Relaxed);
-            items.overwrite_if_due().await?;
+            items.overwrite_erased().await;
             Ok(erased)
         })
         .await
@@ -188,7 +181,6 @@ impl Items {
 
     /// Deletes the files of what a receipt names, where no tenant has it any more.
     pub(super) async fn delete_files(&self, receipt: &Receipt, doomed: &Doomed) {
-        self.overwrite_due.store(true, Ordering::Relaxed);
         for item in &receipt.items {
             let files = doomed.get(&item.id).map_or(&[][..], Vec::as_slice);
             if item.files_erased
@@ -223,17 +215,19 @@ impl Items {
         Ok(())
     }
 
-    /// Overwrites what was deleted from the database since the last time.
+    /// Overwrites what was deleted from the database since the last time, whoever did it.
     ///
     /// # Errors
     /// If the database fails.
     pub async fn overwrite_if_due(&self) -> Result<(), StoreError> {
-        if self.overwrite_due.swap(false, Ordering::Relaxed)
-            && !self.catalogue.overwrite_erased().await?
-        {
-            self.overwrite_due.store(true, Ordering::Relaxed);
+        self.catalogue.overwrite_erased().await.map(|_| ())
+    }
+
+    /// The last step of an erasure, which is done whether it succeeds or not: the upkeep tries again.
+    pub(crate) async fn overwrite_erased(&self) {
+        if let Err(error) = self.overwrite_if_due().await {
+            tracing::warn!(%error, "erased rows are not overwritten yet; the upkeep tries again");
         }
-        Ok(())
     }
 }
 

@@ -29,11 +29,11 @@ pub use erase::RetentionAges;
 pub use pins::Pin;
 pub use sweep::{Custodian, Swept};
 
+use crate::access::Agent;
 use crate::memory::Requester;
 use crate::records::{BlobStore, Catalogue, Clock, Peers, StoreError, Timestamp};
 use pins::ItemLocks;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use tracing::Instrument;
 
 /// The volumes and products of one service.
@@ -42,8 +42,6 @@ pub struct Items {
     blobs: Arc<dyn BlobStore>,
     clock: Arc<dyn Clock>,
     locks: ItemLocks,
-    /// Whether deleted rows may still be read in the database's files.
-    overwrite_due: AtomicBool,
     /// The other processes on the store, if it can be shared.
     peers: Option<Arc<dyn Peers>>,
 }
@@ -61,7 +59,6 @@ impl Items {
             blobs,
             clock,
             locks: ItemLocks::default(),
-            overwrite_due: AtomicBool::new(false),
             peers,
         }
     }
@@ -105,10 +102,11 @@ impl Items {
     }
 }
 
-/// Runs a section to its end even if the caller is dropped meanwhile.
+/// Runs a section to its end even if the caller is dropped meanwhile, for whoever the caller acts.
 async fn to_its_end<T: Send + 'static>(
     section: impl Future<Output = Result<T, StoreError>> + Send + 'static,
 ) -> Result<T, StoreError> {
+    let section = Agent::scope(Agent::acting(), section);
     let section = Requester::current().scope(section);
     tokio::spawn(section.in_current_span())
         .await

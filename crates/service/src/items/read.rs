@@ -4,8 +4,8 @@ use super::{Items, StoredItem, StoredResult, StoredSource};
 use crate::error::ServiceError;
 use crate::memory::read_row;
 use crate::records::{
-    BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, Resource,
-    StoreError, StoreFault, Tenant,
+    BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, ProductFile,
+    Resource, StoreError, StoreFault, Tenant,
 };
 use serde_json::{Map, Value};
 use std::ops::Range;
@@ -120,6 +120,28 @@ impl Items {
         })
     }
 
+    /// As [`Items::with_files`], for what is made of all of them.
+    ///
+    /// # Errors
+    /// If the file store fails; [`StoreFault::Erased`] if the item was erased since its row was read.
+    pub async fn whole(&self, product: Product, wanted: &[&str]) -> Result<StoredItem, StoreError> {
+        let listed = |file: &&ProductFile| wanted.contains(&file.name.as_str());
+        let count = product.files.iter().filter(listed).count();
+        let id = product.id.clone();
+        let error = match self.with_files(product, wanted).await {
+            Ok(item) if item.files.len() == count => return Ok(item),
+            Ok(_) => BlobError::new(
+                StoreFault::DamagedFile,
+                format!("a file of {id} is missing"),
+            ),
+            Err(error) => error,
+        };
+        Err(match error.cause {
+            StoreFault::DamagedFile => self.unless_erased(&id, error).await,
+            _ => error.into(),
+        })
+    }
+
     /// A tenant's product with those of its files that `wanted` names, and the volumes that it was made
     /// of with their files. `None` if the tenant has one of them no more, or the product was made of
     /// no volume.
@@ -153,7 +175,7 @@ impl Items {
         let wanted: Vec<&str> = wanted.iter().map(String::as_str).collect();
         Ok(Some(StoredResult {
             made_at: product.ownership.created_at,
-            files: self.with_files(product.item, &wanted).await?,
+            files: self.whole(product.item, &wanted).await?,
             source,
             rest,
         }))

@@ -74,11 +74,15 @@ pub trait Work: Send + Sync + 'static {
     }
 
     /// The report on a product as an HTML page, made from the product's files. It names whose scan
-    /// it is as far as the fields of `scan` do.
+    /// it is as far as the fields of `scans` do: of its volume, of a comparison then of the one at rest.
     ///
     /// # Errors
     /// If a file is missing, cannot be read or cannot be parsed, or if there is no page.
-    fn page(&self, _product: &StoredItem, _scan: &Map<String, Value>) -> Result<String, Failure> {
+    fn page(
+        &self,
+        _product: &StoredItem,
+        _scans: &[Map<String, Value>],
+    ) -> Result<String, Failure> {
         let detail = format!("A {} has no page.", self.makes().label());
         Err(Failure::new(Fault::Request, "not-found", detail).fix("Read its report instead."))
     }

@@ -72,7 +72,7 @@ impl Work for BeatWork {
         page::BEAT_FILES
     }
 
-    fn page(&self, beat: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        page::beat_page(&|name| beat.read(name), scan).map_err(|error| error.explain())
+    fn page(&self, beat: &StoredItem, scans: &[Map<String, Value>]) -> Result<String, Failure> {
+        page::beat_page(&|name| beat.read_whole(name), scans).map_err(|error| error.explain())
     }
 }

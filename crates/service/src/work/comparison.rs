@@ -98,7 +98,12 @@ impl Work for ComparisonWork {
         page::COMPARISON_FILES
     }
 
-    fn page(&self, comparison: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        page::comparison_page(&|name| comparison.read(name), scan).map_err(|error| error.explain())
+    fn page(
+        &self,
+        comparison: &StoredItem,
+        scans: &[Map<String, Value>],
+    ) -> Result<String, Failure> {
+        page::comparison_page(&|name| comparison.read_whole(name), scans)
+            .map_err(|error| error.explain())
     }
 }

@@ -52,8 +52,8 @@ impl Work for ModelWork {
         page::MODEL_FILES
     }
 
-    fn page(&self, model: &StoredItem, scan: &Map<String, Value>) -> Result<String, Failure> {
-        page::model_page(&|name| model.read(name), scan).map_err(|error| error.explain())
+    fn page(&self, model: &StoredItem, scans: &[Map<String, Value>]) -> Result<String, Failure> {
+        page::model_page(&|name| model.read_whole(name), scans).map_err(|error| error.explain())
     }
 }
 

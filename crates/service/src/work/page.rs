@@ -7,11 +7,12 @@
 //! may be shown of it.
 
 use serde_json::{Map, Value};
+use std::borrow::Cow;
 use std::io;
 use ventriform::export::read_json::{self, ReadMeshError};
 use ventriform::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
-    SegmentationPage, SegmentationReport,
+    SegmentationPage, SegmentationReport, header_text,
 };
 use ventriform::volume::Provenance;
 
@@ -93,7 +94,7 @@ const OTHER_WALLS: [&str; 2] = ["mesh_anatomical.json", "mesh_apparent.json"];
 /// [`PageError`].
 pub(super) fn model_page(
     read: &ReadFile<'_>,
-    scan: &Map<String, Value>,
+    scans: &[Map<String, Value>],
 ) -> Result<String, PageError> {
     let text = required(read, "report.json")?;
     let report: ModelReport = from_json("report.json", &text)?;
@@ -101,7 +102,7 @@ pub(super) fn model_page(
     let closeness: Option<Closeness> = optional(read, "distance.json")?
         .map(|text| from_json("distance.json", &text))
         .transpose()?;
-    let scan = provenance(scan);
+    let scan = first(scans);
     Ok(report::model_page(
         &report,
         &mesh,
@@ -117,7 +118,7 @@ pub(super) fn model_page(
 /// [`PageError`].
 pub(super) fn segmentation_page(
     read: &ReadFile<'_>,
-    scan: &Map<String, Value>,
+    scans: &[Map<String, Value>],
 ) -> Result<String, PageError> {
     let report: SegmentationReport = from_json("report.json", &required(read, "report.json")?)?;
     let mesh_file = required(read, "mesh.json")?;
@@ -145,7 +146,7 @@ pub(super) fn segmentation_page(
         polar: polar.as_deref(),
         polar_map: polar_map.as_ref(),
         region: region.as_deref(),
-        scan: Some(&provenance(scan)),
+        scan: Some(&first(scans)),
     }))
 }
 
@@ -155,7 +156,7 @@ pub(super) fn segmentation_page(
 /// [`PageError`].
 pub(super) fn beat_page(
     read: &ReadFile<'_>,
-    scan: &Map<String, Value>,
+    scans: &[Map<String, Value>],
 ) -> Result<String, PageError> {
     let report: BeatReport = from_json("beat.json", &required(read, "beat.json")?)?;
     let diastole = read_json::decode(&required(read, END_MESHES[0])?)?;
@@ -169,7 +170,7 @@ pub(super) fn beat_page(
         phase: phase.as_deref(),
         maps: &borrowed(&maps),
         meshes: [&diastole, &systole],
-        scan: Some(&provenance(scan)),
+        scan: Some(&first(scans)),
     }))
 }
 
@@ -179,17 +180,19 @@ pub(super) fn beat_page(
 /// [`PageError`].
 pub(super) fn comparison_page(
     read: &ReadFile<'_>,
-    scan: &Map<String, Value>,
+    scans: &[Map<String, Value>],
 ) -> Result<String, PageError> {
     let report = required(read, "comparison.json")?;
     let report: ComparisonReport = from_json("comparison.json", &report)?;
+    let scans = [0, 1].map(|place| scans.get(place).map(provenance).unwrap_or_default());
+    let report = report.with_scans(scans.each_ref());
     let slices = optional(read, COMPARISON_SLICES)?;
     let maps = maps(read, &ComparisonPage::POLAR_MAPS)?;
     Ok(report::comparison_page(&ComparisonPage {
         report: &report,
         slices: slices.as_deref(),
         maps: &borrowed(&maps),
-        scan: Some(&provenance(scan)),
+        scan: Some(&scans[0]),
     }))
 }
 
@@ -213,6 +216,11 @@ fn borrowed(maps: &NamedMaps) -> Vec<(&'static str, &[u8])> {
     maps.map(|(name, svg)| (*name, svg.as_slice())).collect()
 }
 
+/// The scan of a product's volume.
+fn first(scans: &[Map<String, Value>]) -> Provenance {
+    scans.first().map(provenance).unwrap_or_default()
+}
+
 /// Fields of a scan that are named; fields of another type are left out.
 fn provenance(scan: &Map<String, Value>) -> Provenance {
     serde_json::from_value(scan.clone().into()).unwrap_or_default()
@@ -230,5 +238,6 @@ fn from_json<T: serde::de::DeserializeOwned>(
     name: &'static str,
     text: &[u8],
 ) -> Result<T, PageError> {
-    serde_json::from_slice(text).map_err(|error| PageError::Json(name, error))
+    let text = header_text::withheld(text).map_or(Cow::Borrowed(text), Cow::Owned);
+    serde_json::from_slice(&text).map_err(|error| PageError::Json(name, error))
 }

@@ -22,7 +22,9 @@ pub fn part_file(
     format: Format,
 ) -> Result<Option<OutputFile>, Failure> {
     let name = format!("{stem}.{}", Format::Json.extension());
-    let bytes = item.read(&name).map_err(|error| broken_result(&error))?;
+    let bytes = item
+        .read_whole(&name)
+        .map_err(|error| broken_result(&error))?;
     let Some(bytes) = bytes else {
         return Ok(None);
     };

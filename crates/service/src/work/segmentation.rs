@@ -84,9 +84,9 @@ impl Work for SegmentationWork {
     fn page(
         &self,
         segmentation: &StoredItem,
-        scan: &Map<String, Value>,
+        scans: &[Map<String, Value>],
     ) -> Result<String, Failure> {
-        page::segmentation_page(&|name| segmentation.read(name), scan)
+        page::segmentation_page(&|name| segmentation.read_whole(name), scans)
             .map_err(|error| error.explain())
     }
 }

@@ -9,6 +9,7 @@ use serde_json::Value;
 use ventriform::advice::Explain;
 use ventriform::mesh_files::MeshStatement;
 use ventriform::progress::Monitor;
+use ventriform::report::header_text;
 use ventriform::volume::given_mask::{MaskChoice, read_mask};
 use ventriform::volume::nifti::{self, StoredType};
 use ventriform::volume::{self, GateFacts, ReadLimits, ReadOptions, Volume, VolumeFile};
@@ -205,7 +206,9 @@ impl UploadReader for DomainReader {
                 .labels
                 .map(|labels| labels.iter().map(|l| l.label).collect()),
             gates: facts.gates,
-            warnings: facts.warnings,
+            warnings: (facts.warnings.iter())
+                .map(|text| header_text::warning(text).into_owned())
+                .collect(),
         })
     }
 

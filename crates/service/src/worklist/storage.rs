@@ -1,7 +1,7 @@
 //! The interface to the table of work items.
 
 use super::{Workitem, WorkitemState};
-use crate::records::{Bounded, Cutoff, StoreResult, Tenant};
+use crate::records::{Bounded, Cutoff, Erased, ErasureAgent, StoreResult, Tenant, Timestamp};
 use async_trait::async_trait;
 
 /// Bytes of work items that are read at a time.
@@ -56,6 +56,15 @@ pub trait Worklist: Send + Sync + 'static {
     /// The items that this service has claimed and not ended, likewise.
     async fn performed_workitems(&self, after: i64, limit: u32) -> StoreResult<Vec<Workitem>>;
 
-    /// Deletes the items that ended before that moment. Returns how many.
-    async fn delete_ended_workitems(&self, before: Cutoff) -> StoreResult<u64>;
+    /// Erases a tenant's item, with a receipt; not one that this service performs.
+    async fn erase_workitem(
+        &self,
+        tenant: &Tenant,
+        uid: &str,
+        by: &ErasureAgent,
+        now: Timestamp,
+    ) -> StoreResult<Erased>;
+
+    /// Deletes the items that ended before that moment; each leaves a row of the audit trail. Returns how many.
+    async fn delete_ended_workitems(&self, before: Cutoff, now: Timestamp) -> StoreResult<u64>;
 }

@@ -7,8 +7,8 @@ use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
 use ventriform_service::access::{
-    AccessStore, Activity, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
-    KeptRow, Maker, NO_HASH, Quota, Usage, chain_hash,
+    AccessStore, Activity, Agent, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
+    KeptRow, Maker, NO_HASH, Outcome, Quota, Usage, chain_hash,
 };
 use ventriform_service::records::{Cutoff, ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 
@@ -387,6 +387,33 @@ pub(super) fn listed_events(filter: &AuditFilter, page: ListRequest) -> QueryBui
     }
     push_page(&mut query, "sequence", page);
     query
+}
+
+/// Appends the row of an act to the chain, within the transaction that makes the change, if the change is made for
+/// somebody ([`Agent::acting`]).
+pub(super) async fn record(
+    to: &mut Transaction<'_>,
+    activity: Activity,
+    object: &str,
+) -> StoreResult<()> {
+    record_outcome(to, activity, Outcome::Success, object).await
+}
+
+/// As [`record`], for an act that ended in that way.
+pub(super) async fn record_outcome(
+    to: &mut Transaction<'_>,
+    activity: Activity,
+    outcome: Outcome,
+    object: &str,
+) -> StoreResult<()> {
+    if let Some(agent) = Agent::acting() {
+        let event = AuditEvent {
+            outcome,
+            ..agent.acts(activity, object)
+        };
+        append(to, &[event]).await?;
+    }
+    Ok(())
 }
 
 /// Appends events to the chain, within a transaction that holds the database's write lock. Returns

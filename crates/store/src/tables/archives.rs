@@ -1,5 +1,6 @@
 //! The tables of archives. Triggers of the jobs table write their rows; see the migration.
 
+use super::access::{record, record_outcome};
 use super::errands::{self, Errands};
 use super::jobs::renew_volumes;
 use super::rows::{self, to_json};
@@ -7,6 +8,7 @@ use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
+use ventriform_service::access::{Activity, Outcome};
 use ventriform_service::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
@@ -61,14 +63,14 @@ impl ArchiveStore for SqlStore {
         Ok(())
     }
 
-    async fn pulled(&self, job: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>> {
+    async fn pulled(&self, pulled: &str, volume: &str, now: Timestamp) -> StoreResult<Option<Job>> {
         let mut transaction = self.writer.begin().await?;
         let row = query(
             "UPDATE jobs SET volume = $1, revision = revision + 1
              WHERE id = $2 AND state = 'queued' AND volume = '' RETURNING *",
         )
         .bind(volume)
-        .bind(job)
+        .bind(pulled)
         .fetch_optional(&mut transaction)
         .await?;
         let job = row.map(rows::job).transpose()?;
@@ -82,6 +84,9 @@ impl ArchiveStore for SqlStore {
             .execute(&mut transaction)
             .await?;
             renew_volumes(&mut transaction, job, now).await?;
+        }
+        if job.is_some() {
+            record(&mut transaction, Activity::Create, pulled).await?;
         }
         transaction.commit().await?;
         Ok(job)
@@ -136,6 +141,9 @@ impl ArchiveStore for SqlStore {
             .bind(job)
             .execute(&mut transaction)
             .await?;
+        if row.is_some() {
+            record_outcome(&mut transaction, Activity::Create, Outcome::Refused, job).await?;
+        }
         transaction.commit().await?;
         row.map(rows::job).transpose()
     }

@@ -1,13 +1,15 @@
 //! The tables of volumes and products, and the table of holdings that says which tenant
 //! has which of them.
 
-use super::access::stored_bytes;
+use super::access::{record, stored_bytes};
+use super::erasure::forget_deletion;
 use super::pages::{push_page, push_tags};
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use super::scans::{note_upload, push_scan};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{Query, QueryBuilder, query};
 use async_trait::async_trait;
+use ventriform_service::access::Activity;
 use ventriform_service::records::{
     AddedProduct, Bounded, Catalogue, Cutoff, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
     ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource,
@@ -111,6 +113,7 @@ impl Catalogue for SqlStore {
         let now = volume.created_at;
         let new = hold(&mut transaction, tenant, &volume.id, tags, now).await?;
         note_upload(&mut transaction, tenant, &volume.id, scan).await?;
+        record(&mut transaction, Activity::of_added(new), &volume.id).await?;
         transaction.commit().await?;
         Ok(new)
     }
@@ -131,6 +134,7 @@ impl Catalogue for SqlStore {
         }
         let new = hold(&mut transaction, tenant, id, tags, now).await?;
         note_upload(&mut transaction, tenant, id, scan).await?;
+        record(&mut transaction, Activity::of_added(new), id).await?;
         transaction.commit().await?;
         let held = self.volume(tenant, id).await?;
         Ok(held.map(|held| (held, new)))
@@ -206,6 +210,7 @@ impl Catalogue for SqlStore {
         if let Some(volume) = source {
             add_source(&mut transaction, tenant, &product.id, volume).await?;
         }
+        record(&mut transaction, Activity::of_added(new), &product.id).await?;
         transaction.commit().await?;
         Ok(if new {
             AddedProduct::New
@@ -259,30 +264,41 @@ impl Catalogue for SqlStore {
             Some(Resource::Job) => ("jobs", ", revision = revision + 1"),
             _ => ("holdings", ""),
         };
+        let mut transaction = self.writer.begin().await?;
         let changed = query(format!(
             "UPDATE {table} SET external_id = $1, labels = $2{revised}
              WHERE tenant = $3 AND id = $4 AND external_id IS NOT DISTINCT FROM $5 AND labels = $6"
         ))
+        .erasing()
         .bind(&after.external_id)
         .bind(to_json(&after.labels)?)
         .bind(tenant.as_str())
         .bind(id)
         .bind(&before.external_id)
         .bind(to_json(&before.labels)?)
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Update, id).await?;
+        }
+        transaction.commit().await?;
         Ok(changed == 1)
     }
 
     async fn set_library(&self, tenant: &Tenant, id: &str, library: bool) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
         let changed = query(
             "UPDATE holdings SET library = $1 WHERE tenant = $2 AND id = $3 AND kind = 'template'",
         )
         .bind(library)
         .bind(tenant.as_str())
         .bind(id)
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Update, id).await?;
+        }
+        transaction.commit().await?;
         Ok(changed == 1)
     }
 
@@ -292,17 +308,23 @@ impl Catalogue for SqlStore {
         id: &str,
         hold: Option<&LegalHold>,
     ) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
         let changed = query(
             "UPDATE holdings SET hold_reason = $1, held_at = $2, held_by = $3
              WHERE tenant = $4 AND id = $5",
         )
+        .erasing()
         .bind(hold.map(|hold| &hold.reason))
         .bind(hold.map(|hold| hold.since))
         .bind(hold.map(|hold| &hold.by))
         .bind(tenant.as_str())
         .bind(id)
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Update, id).await?;
+        }
+        transaction.commit().await?;
         Ok(changed == 1)
     }
 
@@ -316,15 +338,8 @@ impl Catalogue for SqlStore {
         expected: &[String],
         now: Timestamp,
     ) -> StoreResult<Erased> {
-        let mut transaction = self.writer.begin().await?;
-        let erased = if self.is_held_elsewhere(&mut transaction, expected).await? {
-            Erased::InUse
-        } else {
-            super::erasure::erase(&mut transaction, order, expected, now).await?
-        };
-        // Committed also if nothing was erased, which keeps the connection.
-        transaction.commit().await?;
-        Ok(erased)
+        self.making_room(|| self.erase_once(order, expected, now))
+            .await
     }
 
     async fn erased_at(&self, tenant: &Tenant, id: &str) -> StoreResult<Option<Timestamp>> {
@@ -394,7 +409,27 @@ impl Catalogue for SqlStore {
     }
 
     async fn overwrite_erased(&self) -> StoreResult<bool> {
-        self.writer.overwrite_deleted().await
+        self.overwrite().await
+    }
+}
+
+impl SqlStore {
+    /// Tries the erasure of the method without `_once`.
+    async fn erase_once(
+        &self,
+        order: &ErasureOrder,
+        expected: &[String],
+        now: Timestamp,
+    ) -> StoreResult<Erased> {
+        let mut transaction = self.writer.begin().await?;
+        let erased = if self.is_held_elsewhere(&mut transaction, expected).await? {
+            Erased::InUse
+        } else {
+            super::erasure::erase(&mut transaction, order, expected, now).await?
+        };
+        // Committed also if nothing was erased, which keeps the connection.
+        transaction.commit().await?;
+        Ok(erased)
     }
 }
 
@@ -586,12 +621,7 @@ async fn hold(
     .bind(to_json(&tags.labels)?)
     .execute(&mut *to)
     .await?;
-    // It exists again.
-    query("DELETE FROM erased WHERE tenant = $1 AND id = $2")
-        .bind(tenant.as_str())
-        .bind(id)
-        .execute(to)
-        .await?;
+    forget_deletion(to, tenant, id).await?;
     Ok(known.is_none())
 }
 

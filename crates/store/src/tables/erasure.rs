@@ -13,8 +13,8 @@ use crate::database::Transaction;
 use crate::query::{Target, query};
 use ventriform_service::access::{Activity, AuditEvent};
 use ventriform_service::records::{
-    AuditMark, Cutoff, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, Receipt,
-    Resource, StoreResult, Tenant, Timestamp, random_id,
+    AuditMark, Cutoff, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason,
+    Receipt, Resource, StoreResult, Tenant, Timestamp, random_id,
 };
 
 /// The prefix of the ids of receipts.
@@ -70,25 +70,52 @@ pub(super) async fn erase(
     } else {
         Vec::new()
     };
-    let event = erasure_event(&order.by, tenant, &order.id, now);
+    let what = What {
+        tenant,
+        id: &order.id,
+        by: &order.by,
+        reason: order.reason,
+    };
+    let receipt = write_receipt(to, what, (items, jobs), now).await?;
+    Ok(Erased::Done(Box::new(receipt)))
+}
+
+/// What was erased, by whom and why.
+#[derive(Clone, Copy)]
+pub(super) struct What<'a> {
+    pub tenant: &'a Tenant,
+    pub id: &'a str,
+    pub by: &'a ErasureAgent,
+    pub reason: ErasureReason,
+}
+
+/// Appends the row of an erasure to the audit trail, and stores the receipt, which names that row, the erased items and
+/// the jobs that went with them.
+pub(super) async fn write_receipt(
+    to: &mut Transaction<'_>,
+    what: What<'_>,
+    (items, jobs): (Vec<ErasedItem>, Vec<String>),
+    now: Timestamp,
+) -> StoreResult<Receipt> {
+    let event = erasure_event(what.by, what.tenant, what.id, now);
     let recorded = append(to, &[event]).await?;
     let receipt = Receipt {
         id: random_id(RECEIPT_PREFIX),
-        tenant: tenant.clone(),
-        item: order.id.clone(),
+        tenant: what.tenant.clone(),
+        item: what.id.to_owned(),
         selected_by: Vec::new(),
         erased_at: now,
-        erased_by: order.by.name.clone(),
+        erased_by: what.by.name.clone(),
         audit: AuditMark {
             sequence: recorded.sequence,
             hash: recorded.hash,
         },
-        reason: order.reason,
+        reason: what.reason,
         items,
         jobs,
     };
     store_receipt(to, &receipt).await?;
-    Ok(Erased::Done(Box::new(receipt)))
+    Ok(receipt)
 }
 
 /// Stores a receipt.
@@ -263,5 +290,19 @@ pub(super) async fn record_deletion(
     .bind(now)
     .execute(to)
     .await?;
+    Ok(())
+}
+
+/// Forgets that the item with that id was erased: it exists again.
+pub(super) async fn forget_deletion(
+    to: &mut Transaction<'_>,
+    tenant: &Tenant,
+    id: &str,
+) -> StoreResult<()> {
+    query("DELETE FROM erased WHERE tenant = $1 AND id = $2")
+        .bind(tenant.as_str())
+        .bind(id)
+        .execute(to)
+        .await?;
     Ok(())
 }

@@ -2,9 +2,11 @@
 //! (fetch a series, deliver an object, call a webhook) that waits in a table until it succeeds, is
 //! given up or is taken back. Triggers of the jobs table write the rows; see the migrations.
 
+use super::access::record;
 use super::rows;
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
+use ventriform_service::access::Activity;
 use ventriform_service::hooks::{Backlog, DeliveryState, Lane};
 use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
@@ -168,6 +170,9 @@ impl SqlStore {
             .bind(tenant.as_str())
             .fetch_optional(&mut transaction)
             .await?;
+        if row.is_some() {
+            record(&mut transaction, Activity::Update, job).await?;
+        }
         transaction.commit().await?;
         Ok(row)
     }

@@ -1,11 +1,13 @@
 //! The tables of webhooks. Deliveries are written by a trigger of the jobs table; see the
 //! migration.
 
+use super::access::record;
 use super::errands::{self, Errands};
 use super::rows;
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
+use ventriform_service::access::Activity;
 use ventriform_service::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
     HookEndpoint, HookEvent, Lane, Settlement, SigningSecret,
@@ -16,6 +18,9 @@ use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 const TOO_OLD: &str = "too-old";
 const TOO_MANY: &str = "too-many";
 const ENDPOINT_REMOVED: &str = "endpoint-removed";
+
+/// How the audit trail names the signing secret of a tenant.
+const SECRET_OBJECT: &str = "webhooks/secret";
 
 #[async_trait]
 impl DeliveryStore for SqlStore {
@@ -197,6 +202,9 @@ impl DeliveryStore for SqlStore {
         .bind(limit)
         .execute(&mut transaction)
         .await?;
+        if done > 0 {
+            record(&mut transaction, Activity::Create, &endpoint.id).await?;
+        }
         transaction.commit().await?;
         Ok(done > 0)
     }
@@ -224,6 +232,7 @@ impl DeliveryStore for SqlStore {
         let removed = done > 0;
         if removed {
             give_up(&mut transaction, id, ENDPOINT_REMOVED, now).await?;
+            record(&mut transaction, Activity::Delete, id).await?;
         }
         transaction.commit().await?;
         Ok(removed)
@@ -263,11 +272,13 @@ impl DeliveryStore for SqlStore {
             "INSERT INTO webhook_secrets (tenant, secret) VALUES ($1, $2)
              ON CONFLICT (tenant) DO UPDATE SET former = webhook_secrets.secret, former_until = $3, secret = $2",
         )
+        .erasing()
         .bind(tenant.as_str())
         .bind(fresh.reveal())
         .bind(former_until)
         .execute(&mut transaction)
         .await?;
+        record(&mut transaction, Activity::Update, SECRET_OBJECT).await?;
         transaction.commit().await?;
         Ok(())
     }

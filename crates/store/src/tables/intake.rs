@@ -1,20 +1,21 @@
 //! The tables of received objects.
 
-use super::access::{append, stored_bytes};
-use super::erasure::erasure_event;
+use super::access::{record, stored_bytes};
+use super::erasure::{What, write_receipt};
 use super::pages::push_page;
 use super::rows;
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
+use ventriform_service::access::Activity;
 use ventriform_service::intake::{
     Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
     Protocol, ReceivedObject,
 };
 use ventriform_service::records::{
-    Cutoff, ErasureAgent, Failure, ListPage, ListRequest, StoreError, StoreResult, Tenant,
-    Timestamp, random_id,
+    Cutoff, ErasedFile, ErasedItem, ErasureAgent, ErasureReason, Failure, ListPage, ListRequest,
+    Receipt, StoreError, StoreResult, Tenant, Timestamp, random_id,
 };
 
 /// The columns of a group, with what is counted of its objects.
@@ -37,6 +38,7 @@ impl IntakeStore for SqlStore {
         let obsolete = match earlier(&mut transaction, object).await? {
             Some((group, true, _)) => {
                 reopen_failed(&mut transaction, &group, now).await?;
+                record_first(&mut transaction, object, &group).await?;
                 transaction.commit().await?;
                 return Ok(Added::Known(group));
             }
@@ -70,6 +72,7 @@ impl IntakeStore for SqlStore {
         .bind(now)
         .execute(&mut transaction)
         .await?;
+        record_first(&mut transaction, object, &group).await?;
         transaction.commit().await?;
         Ok(Added::New(group, obsolete))
     }
@@ -209,28 +212,12 @@ impl IntakeStore for SqlStore {
         &self,
         tenant: &Tenant,
         id: &str,
-        by: Option<&ErasureAgent>,
+        by: &ErasureAgent,
+        reason: ErasureReason,
         now: Timestamp,
-    ) -> StoreResult<Option<Vec<String>>> {
-        let mut transaction = self.writer.begin().await?;
-        let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
-            .bind(id)
-            .bind(tenant.as_str())
-            .fetch_optional(&mut transaction)
-            .await?;
-        if known.is_none() {
-            return roll_back(transaction, None).await;
-        }
-        let files = files_of(&mut transaction, id).await?;
-        query("DELETE FROM intake_groups WHERE id = $1")
-            .bind(id)
-            .execute(&mut transaction)
-            .await?;
-        if let Some(by) = by {
-            append(&mut transaction, &[erasure_event(by, tenant, id, now)]).await?;
-        }
-        transaction.commit().await?;
-        Ok(Some(files))
+    ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
+        self.making_room(|| self.remove_once(tenant, id, by, reason, now))
+            .await
     }
 
     async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>> {
@@ -265,6 +252,47 @@ impl IntakeStore for SqlStore {
 }
 
 impl SqlStore {
+    /// Tries the erasure of the method without `_once`.
+    async fn remove_once(
+        &self,
+        tenant: &Tenant,
+        id: &str,
+        by: &ErasureAgent,
+        reason: ErasureReason,
+        now: Timestamp,
+    ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
+        let mut transaction = self.writer.begin().await?;
+        let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
+            .bind(id)
+            .bind(tenant.as_str())
+            .fetch_optional(&mut transaction)
+            .await?;
+        if known.is_none() {
+            return roll_back(transaction, None).await;
+        }
+        let files = files_of(&mut transaction, id).await?;
+        let item = ErasedItem {
+            id: id.to_owned(),
+            files_erased: true,
+            files: waiting_of(&mut transaction, id).await?,
+        };
+        query("DELETE FROM intake_groups WHERE id = $1")
+            .bind(id)
+            .execute(&mut transaction)
+            .await?;
+        let what = What {
+            tenant,
+            id,
+            by,
+            reason,
+        };
+        let receipt = write_receipt(&mut transaction, what, (vec![item], Vec::new()), now).await?;
+        transaction.commit().await?;
+        Ok(Some((files, receipt)))
+    }
+}
+
+impl SqlStore {
     /// Name and SHA-256 of every file of an object that waits.
     pub(crate) async fn waiting_files(&self) -> StoreResult<Vec<(String, String)>> {
         let rows = query(
@@ -283,6 +311,36 @@ impl SqlStore {
             .await?;
         Ok(())
     }
+}
+
+/// The files of a group's objects that wait, for the receipt of their erasure.
+async fn waiting_of(from: &mut Transaction<'_>, group: &str) -> StoreResult<Vec<ErasedFile>> {
+    let rows = query(
+        "SELECT file, bytes, file_sha256 FROM intake_objects
+         WHERE group_id = $1 AND file IS NOT NULL ORDER BY file",
+    )
+    .bind(group)
+    .fetch_all(from)
+    .await?;
+    rows::all(rows, |row| {
+        Ok(ErasedFile {
+            name: row.try_get(0)?,
+            bytes: rows::unsigned(row.try_get(1)?),
+            sha256: row.try_get(2)?,
+        })
+    })
+}
+
+/// Records that a session brings objects of `group`, with the first of them.
+async fn record_first(
+    to: &mut Transaction<'_>,
+    object: &NewObject,
+    group: &str,
+) -> StoreResult<()> {
+    if object.recorded.contains(group) {
+        return Ok(());
+    }
+    record(to, Activity::Create, group).await
 }
 
 /// Ends a transaction that has changed nothing.

@@ -17,7 +17,7 @@
 //! take an index of unfinished jobs, which looks small to it, for as good as the job's key; after a busy
 //! minute that index is full of entries of ended versions, and each of them is read.
 
-use super::access::{append, stored_bytes};
+use super::access::{append, record, stored_bytes};
 use super::catalogue::insert_product;
 use super::erasure::{erasure_event, record_deletion};
 use super::pages::{Times, push_page, push_tags, push_times};
@@ -28,6 +28,7 @@ use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
+use ventriform_service::access::Activity;
 use ventriform_service::records::{
     Bounded, Claimant, DeathLimit, Deleted, ErasureAgent, Failure, Fault, Filed, Interrupted, Job,
     JobFilter, JobOutcome, JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan,
@@ -214,6 +215,7 @@ impl JobStore for SqlStore {
         if let Some(row) = inserted {
             let job = rows::job(row)?;
             renew_volumes(&mut transaction, &job, now).await?;
+            record(&mut transaction, Activity::Execute, &job.id).await?;
             transaction.commit().await?;
             return Ok(Filed::New(job));
         }
@@ -521,6 +523,7 @@ impl JobStore for SqlStore {
     }
 
     async fn interrupt(&self, id: &str, now: Timestamp) -> StoreResult<Interrupted> {
+        let mut transaction = self.writer.begin().await?;
         let row = query(
             "UPDATE jobs SET cancel_requested = TRUE, revision = revision + 1,
                     finished_at = CASE state WHEN 'queued' THEN $1 ELSE finished_at END,
@@ -530,10 +533,14 @@ impl JobStore for SqlStore {
         )
         .bind(now)
         .bind(id)
-        .write_optional(&self.writer)
+        .fetch_optional(&mut transaction)
         .await?;
-        if let Some(row) = row {
-            let job = rows::job(row)?;
+        let job = row.map(rows::job).transpose()?;
+        if let Some(job) = &job {
+            record(&mut transaction, Activity::Delete, &job.id).await?;
+        }
+        transaction.commit().await?;
+        if let Some(job) = job {
             return Ok(match job.state {
                 JobState::Cancelled => Interrupted::Cancelled(job),
                 _ => Interrupted::Asked(job),
@@ -559,6 +566,18 @@ impl JobStore for SqlStore {
         by: Option<&ErasureAgent>,
         now: Timestamp,
     ) -> StoreResult<Deleted> {
+        self.making_room(|| self.delete_job_once(id, by, now)).await
+    }
+}
+
+impl SqlStore {
+    /// Tries the erasure of the method without `_once`.
+    async fn delete_job_once(
+        &self,
+        id: &str,
+        by: Option<&ErasureAgent>,
+        now: Timestamp,
+    ) -> StoreResult<Deleted> {
         let mut transaction = self.writer.begin().await?;
         let row = query(
             "DELETE FROM jobs WHERE id = $1 AND state NOT IN ('queued', 'running')
@@ -576,8 +595,11 @@ impl JobStore for SqlStore {
         };
         let tenant = rows::tenant(&row)?;
         record_deletion(&mut transaction, &tenant, id, now).await?;
-        if let Some(by) = by {
-            append(&mut transaction, &[erasure_event(by, &tenant, id, now)]).await?;
+        match by {
+            Some(by) => {
+                append(&mut transaction, &[erasure_event(by, &tenant, id, now)]).await?;
+            }
+            None => record(&mut transaction, Activity::Delete, id).await?,
         }
         transaction.commit().await?;
         Ok(Deleted::Done)

@@ -1,9 +1,11 @@
 //! The table of scans: whose scan each volume is.
 
+use super::access::record;
 use super::rows::{self, SCAN_COLUMNS, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
+use ventriform_service::access::Activity;
 use ventriform_service::records::{
     ScanFields, ScanFilter, ScanIdentity, Scans, StoreResult, Tenant, Timestamp, UnreadScan,
     random_key,
@@ -49,34 +51,29 @@ impl Scans for SqlStore {
         volume: &str,
         stated: &ScanFields,
     ) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
         let changed = query(
             "INSERT INTO scans (tenant, volume, stated)
              SELECT tenant, id, $3 FROM holdings
              WHERE tenant = $1 AND id = $2 AND kind = 'volume'
              ON CONFLICT (tenant, volume) DO UPDATE SET stated = excluded.stated",
         )
+        .erasing()
         .bind(tenant.as_str())
         .bind(volume)
         .bind(to_json(&stated.0)?)
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Update, volume).await?;
+        }
+        transaction.commit().await?;
         Ok(changed == 1)
     }
 
     async fn erase_scan(&self, tenant: &Tenant, volume: &str, now: Timestamp) -> StoreResult<bool> {
-        let changed = query(
-            "INSERT INTO scans (tenant, volume, erased_at)
-             SELECT tenant, id, $3 FROM holdings
-             WHERE tenant = $1 AND id = $2 AND kind = 'volume' AND held_at IS NULL
-             ON CONFLICT (tenant, volume) DO UPDATE SET
-                 found = NULL, stated = NULL, erased_at = coalesce(scans.erased_at, excluded.erased_at)",
-        )
-        .bind(tenant.as_str())
-        .bind(volume)
-        .bind(now)
-        .write(&self.writer)
-        .await?;
-        Ok(changed == 1)
+        self.making_room(|| self.erase_scan_once(tenant, volume, now))
+            .await
     }
 
     async fn unread_scans(&self, after: i64, limit: u32) -> StoreResult<Vec<UnreadScan>> {
@@ -120,6 +117,36 @@ impl Scans for SqlStore {
         .write(&self.writer)
         .await?;
         Ok(known().await?.unwrap_or_default())
+    }
+}
+
+impl SqlStore {
+    /// Tries the erasure of the method without `_once`.
+    async fn erase_scan_once(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+        now: Timestamp,
+    ) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
+        let changed = query(
+            "INSERT INTO scans (tenant, volume, erased_at)
+             SELECT tenant, id, $3 FROM holdings
+             WHERE tenant = $1 AND id = $2 AND kind = 'volume' AND held_at IS NULL
+             ON CONFLICT (tenant, volume) DO UPDATE SET
+                 found = NULL, stated = NULL, erased_at = coalesce(scans.erased_at, excluded.erased_at)",
+        )
+        .erasing()
+        .bind(tenant.as_str())
+        .bind(volume)
+        .bind(now)
+        .execute(&mut transaction)
+        .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Delete, volume).await?;
+        }
+        transaction.commit().await?;
+        Ok(changed == 1)
     }
 }
 

@@ -1,10 +1,16 @@
 //! The table of work items.
 
+use super::access::{append, record};
+use super::erasure::{What, erasure_event, forget_deletion, record_deletion, write_receipt};
 use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::records::{Bounded, Cutoff, StoreError, StoreResult, Tenant};
+use ventriform_service::access::Activity;
+use ventriform_service::records::{
+    Bounded, Cutoff, Erased, ErasedItem, ErasureAgent, ErasureReason, StoreError, StoreResult,
+    Tenant, Timestamp,
+};
 use ventriform_service::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
@@ -13,6 +19,7 @@ use ventriform_service::worklist::{
 impl Worklist for SqlStore {
     async fn add_workitem(&self, item: &Workitem, limit: u64) -> StoreResult<AddedWorkitem> {
         self.require_room()?;
+        let mut transaction = self.writer.begin().await?;
         let added = query(
             "INSERT INTO workitems (tenant, uid, state, attributes, changed_at)
              SELECT $1, $2, $3, $4, $5
@@ -25,8 +32,13 @@ impl Worklist for SqlStore {
         .bind(to_json(item.attributes.object())?)
         .bind(item.changed_at)
         .bind(i64::try_from(limit).unwrap_or(i64::MAX))
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if added == 1 {
+            forget_deletion(&mut transaction, &item.tenant, &item.uid).await?;
+            record(&mut transaction, Activity::Create, &item.uid).await?;
+        }
+        transaction.commit().await?;
         if added == 1 {
             return Ok(AddedWorkitem::Done);
         }
@@ -61,11 +73,13 @@ impl Worklist for SqlStore {
     }
 
     async fn change_workitem(&self, item: &Workitem) -> StoreResult<bool> {
+        let mut transaction = self.writer.begin().await?;
         let changed = query(
             "UPDATE workitems SET state = $1, transaction_uid = $2, performer = $3, attributes = $4,
                  changed_at = $5, revision = revision + 1
              WHERE tenant = $6 AND uid = $7 AND revision = $8",
         )
+        .erasing()
         .bind(item.state.as_str())
         .bind(&item.transaction)
         .bind(performer_column(&item.performer))
@@ -74,8 +88,12 @@ impl Worklist for SqlStore {
         .bind(item.tenant.as_str())
         .bind(&item.uid)
         .bind(item.revision)
-        .write(&self.writer)
+        .execute(&mut transaction)
         .await?;
+        if changed == 1 {
+            record(&mut transaction, Activity::Update, &item.uid).await?;
+        }
+        transaction.commit().await?;
         Ok(changed == 1)
     }
 
@@ -114,16 +132,91 @@ impl Worklist for SqlStore {
         rows::all(items.await?, item_of)
     }
 
-    async fn delete_ended_workitems(&self, before: Cutoff) -> StoreResult<u64> {
-        query(
-            "DELETE FROM workitems
-             WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < $1",
-        )
-        .bind(before.moment())
-        .write(&self.writer)
-        .await
+    async fn delete_ended_workitems(&self, before: Cutoff, now: Timestamp) -> StoreResult<u64> {
+        let by = ErasureAgent::retention();
+        let mut deleted = 0;
+        loop {
+            let mut transaction = self.writer.begin().await?;
+            let rows = query(
+                "DELETE FROM workitems WHERE sequence IN (
+                     SELECT sequence FROM workitems
+                     WHERE state IN ('COMPLETED', 'CANCELED') AND changed_at < $1
+                     ORDER BY changed_at LIMIT $2)
+                 RETURNING tenant, uid",
+            )
+            .bind(before.moment())
+            .bind(ERASED_ITEMS)
+            .fetch_all(&mut transaction)
+            .await?;
+            let count = rows.len();
+            for row in rows {
+                let (tenant, uid) = (rows::tenant(&row)?, row.try_get::<String, _>("uid")?);
+                record_deletion(&mut transaction, &tenant, &uid, now).await?;
+                append(&mut transaction, &[erasure_event(&by, &tenant, &uid, now)]).await?;
+            }
+            transaction.commit().await?;
+            deleted += count as u64;
+            if count < ERASED_ITEMS as usize {
+                return Ok(deleted);
+            }
+        }
+    }
+
+    async fn erase_workitem(
+        &self,
+        tenant: &Tenant,
+        uid: &str,
+        by: &ErasureAgent,
+        now: Timestamp,
+    ) -> StoreResult<Erased> {
+        self.making_room(|| self.erase_workitem_once(tenant, uid, by, now))
+            .await
     }
 }
+
+impl SqlStore {
+    /// Tries the erasure of the method without `_once`.
+    async fn erase_workitem_once(
+        &self,
+        tenant: &Tenant,
+        uid: &str,
+        by: &ErasureAgent,
+        now: Timestamp,
+    ) -> StoreResult<Erased> {
+        let mut transaction = self.writer.begin().await?;
+        let done = query(
+            "DELETE FROM workitems WHERE tenant = $1 AND uid = $2
+                 AND NOT (state = 'IN PROGRESS' AND performer IS NOT NULL)",
+        )
+        .bind(tenant.as_str())
+        .bind(uid)
+        .execute(&mut transaction)
+        .await?;
+        if done == 0 {
+            transaction.commit().await?;
+            let known = self.workitem(tenant, uid).await?;
+            return Ok(known.map_or(Erased::Unknown, |_| Erased::InUse));
+        }
+        record_deletion(&mut transaction, tenant, uid, now).await?;
+        let item = ErasedItem {
+            id: uid.to_owned(),
+            files_erased: true,
+            files: Vec::new(),
+        };
+        let what = What {
+            tenant,
+            id: uid,
+            by,
+            reason: ErasureReason::Request,
+        };
+        let receipt = write_receipt(&mut transaction, what, (vec![item], Vec::new()), now).await?;
+        transaction.commit().await?;
+        Ok(Erased::Done(Box::new(receipt)))
+    }
+}
+
+/// Ended items that are erased in one transaction.
+const ERASED_ITEMS: u32 = 200;
 
 /// A statement for the items for which `which` holds: at most `$2` after position `$1`, as long as those before each
 /// have fewer than `$3` bytes together. Sizes are added up before any item is read.

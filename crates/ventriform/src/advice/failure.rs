@@ -19,6 +19,9 @@ pub struct Failure {
     /// Advice, as a sentence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
+    /// The cause with the texts of the file that it is about, for whoever sent the file, in the answer to that. Never stored.
+    #[serde(skip)]
+    pub to_sender: Option<String>,
 }
 
 /// Where the cause of a [`Failure`] lies.
@@ -44,6 +47,7 @@ impl Failure {
             detail: detail.into(),
             field: None,
             fix: None,
+            to_sender: None,
         }
     }
 
@@ -51,6 +55,20 @@ impl Failure {
     #[must_use]
     pub fn at(mut self, field: impl Into<String>) -> Self {
         self.field = Some(field.into());
+        self
+    }
+
+    /// Sets what whoever sent the file is told instead.
+    #[must_use]
+    pub fn or_to_sender(mut self, detail: String) -> Self {
+        self.to_sender = (detail != self.detail).then_some(detail);
+        self
+    }
+
+    /// Tells whoever sent the file its texts.
+    #[must_use]
+    pub fn for_sender(mut self) -> Self {
+        self.detail = self.to_sender.take().unwrap_or(self.detail);
         self
     }
 

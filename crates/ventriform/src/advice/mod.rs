@@ -82,8 +82,8 @@ impl Explain for VolumeError {
             VolumeError::TooLarge { .. } => (Fault::TooLarge, "volume-too-large"),
             VolumeError::Mesh { error, .. } => {
                 let mut told = error.explain();
-                told.detail = sentence(self);
-                return told;
+                told.detail = sentence(&self.without_header_text());
+                return told.or_to_sender(sentence(self));
             }
             VolumeError::SingleSlice { .. } => (Fault::Content, "single-slice"),
             VolumeError::FrameNeeded { .. } => (Fault::Request, "frame-needed"),
@@ -101,7 +101,8 @@ impl Explain for VolumeError {
             VolumeError::Cancelled(_) => CANCELLED_FAILURE,
             _ => (Fault::Content, "unusable-volume"),
         };
-        failure(kind, self, self.field(), volume_advice(self))
+        let told = self.without_header_text();
+        failure(kind, &told, self.field(), volume_advice(self)).or_to_sender(sentence(self))
     }
 
     fn is_cancelled(&self) -> bool {
@@ -378,6 +379,7 @@ impl Explain for ComparisonError {
 /// A failure of one of two scans: its text begins with the scan's name.
 fn of_scan(scan: WhichScan, mut told: Failure) -> Failure {
     told.detail = format!("{scan}: {}", told.detail);
+    told.to_sender = told.to_sender.map(|text| format!("{scan}: {text}"));
     told
 }
 
@@ -453,7 +455,7 @@ impl Explain for GivenMaskError {
             ),
             GivenMaskError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN.into()),
         };
-        failure(kind, self, field, advice)
+        failure(kind, &self.without_header_text(), field, advice)
     }
 
     fn is_cancelled(&self) -> bool {

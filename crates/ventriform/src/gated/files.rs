@@ -187,7 +187,8 @@ impl GatedHeart {
             "edv_ml": report.edv_ml, "esv_ml": report.esv_ml, "ef_percent": report.ef_percent,
         });
         Ok(Metadata {
-            frame_of_reference_uid: scan.and_then(|scan| scan.frame_of_reference_uid.clone()),
+            frame_of_reference_uid: scan
+                .and_then(|scan| scan.frame_of_reference().map(str::to_owned)),
             quality: report::object(&figures),
             parts: self.segmentation.parts(&self.wall.mesh, monitor)?,
             field: self.segmentation.uptake(&self.wall.mesh),

@@ -114,6 +114,23 @@ pub enum MeshFileError {
     Size(UnlikelySize),
 }
 
+impl MeshFileError {
+    /// The error without words of the file.
+    #[must_use]
+    pub fn without_text(&self) -> Self {
+        let mut error = self.clone();
+        let hidden = || "something that is not told here".to_owned();
+        match &mut error {
+            Self::Unknown { start: text }
+            | Self::Damaged { reason: text, .. }
+            | Self::Unsupported { what: text, .. }
+            | Self::UnknownWord { word: text, .. } => *text = hidden(),
+            _ => {}
+        }
+        error
+    }
+}
+
 /// The error for a file that begins with `start`.
 pub(super) fn unknown(start: &[u8]) -> MeshFileError {
     let first = &start[..start.len().min(8)];

@@ -27,6 +27,7 @@ mod distance_pictures;
 pub mod elements;
 mod embedded;
 mod fit_report;
+pub mod header_text;
 mod input;
 mod json_number;
 pub mod measure;

@@ -122,7 +122,8 @@ impl ComparedHeart {
         let (segmentation, mesh) = (self.segmentation(), self.mesh());
         let scan = self.provenance();
         Ok(Metadata {
-            frame_of_reference_uid: scan.and_then(|scan| scan.frame_of_reference_uid.clone()),
+            frame_of_reference_uid: scan
+                .and_then(|scan| scan.frame_of_reference().map(str::to_owned)),
             parts: segmentation.parts(mesh, monitor)?,
             field: segmentation.uptake(mesh),
             ..Metadata::new(format!("Left ventricle at {}", which.as_str()))

@@ -255,4 +255,182 @@ impl VolumeError {
             _ => None,
         }
     }
+
+    /// The error without what the file says in words: values that are texts, names of series, first bytes. Numbers, UIDs of
+    /// known form and the standard's own terms stay. For records that outlive the file, or that others read.
+    #[must_use]
+    pub fn without_header_text(&self) -> Self {
+        let mut error = self.clone();
+        match &mut error {
+            VolumeError::Field { value, .. } => {
+                if !is_told(value) {
+                    *value = untold(value);
+                }
+            }
+            VolumeError::NotSlices { image_type, .. } => {
+                if !image_type.split('\\').all(is_term) {
+                    *image_type = untold(image_type);
+                }
+            }
+            // SOP class and modality follow in parentheses.
+            VolumeError::NotVolume { found: text, .. }
+            | VolumeError::Unsupported { format: text, .. } => {
+                if let Some((name, said)) = text.rsplit_once(" (")
+                    && !said
+                        .trim_end_matches(')')
+                        .chars()
+                        .all(|c| c.is_ascii_hexdigit() || c == ',')
+                {
+                    *text = name.to_owned();
+                }
+            }
+            // The series are listed after a colon.
+            VolumeError::NotOneSeries { reason, .. } => {
+                if let Some((count, _)) = reason.split_once(" series: ") {
+                    *reason = format!("{count} series; send the files of one of them alone");
+                }
+            }
+            VolumeError::Unrecognised { start, .. } => *start = "other bytes".to_owned(),
+            VolumeError::Mesh { error, .. } => *error = error.without_text(),
+            _ => {}
+        }
+        error
+    }
+}
+
+/// Words of this program in the place of a value.
+const OWN_WORDS: [&str; 9] = [
+    "missing",
+    "contradictory",
+    "present",
+    "given too often",
+    "in one piece",
+    "in fragments",
+    "in more fragments",
+    "not finite",
+    "empty",
+];
+
+/// Whether a value is no text of the file: a number or several, a UID, or words of this program.
+fn is_told(value: &str) -> bool {
+    let is_number = |c: char| c.is_ascii_digit() || " .,+-()[]\\".contains(c);
+    let numbers = value.split(is_number).filter(|rest| !rest.is_empty());
+    OWN_WORDS.contains(&value)
+        || numbers
+            .clone()
+            .all(|rest| ["e", "E", "NaN", "inf", "bytes", "long", "intercept"].contains(&rest))
+        || (value.starts_with('(')
+            && value
+                .chars()
+                .all(|c| c.is_ascii_hexdigit() || " (),".contains(c)))
+}
+
+/// What stands for a text.
+fn untold(value: &str) -> String {
+    format!("a text of {} characters", value.chars().count())
+}
+
+/// Whether a value of Image Type is a term of the standard that tells the kind of image.
+fn is_term(value: &str) -> bool {
+    const TERMS: [&str; 22] = [
+        "",
+        "ORIGINAL",
+        "DERIVED",
+        "PRIMARY",
+        "SECONDARY",
+        "STATIC",
+        "DYNAMIC",
+        "GATED",
+        "WHOLE BODY",
+        "TOMO",
+        "GATED TOMO",
+        "RECON TOMO",
+        "RECON GATED TOMO",
+        "EMISSION",
+        "TRANSMISSION",
+        "LOCALIZER",
+        "MOSAIC",
+        "AXIAL",
+        "REPROJECTION",
+        "VOLUME",
+        "NONE",
+        "OTHER",
+    ];
+    TERMS.contains(&value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a header says of a person.
+    const MARK: &str = "Zzyzx^Maria";
+
+    #[test]
+    fn no_error_keeps_a_text_of_the_file() {
+        let file = || "volume.dcm".to_owned();
+        let field = |value: &str| VolumeError::Field {
+            file: file(),
+            field: "Rescale Slope (0028,1053)",
+            value: value.to_owned(),
+            reason: "1 decimal number(s) expected".into(),
+            byte: None,
+        };
+        let errors = [
+            field(MARK),
+            field(&format!("1.5\\{MARK}")),
+            VolumeError::NotSlices {
+                file: file(),
+                image_type: MARK.into(),
+                reason: "it is no slice",
+                fix: "",
+            },
+            VolumeError::NotVolume {
+                file: file(),
+                found: format!("a CT Image (1.2.{MARK}, modality {MARK})"),
+                reason: "an object of a kind that is not read",
+                fix: "",
+            },
+            VolumeError::Unsupported {
+                file: file(),
+                format: format!("a DICOM file in an unknown transfer syntax ({MARK})"),
+                fix: "",
+            },
+            VolumeError::NotOneSeries {
+                count: 4,
+                reason: format!(
+                    "they belong to 2 series: number {MARK} \"{MARK}\" (UID 1.2, 4 files); send them"
+                ),
+            },
+            VolumeError::Unrecognised {
+                file: file(),
+                start: MARK.into(),
+            },
+        ];
+        for error in errors {
+            let told = error.without_header_text().to_string();
+            assert!(
+                error.to_string().contains(MARK) && !told.contains("Zzyzx"),
+                "{told}"
+            );
+        }
+        let kept = [
+            "1.5\\2",
+            "[0.0, -1e-3]",
+            "missing",
+            "12",
+            "(0054,0080) (0054,0050)",
+            "70000 bytes long",
+        ];
+        for value in kept {
+            assert_eq!(field(value).without_header_text(), field(value));
+        }
+        let recon = VolumeError::NotVolume {
+            file: file(),
+            found: "a DICOM data set without a SOP Class UID (0008,0016)".into(),
+            reason: "it does not say what it holds",
+            fix: "",
+        };
+        assert_eq!(recon.without_header_text(), recon);
+    }
 }

@@ -61,7 +61,7 @@ impl Reading {
     pub fn frame_of_reference(&self) -> Option<&str> {
         let placed = self.facts.affine_source == AffineSource::ImagePosition;
         let from = self.provenance.as_ref().filter(|_| placed)?;
-        from.frame_of_reference_uid.as_deref()
+        from.frame_of_reference()
     }
 }
 

@@ -139,6 +139,13 @@ impl Provenance {
         arc.is_finite().then_some(arc.abs())
     }
 
+    /// The Frame of Reference UID, which meshes name; `None` if the header has a text in its place.
+    pub fn frame_of_reference(&self) -> Option<&str> {
+        let uid = self.frame_of_reference_uid.as_deref()?;
+        let formed = uid.len() <= 64 && uid.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+        formed.then_some(uid)
+    }
+
     /// The total dose in MBq, as text; what is no number stays as the header has it.
     pub fn injected_dose_mbq(&self) -> Option<String> {
         /// Units of the header in a megabecquerel, in PET images.

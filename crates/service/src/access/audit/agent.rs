@@ -1,8 +1,13 @@
 //! Who changes something, and the row that says so.
 //!
-//! A use case that changes something takes the [`Agent`] for whom it does, and makes the change by [`Agent::change`]: the
-//! change and its row are one task, which goes on if the caller goes away. So a request whose connection is reset, or that
-//! is refused after a part of it was done, leaves the rows of what it has done.
+//! A use case that changes something takes the [`Agent`] for whom it does, and makes the change by [`Agent::change`]. While
+//! the change runs, [`Agent::acting`] tells the store who acts; the store names the act where it makes the change, and writes
+//! its row ([`Agent::acts`]) in the transaction of the change. Both are on disk, or neither: a row that cannot be written
+//! undoes the change, and a process that dies between the two leaves none of them.
+//!
+//! The change is a task of its own, which goes on if the caller goes away. So a request whose connection is reset, or that is
+//! refused after a part of it was done, leaves the rows of what it has done. What the service does of itself, without an
+//! agent, leaves no row.
 
 use super::event::{Activity, AuditEvent, Outcome};
 use super::recorder::{NotRecorded, Recorder};
@@ -13,8 +18,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing::Instrument;
 
-/// An act that was done: what it was, and the id of the item.
-pub type Done = (Activity, String);
+tokio::task_local! {
+    /// For whom the task makes changes.
+    static ACTING: Agent;
+}
 
 /// What became of an agent's rows.
 #[derive(Debug, Default)]
@@ -89,33 +96,43 @@ impl Agent {
         }
     }
 
-    /// Makes a change and writes its row, both in a task of their own, which goes on if the caller goes away. `done` tells
-    /// the act; `None` if nothing was changed.
+    /// Makes a change for this agent, in a task of its own, which goes on if the caller goes away. The store writes the row of
+    /// each act in the transaction of the change.
     ///
     /// # Errors
-    /// Those of `change`. That the row could not be written is no error here: see [`Agent::lacks_rows`].
+    /// Those of `change`; one is that the row cannot be written: then nothing was changed.
     pub async fn change<T, E>(
         &self,
         change: impl Future<Output = Result<T, E>> + Send + 'static,
-        done: impl FnOnce(&T) -> Option<Done> + Send + 'static,
     ) -> Result<T, E>
     where
         T: Send + 'static,
         E: From<StoreError> + Send + 'static,
     {
-        let agent = self.clone();
-        let task = async move {
-            let changed = change.await?;
-            if let Some((activity, object)) = done(&changed) {
-                // Whoever waits for the change asks the agent.
-                let _ = agent.did(activity, object).await;
-            }
-            Ok(changed)
-        };
+        let task = Self::scope(Some(self.clone()), change);
         let task = Requester::current().scope(task);
         tokio::spawn(task.in_current_span())
             .await
             .unwrap_or_else(|error| Err(StoreError::database(error.to_string()).into()))
+    }
+
+    /// For whom the running task makes changes; `None` if the service does of itself.
+    pub fn acting() -> Option<Self> {
+        ACTING.try_with(Clone::clone).ok()
+    }
+
+    /// Runs a part of a change that has a task of its own for `agent`, which [`Agent::acting`] told before that task began.
+    pub async fn scope<T>(agent: Option<Self>, part: impl Future<Output = T>) -> T {
+        match agent {
+            Some(agent) => ACTING.scope(agent, part).await,
+            None => part.await,
+        }
+    }
+
+    /// The row of an act of this agent that is being done. The store commits it with the change.
+    pub fn acts(&self, activity: Activity, object: &str) -> AuditEvent {
+        self.rows.written.store(true, Ordering::Relaxed);
+        self.event(activity, self.clock.now()).on(object)
     }
 
     /// Writes the row of an act that was done; returns when it is on disk. One that cannot be written is tried again each
@@ -158,7 +175,7 @@ impl Agent {
         self.recorder.note(event).await;
     }
 
-    /// Whether a change was tried to be recorded.
+    /// Whether a change has a row, or was tried to be recorded.
     pub fn has_acted(&self) -> bool {
         self.rows.written.load(Ordering::Relaxed) || self.lacks_rows()
     }

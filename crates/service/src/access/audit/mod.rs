@@ -17,7 +17,7 @@ mod event;
 mod fhir;
 mod recorder;
 
-pub use agent::{Agent, Done};
+pub use agent::Agent;
 pub use chain::{AuditReport, BrokenLink, NO_HASH, chain_hash, verify};
 pub use event::{
     Activity, Anchor, AuditEvent, AuditFilter, AuditLink, AuditRecord, KeptRow, Outcome,

@@ -133,7 +133,6 @@ impl Queue {
     /// # Errors
     /// If the database fails.
     pub async fn delete_job(&self, id: &str) -> Result<Deleted, StoreError> {
-        self.items.note_deleted_rows();
         self.jobs.delete_job(id, None, self.clock.now()).await
     }
 
@@ -149,7 +148,6 @@ impl Queue {
         let mut pages = ExpiredPages::new(Resource::Job, trusted.older_than(age));
         while let Some(page) = pages.next(self.items.catalogue()).await? {
             for found in page {
-                self.items.note_deleted_rows();
                 let by = Some(ErasureAgent::retention());
                 let now = self.clock.now();
                 self.jobs.delete_job(&found.id, by.as_ref(), now).await?;

@@ -294,10 +294,11 @@ impl JobRunner {
                 let (work, input) = prepared?;
                 let observer = ProgressSender::new(work.plan(), reports);
                 let monitor = Monitor::new(&observer, cancel);
-                match isolation {
+                let made = match isolation {
                     Some(isolation) => isolation.compute(&kind, &input, threads, &monitor),
                     None => Ok(work.run(&input, &monitor)?),
-                }
+                };
+                made.map(WorkOutput::without_header_text)
             }));
             // The receiver is gone only if the job was ended without the computation.
             let _ = sender.send(computed);

@@ -6,7 +6,7 @@ use super::{scan, stored};
 use crate::items::{StoredResult, StoredSource};
 use crate::records::Failure;
 use ventriform::advice::Explain;
-use ventriform::export::dicom::{ComparisonObject, DicomComparison, Structure};
+use ventriform::export::dicom::{ComparisonObject, DicomComparison, SourceScan, Structure};
 use ventriform::report::ComparisonReport;
 use ventriform::volume::ReadLimits;
 
@@ -41,6 +41,12 @@ pub fn object(
     };
     let scans = [source(&result.source)?, source(rest)?];
     let structure = Structure::of("left_ventricle");
+    let [stress, rest] = scans.each_ref().map(SourceScan::shown);
+    // Objects that are freed of the identity say nothing of the headers.
+    let report = match stress.zip(rest) {
+        Some((stress, rest)) => report.with_scans([stress, rest]),
+        None => report,
+    };
     let comparison = DicomComparison::new(structure, &scans, &report, &text);
     if object == ComparisonObject::Measurements {
         return (comparison.measurements().map(Some)).map_err(|error| error.explain());

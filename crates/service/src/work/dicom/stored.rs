@@ -5,11 +5,13 @@ use crate::items::StoredItem;
 use crate::records::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::borrow::Cow;
 use ventriform::advice::Explain;
 use ventriform::export::read_json;
 use ventriform::grid::voxelise::Mask;
 use ventriform::mesh::TriMesh;
 use ventriform::progress::Monitor;
+use ventriform::report::header_text;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 /// A file's content; `None` if the result has no such file.
@@ -17,7 +19,7 @@ use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 /// # Errors
 /// If it cannot be read.
 pub fn read(item: &StoredItem, name: &str) -> Result<Option<Vec<u8>>, Failure> {
-    item.read(name).map_err(|error| broken_result(&error))
+    item.read_whole(name).map_err(|error| broken_result(&error))
 }
 
 /// A file's content.
@@ -28,12 +30,13 @@ pub fn required(item: &StoredItem, name: &str) -> Result<Vec<u8>, Failure> {
     read(item, name)?.ok_or_else(|| broken_result(&format!("the file {name} is missing")))
 }
 
-/// A report of type `R`.
+/// A report of type `R`, without text of headers.
 ///
 /// # Errors
 /// If it is none.
 pub fn report<R: DeserializeOwned>(bytes: &[u8]) -> Result<R, Failure> {
-    serde_json::from_slice(bytes).map_err(|error| broken_result(&error))
+    let bytes = header_text::withheld(bytes).map_or(Cow::Borrowed(bytes), Cow::Owned);
+    serde_json::from_slice(&bytes).map_err(|error| broken_result(&error))
 }
 
 /// A report without its spaces; UIDs are derived from this text.
@@ -41,7 +44,8 @@ pub fn report<R: DeserializeOwned>(bytes: &[u8]) -> Result<R, Failure> {
 /// # Errors
 /// If it is no JSON.
 pub fn report_text(bytes: &[u8]) -> Result<String, Failure> {
-    Ok(report::<Value>(bytes)?.to_string())
+    let whole: Value = serde_json::from_slice(bytes).map_err(|error| broken_result(&error))?;
+    Ok(whole.to_string())
 }
 
 /// The mesh in the JSON file of that name.

@@ -330,7 +330,7 @@ impl SourceScan {
     }
 
     /// What a picture may name of the scan; `None` of a scan without identity.
-    pub(super) fn shown(&self) -> Option<&Provenance> {
+    pub fn shown(&self) -> Option<&Provenance> {
         (!self.deidentified).then_some(&self.provenance)
     }
 

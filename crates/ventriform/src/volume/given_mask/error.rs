@@ -97,6 +97,26 @@ pub enum GivenMaskError {
     Cancelled(#[from] Cancelled),
 }
 
+impl GivenMaskError {
+    /// The error without what the file says in words: names of structures are left out, their numbers stay.
+    #[must_use]
+    pub fn without_header_text(&self) -> Self {
+        let mut error = self.clone();
+        match &mut error {
+            Self::File(file) => *file = file.without_header_text(),
+            Self::SeveralStructures { present }
+            | Self::OnlyCavity { present }
+            | Self::NoSuchStructure { present, .. } => {
+                present
+                    .iter_mut()
+                    .for_each(|structure| structure.names.clear());
+            }
+            _ => {}
+        }
+        error
+    }
+}
+
 fn list(present: &[MaskStructure]) -> String {
     if present.is_empty() {
         return "no labels".into();
