@@ -222,7 +222,10 @@ fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     }
     let wall = model.sensed_wall.as_ref()?;
     let uptake = field_of_view::bright_uptake(wall, volume);
-    if let Some((pair, score)) = exchanged_axes::exchanged(volume, &cup.centre, uptake) {
+    // Where the background is not at zero, shares of the uptake show neither body nor liver.
+    let exchanged = exchanged_axes::exchanged(volume, &cup.centre, uptake)
+        .filter(|_| values::background(volume, uptake).is_none());
+    if let Some((pair, score)) = exchanged {
         return Some(Flag::ExchangedAxes { pair, score });
     }
     if axis.x > OPEN_SIDE_SINE {
