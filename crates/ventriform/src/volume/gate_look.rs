@@ -718,7 +718,7 @@ mod tests {
 
     #[test]
     fn a_gate_that_repeats_another_or_has_too_many_counts_tells_nothing() {
-        let all = beat(8, 1.0);
+        let all = beat(8, 12.0);
         let alone = summed(&all).unwrap().volume.voxels;
         // A ninth that closes the cycle is none.
         let closed = [&all[..], &all[..1]].concat();
@@ -755,7 +755,7 @@ mod tests {
                 let centre = USUAL.centre + 28.0 * Vec3::new(turn.cos(), turn.sin(), 0.3);
                 Heart {
                     centre,
-                    radius_mm: 24.0 + f64::from(n % 3) * 5.0,
+                    radius_mm: 24.0 + f64::from(n % 3) * 2.0,
                     ..USUAL
                 }
                 .image()

@@ -87,8 +87,8 @@ fn stress_and_rest_together_are_refused_by_their_names() {
         named("6", "1.8", "4", "REST AC"),
     ]);
     for part in [
-        "number 3 \"STRESS AC\" (UID 1.7, 2 files)",
-        "number 4 \"REST AC\" (UID 1.8, 1 files)",
+        "number 3 \"STRESS AC\" (UID 1.7, 2 files; rest or stress",
+        "number 4 \"REST AC\" (UID 1.8, 1 files; rest or stress",
         "send the files of one of them alone",
     ] {
         assert!(said.contains(part), "{said}");
