@@ -21,7 +21,7 @@ pub struct Failure {
     pub fix: Option<String>,
     /// The cause with the texts of the file that it is about, for whoever sent the file, in the answer to that. Never stored.
     #[serde(skip)]
-    pub to_sender: Option<String>,
+    pub to_sender: Option<Box<str>>,
 }
 
 /// Where the cause of a [`Failure`] lies.
@@ -61,14 +61,14 @@ impl Failure {
     /// Sets what whoever sent the file is told instead.
     #[must_use]
     pub fn or_to_sender(mut self, detail: String) -> Self {
-        self.to_sender = (detail != self.detail).then_some(detail);
+        self.to_sender = (detail != self.detail).then(|| detail.into());
         self
     }
 
     /// Tells whoever sent the file its texts.
     #[must_use]
     pub fn for_sender(mut self) -> Self {
-        self.detail = self.to_sender.take().unwrap_or(self.detail);
+        self.detail = self.to_sender.take().map_or(self.detail, String::from);
         self
     }
 

@@ -379,7 +379,7 @@ impl Explain for ComparisonError {
 /// A failure of one of two scans: its text begins with the scan's name.
 fn of_scan(scan: WhichScan, mut told: Failure) -> Failure {
     told.detail = format!("{scan}: {}", told.detail);
-    told.to_sender = told.to_sender.map(|text| format!("{scan}: {text}"));
+    told.to_sender = told.to_sender.map(|text| format!("{scan}: {text}").into());
     told
 }
 

@@ -262,15 +262,9 @@ impl VolumeError {
     pub fn without_header_text(&self) -> Self {
         let mut error = self.clone();
         match &mut error {
-            VolumeError::Field { value, .. } => {
-                if !is_told(value) {
-                    *value = untold(value);
-                }
-            }
-            VolumeError::NotSlices { image_type, .. } => {
-                if !image_type.split('\\').all(is_term) {
-                    *image_type = untold(image_type);
-                }
+            VolumeError::Field { value, .. } if !is_told(value) => *value = untold(value),
+            VolumeError::NotSlices { image_type, .. } if !image_type.split('\\').all(is_term) => {
+                *image_type = untold(image_type);
             }
             // SOP class and modality follow in parentheses.
             VolumeError::NotVolume { found: text, .. }
