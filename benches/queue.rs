@@ -285,7 +285,7 @@ impl Work for Sleepy {
     fn page(
         &self,
         product: &StoredItem,
-        scan: &serde_json::Map<String, serde_json::Value>,
+        scan: &[serde_json::Map<String, serde_json::Value>],
     ) -> Result<String, Failure> {
         self.real.page(product, scan)
     }

@@ -2442,6 +2442,7 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         quota: Quota::default(),
         expires_at: None,
         maker: Maker::Operator,
+        owner: None,
     };
     let (api_key, _) = ApiKey::make(new_key, now()).unwrap();
     let event = |activity| AuditEvent::new(now(), activity, t.clone(), "clerk".into());

@@ -433,6 +433,7 @@ async fn rows_that_are_missing_on_a_server_are_found_and_mended_alike() {
         scope: Scope::Read,
         quota: Quota::default(),
         maker: Maker::Operator,
+        owner: None,
         expires_at: None,
     };
     let (made_key, _) = ApiKey::make(request, 1).unwrap();

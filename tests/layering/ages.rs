@@ -34,6 +34,14 @@ const RAW_CLOCKS: &[(&str, &str)] = &[
         "names of folders in the quarantine",
     ),
     (
+        "crates/store/src/kept.rs",
+        "the stamp of the note beside the database",
+    ),
+    (
+        "crates/store/src/missed.rs",
+        "stamps of what a command does",
+    ),
+    (
         "crates/store/src/s3/doctor.rs",
         "names of folders in the quarantine",
     ),
@@ -75,6 +83,11 @@ const AGE_FIELDS: &[&str] = &[
 
 /// The statements that compare a stamp with a moment: the file, the column and the comparison, and by which time.
 const COMPARISONS: &[(&str, &str)] = &[
+    // Two stamps of one store.
+    (
+        "kept.rs: noted_at <=",
+        "a note from before the store was opened",
+    ),
     // By an age.
     ("tables/access.rs: recorded >=", "Cutoff of the retention"),
     ("tables/catalogue.rs: {since} <", "Cutoff of the retention"),

@@ -219,11 +219,33 @@ mod tests {
                     Resource::Job => "finished_at<?",
                     _ => "renewed_at<?",
                 };
-                let query = catalogue::expired(kind, 9, after, 100);
+                let query = catalogue::expired(kind, cutoff(9), after, 100);
                 all.push((query.text(), vec![by]));
             }
         }
         all
+    }
+
+    /// A clock that stands still and is trusted.
+    struct StandingClock(Timestamp);
+
+    impl Clock for StandingClock {
+        fn now(&self) -> Timestamp {
+            self.0
+        }
+
+        fn is_trusted(&self) -> bool {
+            true
+        }
+
+        fn latest(&self) -> Timestamp {
+            self.0
+        }
+    }
+
+    fn cutoff(moment: Timestamp) -> Cutoff {
+        let clock: &dyn Clock = &StandingClock(moment);
+        clock.trusted().unwrap().older_than(Duration::ZERO)
     }
 
     #[tokio::test]

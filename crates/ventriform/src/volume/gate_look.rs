@@ -636,8 +636,11 @@ mod tests {
         read_gates(&file(volumes), false, &limits, &quiet).unwrap()
     }
 
+    #[track_caller]
     fn refusal(volumes: &[Volume]) -> String {
-        let error = summed(volumes).unwrap_err();
+        let Err(error) = summed(volumes) else {
+            panic!("the volumes were summed");
+        };
         assert!(matches!(error, VolumeError::FrameNeeded { .. }), "{error}");
         let (limits, quiet) = (ReadLimits::default(), Monitor::silent());
         let held = hold_gates(&file(volumes), false, &limits, &quiet);

@@ -973,7 +973,8 @@ fn a_page_names_patient_and_study_and_says_so() {
     let of = |scan: Provenance| page_of(&Scene::new(Matrix3::identity(), scan, true));
     let (named, burned_in) = of(provenance());
     assert!(burned_in);
-    let other = || Some("19990909".to_owned());
+    // A sex has three values.
+    let other = |number| Some(if number == 3 { "O" } else { "19990909" }.to_owned());
     let changes: [fn(&mut Provenance) -> &mut Option<String>; 9] = [
         |scan| &mut scan.patient_name,
         |scan| &mut scan.patient_id,
@@ -993,10 +994,10 @@ fn a_page_names_patient_and_study_and_says_so() {
     assert!(!burned_in);
     for (number, field) in changes.into_iter().enumerate() {
         let mut scan = provenance();
-        *field(&mut scan) = other();
+        *field(&mut scan) = other(number);
         assert_ne!(of(scan).0, named, "{number}");
         let mut alone = nobody.clone();
-        *field(&mut alone) = other();
+        *field(&mut alone) = other(number);
         let (shown, burned_in) = of(alone);
         assert!(burned_in && shown != unnamed, "{number}");
     }

@@ -645,10 +645,12 @@ impl Attributes {
 
     /// The 64-bit floating-point number (FD) of an attribute, `None` if it is absent.
     pub(super) fn double(&self, attribute: Attribute, frame: Option<usize>) -> Option<f64> {
-        let bytes = self.bytes_of(attribute, frame)?.first_chunk()?;
-        Some(match self.byte_order {
-            ByteOrder::Little => f64::from_le_bytes(*bytes),
-            ByteOrder::Big => f64::from_be_bytes(*bytes),
+        let bytes = self.bytes_of(attribute, frame)?;
+        Some(match (standard(attribute.tag), self.byte_order) {
+            (VR::FL, ByteOrder::Little) => f32::from_le_bytes(*bytes.first_chunk()?).into(),
+            (VR::FL, ByteOrder::Big) => f32::from_be_bytes(*bytes.first_chunk()?).into(),
+            (_, ByteOrder::Little) => f64::from_le_bytes(*bytes.first_chunk()?),
+            (_, ByteOrder::Big) => f64::from_be_bytes(*bytes.first_chunk()?),
         })
     }
 }

@@ -4,7 +4,7 @@ use super::ScannedFile;
 use super::attributes::{SERIES_DESCRIPTION, SERIES_NUMBER, SERIES_UID, clip};
 use super::one_scan::{ScanStatement, differing};
 use crate::grid::gates::GATE_COUNTS;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Most scans that are listed.
 const MOST_LISTED: usize = 8;
@@ -103,14 +103,22 @@ impl Scans {
             (whole, 0) => format!(
                 "they are {whole} scans, of which each file is a volume of its own: {list}; send one of them alone"
             ),
-            (1, series) => format!(
-                "one file is a volume of its own and not a slice of a series, beside {series} series of slices: {list}; send one of \
-                 them alone"
-            ),
-            (whole, series) => format!(
-                "{whole} files are each a volume of its own and not a slice of a series, beside {series} series of slices: {list}; \
-                 send one of them alone"
-            ),
+            (whole, series) => {
+                let whole = match whole {
+                    1 => "one file is a volume of its own".to_owned(),
+                    whole => format!("{whole} files are each a volume of its own"),
+                };
+                let slices = match series {
+                    1 => "the others are slices of a series".to_owned(),
+                    series => format!("the others are slices of {series} series"),
+                };
+                let uids: BTreeSet<&str> = all.iter().map(|scan| &*scan.uid).collect();
+                let although = match uids.len() {
+                    1 => ", although all have one Series Instance UID (0020,000E)",
+                    _ => "",
+                };
+                format!("{whole} and {slices}{although}: {list}; send one of them alone")
+            }
         }
     }
 }

@@ -456,7 +456,7 @@ fn scans_of_one_series_are_listed_with_what_differs() {
     let told = said(&images).unwrap_err();
     for part in [
         "they are 6 scans",
-        "2: series number 3 \"STRESS OSEM AC\" (UID 1.2.9; Corrected Image (0028,0051) ATTN",
+        "2 (a Nuclear Medicine image): series number 3 \"STRESS OSEM AC\" (UID 1.2.9; Corrected Image (0028,0051) ATTN",
         "Acquisition Time (0008,0032) 131500",
         "send one of them alone",
         "do not all say that they are gates",

@@ -105,7 +105,7 @@ fn stress_and_rest_together_are_refused_by_their_names() {
     for part in [
         "\"STRESS\" (UID 1.7",
         "\"REST\" (UID 1.8",
-        "they are 2 scans, of which each file is a volume of its own: 0: series number 3",
+        "they are 2 scans, of which each file is a volume of its own: 0 (a Nuclear Medicine image): series number 3",
     ] {
         assert!(said.contains(part), "{said}");
     }
