@@ -403,7 +403,7 @@ async fn a_table_that_is_none_is_refused_with_its_row() {
     assert_eq!(refused["field"], "volume");
 }
 
-fn person(seed: u64, defects: &[PerfusionDefect]) -> Volume {
+pub fn person(seed: u64, defects: &[PerfusionDefect]) -> Volume {
     let base = PhantomParameters {
         shape: [52; 3],
         spacing_mm: [5.0; 3],

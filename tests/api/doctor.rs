@@ -34,7 +34,7 @@ pub fn to_default() -> Repair {
 }
 
 /// Admits callers without credentials to a restored copy, which may be from before the first key.
-fn open(data: &Path) {
+pub fn open(data: &Path) {
     let opened = Command::new(env!("CARGO_BIN_EXE_ventriform"))
         .args(["keys", "open", "--data-dir"])
         .arg(data)

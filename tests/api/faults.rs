@@ -101,6 +101,7 @@ impl Disk {
     }
 
     fn rebuild(&self, inode: u64, to: &Path) {
+        use std::os::unix::fs::MetadataExt;
         let shadow = self.folder.path().join("shadow");
         let listing = fs::read_to_string(shadow.join(format!("{inode}.dir")));
         for line in listing.unwrap_or_default().lines() {
@@ -113,7 +114,16 @@ impl Disk {
                 self.rebuild(inode, &place);
             } else {
                 let content = fs::read(shadow.join(format!("{inode}.data")));
-                fs::write(&place, content.unwrap_or_default()).unwrap();
+                let mut content = content.unwrap_or_default();
+                fs::write(&place, &content).unwrap();
+                if place.ends_with("kept.json") {
+                    // A power cut leaves a file its inode, by which the store tells its note from a copy.
+                    let now = fs::metadata(&place).unwrap().ino();
+                    let note = String::from_utf8(content).unwrap();
+                    let [before, now] = [inode, now].map(|inode| format!("\"inode {inode}\""));
+                    content = note.replace(&before, &now).into_bytes();
+                    fs::write(&place, &content).unwrap();
+                }
             }
         }
     }

@@ -4,7 +4,8 @@
 //! A mark in every attribute of the dictionary that holds text, in every text of a NIfTI header and a mesh, and in every free
 //! text of a caller; then every GET of the OpenAPI document.
 
-use crate::dicom::{JANE, nm};
+use crate::comparisons::person;
+use crate::dicom::{JANE, Patient, nm_of};
 use crate::helpers::{Api, TestApp, closed, heart, key, scan, text};
 use crate::readers::profile;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
@@ -51,9 +52,14 @@ fn mark(tag: Tag) -> String {
     format!("{MARK}{:04X}{:04X}", tag.0, tag.1)
 }
 
-/// A scan of a heart with a mark in every attribute that can hold text, and their number.
-fn marked_dicom(series: usize) -> (Vec<u8>, usize) {
-    let mut object = from_reader(&nm(&JANE, 1)[..]).unwrap();
+/// A scan of a heart of its own, for each number, with a mark in every attribute that can hold text, and their number.
+fn marked_dicom(series: u64) -> (Vec<u8>, usize) {
+    let patient = Patient {
+        study: ["1.2.840.99999.7", "1.2.840.99999.7.20"][(series % 2) as usize],
+        ..JANE
+    };
+    let heart = nm_of(&patient, &[&person(100 + series, &[])]);
+    let mut object = from_reader(&heart[..]).unwrap();
     let holds_text = [
         VR::PN,
         VR::LO,
@@ -88,7 +94,7 @@ fn marked_dicom(series: usize) -> (Vec<u8>, usize) {
     object.put(DataElement::new(
         Tag(0x0054, 0x0081),
         VR::US,
-        PrimitiveValue::from(64_u16),
+        PrimitiveValue::from(52_u16),
     ));
     object.put(DataElement::new(
         Tag(0x0008, 0x0005),
@@ -285,7 +291,11 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
             &volumes[0],
             json!({"parameters": {"rest": volumes[1]}}),
         ),
-        ("model", &volumes[0], json!({"parameters": {"iso": 1e30}})),
+        (
+            "model",
+            &volumes[0],
+            json!({"parameters": {"iso": "absolute:1e30"}}),
+        ),
         ("beat", &volumes[0], json!({})),
     ] {
         let job = ended(&app, &order(kind, volume, more)).await;

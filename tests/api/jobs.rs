@@ -312,6 +312,8 @@ async fn a_job_whose_lease_expired_is_claimed_again() {
     let data = app.data.clone();
     let copy = std::sync::Arc::new(tempfile::tempdir().unwrap());
     copy_folder(data.path(), copy.path());
+    // A copy may be from before the first key, so it is closed until the operator opens it.
+    crate::doctor::open(copy.path());
     let heir = TestApp::on(copy, fake_engine(), |_| {}).await;
     let again = heir.until(&job, &["running"]).await;
     assert_eq!(again["attempts"], 2);

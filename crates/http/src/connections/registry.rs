@@ -248,6 +248,11 @@ impl OpenConnection {
         self.whole.store(true, Ordering::Relaxed);
     }
 
+    /// Whether the body of the current request was received to its end.
+    pub fn is_whole(&self) -> bool {
+        self.whole.load(Ordering::Relaxed)
+    }
+
     /// The current request is answered, and the next head is awaited.
     pub fn answered(&self) {
         if self.whole.load(Ordering::Relaxed) {

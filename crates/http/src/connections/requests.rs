@@ -23,6 +23,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The paths that are answered on every connection.
 const FOR_OPERATORS: [&str; 2] = ["/healthz", "/readyz"];
 
+/// The value of `Connection` in the last answer on a connection.
+const CLOSE: HeaderValue = HeaderValue::from_static("close");
+
 /// Answers the requests of one connection.
 pub struct RequestService {
     /// The routes.
@@ -65,8 +68,7 @@ impl Service<Request<Incoming>> for RequestService {
             let mut response = problem.into_response();
             let status = response.status().as_u16();
             tracing::info!(%client, status, "a request was refused before it was routed");
-            let close = HeaderValue::from_static("close");
-            response.headers_mut().insert(header::CONNECTION, close);
+            response.headers_mut().insert(header::CONNECTION, CLOSE);
             return Box::pin(async move {
                 Ok(dated(response).map(|body| HeldBody::new(body, answering)))
             });
@@ -92,7 +94,12 @@ impl Service<Request<Incoming>> for RequestService {
         let mut router = self.router.clone();
         let answer = tower::Service::call(&mut router, request);
         Box::pin(async move {
-            let response = base.scope(client.scope(answer)).await?;
+            let mut response = base.scope(client.scope(answer)).await?;
+            if !answering.0.is_whole() {
+                // hyper closes a connection of which a body is unread, and says so to nobody: a client would lose the
+                // answer to the request that it sends on it next.
+                response.headers_mut().insert(header::CONNECTION, CLOSE);
+            }
             Ok(dated(response).map(|body| HeldBody::new(body, answering)))
         })
     }

@@ -90,7 +90,7 @@ mod tests {
     use ventriform_service::access::AuditFilter;
     use ventriform_service::intake::GroupState;
     use ventriform_service::records::{
-        Expired, ItemFilter, JobFilter, JobState, Priority, ScanFilter,
+        Clock, Cutoff, Expired, ItemFilter, JobFilter, JobState, Priority, ScanFilter,
     };
 
     /// Every combination of so many filters, as bits.
