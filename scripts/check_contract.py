@@ -48,8 +48,10 @@ RARE = {
 
 # The checks in the answer of a service that is not ready, which the walk does not provoke either.
 NOT_READY = [{"name": "database", "status": "failing", "required": True, "detail": "The database does not answer."},
+             {"name": "audit", "status": "failing", "required": True, "detail": "The database does not answer."},
              {"name": "files", "status": "ok", "required": True}, {"name": "disk", "status": "ok", "required": True},
-             {"name": "workers", "status": "failing", "required": False, "detail": "The database does not answer."}]
+             {"name": "workers", "status": "failing", "required": True, "detail": "The database does not answer."},
+             {"name": "clock", "status": "ok", "required": False}]
 
 # What stands in the examples for the keys and secrets of the recorded service.
 SECRETS = {"key": "vf_0123456789abcdef_KEEP-IT-SECRET", "secret": "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"}
@@ -251,7 +253,7 @@ def rest_and_stress(walk, folder, rest, normals):
 
 
 def workitems(walk):
-    """A work item's life: scheduled, claimed, changed, canceled."""
+    """A work item's life: scheduled, claimed, changed, canceled, erased."""
     uid, transaction = "1.2.840.99999.3", {"vr": "UI", "Value": ["1.2.840.99999.4"]}
 
     def call(method, path, body, expect, query=""):
@@ -267,6 +269,7 @@ def workitems(walk):
     call("post", "/{uid}/cancelrequest", {"00741238": {"vr": "LT", "Value": ["not needed"]}}, 202)
     walk.call("get", "/dicom-web/workitems/{uid}", expect=200, uid=uid)
     walk.call("get", "/dicom-web/workitems", expect=200)
+    walk.call("delete", "/dicom-web/workitems/{uid}", expect=200, headers={"prefer": "return=representation"}, uid=uid)
 
 
 def beating():
@@ -505,6 +508,10 @@ def access(walk):
     call("get", "/v1/keys", expect=200)
     call("get", "/v1/audit", expect=200, query="?limit=6")
     call("delete", "/v1/keys/{id}", expect=204, id=second["id"])
+    call("delete", "/v1/keys", expect=422)
+    call("delete", "/v1/keys", expect=200, query="?owner=contractor-7")
+    # Without an issuer of tokens no key has an owner.
+    walk.recorded["operations"]["revoke_keys_of_owner"]["200"]["application/json"] = {"revoked": [second["id"]]}
     walk.credentials = {"authorization": "Bearer " + second["key"]}
     call("get", "/v1/volumes", expect=401)
     # No key stands in a document that everybody reads.

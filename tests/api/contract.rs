@@ -2420,7 +2420,11 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         by: "clerk".into(),
     };
     let fields = ScanFields(object(json!({"patient_id": "7"})));
-    let by = ErasureAgent::default();
+    // An erasure names its agent itself: its receipt does so too.
+    let by = ErasureAgent {
+        name: "clerk".into(),
+        ..ErasureAgent::default()
+    };
     let (erased_volume, order) = {
         let id = on.volume(t).await;
         let order = ErasureOrder {

@@ -89,7 +89,7 @@ pub fn nm_of(patient: &Patient, volumes: &[&Volume]) -> Vec<u8> {
     nm_numbered(patient, volumes, None)
 }
 
-/// The same as the instance of that number of its series.
+/// The same as the instance of that number of its series, which holds gates: it is gated also if there is one.
 pub fn nm_numbered(patient: &Patient, volumes: &[&Volume], number: Option<usize>) -> Vec<u8> {
     let (volume, gates) = (volumes[0], volumes.len());
     let [columns, rows, slices] = volume.shape;
@@ -127,9 +127,11 @@ pub fn nm_numbered(patient: &Patient, volumes: &[&Volume], number: Option<usize>
     let of_gates: Vec<u16> = frames.iter().map(|(gate, _)| *gate).collect();
     let of_slices: Vec<u16> = frames.iter().map(|(_, slice)| *slice).collect();
     let ones = vec![1; frames.len()];
-    let (kind, vectors) = match gates {
-        1 => ("RECON TOMO", vec![0x54, 0x80]),
-        _ => ("RECON GATED TOMO", vec![0x54, 0x60, 0x54, 0x70, 0x54, 0x80]),
+    let gated = gates > 1 || number.is_some();
+    let (kind, vectors) = if gated {
+        ("RECON GATED TOMO", vec![0x54, 0x60, 0x54, 0x70, 0x54, 0x80])
+    } else {
+        ("RECON TOMO", vec![0x54, 0x80])
     };
     let below = |number: usize| format!("{}.{number}", patient.study).into_bytes();
     let instance = match number {
@@ -179,7 +181,7 @@ pub fn nm_numbered(patient: &Patient, volumes: &[&Volume], number: Option<usize>
         element(0x54, 0x16, "SQ", &item(drug)),
         element(0x54, 0x22, "SQ", &item(detector)),
     ];
-    if gates > 1 {
+    if gated {
         elements.push(element(0x54, 0x60, "US", &shorts(&ones)));
         elements.push(element(0x54, 0x70, "US", &shorts(&of_gates)));
     }

@@ -557,6 +557,8 @@ async fn a_key_can_be_made_while_the_service_starts_for_the_first_time() {
     for _ in 0..4 {
         let folder = tempfile::tempdir().unwrap();
         let data = folder.path().join("data");
+        // A command makes no folder: the operator does.
+        std::fs::create_dir(&data).unwrap();
         let create = std::process::Command::new(env!("CARGO_BIN_EXE_ventriform"))
             .args([
                 "keys",

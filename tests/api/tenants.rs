@@ -1,17 +1,19 @@
 //! Tenants: what belongs to one does not exist for another. Two of them, each with an API key, use
 //! one service.
 
-use crate::helpers::{TestApp, closed, key, problem, text, volume};
+use crate::helpers::{TestApp, closed, key, problem, rows_of, text, volume};
 use crate::receiver::Receiver;
 use crate::scu::nuclear;
 use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use ventriform_http::document_json;
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::access::{
+    AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
+};
 use ventriform_service::config::Settings;
 use ventriform_service::records::{
-    Catalogue, Filed, Idempotency, JobStore, NewJob, StoredVolume, Tags, Tenant,
+    Catalogue, Clock, Filed, Idempotency, JobStore, NewJob, StoredVolume, SystemClock, Tags, Tenant,
 };
 use ventriform_store::Store;
 
@@ -85,6 +87,24 @@ async fn two_tenants(app: &TestApp) -> [TestApp; 2] {
     let tenants = [make("a").await, make("b").await];
     closed(app).await;
     tenants
+}
+
+/// Makes a key of that tenant which a subject of the issuer owns, beside the service.
+async fn key_of_subject(app: &TestApp, tenant: &str, owner: &str) {
+    let now = SystemClock.now();
+    let request = KeyRequest {
+        name: format!("of {owner}"),
+        tenant: tenant.parse().unwrap(),
+        scope: Scope::Read,
+        quota: Quota::default(),
+        maker: Maker::Caller(None),
+        owner: Some(owner.into()),
+        expires_at: None,
+    };
+    let (key, _) = ApiKey::make(request, now).unwrap();
+    let event = AuditEvent::new(now, Activity::KeyCreated, key.tenant.clone(), owner.into());
+    let store = rows_of(app.data.path()).await;
+    store.add_key(&key, &event.on(&key.id)).await.unwrap();
 }
 
 /// A tenant's ids: for each kind of path, the values that go into it.
@@ -315,8 +335,10 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
             let known: Vec<String> = known.map(|kind| format!("/v1/{kind}")).collect();
             // By what a caller's own volumes are scans of: `scan_erasures.rs`.
             let by_scans = method == Method::DELETE && path == "/v1/volumes";
+            // By who owns the caller's own keys; see below.
+            let by_owner = method == Method::DELETE && path == "/v1/keys";
             assert!(
-                method == Method::POST && known.contains(&path) || by_scans,
+                method == Method::POST && known.contains(&path) || by_scans || by_owner,
                 "this test must know what {method} {path} can name"
             );
         }
@@ -357,6 +379,26 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         let copied = b.post(&format!("/v1/templates?model={}", theirs.ids[kind]));
         problem(copied.send().await.unwrap(), 422, "invalid-field").await;
     }
+
+    // A subject may have keys of both tenants.
+    key_of_subject(&app, "a", "dr-who").await;
+    let (status, revoked) = seen(&b, &Method::DELETE, "/v1/keys?owner=dr-who").await;
+    assert_eq!(status, StatusCode::OK);
+    let revoked: Value = serde_json::from_slice(&revoked).unwrap();
+    assert_eq!(revoked, json!({"revoked": []}));
+
+    // Work items are named by their makers.
+    let scheduled = json!([{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}}]);
+    let made = a.post("/dicom-web/workitems?workitem=1.2.840.7");
+    let made = made.header("content-type", "application/dicom+json");
+    let made = made.body(scheduled.to_string()).send().await.unwrap();
+    assert_eq!(made.status(), StatusCode::CREATED);
+    let item = "/dicom-web/workitems/1.2.840.7";
+    for method in [Method::GET, Method::DELETE] {
+        let (status, _) = seen(&b, &method, item).await;
+        assert_eq!(status, StatusCode::NOT_FOUND, "{method} {item}");
+    }
+    assert_eq!(seen(&a, &Method::GET, item).await.0, StatusCode::OK);
 
     // Nothing of all that has changed anything for the owner.
     for (kind, shown) in [("volume", &theirs.volume), ("self", &theirs.job)] {

@@ -7,7 +7,7 @@ use super::guard::AlreadyRecorded;
 use super::links::rfc3339;
 use super::openapi::{ListProblems, LookupProblems, UploadProblems};
 use super::pagination::{PageQuery, next_cursor};
-use super::problem::{Answer, Problem, shorten};
+use super::problem::{Answer, Problem, ProblemBody, shorten};
 use super::query::{NoQuery, Query};
 use super::request::{PathSegments, json_object, unknown};
 use super::words::{ScopeName, Word};
@@ -249,8 +249,9 @@ impl Ends {
 #[into_params(parameter_in = Query)]
 pub struct OwnerQuery {
     /// The subject whose keys they are: `owner` in the list of keys
-    #[param(min_length = 1, example = "contractor-7")]
-    owner: String,
+    // An option, so that a query without it is refused by the handler.
+    #[param(required = true, min_length = 1, example = "contractor-7")]
+    owner: Option<String>,
 }
 
 /// The keys that were revoked.
@@ -267,12 +268,20 @@ pub struct RevokedKeys {
 /// were made with these. From now on they are refused. They stay in the list.
 #[utoipa::path(delete, path = "/v1/keys", tag = "access", operation_id = "revoke_keys_of_owner",
     params(OwnerQuery),
-    responses((status = 200, description = "Revoked", body = RevokedKeys), ListProblems))]
+    responses(
+        (status = 200, description = "Revoked", body = RevokedKeys),
+        (status = 422, description = "It is not said whose keys to revoke",
+            body = ProblemBody, content_type = "application/problem+json"),
+        ListProblems))]
 pub async fn revoke_keys_of_owner(
     State(app): State<App>,
     caller: Caller,
     Query(OwnerQuery { owner }): Query<OwnerQuery>,
 ) -> Answer {
+    let owner = owner.filter(|owner| !owner.is_empty()).ok_or_else(|| {
+        Problem::invalid_field("owner", "`owner` is missing. Nothing was revoked.")
+            .fix("Give the `owner` that GET /v1/keys shows; or DELETE /v1/keys/ID for one key.")
+    })?;
     let now = app.service.now();
     let event = caller.by.event(Activity::KeyRevoked, now);
     let access = &app.service.access;
