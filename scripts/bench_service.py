@@ -121,6 +121,7 @@ def compare(what, unit, rounds, sides):
 
 def ventriform(name, program, folder):
     data, port = folder / name, free_port()
+    data.mkdir(parents=True, exist_ok=True)
     made = [program, "keys", "create", "--name", "bench", "--scope", "submit", "--requests-per-minute", "1000000000",
             "--data-dir", str(data)]
     key = subprocess.run(made, capture_output=True, text=True, check=True).stdout.split()[-1]

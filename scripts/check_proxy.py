@@ -57,6 +57,7 @@ class Service:
     def __init__(self, name, *flags, keys=()):
         self.data, self.port = f"{FOLDER}/{name}", free_port()
         self.keys = {}
+        os.makedirs(self.data, exist_ok=True)
         for scope in keys:
             make = [PROGRAM, "keys", "create", "--name", scope, "--scope", scope, "--data-dir", self.data]
             self.keys[scope] = subprocess.run(make, check=True, capture_output=True, text=True).stdout.strip()

@@ -131,6 +131,20 @@ def test_a_last_axis_of_channels_is_asked_about(volume: vf.Volume) -> None:
     assert vf.generate(several, points=60, frame=1).vertices.shape == (60, 3)
 
 
+def test_volumes_that_do_not_look_like_gates_are_asked_about(volume: vf.Volume) -> None:
+    """Rest and stress by turns, as it were: eight volumes, but no beat."""
+    moved = np.roll(volume.array, 6, axis=0)
+    several = vf.Volume(np.stack([volume.array, moved] * 4, axis=-1), volume.affine)
+    for use in (lambda: vf.generate(several, points=60), lambda: vf.segment(several), lambda: several.array):
+        with pytest.raises(vf.InputError, match="no gates of one heart beat: ") as caught:
+            use()
+        assert caught.value.code == "frame-needed" and "6 to 32" not in caught.value.reason
+    # As the command does: who asks for a beat says that they are gates, and the fit tells that they are not.
+    beat = vf.beat(several)
+    assert beat.ef_percent is None and "no_contraction" in [flag.code for flag in beat.flags]
+    assert vf.generate(several, points=60, frame=7).vertices.shape == (60, 3)
+
+
 @pytest.mark.parametrize("shape", [(40, 36, 32, 8), (64, 64, 20, 16), (20, 64, 64, 8)])
 def test_gates_along_the_last_axis_are_taken(shape: tuple[int, ...]) -> None:
     assert vf.Volume(np.random.default_rng(1).random(shape), np.diag([5, 5, 5, 1])).frames == shape[-1]

@@ -113,6 +113,8 @@ def test_a_wrong_key_is_refused(command: Command, tmp_path: pathlib.Path, scan: 
 
     from conftest import PROGRAM
 
+    # The operator's: `keys` makes no folder.
+    (tmp_path / "data").mkdir()
     key = command("keys", "create", "--name", "n", "--scope", "submit", "--data-dir", tmp_path / "data").split()[-1]
     with (tmp_path / "log").open("wb") as log:
         arguments = ["serve", "--listen", "127.0.0.1:0", "--data-dir", str(tmp_path / "data")]

@@ -113,7 +113,9 @@ def asking(*natives: Native) -> Iterator[None]:
     except InputError as error:
         if error.code != "frame-needed" or any(native.files() for native in natives):
             raise
-        reason = "The array holds several volumes along its last axis, and they are no gates of one heart beat (6 to 32)."
+        why = error.reason.partition(" heart beat: ")[2]
+        reason = "The array holds several volumes along its last axis, and they are no gates of one heart beat"
+        reason += f": {why}" if why else " (6 to 32)."
         fix = f"Give array[..., n] if that axis is one of channels. {error.fix}"
         raise InputError("array", reason, fix, error.code) from error
 

@@ -839,7 +839,7 @@ class Job(Document):
     estimated_start: str | None = None
     """When it will probably start (RFC 3339), estimated from past jobs. Only while it waits."""
     external_id: str | None = None
-    """The caller's own id for it."""
+    """The caller's own id for it; not shown to the scope `read`."""
     finished_at: str | None = None
     """When it ended (RFC 3339)."""
     id: str
@@ -847,7 +847,7 @@ class Job(Document):
     kind: str
     """The kind of work."""
     labels: dict[str, str]
-    """The caller's own names and values for it."""
+    """The caller's own names and values for it; none are shown to the scope `read`."""
     links: JobLinks
     """Related paths."""
     model: str | None = None
@@ -968,8 +968,8 @@ class LegalHold(Document):
 
     by: str
     """The name of the key that set it."""
-    reason: str
-    """The reason that was given."""
+    reason: str | None = None
+    """The reason that was given; not shown to the scope `read`."""
     since: str
     """Since when (RFC 3339)."""
 
@@ -2043,7 +2043,7 @@ class StoredVolume(Document):
     expires_at: str | None = None
     """When it will be erased unless it is uploaded or used again (RFC 3339); absent if it is kept."""
     external_id: str | None = None
-    """The caller's own id for it."""
+    """The caller's own id for it; not shown to the scope `read`."""
     files: int
     """Number of its files."""
     format: str
@@ -2054,7 +2054,7 @@ class StoredVolume(Document):
     """How many volumes of that shape the file holds; if several, the parameter `frame` chooses one."""
     gates: Gates | None = None
     """The gates of one heart beat, if the frames are gates: a gated DICOM series, 6 to 32 DICOM or NIfTI files of one
-    gate each, or a 4-D NIfTI file whose header does not contradict."""
+    gate each, or a 4-D NIfTI file whose header does not contradict and whose volumes look like gates."""
     id: str
     """Derived from the SHA-256 of the content, so it is the same on every machine."""
     intensity: Intensity
@@ -2062,7 +2062,7 @@ class StoredVolume(Document):
     label_values: list[int] | None = None
     """The voxel values in rising order if the volume looks like a label map."""
     labels: dict[str, str]
-    """The caller's own names and values for it."""
+    """The caller's own names and values for it; none are shown to the scope `read`."""
     legal_hold: LegalHold | None = None
     """The legal hold that forbids to erase it."""
     links: VolumeLinks
