@@ -766,19 +766,6 @@ mod tests {
             .collect();
         let told = refusal(&people);
         assert!(told.contains("shows another heart"), "{told}");
-        // Hearts of one place that differ a little.
-        let alike = |n: usize| {
-            let [a, b, c] = [5, 3, 7].map(|step| (n * step % 8) as f64 / 8.0 - 0.5);
-            let centre = USUAL.centre + 6.0 * Vec3::new(a, b, c);
-            Heart {
-                centre,
-                radius_mm: 30.0 + 4.0 * b,
-                ..USUAL
-            }
-            .image()
-        };
-        let told = refusal(&(0..8).map(alike).collect::<Vec<_>>());
-        assert!(told.contains("do not follow each other"), "{told}");
         // One stranger among gates.
         let mut stranger = beat(8, 1.0);
         stranger[5] = people[0].clone();

@@ -643,14 +643,23 @@ impl Attributes {
         number.ok_or_else(|| self.missing(attribute))
     }
 
-    /// The 64-bit floating-point number (FD) of an attribute, `None` if it is absent.
+    /// The floating-point number (FD, or FL by its length) of an attribute, `None` if it is absent.
     pub(super) fn double(&self, attribute: Attribute, frame: Option<usize>) -> Option<f64> {
         let bytes = self.bytes_of(attribute, frame)?;
-        Some(match (standard(attribute.tag), self.byte_order) {
-            (VR::FL, ByteOrder::Little) => f32::from_le_bytes(*bytes.first_chunk()?).into(),
-            (VR::FL, ByteOrder::Big) => f32::from_be_bytes(*bytes.first_chunk()?).into(),
-            (_, ByteOrder::Little) => f64::from_le_bytes(*bytes.first_chunk()?),
-            (_, ByteOrder::Big) => f64::from_be_bytes(*bytes.first_chunk()?),
-        })
+        let little = self.byte_order == ByteOrder::Little;
+        if let Ok(single) = <[u8; 4]>::try_from(bytes) {
+            let read = if little {
+                f32::from_le_bytes
+            } else {
+                f32::from_be_bytes
+            };
+            return Some(read(single).into());
+        }
+        let read = if little {
+            f64::from_le_bytes
+        } else {
+            f64::from_be_bytes
+        };
+        Some(read(*bytes.first_chunk()?))
     }
 }
