@@ -178,6 +178,45 @@ export interface components {
          * @enum {string}
          */
         WhichScan: "stress" | "rest";
+        BeatJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "beat";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["BeatParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("mask_ed.dcm" | "mask_es.dcm" | "measurements.dcm")[];
+            source?: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
         /** @description Paths of one beat. */
         BeatLinks: {
             /** @description The volume curve. */
@@ -784,6 +823,45 @@ export interface components {
              */
             stress: string;
         };
+        ComparisonJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "comparison";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["ComparisonParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("measurements.dcm" | "page.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm")[];
+            source?: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
+        };
         /** @description Paths of one comparison. */
         ComparisonLinks: {
             /** @description DICOM objects of the study of the scan at stress, for the archive. */
@@ -1243,7 +1321,8 @@ export interface components {
             /** @description The reason why it does not work. */
             detail?: string | null;
             /**
-             * @description `database`, `files`, `disk`, or `workers`: processes that compute jobs.
+             * @description `database`, `audit` (the audit trail), `files`, `disk`, `workers` (processes that compute jobs), or `clock`
+             *     (whether ages count by the time of day).
              * @example database
              */
             name: string;
@@ -1410,6 +1489,32 @@ export interface components {
             files_erased: boolean;
             /** @description Its id. */
             id: string;
+        };
+        /** @description What an erasure would erase, and what stands in its way. */
+        ErasurePlan: {
+            /** @description The volumes and what would go with them. */
+            items: components["schemas"]["PlannedItem"][];
+            /** @description The ended jobs whose records would go. */
+            jobs: string[];
+            /** @description Items on legal hold: selected, or another source of something that would go. Nothing is erased while there are any. */
+            legal_holds: string[];
+            /** @description Items that a request needs at this moment. Nothing is erased while there are any. */
+            pinned: string[];
+            /**
+             * @description A name for exactly these items and jobs.
+             * @example 9f86d081884c7d659a2feaa0c55ad015
+             */
+            plan: string;
+            /** @description Jobs that have not ended and need one of the items. Nothing is erased while there are any. */
+            unfinished_jobs: string[];
+            /**
+             * Format: int64
+             * @description Volumes that an older version has stored and of which it is not known yet whose scan they are, so that they may be
+             *     missing here.
+             */
+            unread_volumes: number;
+            /** @description The volumes that are selected. */
+            volumes: string[];
         };
         /**
          * @description Why something was erased.
@@ -2053,7 +2158,7 @@ export interface components {
              * @description When it will probably start (RFC 3339), estimated from past jobs. Only while it waits.
              */
             estimated_start?: string | null;
-            /** @description The caller's own id for it. */
+            /** @description The caller's own id for it; not shown to the scope `read`. */
             external_id?: string | null;
             /**
              * Format: date-time
@@ -2070,7 +2175,7 @@ export interface components {
              * @example model
              */
             kind: string;
-            /** @description The caller's own names and values for it. */
+            /** @description The caller's own names and values for it; none are shown to the scope `read`. */
             labels: {
                 [key: string]: string;
             };
@@ -2150,7 +2255,7 @@ export interface components {
             next_cursor?: string | null;
         };
         JobParameters: components["schemas"]["ModelParameters"] | components["schemas"]["SegmentationParameters"] | components["schemas"]["BeatParameters"] | components["schemas"]["ComparisonParameters"] | components["schemas"]["NormalsParameters"];
-        JobRequest: components["schemas"]["VolumeJobRequest"] | components["schemas"]["SourceJobRequest"];
+        JobRequest: components["schemas"]["ModelJobRequest"] | components["schemas"]["SegmentationJobRequest"] | components["schemas"]["BeatJobRequest"] | components["schemas"]["ComparisonJobRequest"] | components["schemas"]["NormalsJobRequest"];
         /** @description A series in an archive. */
         JobSource: {
             /** @description The archive's name. */
@@ -2213,6 +2318,11 @@ export interface components {
              * @example scanner 2
              */
             name: string;
+            /**
+             * @description The subject of the OpenID Connect issuer whose key it is: that made it with a token, or with a key of its own.
+             * @example contractor-7
+             */
+            owner?: string | null;
             /**
              * Format: int64
              * @description Jobs of its tenant that may wait; `null` is the service's general limit.
@@ -2344,8 +2454,8 @@ export interface components {
         LegalHold: {
             /** @description The name of the key that set it. */
             by: string;
-            /** @description The reason that was given. */
-            reason: string;
+            /** @description The reason that was given; not shown to the scope `read`. */
+            reason?: string | null;
             /**
              * Format: date-time
              * @description Since when (RFC 3339).
@@ -2540,6 +2650,45 @@ export interface components {
             summary: components["schemas"]["ModelSummary"];
             /** @description The volume it was made of. */
             volume: string;
+        };
+        ModelJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "model";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["ModelParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm")[];
+            source?: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
         };
         /** @description Paths of one model. */
         ModelLinks: {
@@ -2831,7 +2980,8 @@ export interface components {
         NewKey: {
             /**
              * Format: date-time
-             * @description From when on it is refused (RFC 3339); never if absent.
+             * @description From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
+             *     never ends.
              */
             expires_at?: string | null;
             /**
@@ -3111,6 +3261,41 @@ export interface components {
              * @default 7.5
              */
             torsion_stiffness?: number;
+        };
+        NormalsJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "normals";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters: components["schemas"]["NormalsParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            source?: components["schemas"]["SourceRequest"];
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
         };
         /** @description Paths of normal limits. */
         NormalsLinks: {
@@ -3480,6 +3665,24 @@ export interface components {
          * @enum {string}
          */
         PlaceState: "muscle" | "valve_plane" | "no_wall";
+        /** @description An item that would be erased. */
+        PlannedItem: {
+            /**
+             * Format: int64
+             * @description Size of all its files in bytes.
+             */
+            bytes: number;
+            /**
+             * Format: int64
+             * @description Number of its files.
+             */
+            files: number;
+            /**
+             * @description Its id.
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            id: string;
+        };
         /** @description A figure of the wall on a polar map, as it is written. */
         PolarFigure: {
             /**
@@ -3866,7 +4069,8 @@ export interface components {
              */
             id: string;
             /**
-             * @description The item that was to be erased.
+             * @description The item that was to be erased: its id, that of what was received, or the UID of a work item; `volumes` if volumes were
+             *     selected by a filter.
              * @example vol_9f86d081884c7d659a2feaa0c55ad015
              */
             item: string;
@@ -3878,6 +4082,8 @@ export interface components {
             links: components["schemas"]["ReceiptLinks"];
             /** @description Why it was erased. */
             reason: components["schemas"]["ErasureReason"];
+            /** @description By what volumes were selected, such as `study`; never a value. */
+            selected_by?: string[];
         };
         /** @description Paths of one receipt. */
         ReceiptLinks: {
@@ -4018,6 +4224,16 @@ export interface components {
             smoothness: components["schemas"]["Smoothness"];
             /** @description The models of which the best was kept. */
             starts: components["schemas"]["Start"][];
+        };
+        /** @description The keys that were revoked. */
+        RevokedKeys: {
+            /**
+             * @description Their ids; those that had been revoked before are none of them.
+             * @example [
+             *       "0123456789abcdef"
+             *     ]
+             */
+            revoked: string[];
         };
         /** @description intensity = slope × stored value + intercept. */
         Scaling: {
@@ -4269,6 +4485,45 @@ export interface components {
              * @description The volume; several files make up one
              */
             volume: string;
+        };
+        SegmentationJobRequest: {
+            /**
+             * @description The id in the caller's own system
+             * @example A-2026-17
+             */
+            external_id?: string;
+            /**
+             * @description The kind of work (enum property replaced by openapi-typescript)
+             * @enum {string}
+             */
+            kind: "segmentation";
+            /**
+             * @description The caller's own names and values
+             * @example {
+             *       "study": "42"
+             *     }
+             */
+            labels?: {
+                [key: string]: string;
+            };
+            parameters?: components["schemas"]["SegmentationParameters"];
+            /**
+             * @description How urgent the job is: every waiting job of a higher priority starts before it
+             * @default routine
+             * @enum {string}
+             */
+            priority?: "urgent" | "routine" | "bulk";
+            /** @description DICOM objects of the result that are sent to an archive */
+            send?: ("mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm")[];
+            source?: components["schemas"]["SourceRequest"];
+            /** @description The archive that they are sent to; that of `source` unless given */
+            to?: string;
+            /**
+             * @description Id of the volume
+             * @example vol_9f86d081884c7d659a2feaa0c55ad015
+             */
+            volume?: string;
+            webhook?: components["schemas"]["WebhookRequest"];
         };
         /** @description Paths of one segmentation. */
         SegmentationLinks: {
@@ -5236,7 +5491,7 @@ export interface components {
              * @description When it will be erased unless it is uploaded or used again (RFC 3339); absent if it is kept.
              */
             expires_at?: string | null;
-            /** @description The caller's own id for it. */
+            /** @description The caller's own id for it; not shown to the scope `read`. */
             external_id?: string | null;
             /**
              * Format: int64
@@ -5269,7 +5524,7 @@ export interface components {
             intensity: components["schemas"]["Intensity"];
             /** @description The voxel values in rising order if the volume looks like a label map. */
             label_values?: number[] | null;
-            /** @description The caller's own names and values for it. */
+            /** @description The caller's own names and values for it; none are shown to the scope `read`. */
             labels: {
                 [key: string]: string;
             };
@@ -5384,6 +5639,7 @@ export type AuditPage = components['schemas']['AuditPage'];
 export type Beat = components['schemas']['Beat'];
 export type BeatChange = components['schemas']['BeatChange'];
 export type WhichScan = components['schemas']['WhichScan'];
+export type BeatJobRequest = components['schemas']['BeatJobRequest'];
 export type BeatLinks = components['schemas']['BeatLinks'];
 export type BeatList = components['schemas']['BeatList'];
 export type BeatParameters = components['schemas']['BeatParameters'];
@@ -5399,6 +5655,7 @@ export type ComparedTerritory = components['schemas']['ComparedTerritory'];
 export type Comparison = components['schemas']['Comparison'];
 export type WebhookSecret = components['schemas']['WebhookSecret'];
 export type ComparisonForm = components['schemas']['ComparisonForm'];
+export type ComparisonJobRequest = components['schemas']['ComparisonJobRequest'];
 export type ComparisonLinks = components['schemas']['ComparisonLinks'];
 export type ComparisonList = components['schemas']['ComparisonList'];
 export type ComparisonParameters = components['schemas']['ComparisonParameters'];
@@ -5415,6 +5672,7 @@ export type DistanceDirection = components['schemas']['DistanceDirection'];
 export type Download = components['schemas']['Download'];
 export type ErasedFile = components['schemas']['ErasedFile'];
 export type ErasedItem = components['schemas']['ErasedItem'];
+export type ErasurePlan = components['schemas']['ErasurePlan'];
 export type ErasureReason = components['schemas']['ErasureReason'];
 export type Evidence = components['schemas']['Evidence'];
 export type ExcludedCase = components['schemas']['ExcludedCase'];
@@ -5464,6 +5722,7 @@ export type LongAxis = components['schemas']['LongAxis'];
 export type MeshDocument = components['schemas']['MeshDocument'];
 export type MeshFacts = components['schemas']['MeshFacts'];
 export type Model = components['schemas']['Model'];
+export type ModelJobRequest = components['schemas']['ModelJobRequest'];
 export type ModelLinks = components['schemas']['ModelLinks'];
 export type ModelList = components['schemas']['ModelList'];
 export type ModelParameters = components['schemas']['ModelParameters'];
@@ -5479,6 +5738,7 @@ export type NormalLimits = components['schemas']['NormalLimits'];
 export type Normals = components['schemas']['Normals'];
 export type WebhookList = components['schemas']['WebhookList'];
 export type NormalsFitParameters = components['schemas']['NormalsFitParameters'];
+export type NormalsJobRequest = components['schemas']['NormalsJobRequest'];
 export type NormalsLinks = components['schemas']['NormalsLinks'];
 export type NormalsList = components['schemas']['NormalsList'];
 export type NormalsParameters = components['schemas']['NormalsParameters'];
@@ -5491,6 +5751,7 @@ export type OptimiseReport = components['schemas']['OptimiseReport'];
 export type Perfusion = components['schemas']['Perfusion'];
 export type PhaseReport = components['schemas']['PhaseReport'];
 export type PlaceState = components['schemas']['PlaceState'];
+export type PlannedItem = components['schemas']['PlannedItem'];
 export type PolarFigure = components['schemas']['PolarFigure'];
 export type PolarMap = components['schemas']['PolarMap'];
 export type PolarSegment = components['schemas']['PolarSegment'];
@@ -5518,6 +5779,7 @@ export type Redelivered = components['schemas']['Redelivered'];
 export type RefusedTemplate = components['schemas']['RefusedTemplate'];
 export type Resolution = components['schemas']['Resolution'];
 export type RetileReport = components['schemas']['RetileReport'];
+export type RevokedKeys = components['schemas']['RevokedKeys'];
 export type Scaling = components['schemas']['Scaling'];
 export type Scan = components['schemas']['Scan'];
 export type ScanUids = components['schemas']['ScanUids'];
@@ -5527,6 +5789,7 @@ export type SegmentScore = components['schemas']['SegmentScore'];
 export type Segmentation = components['schemas']['Segmentation'];
 export type WallVolumes = components['schemas']['WallVolumes'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
+export type SegmentationJobRequest = components['schemas']['SegmentationJobRequest'];
 export type SegmentationLinks = components['schemas']['SegmentationLinks'];
 export type SegmentationList = components['schemas']['SegmentationList'];
 export type SegmentationParameters = components['schemas']['SegmentationParameters'];
