@@ -23,7 +23,7 @@ use ventriform_service::access::{Quota, Scope};
 use ventriform_service::work::Engine;
 
 /// The beginning of every mark.
-const MARK: &str = "QZX";
+const MARK: &str = "QZXVKJ";
 
 /// Attributes whose values decide how the file is read.
 const NEEDED: [Tag; 8] = [
@@ -40,12 +40,12 @@ const NEEDED: [Tag; 8] = [
 /// What `read` sees of a scan (docs/security.md): manufacturer, model, software, reconstruction, and what UIDs, Image Type and
 /// the tracer are in.
 const SHOWN: [&str; 6] = [
-    "QZX00080070",
-    "QZX00081090",
-    "QZX00181020",
-    "QZX00541103",
-    "QZX00201040",
-    "QZX00180031",
+    "QZXVKJ00080070",
+    "QZXVKJ00081090",
+    "QZXVKJ00181020",
+    "QZXVKJ00541103",
+    "QZXVKJ00201040",
+    "QZXVKJ00180031",
 ];
 
 fn mark(tag: Tag) -> String {
@@ -99,7 +99,7 @@ fn marked_dicom(series: u64) -> (Vec<u8>, usize) {
     object.put(DataElement::new(
         Tag(0x0008, 0x0005),
         VR::CS,
-        PrimitiveValue::from("QZX CHARSET"),
+        PrimitiveValue::from("QZXVKJ CHARSET"),
     ));
     object.put(DataElement::new(
         Tag(0x0008, 0x103e),
@@ -120,17 +120,17 @@ fn marked_nifti() -> Vec<u8> {
         .unwrap();
     // data_type, db_name, descrip, aux_file, intent_name.
     for (at, mark) in [
-        (4, "QZXTYPE"),
-        (14, "QZXDBNAME"),
-        (148, "QZXDESCRIP"),
-        (228, "QZXAUX"),
-        (328, "QZXINTENT"),
+        (4, "QZXVKJTYPE"),
+        (14, "QZXVKJDBNAME"),
+        (148, "QZXVKJDESCRIP"),
+        (228, "QZXVKJAUX"),
+        (328, "QZXVKJINTENT"),
     ] {
         bytes[at..at + mark.len()].copy_from_slice(mark.as_bytes());
     }
     let mut file = flate2::GzBuilder::new()
-        .filename("QZXGZNAME.nii")
-        .comment("QZXGZCOMMENT")
+        .filename("QZXVKJGZNAME.nii")
+        .comment("QZXVKJGZCOMMENT")
         .write(Vec::new(), flate2::Compression::fast());
     file.write_all(&bytes).unwrap();
     file.finish().unwrap()
@@ -255,7 +255,7 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
     let ((stress, marked), (rest, _)) = (marked_dicom(1), marked_dicom(2));
     assert!(marked > 500, "{marked} attributes");
     for bytes in [stress, rest, marked_nifti(), heart().0] {
-        let path = "/v1/volumes?external_id=QZXEXTERNAL&labels=name:QZXLABEL.dcm";
+        let path = "/v1/volumes?external_id=QZXVKJEXTERNAL&labels=name:QZXVKJLABEL.dcm";
         let answer = app.post(path).body(bytes).send().await.unwrap();
         let status = answer.status();
         let volume: Value = answer.json().await.unwrap();
@@ -266,12 +266,12 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         .client
         .put(format!("{}/v1/volumes/{}/hold", app.url, volumes[3]));
     let hold = hold
-        .json(&json!({"reason": "QZXREASON"}))
+        .json(&json!({"reason": "QZXVKJREASON"}))
         .send()
         .await
         .unwrap();
     assert_eq!(hold.status(), StatusCode::OK);
-    let named = json!({"external_id": "QZXJOB", "labels": {"who": "QZXWHO"}});
+    let named = json!({"external_id": "QZXVKJJOB", "labels": {"who": "QZXVKJWHO"}});
     let order = |kind: &str, volume: &str, more: Value| {
         let mut order = named.clone();
         for (name, value) in [("kind", json!(kind)), ("volume", json!(volume))] {
@@ -380,7 +380,13 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         .filter(|path| !path.ends_with("/content") && !path.contains("/files/"))
         .cloned()
         .collect();
-    let callers = ["QZXEXTERNAL", "QZXLABEL", "QZXREASON", "QZXJOB", "QZXWHO"];
+    let callers = [
+        "QZXVKJEXTERNAL",
+        "QZXVKJLABEL",
+        "QZXVKJREASON",
+        "QZXVKJJOB",
+        "QZXVKJWHO",
+    ];
     let found = seen(&app, &kept, "", &callers).await;
     assert!(found.is_empty(), "{found:#?}");
     let found = seen(&reader, &paths, "", &[]).await;

@@ -216,7 +216,8 @@ pub async fn erase_volumes(
 }
 
 /// The two answers with a body.
-#[derive(ToSchema)]
+#[derive(serde::Serialize, ToSchema)]
+#[serde(untagged)]
 #[schema(as = ErasureAnswer)]
 #[allow(dead_code, reason = "only its schema is used")]
 enum ErasureAnswer {
