@@ -491,7 +491,7 @@ def received(walk):
     while any(group["state"] in ("gathering", "filing") for group in intake(walk)):
         time.sleep(0.05)
     failed = [group["id"] for group in intake(walk) if group["state"] == "failed"]
-    call("delete", "/v1/intake/{id}", expect=204, id=failed[0])
+    call("delete", "/v1/intake/{id}", expect=200, headers={"prefer": "return=representation"}, id=failed[0])
 
 
 def intake(walk):

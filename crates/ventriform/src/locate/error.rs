@@ -13,7 +13,7 @@ pub enum LocateError {
     #[error("the volume shows nothing: it holds no positive values that differ")]
     Blank,
     /// No place looks like a ventricle.
-    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}{}", .size.map(|size| size.to_string()).unwrap_or_default())]
+    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}{}", .size.as_ref().map(|size| size.to_string()).unwrap_or_default())]
     NoHeart {
         /// Best candidate's centre, LPS mm.
         centre: [f64; 3],
@@ -22,7 +22,7 @@ pub enum LocateError {
         /// Why it is not a heart.
         reason: NotAHeart,
         /// The size of the volume, if it is not that of a scan of a chest.
-        size: Option<OddSize>,
+        size: Option<Box<OddSize>>,
     },
     /// Without a hint, no place in the volume is a candidate.
     #[error("no heart found: nowhere does a bright wall lie about a darker cavity")]
@@ -43,7 +43,7 @@ impl LocateError {
     #[must_use]
     pub(crate) fn about(mut self, volume: &Volume) -> Self {
         if let Self::NoHeart { size, .. } = &mut self {
-            *size = OddSize::of(volume);
+            *size = OddSize::of(volume).map(Box::new);
         }
         self
     }
