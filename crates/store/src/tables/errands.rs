@@ -118,10 +118,8 @@ impl SqlStore {
     /// than `now`. Returns how many these are.
     pub(super) async fn recall(&self, errands: Errands, now: Timestamp) -> StoreResult<u64> {
         let table = errands.table();
-        let put_off = format!(
-            "state = 'pending' AND next_attempt_at > $1
-                 AND (since > $2 OR (last_attempt_at IS NOT NULL AND last_attempt_at > $2))"
-        );
+        let put_off = "state = 'pending' AND next_attempt_at > $1
+                 AND (since > $2 OR (last_attempt_at IS NOT NULL AND last_attempt_at > $2))";
         let latest = now.saturating_add(CLOCK_NOISE_MS);
         let found = query(format!("SELECT 1 FROM {table} WHERE {put_off} LIMIT 1"))
             .bind(now)
