@@ -986,6 +986,10 @@ async fn streams_and_waits_end_soon_after_their_credentials() {
     let mut claims = issuer.claims();
     claims["exp"] = json!(SystemClock.now() / 1000 + 8);
     let token = issuer.sign(Algorithm::ES256, "ec", &claims);
+    #[expect(
+        clippy::async_yields_async,
+        reason = "the stream is read to its end later"
+    )]
     let open = async |credentials: &str| {
         let stream = app.get(&events).bearer_auth(credentials).send();
         let stream = stream.await.unwrap();
