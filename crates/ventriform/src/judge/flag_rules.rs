@@ -96,16 +96,22 @@ pub(super) fn with_chance(mut flags: Vec<Flag>, chance: f64, evidence: &Evidence
     flags
 }
 
-/// The chance of a good fit that got these `flags`: it is calibrated on images of uptake, and at most 0.5 in a map
-/// of labels and in an image whose values are no counts.
+/// The chance of a good fit that got these `flags`: it is calibrated on images of uptake that lie in the patient as they
+/// say, and at most 0.5 in a map of labels, in an image whose values are no counts, and in one that looks mirrored.
 pub(super) fn limited(chance: f64, flags: &[Flag]) -> f64 {
-    let no_counts = |flag: &Flag| {
+    let outside_of_calibration = |flag: &Flag| {
         matches!(
             flag,
-            Flag::LabelMap { .. } | Flag::Saturated(_) | Flag::Background(_) | Flag::HotVoxels(_)
+            Flag::LabelMap { .. }
+                | Flag::Saturated(_)
+                | Flag::Background(_)
+                | Flag::HotVoxels(_)
+                | Flag::Mirrored { .. }
+                | Flag::ExchangedAxes { .. }
+                | Flag::LiverOnTheLeft { .. }
         )
     };
-    if flags.iter().any(no_counts) {
+    if flags.iter().any(outside_of_calibration) {
         chance.min(0.5)
     } else {
         chance

@@ -140,7 +140,7 @@ const REFUSED_FILES: &[(&[&str], &str)] = &[
     ),
     (
         &["nifti-rs/minimal.hdr", "nifti-rs/27/int8.nii"],
-        "1 NIfTI file, 1 NIfTI header, which are not one volume",
+        "1 NIfTI file (int8.nii), 1 NIfTI header, which are not one volume",
     ),
 ];
 
