@@ -4,7 +4,7 @@ import { at } from "./base";
 import { type Problem, ProblemError, type Volume, authorization, key, nextKey, page, problemOf, uploadLimit } from "./api";
 import { pathOf } from "./drop";
 import { Watched } from "./state";
-import { LEAST_GATES, MOST_GATES, bytes } from "./words";
+import { LEAST_GATES, MOST_GATES, bytes, rememberFileName } from "./words";
 
 export interface Group {
   name: string;
@@ -187,6 +187,7 @@ async function send(upload: Upload): Promise<void> {
     }
     if (answer.status === 200 || answer.status === 201) {
       const volume = JSON.parse(answer.text) as Volume;
+      rememberFileName(volume, upload.group.name);
       change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
       whenStored(volume);
       const together = uploads.value.filter(other => other.batch === upload.batch);

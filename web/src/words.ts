@@ -2,8 +2,24 @@
 
 import type { Job, Kind, Result, Volume } from "./api";
 
+/** Names of the files that this tab has sent, by the ids of their volumes. They are often patients' names, and are stored nowhere. */
+const sentAs = new Map<string, string>();
+export function rememberFileName(volume: Volume, name: string): void {
+  sentAs.set(volume.id, name);
+}
+
+/** What the service calls a scan: what may be stored with what is made of it. */
+export function storedNameOf(volume: Volume): string {
+  return volume.external_id || volume.labels["name"] || shortId(volume);
+}
+
+/** What a scan is called on the screen. */
 export function nameOf(volume: Volume): string {
-  return volume.external_id || volume.labels["name"] || `Scan ${volume.id.slice(4, 12)}`;
+  return volume.external_id || volume.labels["name"] || sentAs.get(volume.id) || shortId(volume);
+}
+
+function shortId(volume: Volume): string {
+  return `Scan ${volume.id.slice(4, 12)}`;
 }
 
 /** Most letters of an identifier in lists. */

@@ -2,7 +2,7 @@
 
 import { type Job, type Kind, type ParameterValue, type Volume, post } from "./api";
 import { put, watchActive } from "./library";
-import { nameOf } from "./words";
+import { storedNameOf } from "./words";
 
 /** What is compared, and with what. */
 export interface Pair {
@@ -13,7 +13,7 @@ export interface Pair {
 }
 
 export async function fileComparison({ stress, rest, normals, parameters }: Pair): Promise<Job> {
-  const labels = { name: nameOf(stress).slice(0, 200) };
+  const labels = { name: storedNameOf(stress).slice(0, 200) };
   const order = { stress: stress.id, rest: rest.id, parameters, labels, ...(normals ? { normals } : {}) };
   const job = await post<Job>("/v1/comparisons", order);
   put(job);
@@ -22,7 +22,7 @@ export async function fileComparison({ stress, rest, normals, parameters }: Pair
 }
 
 export async function file(kind: Kind, volume: Volume, parameters: Record<string, ParameterValue>, labels: Record<string, string> = {}): Promise<Job> {
-  const name = nameOf(volume).slice(0, 200);
+  const name = storedNameOf(volume).slice(0, 200);
   const job = await post<Job>("/v1/jobs", { kind, volume: volume.id, parameters, labels: { name, ...labels } });
   put(job);
   watchActive();

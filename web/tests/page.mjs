@@ -496,6 +496,34 @@ async function main() {
     }
   });
 
+  await check("names of files are shown by the tab that sent them, and stored if a person asks for it", async () => {
+    const own = await service();
+    const { page, faults, close } = await tab(browser, own.address);
+    const stored = async () => (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes.map(volume => volume.labels.name);
+    const shown = () => page.locator(".scan .name").allTextContents();
+    await page.waitForSelector(".welcome");
+    await page.getByLabel("then").selectOption("fit");
+    await choose(page, SCAN);
+    await page.waitForFunction(() => /seg_/.test(location.hash));
+    await page.goto(`${own.address}/#/`);
+    await page.waitForSelector(".scan .result");
+    assert.match((await shown()).join(), /spect/);
+    const [job] = (await (await fetch(`${own.address}/v1/jobs`)).json()).jobs;
+    assert.doesNotMatch(JSON.stringify(job.labels), /spect/);
+    await page.reload();
+    await page.waitForSelector(".scan .name");
+    assert.match((await shown()).join(), /^Scan /);
+    await page.getByLabel("keep file names").check();
+    await choose(page, TRUTH);
+    await page.waitForFunction(() => document.querySelectorAll(".scan").length === 2);
+    assert.deepEqual((await stored()).map(name => name ?? "none").sort(), ["lv_truth.nii.gz", "none"]);
+    await page.reload();
+    await page.waitForFunction(() => /lv_truth/.test(document.querySelector("main")?.textContent ?? ""));
+    assert.deepEqual(faults, []);
+    await close();
+    await own.stop();
+  });
+
   await check("an expert's mask is measured against, and the list is searched", async () => {
     const { page, faults, close } = await tab(browser, address);
     await filled(page, address);

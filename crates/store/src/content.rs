@@ -61,6 +61,32 @@ impl Stamp {
             identity: [nanoseconds, 0, 0, 0, 0, 0],
         }
     }
+
+    /// Whether the open file with this stamp still holds the same: nothing of it has changed, or it was erased. That changes
+    /// the time of its inode alone, and whoever has it open reads on.
+    fn still_holds(&self, now: &Metadata) -> bool {
+        let mut found = Self::of(now);
+        if is_erased(now) {
+            found.identity[CHANGED..=CHANGED_NANOSECONDS]
+                .copy_from_slice(&self.identity[CHANGED..=CHANGED_NANOSECONDS]);
+        }
+        found == *self
+    }
+}
+
+/// Places of the time of the inode in the identity.
+const CHANGED: usize = 2;
+const CHANGED_NANOSECONDS: usize = 3;
+
+#[cfg(unix)]
+fn is_erased(file: &Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    file.nlink() == 0
+}
+
+#[cfg(not(unix))]
+fn is_erased(_: &Metadata) -> bool {
+    false
 }
 
 /// The hashes of files, with the stamps they had when they were hashed.
@@ -166,12 +192,13 @@ impl Reading {
         reading.next()
     }
 
-    /// The next chunk. With the last one, checks that the file was not changed meanwhile.
+    /// The next chunk. With the last one, checks that the file was not changed meanwhile. A file that was erased meanwhile
+    /// is read to its end: the answer has begun, and is whole.
     fn next(mut self) -> Result<(Bytes, Self), BlobError> {
         let mut chunk = vec![0; self.left.min(SENT_CHUNK) as usize];
         self.file.read_exact(&mut chunk)?;
         self.left -= chunk.len() as u64;
-        if self.left == 0 && Stamp::of(&self.file.metadata()?) != self.stamp {
+        if self.left == 0 && !self.stamp.still_holds(&self.file.metadata()?) {
             return Err(damaged(&self.path, "it changed while it was read"));
         }
         Ok((chunk.into(), self))
@@ -190,4 +217,49 @@ pub(super) fn stream((chunk, rest): (Bytes, Reading)) -> BlobStream {
             .map(Some)
     });
     stream::iter([Ok(chunk)]).chain(rest).boxed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::path::Path;
+
+    /// Whether a reading that has begun ends whole after `act` on its file.
+    fn ends_whole(act: impl FnOnce(&Path)) -> bool {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("volume.nii");
+        let content: Vec<u8> = (0..3 * SENT_CHUNK / 2).map(|at| at as u8).collect();
+        fs::write(&path, &content).unwrap();
+        let file = File::open(&path).unwrap();
+        let stamp = Stamp::of(&file.metadata().unwrap());
+        let all = 0..content.len() as u64;
+        let (first, rest) = Reading::begin(file, stamp, "volume.nii".into(), all).unwrap();
+        act(&path);
+        let second = rest.next();
+        second.is_ok_and(|(second, _)| [first, second].concat() == content)
+    }
+
+    /// An answer that has begun when the item is erased is whole: the file is read on, as it is open. One that was altered
+    /// is not passed on.
+    #[test]
+    fn a_file_that_is_erased_while_it_is_read_is_whole_and_one_that_is_altered_is_refused() {
+        let alter = |path: &Path| {
+            // The times of files are those of the kernel's last tick.
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            fs::write(path, vec![7; 3 * SENT_CHUNK as usize / 2]).unwrap();
+        };
+        assert!(ends_whole(|_| {}));
+        assert!(ends_whole(|path| fs::remove_file(path).unwrap()));
+        assert!(ends_whole(|path| {
+            let doomed = path.with_extension("doomed");
+            fs::rename(path, &doomed).unwrap();
+            fs::remove_file(doomed).unwrap();
+        }));
+        assert!(!ends_whole(alter));
+        assert!(!ends_whole(|path| {
+            alter(path);
+            fs::remove_file(path).unwrap();
+        }));
+    }
 }
