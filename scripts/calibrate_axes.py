@@ -1,4 +1,4 @@
-"""Estimates the score below which axes of an image count as exchanged (FLAG_SCORE of judge/exchanged_axes.rs).
+"""Estimates the scores below which axes of an image count as exchanged (AxisPair::flag_score of judge/exchanged_axes.rs).
 
     cargo build --release --bin ventriform && cargo build --release --package ventriform-tools --bin exchanged_axes
     python scripts/calibrate_axes.py OUT [--cases 120] [--seed 1] [--also FOLDER...]

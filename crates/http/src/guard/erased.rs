@@ -23,7 +23,10 @@ pub async fn settled(app: &App, tenant: &Tenant, id: Option<&str>, response: Res
     };
     match instead(app, tenant, id, kind).await {
         Ok(Some(problem)) => {
-            tracing::info!(item = id, "the internal error is that of a read beside an erasure");
+            tracing::info!(
+                item = id,
+                "the internal error is that of a read beside an erasure"
+            );
             problem.into_response()
         }
         // It failed for another reason.

@@ -92,6 +92,12 @@ const ODD_FILES: &[(&str, usize, f64, [f64; 3])] = &[
         -115_524_515.0,
         CT_SPACING_MM,
     ),
+    (
+        "GH177_D_CLUNIE_CT1_IVRLE_BigEndian_undefined_length.dcm",
+        1,
+        -115_524_515.0,
+        CT_SPACING_MM,
+    ),
     ("GH184.dcm", 1, 3_228_937.134_038, PET_SPACING_MM),
     ("GH610.dcm", 1, 1.166_530_305_741_4, PET_SPACING_MM),
     ("CT_small.dcm", 1, -1_950_906.0, CT_SPACING_MM),
