@@ -8,6 +8,7 @@
 //! of one beat; a fit tells ([`crate::beat`]), and a warning says what was taken for what.
 
 use super::VolumeError;
+use super::gate_names::{NamesSay, said_by_names};
 use super::limits::ReadLimits;
 use super::nifti::{NiftiFile, StatedGrid};
 use super::open::{Decoded, HeaderFacts, OpenVolume};
@@ -113,6 +114,10 @@ impl OpenVolume for GateFiles {
 
     fn assumes_gates(&self) -> bool {
         true
+    }
+
+    fn names_say(&self) -> NamesSay {
+        said_by_names(&self.volume_names())
     }
 
     fn volume_names(&self) -> Vec<&str> {

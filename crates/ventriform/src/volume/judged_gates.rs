@@ -1,7 +1,7 @@
 //! A file of gates without the volumes that are none, or of volumes that are no gates although nothing in the header says so.
 
 use super::dicom::one_scan::ScanStatement;
-use super::gate_look::{GateLook, look};
+use super::gate_look::{GateLook, called_by, look};
 use super::gate_timing::GateTiming;
 use super::left_out::LeftOut;
 use super::nifti::{StatedGrid, TAKEN_FOR_GATES};
@@ -32,7 +32,8 @@ pub(super) fn judged(
     if header.frames < 2 || !(header.gated || assumed) {
         return Ok(file);
     }
-    let mut look = look(&mut *file, !assumed, monitor)?;
+    let called = called_by(&*file);
+    let mut look = look(&mut *file, &called, monitor)?;
     if !file.reads_again() {
         file = again()?;
     }
