@@ -30,6 +30,8 @@ const CUT: f64 = 3.0;
 const BRIGHT_SHARE: f64 = 0.25;
 /// Distance from the place that changes most, mm.
 const REACH_MM: f64 = 20.0;
+/// Least change where it is greatest, as a share of the brightness: the root of its mean square. Less is that of rounding.
+const LEAST_CHANGE: f64 = 1e-3;
 /// Steps of the power iteration for the main course.
 const ITERATIONS: usize = 200;
 
@@ -163,7 +165,7 @@ fn contrasts(blocks: &Blocks<'_>, monitor: &Monitor) -> Result<Vec<Vec<f32>>, Ca
     Ok(contrasts)
 }
 
-/// The products of the volumes' changes about the place that changes most, each with each; `None` if no place counts.
+/// The products of the volumes' changes about the place that changes most, each with each; `None` if none changes.
 fn products(contrasts: &[Vec<f32>], blocks: &Blocks<'_>) -> Option<Vec<Vec<f64>>> {
     let count = contrasts.len() as f64;
     let mean = |at: usize| contrasts.iter().map(|c| f64::from(c[at])).sum::<f64>() / count;
@@ -173,13 +175,16 @@ fn products(contrasts: &[Vec<f32>], blocks: &Blocks<'_>) -> Option<Vec<Vec<f64>>
         contrasts.iter().map(square).sum::<f64>()
     };
     let places = 0..contrasts.first()?.len();
-    let (peak, _) = places
+    let (peak, largest) = places
         .clone()
         .map(|at| (at, change(at)))
         .fold(
             (0, 0.0),
             |most, own| if own.1 > most.1 { own } else { most },
         );
+    if (largest / count).sqrt() < LEAST_CHANGE {
+        return None;
+    }
     let index = |at: usize| {
         let [nx, ny, _] = blocks.shape;
         [at % nx, at / nx % ny, at / nx / ny]

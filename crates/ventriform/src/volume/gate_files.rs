@@ -170,6 +170,9 @@ impl OpenVolume for GateFiles {
     }
 }
 
+/// What a warning says of files of one volume each.
+pub(super) const FILES_TAKEN_FOR_GATES: &str = "were taken for the gates of one heart beat";
+
 /// The warning that files of one volume each were taken for gates, in such an order.
 pub(super) fn taken_for_gates(order: &[usize]) -> String {
     let by = match order.is_sorted() {
@@ -177,7 +180,7 @@ pub(super) fn taken_for_gates(order: &[usize]) -> String {
         false => "in the order of the numbers in their names",
     };
     format!(
-        "{} files of one volume each were taken for the gates of one heart beat, {by}.",
+        "{} files of one volume each {FILES_TAKEN_FOR_GATES}, {by}.",
         order.len()
     )
 }
