@@ -290,16 +290,16 @@ impl VolumeUpload {
         GATE_COUNTS.contains(&self.files.len()) && self.files.iter().all(|file| file.may_be_gate)
     }
 
-    /// What the client's names say of files of one volume each, as a word in the names of the stored files. It is part of the
-    /// volume's id, because it tells how the files are read.
+    /// What the client's names say of files of one volume each, as a word in the names of the stored files, by which
+    /// they are read. It is no part of the volume's id.
     fn word(&self) -> &'static str {
         if !self.may_be_gates() {
             return "";
         }
         let names: Vec<&str> = self.files.iter().map(|file| file.given.as_str()).collect();
         match said_by_names(&names) {
-            NamesSay::Gates => "gate.",
-            NamesSay::Others(_) => "case.",
+            NamesSay::Gates => "gate-",
+            NamesSay::Others(_) => "case-",
             NamesSay::Nothing => "",
         }
     }
@@ -313,7 +313,7 @@ impl VolumeUpload {
             && self.files[1].kind.starts_with("img");
         let name = |number: usize, kind| match (pair, self.files.len()) {
             (true, _) | (_, 1) => format!("volume.{kind}"),
-            _ => format!("{number:04}.{word}{kind}"),
+            _ => format!("{word}{number:04}.{kind}"),
         };
         let files = self.files.iter().enumerate();
         files

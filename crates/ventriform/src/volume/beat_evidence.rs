@@ -38,9 +38,9 @@ const ITERATIONS: usize = 200;
 /// Gates from which on chance makes less of a share.
 const MANY_GATES: usize = 10;
 /// Least share of a beat's change that comes and goes once: of fewer than [`MANY_GATES`], and of as many or more.
-const LEAST_ONCE: [f64; 2] = [0.7, 0.6];
+const LEAST_ONCE: [f64; 2] = [0.75, 0.65];
 /// Least share that comes and goes once or twice, of the same.
-const LEAST_TWICE: [f64; 2] = [0.85, 0.75];
+const LEAST_TWICE: [f64; 2] = [0.85, 0.8];
 /// Largest step of a beat, as a share of its range.
 const LARGEST_STEP: f64 = 0.75;
 

@@ -55,8 +55,8 @@ const GROUPS_APART: f64 = 2.0;
 const NOISE_STEP: f64 = 0.03;
 /// Squared distance, as a share of the squared contrast of the image, up to which groups are of equal images: 2 % of it.
 const ALIKE_DISTANCE: f64 = 3e-4;
-/// The same up to which images are equal but for the rounding of their values.
-const EQUAL_DISTANCE: f64 = 1e-6;
+/// The same up to which images are equal but for their scale and the rounding of their values: 1 %.
+const EQUAL_DISTANCE: f64 = 1e-4;
 
 /// What calls the volumes of a file gates.
 #[derive(Debug, Clone, PartialEq, Eq)]
