@@ -3140,6 +3140,7 @@ fn object_of(tenant: &Tenant, instance: &str, data: &str) -> NewObject {
             study: "1.2".into(),
             series: "1.2.3".into(),
             is_part: true,
+            gates: None,
             modality: Some("NM".into()),
             image_type: vec!["ORIGINAL".into()],
             study_description: None,

@@ -2,7 +2,9 @@
 
 use crate::dicom::{JANE, Patient, nm_of};
 use crate::helpers::{Service, TestApp, fake_engine, key, problem, rows_of, text};
-use crate::scu::{CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, one_gate, slice};
+use crate::scu::{
+    CT_CLASS, NM_CLASS, Object, Scu, command, nuclear, one_gate, slice, slice_of_a_gate,
+};
 use dicom_ul::pdu::{PDataValueType, Pdu};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -208,7 +210,7 @@ async fn a_request_that_breaks_off_leaves_a_row_for_what_it_has_stored() {
 async fn each_context_is_accepted_or_rejected_by_itself() {
     let (_app, address) = service(|_| {}).await;
     let mut scu = Scu::open(address);
-    assert_eq!(scu.contexts(), [1, 3, 5]);
+    assert_eq!(scu.contexts(), [1, 3, 5, 11]);
     // C-FIND, and C-STORE of another class than the context's.
     scu.send(
         PDataValueType::Command,
@@ -289,6 +291,71 @@ async fn images_of_one_gate_each_are_gathered_to_one_gated_volume() {
     // Its numbers grow from gate to gate.
     assert_eq!(volume["intensity"]["min"], 1.0);
     assert_eq!(volume["intensity"]["max"], 55.0);
+}
+
+/// As the library groups a folder: gates of one acquisition are one volume, although each is a series of its own.
+#[tokio::test(flavor = "multi_thread")]
+async fn gates_of_a_series_each_are_gathered_to_one_gated_volume() {
+    let slices: Vec<Object> = [3, 8, 1, 2, 7, 5, 6, 4]
+        .into_iter()
+        .flat_map(|gate| (1..4).map(move |number| slice_of_a_gate("1.2.6", gate, number)))
+        .collect();
+    let images: Vec<Object> = [3, 8, 1, 2, 7, 5, 6, 4]
+        .into_iter()
+        .map(|gate| one_gate("1.2.5", gate).of_study("1.2.5", &format!("1.2.5.9.{gate}")))
+        .collect();
+    for objects in [slices, images] {
+        for over_http in [false, true] {
+            let (app, address) =
+                service(|settings| settings.series_patience = "5s".parse().unwrap()).await;
+            if over_http {
+                let files: Vec<_> = objects.iter().map(Object::file).collect();
+                let answer = stow(&app, "/dicom-web/studies", RELATED_TYPE, related(&files)).await;
+                assert_eq!(answer.status(), StatusCode::OK);
+            } else {
+                let mut scu = Scu::open(address);
+                for object in &objects {
+                    assert_eq!(scu.store(object), 0);
+                }
+                // Sent again, they are known.
+                assert_eq!(scu.store(&objects[objects.len() - 1]), 0);
+                scu.release();
+            }
+            let group = settled(&app, 1).await.remove(0);
+            assert_eq!(group["state"], "stored", "{group}");
+            assert_eq!(group["objects"], objects.len());
+            let volume = app.json(&text(&group["links"]["volume"])).await;
+            assert_eq!(volume["shape"], json!([4, 4, 3]));
+            assert_eq!(volume["frames"], 8, "{volume}");
+            assert_eq!(volume["gates"]["number"], 8);
+        }
+    }
+}
+
+/// Acquisitions stay apart: gates at rest and under stress, and reconstructions of the same counts.
+#[tokio::test(flavor = "multi_thread")]
+async fn gates_of_several_acquisitions_are_several_volumes() {
+    let (app, address) = service(|_| {}).await;
+    let mut scu = Scu::open(address);
+    for (number, description) in [(1, "Rest"), (2, "Stress")] {
+        for gate in 1..9 {
+            for slice in 1..4 {
+                let mut object = slice_of_a_gate("1.2.6", gate, slice)
+                    .described(&format!("{description} gated, gate {gate}"))
+                    .of_study("1.2.6", &format!("1.2.6.{number}.{gate}"));
+                object.rename(&format!("1.2.6.{number}.{gate}.{slice}"));
+                assert_eq!(scu.store(&object), 0);
+            }
+        }
+    }
+    scu.release();
+    for group in settled(&app, 2).await {
+        assert_eq!(
+            (&group["state"], &group["objects"]),
+            (&json!("stored"), &json!(24)),
+            "{group}"
+        );
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

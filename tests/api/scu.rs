@@ -12,6 +12,7 @@ use std::net::{SocketAddr, TcpStream};
 
 pub const VERIFICATION_CLASS: &str = "1.2.840.10008.1.1";
 pub const NM_CLASS: &str = "1.2.840.10008.5.1.4.1.1.20";
+pub const PET_CLASS: &str = "1.2.840.10008.5.1.4.1.1.128";
 pub const CT_CLASS: &str = "1.2.840.10008.5.1.4.1.1.2";
 pub const EXPLICIT_LITTLE: &str = "1.2.840.10008.1.2.1";
 pub const IMPLICIT_LITTLE: &str = "1.2.840.10008.1.2";
@@ -137,7 +138,53 @@ pub fn one_gate(series: &str, gate: u16) -> Object {
     object
 }
 
+/// A slice of one of eight gates of a PET study, of which each gate is a series of its own.
+pub fn slice_of_a_gate(study: &str, gate: u16, number: u16) -> Object {
+    let mut object = slice(&format!("{study}.{gate}"), number);
+    object.class = PET_CLASS;
+    let set = &mut object.set;
+    put(set, (0x0008, 0x0016), VR::UI, PET_CLASS);
+    put(set, (0x0008, 0x0060), VR::CS, "PT");
+    put(set, (0x0008, 0x0008), VR::CS, "ORIGINAL\\PRIMARY");
+    put(set, (0x0008, 0x0032), VR::TM, format!("0915{gate:02}"));
+    put(set, (0x0008, 0x103e), VR::LO, format!("Gated, gate {gate}"));
+    put(
+        set,
+        (0x0018, 0x1060),
+        VR::DS,
+        format!("{}", 100 * (gate - 1)),
+    );
+    put(set, (0x0020, 0x000d), VR::UI, study.to_owned());
+    put(set, (0x0020, 0x0011), VR::IS, (100 + gate).to_string());
+    put(set, (0x0020, 0x0013), VR::IS, number.to_string());
+    put(set, (0x0054, 0x0071), VR::US, 8_u16);
+    put(set, (0x0054, 0x1000), VR::CS, "GATED\\IMAGE");
+    put(set, (0x0054, 0x1001), VR::CS, "BQML");
+    let pixels = PrimitiveValue::U16(vec![10 * gate + number; 16].into());
+    put(set, (0x7fe0, 0x0010), VR::OW, pixels);
+    object
+}
+
 impl Object {
+    /// The object in that series of that study.
+    pub fn of_study(mut self, study: &str, series: &str) -> Self {
+        put(&mut self.set, (0x0020, 0x000d), VR::UI, study);
+        put(&mut self.set, (0x0020, 0x000e), VR::UI, series);
+        self
+    }
+
+    /// Gives it another SOP Instance UID.
+    pub fn rename(&mut self, instance: &str) {
+        put(&mut self.set, (0x0008, 0x0018), VR::UI, instance);
+        instance.clone_into(&mut self.instance);
+    }
+
+    /// The object with another description of its series.
+    pub fn described(mut self, description: &str) -> Self {
+        put(&mut self.set, (0x0008, 0x103e), VR::LO, description);
+        self
+    }
+
     /// The data set in that transfer syntax.
     pub fn data_set(&self, syntax: &str) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -194,7 +241,8 @@ impl Scu {
             .with_presentation_context(CT_CLASS, vec![IMPLICIT_LITTLE])
             // Secondary Capture and High-Throughput JPEG 2000 are not read.
             .with_presentation_context("1.2.840.10008.5.1.4.1.1.7", vec![IMPLICIT_LITTLE])
-            .with_presentation_context(NM_CLASS, vec!["1.2.840.10008.1.2.4.201"]);
+            .with_presentation_context(NM_CLASS, vec!["1.2.840.10008.1.2.4.201"])
+            .with_presentation_context(PET_CLASS, vec![IMPLICIT_LITTLE]);
         options
             .establish(to)
             .map(Self)
@@ -246,6 +294,7 @@ impl Scu {
     pub fn store(&mut self, object: &Object) -> u16 {
         let (context, syntax) = match object.class {
             NM_CLASS => (3, EXPLICIT_LITTLE),
+            PET_CLASS => (11, IMPLICIT_LITTLE),
             _ => (5, IMPLICIT_LITTLE),
         };
         let set = command(0x0001, object.class, Some(&object.instance));

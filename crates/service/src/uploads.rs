@@ -26,7 +26,7 @@ use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
 use ventriform::progress::Monitor;
 use ventriform::volume::gates::GATE_COUNTS;
-use ventriform::volume::order_by_numbers;
+use ventriform::volume::{NamesSay, order_by_numbers, said_by_names};
 
 /// Bytes gathered for one write: at most, for the first one, and where the client has no memory left.
 /// Up to the first write an upload lies in memory alone: clients that send a few bytes and then wait cost neither
@@ -290,15 +290,30 @@ impl VolumeUpload {
         GATE_COUNTS.contains(&self.files.len()) && self.files.iter().all(|file| file.may_be_gate)
     }
 
+    /// What the client's names say of files of one volume each, as a word in the names of the stored files, by which
+    /// they are read. It is no part of the volume's id.
+    fn word(&self) -> &'static str {
+        if !self.may_be_gates() {
+            return "";
+        }
+        let names: Vec<&str> = self.files.iter().map(|file| file.given.as_str()).collect();
+        match said_by_names(&names) {
+            NamesSay::Gates => "gate-",
+            NamesSay::Others(_) => "case-",
+            NamesSay::Nothing => "",
+        }
+    }
+
     /// The files under their final names: `volume` with its extension for one file or a pair, else
     /// numbers with extensions.
     fn records(&self) -> Vec<FileRecord> {
+        let word = self.word();
         let pair = self.files.len() == 2
             && self.files[0].kind.starts_with("hdr")
             && self.files[1].kind.starts_with("img");
         let name = |number: usize, kind| match (pair, self.files.len()) {
             (true, _) | (_, 1) => format!("volume.{kind}"),
-            _ => format!("{number:04}.{kind}"),
+            _ => format!("{word}{number:04}.{kind}"),
         };
         let files = self.files.iter().enumerate();
         files

@@ -59,8 +59,8 @@ impl IntakeStore for SqlStore {
         let group = open_group(&mut transaction, object, now).await?;
         query(
             "INSERT INTO intake_objects (tenant, sop_instance, group_id, data_sha256, file_sha256,
-                                         file, bytes, received_at)
-             VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+                                         file, bytes, received_at, series)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
         )
         .bind(tenant)
         .bind(&header.sop_instance)
@@ -70,6 +70,7 @@ impl IntakeStore for SqlStore {
         .bind(&object.file)
         .bind(i64::try_from(object.bytes).unwrap_or(i64::MAX))
         .bind(now)
+        .bind(header.gates.as_ref().map(|_| &header.series))
         .execute(&mut transaction)
         .await?;
         record_first(&mut transaction, object, &group).await?;
@@ -372,7 +373,7 @@ async fn earlier(
     object: &NewObject,
 ) -> StoreResult<Option<(String, bool, Option<String>)>> {
     let row = query(
-        "SELECT group_id, data_sha256 = $1 AND study = $2 AND series = $3, file,
+        "SELECT group_id, data_sha256 = $1 AND study = $2 AND coalesce(o.series, g.series) = $3, file,
                 state = 'failed'
          FROM intake_objects AS o JOIN intake_groups AS g ON g.id = o.group_id
          WHERE o.tenant = $4 AND sop_instance = $5",
@@ -460,31 +461,87 @@ async fn open_group(
     } else {
         header.sop_instance.as_str()
     };
+    if let Some(known) = group_of_gates(to, object).await? {
+        let row = query(
+            "UPDATE intake_groups SET protocol = $1, sender = $2, address = $3, state = 'gathering',
+                    revision = revision + 1, failure = NULL, changed_at = $4
+             WHERE id = $5 RETURNING id",
+        )
+        .bind(origin.protocol.as_str())
+        .bind(&origin.sender)
+        .bind(&origin.address)
+        .bind(now)
+        .bind(known)
+        .fetch_one(to)
+        .await?;
+        return row.try_get(0);
+    }
+    let statement = match header.gates {
+        Some(_) => OPEN_GATES,
+        None => OPEN_GROUP,
+    };
+    let row = query(statement)
+        .bind(random_id(GROUP_PREFIX))
+        .bind(origin.tenant.as_str())
+        .bind(&header.study)
+        .bind(&header.series)
+        .bind(instance)
+        .bind(&header.modality)
+        .bind(rows::to_json(&header.image_type)?)
+        .bind(&header.study_description)
+        .bind(origin.protocol.as_str())
+        .bind(&origin.sender)
+        .bind(&origin.address)
+        .bind(now)
+        .bind(&header.gates)
+        .fetch_one(to)
+        .await?;
+    row.try_get(0)
+}
+
+/// Makes the group of an object that has none, or opens it; a group is known by these columns.
+macro_rules! open_by {
+    ($columns:literal) => {
+        concat!(
+            "INSERT INTO intake_groups (id, tenant, study, series, instance, modality, image_type,
+                 study_description, protocol, sender, address, state, revision, created_at, changed_at, gates)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, 'gathering', 1, $12, $12, $13)
+             ON CONFLICT (",
+            $columns,
+            ") DO UPDATE SET
+                 protocol = excluded.protocol, sender = excluded.sender, address = excluded.address,
+                 state = 'gathering', revision = intake_groups.revision + 1, failure = NULL,
+                 changed_at = excluded.changed_at
+             RETURNING id"
+        )
+    };
+}
+const OPEN_GROUP: &str = open_by!("tenant, study, series, instance");
+const OPEN_GATES: &str = open_by!("tenant, study, gates");
+
+/// The group of an earlier object of the same series, if the object is one of one gate: a series stays together, whatever differs
+/// between its objects.
+async fn group_of_gates(
+    to: &mut Transaction<'_>,
+    object: &NewObject,
+) -> StoreResult<Option<String>> {
+    let header = &object.header;
+    if header.gates.is_none() {
+        return Ok(None);
+    }
     let row = query(
-        "INSERT INTO intake_groups (id, tenant, study, series, instance, modality, image_type,
-             study_description, protocol, sender, address, state, revision, created_at, changed_at)
-         VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, 'gathering', 1, $12, $12)
-         ON CONFLICT (tenant, study, series, instance) DO UPDATE SET
-             protocol = excluded.protocol, sender = excluded.sender, address = excluded.address,
-             state = 'gathering', revision = intake_groups.revision + 1, failure = NULL,
-             changed_at = $12
-         RETURNING id",
+        "SELECT id FROM intake_groups WHERE tenant = $1 AND study = $2 AND series = $3 AND instance = ''
+         UNION ALL
+         SELECT g.id FROM intake_objects AS o JOIN intake_groups AS g ON g.id = o.group_id
+         WHERE o.tenant = $1 AND o.series = $3 AND g.study = $2
+         LIMIT 1",
     )
-    .bind(random_id(GROUP_PREFIX))
-    .bind(origin.tenant.as_str())
+    .bind(object.origin.tenant.as_str())
     .bind(&header.study)
     .bind(&header.series)
-    .bind(instance)
-    .bind(&header.modality)
-    .bind(rows::to_json(&header.image_type)?)
-    .bind(&header.study_description)
-    .bind(origin.protocol.as_str())
-    .bind(&origin.sender)
-    .bind(&origin.address)
-    .bind(now)
-    .fetch_one(to)
+    .fetch_optional(to)
     .await?;
-    row.try_get(0)
+    row.map(|row| row.try_get(0)).transpose()
 }
 
 async fn files_of(to: &mut Transaction<'_>, group: &str) -> StoreResult<Vec<String>> {

@@ -31,6 +31,7 @@ use crate::retile::RetileError;
 use crate::segmentation::SegmentationError;
 use crate::surface::SurfaceError;
 use crate::volume::VolumeError;
+use crate::volume::gates::GATE_COUNTS;
 use crate::volume::given_mask::GivenMaskError;
 use std::error::Error;
 
@@ -728,7 +729,15 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::TooLarge { what, limit, .. } => too_large_advice(what, *limit),
         VolumeError::FrameNeeded { frames, .. } | VolumeError::FrameOutOfRange { frames, .. } => {
             let last = frames.saturating_sub(1);
-            format!("Set `frame` to a number from 0 (the first) to {last} (the last).")
+            let choose = format!("Set `frame` to a number from 0 (the first) to {last} (the last).");
+            match error {
+                VolumeError::FrameNeeded { .. } if GATE_COUNTS.contains(frames) => format!(
+                    "{choose} If they are the gates of one heart beat, say so: in the names of files of one gate each (gate1.nii, gate2.nii, \
+                     ...), or by the time of a gate in the header (pixdim[4] and xyzt_units of NIfTI); or give their sum. A beat takes them \
+                     with `gated`."
+                ),
+                _ => choose,
+            }
         }
         VolumeError::OtherGate { .. } => {
             "Give the gates as they were reconstructed together: of one study, as many voxels, at the same place.".into()

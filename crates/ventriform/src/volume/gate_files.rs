@@ -8,6 +8,7 @@
 //! of one beat; a fit tells ([`crate::beat`]), and a warning says what was taken for what.
 
 use super::VolumeError;
+use super::gate_names::{NamesSay, said_by_names};
 use super::limits::ReadLimits;
 use super::nifti::{NiftiFile, StatedGrid};
 use super::open::{Decoded, HeaderFacts, OpenVolume};
@@ -115,6 +116,10 @@ impl OpenVolume for GateFiles {
         true
     }
 
+    fn names_say(&self) -> NamesSay {
+        said_by_names(&self.volume_names())
+    }
+
     fn volume_names(&self) -> Vec<&str> {
         let names = [self.first.header().file].into_iter();
         names
@@ -165,6 +170,9 @@ impl OpenVolume for GateFiles {
     }
 }
 
+/// What a warning says of files of one volume each.
+pub(super) const FILES_TAKEN_FOR_GATES: &str = "were taken for the gates of one heart beat";
+
 /// The warning that files of one volume each were taken for gates, in such an order.
 pub(super) fn taken_for_gates(order: &[usize]) -> String {
     let by = match order.is_sorted() {
@@ -172,7 +180,7 @@ pub(super) fn taken_for_gates(order: &[usize]) -> String {
         false => "in the order of the numbers in their names",
     };
     format!(
-        "{} files of one volume each were taken for the gates of one heart beat, {by}.",
+        "{} files of one volume each {FILES_TAKEN_FOR_GATES}, {by}.",
         order.len()
     )
 }

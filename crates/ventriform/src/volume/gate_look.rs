@@ -1,32 +1,38 @@
 //! Whether volumes that are taken for gates look like gates of one heart beat, and which of them are none.
 //!
-//! In: a file whose volumes its header, or nothing but their number, calls gates. Out: the volumes that are left out, and, where nothing
-//! but their number calls them gates, why they are none. Steps, on means over blocks of about [`BLOCK_MM`], each volume scaled to equal
+//! In: a file of several volumes, and what calls them gates ([`CalledBy`]). Out: the volumes that are left out, and, unless the
+//! header or the caller calls them gates, why they are none. Steps, on means over blocks of about [`BLOCK_MM`], each volume scaled to equal
 //! counts:
 //!
 //! 1. A volume that is the sum or the mean of the others, or has far more counts than a gate, is no gate. One that repeats another
 //!    voxel by voxel tells nothing of its own.
-//! 2. Of what nothing calls gates, each must show the heart where the others do (the correlation with their mean), have counts like
+//! 2. Each of the others must show the heart where the rest do (the correlation with their mean), have counts like
 //!    them, and not fall into groups: distances between the groups that are beyond all distances within them. A heart that beats passes
 //!    through all shapes between its extremes; scans at rest and under stress, or with and without attenuation correction, do not.
-//!    Where the volumes change by more than noise, each must be near the next.
+//! 3. What nothing but its number calls gates is summed only if it shows a heart that beats ([`beat_evidence`](super::beat_evidence)), or
+//!    if all volumes are equal, whose sum is any of them.
 //!
-//! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes without groups are moments of
+//! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes are moments of
 //! one beat; a fit tells ([`crate::beat`]).
 //!
 //! The bounds are those of `scripts/gate_look.py`, which measures simulated beats, hearts of several people and
-//! reconstructions of two scans.
+//! reconstructions of scans.
 
-use super::VolumeError;
+use super::beat_evidence::{Blocks, Course};
+use super::gate_names::NamesSay;
 use super::left_out::LeftOut;
 use super::open::OpenVolume;
+use super::{Volume, VolumeError};
 use crate::grid::gates::GATE_COUNTS;
-use crate::progress::Monitor;
+use crate::progress::{Cancelled, Monitor};
 
 /// Edge of a block, mm.
 const BLOCK_MM: f64 = 18.0;
 /// Most blocks along an axis.
 const MOST_BLOCKS: usize = 24;
+/// The same of the blocks in which a beat is looked for.
+const FINE_BLOCK_MM: f64 = 9.0;
+const MOST_FINE_BLOCKS: usize = 80;
 /// Gates into which studies are usually divided.
 const USUAL_GATES: [usize; 7] = [8, 10, 12, 16, 20, 24, 32];
 /// Counts, as a multiple of those of a usual gate, beyond which a volume is more than a gate.
@@ -45,20 +51,25 @@ const MEAN_DISTANCE_AT_END: f64 = 0.25;
 const LEAST_CORRELATION: f64 = 0.85;
 /// Squared distance between groups, as a multiple of the largest within one, from which on volumes are no beat.
 const GROUPS_APART: f64 = 2.0;
-/// Mean squared step of a smooth order, as a share of the mean squared distance.
-const SMOOTH_STEP: f64 = 0.95;
 /// Least squared distance of noisy volumes, as a share of the usual step.
 const NOISE_STEP: f64 = 0.03;
-/// Share of the blocks that change most.
-const CHANGING_SHARE: f64 = 0.03;
-/// Variance of these over the usual one, both over the mean, from which on a change is none of noise.
-const CLEAR_CHANGE: f64 = 6.0;
-/// Mean squared step of a beat in these blocks, as a share of the mean squared distance: of eight gates and more, and of fewer.
-const CLEAR_STEPS: [f64; 2] = [0.55, 0.62];
-/// Blocks darker than this share of the brightest have no usual variance, and none below the second share has a scale.
-const DARK_SHARES: [f64; 2] = [0.1, 0.02];
 /// Squared distance, as a share of the squared contrast of the image, up to which groups are of equal images: 2 % of it.
-const EQUAL_DISTANCE: f64 = 3e-4;
+const ALIKE_DISTANCE: f64 = 3e-4;
+/// The same up to which images are equal but for their scale and the rounding of their values: 1 %.
+const EQUAL_DISTANCE: f64 = 1e-4;
+
+/// What calls the volumes of a file gates.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum CalledBy {
+    /// Their header or the caller.
+    Header,
+    /// The names of their files, or a time that fits a beat.
+    Word,
+    /// Nothing but their number.
+    Number,
+    /// Nothing, and the names of their files have this word for something else.
+    Others(&'static str),
+}
 
 /// What was seen in the volumes of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -70,21 +81,41 @@ pub(super) struct GateLook {
     pub refusal: Option<String>,
 }
 
-/// Looks at the volumes of `file`, which are taken for gates; `stated` if its header says so.
+/// What calls the volumes of `file` gates.
+pub(super) fn called_by(file: &dyn OpenVolume) -> CalledBy {
+    if !file.assumes_gates() {
+        return CalledBy::Header;
+    }
+    let timing = file.gate_timings().into_iter().next().unwrap_or_default();
+    match file.names_say() {
+        NamesSay::Others(word) => CalledBy::Others(word),
+        NamesSay::Gates => CalledBy::Word,
+        NamesSay::Nothing if timing.rr_of(file.header().frames).is_some() => CalledBy::Word,
+        NamesSay::Nothing => CalledBy::Number,
+    }
+}
+
+/// Looks at the volumes of `file`, which are taken for gates.
 ///
 /// # Errors
 /// [`VolumeError`] if a volume cannot be decoded.
 pub(super) fn look(
     file: &mut dyn OpenVolume,
-    stated: bool,
+    called: &CalledBy,
     monitor: &Monitor,
 ) -> Result<GateLook, VolumeError> {
     let frames = file.header().frames;
     let timing = file.gate_timings().into_iter().next().unwrap_or_default();
+    let stated = *called == CalledBy::Header;
     if !stated && frames < *GATE_COUNTS.start() {
         return Ok(refused(format!(
             "nothing in the file calls the {frames} volumes gates, and they are fewer than the {} of a beat",
             GATE_COUNTS.start()
+        )));
+    }
+    if let CalledBy::Others(word) = called {
+        return Ok(refused(format!(
+            "the names of the files say that they are something else (\"{word}\")"
         )));
     }
     // Several R-R intervals are compared by their counts elsewhere.
@@ -92,9 +123,35 @@ pub(super) fn look(
     if several || !GATE_COUNTS.contains(&frames) {
         return Ok(GateLook::default());
     }
-    let images = Images::of(file, monitor)?;
-    let timed = timing.rr_of(frames).is_some();
-    Ok(images.judged(stated, timed))
+    let fine = *called == CalledBy::Number;
+    let images = Images::of(file, fine, monitor)?;
+    Ok(images.judged(stated, monitor)?)
+}
+
+/// Looks at the volumes of files that were read one by one, which the caller calls gates.
+///
+/// # Errors
+/// [`Cancelled`].
+pub(super) fn look_at(volumes: &[&Volume], monitor: &Monitor) -> Result<GateLook, Cancelled> {
+    let alike = volumes
+        .iter()
+        .all(|volume| volume.shape == volumes[0].shape);
+    if !alike || !GATE_COUNTS.contains(&volumes.len()) {
+        return Ok(GateLook::default());
+    }
+    let grid = Grid {
+        shape: volumes[0].shape,
+        spacing_mm: volumes[0].frame.spacing(),
+    };
+    let mut images = Images::empty(grid, volumes.len(), false);
+    for volume in volumes {
+        monitor.check()?;
+        images.add(|take| {
+            take(0, &volume.voxels);
+            Ok::<(), Cancelled>(())
+        })?;
+    }
+    images.judged(true, monitor)
 }
 
 fn refused(why: String) -> GateLook {
@@ -104,10 +161,74 @@ fn refused(why: String) -> GateLook {
     }
 }
 
+/// The volumes of a file in finer blocks.
+struct Fine {
+    raster: Raster,
+    /// For each volume its blocks, scaled to a sum of 1.
+    blocks: Vec<Vec<f32>>,
+    /// Size of a block.
+    spacing_mm: [f64; 3],
+}
+
+/// Voxels along each axis and their size.
+#[derive(Clone, Copy)]
+struct Grid {
+    shape: [usize; 3],
+    spacing_mm: [f64; 3],
+}
+
+/// How voxels of a volume make up blocks.
+struct Raster {
+    /// Voxels of a volume along each axis.
+    shape: [usize; 3],
+    /// Voxels of a block.
+    edges: [usize; 3],
+    /// Blocks.
+    along: [usize; 3],
+}
+
+impl Raster {
+    /// Blocks of about `block_mm`, at most `most` along an axis.
+    fn of(grid: Grid, block_mm: f64, most: usize) -> Self {
+        let Grid { shape, spacing_mm } = grid;
+        let edge = |axis: usize| {
+            let edge = (block_mm / spacing_mm[axis]).round();
+            let least = shape[axis].div_ceil(most);
+            (edge.clamp(1.0, shape[axis] as f64) as usize).max(least)
+        };
+        let edges = [0, 1, 2].map(edge);
+        Self {
+            shape,
+            edges,
+            along: [0, 1, 2].map(|axis| shape[axis].div_ceil(edges[axis])),
+        }
+    }
+
+    fn empty(&self) -> Vec<f64> {
+        vec![0.0; self.along.iter().product()]
+    }
+
+    /// Adds voxels of one row from number `at` of the volume on to the `sums` of the blocks.
+    fn add(&self, sums: &mut [f64], at: usize, row: &[f32]) {
+        let (i, line) = (at % self.shape[0], at / self.shape[0]);
+        let (j, k) = (line % self.shape[1], line / self.shape[1]);
+        let [ei, ej, ek] = self.edges;
+        let begin = ((k / ek) * self.along[1] + j / ej) * self.along[0];
+        for (offset, value) in row.iter().enumerate() {
+            if value.is_finite() {
+                sums[begin + (i + offset) / ei] += f64::from(*value);
+            }
+        }
+    }
+}
+
 /// The volumes of a file, coarsely.
 struct Images {
+    raster: Raster,
     /// For each volume the means of its blocks, scaled to a sum of 1.
     blocks: Vec<Vec<f32>>,
+    /// The same in finer blocks, if a beat is looked for.
+    fine: Option<Fine>,
     /// The sum of each volume's voxels.
     counts: Vec<f64>,
     /// A hash over the voxels of each volume.
@@ -115,50 +236,76 @@ struct Images {
 }
 
 impl Images {
-    fn of(file: &mut dyn OpenVolume, monitor: &Monitor) -> Result<Self, VolumeError> {
+    /// The volumes of `file`, in finer blocks too if `fine`.
+    fn of(file: &mut dyn OpenVolume, fine: bool, monitor: &Monitor) -> Result<Self, VolumeError> {
         let header = file.header();
-        let (frames, shape) = (header.frames, header.shape);
-        let spacing = header.placement.frame.spacing();
-        let edge = |axis: usize| {
-            let edge = (BLOCK_MM / spacing[axis]).round();
-            let least = shape[axis].div_ceil(MOST_BLOCKS);
-            (edge.clamp(1.0, shape[axis] as f64) as usize).max(least)
+        let frames = header.frames;
+        let grid = Grid {
+            shape: header.shape,
+            spacing_mm: header.placement.frame.spacing(),
         };
-        let edges = [0, 1, 2].map(edge);
-        let along = [0, 1, 2].map(|axis| shape[axis].div_ceil(edges[axis]));
-        let mut images = Self {
-            blocks: Vec::with_capacity(frames),
-            counts: Vec::with_capacity(frames),
-            hashes: Vec::with_capacity(frames),
-        };
+        let mut images = Self::empty(grid, frames, fine);
         for frame in 0..frames {
-            let mut sums = vec![0.0_f64; along.iter().product()];
-            let mut hash = 0_u64;
-            let mut take = |first: usize, voxels: &[f32]| {
-                let (mut at, mut rest) = (first, voxels);
-                while !rest.is_empty() {
-                    let (i, row) = (at % shape[0], at / shape[0]);
-                    let (j, k) = (row % shape[1], row / shape[1]);
-                    let (part, next) = rest.split_at((shape[0] - i).min(rest.len()));
-                    let begin = ((k / edges[2]) * along[1] + j / edges[1]) * along[0];
-                    for (offset, value) in part.iter().enumerate() {
-                        hash = hash.wrapping_add(mixed((at + offset) as u64, value.to_bits()));
-                        if value.is_finite() {
-                            sums[begin + (i + offset) / edges[0]] += f64::from(*value);
-                        }
-                    }
-                    (at, rest) = (at + part.len(), next);
-                }
-            };
-            file.stream_frame(frame, &mut take, &monitor.part(frame, frames))?;
-            let counts: f64 = sums.iter().sum();
-            images
-                .blocks
-                .push(sums.iter().map(|sum| (sum / counts) as f32).collect());
-            images.counts.push(counts);
-            images.hashes.push(hash);
+            let part = monitor.part(frame, frames);
+            images.add(|take| file.stream_frame(frame, take, &part))?;
         }
         Ok(images)
+    }
+
+    /// No volumes yet of so many on that grid.
+    fn empty(grid: Grid, frames: usize, fine: bool) -> Self {
+        Self {
+            raster: Raster::of(grid, BLOCK_MM, MOST_BLOCKS),
+            blocks: Vec::with_capacity(frames),
+            fine: fine.then(|| {
+                let raster = Raster::of(grid, FINE_BLOCK_MM, MOST_FINE_BLOCKS);
+                let edge_mm = |axis: usize| grid.spacing_mm[axis] * raster.edges[axis] as f64;
+                Fine {
+                    spacing_mm: [0, 1, 2].map(edge_mm),
+                    blocks: Vec::with_capacity(frames),
+                    raster,
+                }
+            }),
+            counts: Vec::with_capacity(frames),
+            hashes: Vec::with_capacity(frames),
+        }
+    }
+
+    /// Adds the next volume, whose voxels `stream` gives in portions, each with the number of its first voxel.
+    fn add<E>(
+        &mut self,
+        stream: impl FnOnce(&mut dyn FnMut(usize, &[f32])) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let raster = &self.raster;
+        let finer = self.fine.as_ref().map(|fine| &fine.raster);
+        let mut sums = raster.empty();
+        let mut fine_sums = finer.map(Raster::empty).unwrap_or_default();
+        let mut hash = 0_u64;
+        let mut take = |first: usize, voxels: &[f32]| {
+            let (mut at, mut rest) = (first, voxels);
+            while !rest.is_empty() {
+                let row = raster.shape[0] - at % raster.shape[0];
+                let (part, next) = rest.split_at(row.min(rest.len()));
+                for (offset, value) in part.iter().enumerate() {
+                    hash = hash.wrapping_add(mixed((at + offset) as u64, value.to_bits()));
+                }
+                raster.add(&mut sums, at, part);
+                if let Some(finer) = finer {
+                    finer.add(&mut fine_sums, at, part);
+                }
+                (at, rest) = (at + part.len(), next);
+            }
+        };
+        stream(&mut take)?;
+        let counts: f64 = sums.iter().sum();
+        let scaled = |sums: &[f64]| sums.iter().map(|sum| (sum / counts) as f32).collect();
+        self.blocks.push(scaled(&sums));
+        if let Some(fine) = &mut self.fine {
+            fine.blocks.push(scaled(&fine_sums));
+        }
+        self.counts.push(counts);
+        self.hashes.push(hash);
+        Ok(())
     }
 
     /// The usual counts of a gate: the median of the upper half, since gates at the end of a beat lose counts.
@@ -169,20 +316,55 @@ impl Images {
         f64::midpoint(upper[(upper.len() - 1) / 2], upper[upper.len() / 2])
     }
 
-    fn judged(&self, stated: bool, timed: bool) -> GateLook {
+    fn judged(&self, stated: bool, monitor: &Monitor) -> Result<GateLook, Cancelled> {
         let mut look = GateLook::default();
         let usual = self.usual_counts();
         // Values about 0 are no counts, and have no scale to compare them by.
         if !(usual > 0.0) || self.counts.iter().any(|counts| !(*counts > 0.0)) {
-            return look;
+            if self.fine.is_some() {
+                look.refusal = Some(
+                    "nothing in the file calls them gates, and their values are about 0, which counts are not".into(),
+                );
+            }
+            return Ok(look);
         }
         self.leave_out_sums(usual, &mut look);
         self.leave_out_repeats(&mut look);
         self.leave_out_rich(usual, &mut look);
         if !stated {
-            look.refusal = self.refusal(usual, timed, &look);
+            look.refusal = self.refusal(usual, &look);
         }
-        look
+        if look.refusal.is_none() {
+            look.refusal = self.no_beat(&look, monitor)?;
+        }
+        Ok(look)
+    }
+
+    /// Why volumes that nothing calls gates are none, although nothing speaks against it: they show no heart that beats.
+    fn no_beat(&self, look: &GateLook, monitor: &Monitor) -> Result<Option<String>, Cancelled> {
+        let kept = self.kept(look);
+        let Some(fine) = &self.fine else {
+            return Ok(None);
+        };
+        if mean_apart(&self.distances(&kept)) <= EQUAL_DISTANCE {
+            return Ok(None);
+        }
+        let blocks = Blocks {
+            volumes: kept.iter().map(|n| &*fine.blocks[*n]).collect(),
+            shape: fine.raster.along,
+            spacing_mm: fine.spacing_mm,
+        };
+        let course = Course::of(&blocks, monitor)?;
+        Ok(match course {
+            Some(course) if course.is_beat() => None,
+            Some(course) => Some(format!(
+                "nothing in the file calls them gates, and in their order they show no heart that beats: {}",
+                course.text()
+            )),
+            None => Some(
+                "nothing in the file calls them gates, and they show no heart that beats".into(),
+            ),
+        })
     }
 
     fn all(&self) -> std::ops::Range<usize> {
@@ -302,7 +484,7 @@ impl Images {
     }
 
     /// Why the volumes that are left are no gates of one beat.
-    fn refusal(&self, usual: f64, timed: bool, look: &GateLook) -> Option<String> {
+    fn refusal(&self, usual: f64, look: &GateLook) -> Option<String> {
         let kept = self.kept(look);
         let loses = |n: &&usize| self.counts[**n] < (1.0 - COUNT_LOSS_SHARE) * usual;
         let losing = kept.iter().filter(loses).count();
@@ -336,61 +518,7 @@ impl Images {
                 groups.join("; ")
             ));
         }
-        if self.jumps(&kept, &distances) {
-            return Some(
-                "nothing in the file calls them gates, and they do not follow each other as moments of a beat do, as the hearts of several \
-                 people do not"
-                    .into(),
-            );
-        }
-        let odd = !timed && !USUAL_GATES.contains(&kept.len());
-        (odd && !is_smooth(&distances)).then(|| {
-            format!(
-                "nothing in the file calls them gates, {} is no usual number of gates ({}), and they do not follow each other as moments \
-                 of a beat do",
-                kept.len(),
-                USUAL_GATES.map(|n| n.to_string()).join(", ")
-            )
-        })
-    }
-
-    /// Whether volumes with these `distances` change by more than noise does, and not in steps as small as those of a beat.
-    fn jumps(&self, volumes: &[usize], distances: &[Vec<f64>]) -> bool {
-        if mean_apart(distances) <= EQUAL_DISTANCE {
-            return false;
-        }
-        let mean = self.mean(volumes, None);
-        let brightest = mean.iter().copied().fold(0.0, f64::max);
-        let count = volumes.len();
-        let change = |block: usize| {
-            let values = volumes.iter().map(|n| f64::from(self.blocks[*n][block]));
-            let square = values
-                .map(|value| (value - mean[block]).powi(2))
-                .sum::<f64>();
-            square / count as f64 / (mean[block] + DARK_SHARES[1] * brightest)
-        };
-        let changes: Vec<f64> = (0..mean.len()).map(change).collect();
-        let mut order: Vec<usize> = (0..mean.len()).collect();
-        order.sort_by(|a, b| changes[*b].total_cmp(&changes[*a]));
-        let most = &order[..((CHANGING_SHARE * order.len() as f64) as usize).max(1)];
-        let bright = order
-            .iter()
-            .filter(|block| mean[**block] > DARK_SHARES[0] * brightest);
-        let usual: Vec<f64> = bright.map(|block| changes[*block]).collect();
-        let Some(usual) = usual.get(usual.len() / 2) else {
-            return false;
-        };
-        let largest = most.iter().map(|block| changes[*block]).sum::<f64>() / most.len() as f64;
-        let between = |a: &usize, b: &usize| -> f64 {
-            let apart = |block: &usize| self.blocks[*a][*block] - self.blocks[*b][*block];
-            most.iter()
-                .map(|block| f64::from(apart(block)).powi(2))
-                .sum()
-        };
-        let row = |a: &usize| volumes.iter().map(|b| between(a, b)).collect();
-        let changing: Vec<Vec<f64>> = volumes.iter().map(row).collect();
-        let bound = CLEAR_STEPS[usize::from(count < USUAL_GATES[0])];
-        largest > CLEAR_CHANGE * usual && mean_step(&changing) > bound * mean_apart(&changing)
+        None
     }
 
     /// Squared distances between the volumes, as shares of the squared deviation of their mean.
@@ -469,7 +597,7 @@ fn groups(distances: &[Vec<f64>]) -> Option<Vec<Vec<usize>>> {
         });
         let within = within.fold(0.0, f64::max);
         let between = cut.last().map_or(0.0, |(distance, ..)| *distance);
-        let apart = between > EQUAL_DISTANCE && between >= GROUPS_APART * within;
+        let apart = between > ALIKE_DISTANCE && between >= GROUPS_APART * within;
         (apart && stretches && all.iter().all(|group| group.len() > 1)).then_some(all)
     })
 }
@@ -504,18 +632,6 @@ fn is_noisy(distances: &[Vec<f64>]) -> bool {
     let mut steps: Vec<f64> = (0..count).map(|n| distances[n][(n + 1) % count]).collect();
     steps.sort_by(f64::total_cmp);
     least > NOISE_STEP * steps[count / 2]
-}
-
-/// Whether neighbours about the cycle are nearer to each other than volumes are in the mean.
-fn is_smooth(distances: &[Vec<f64>]) -> bool {
-    mean_step(distances) <= SMOOTH_STEP * mean_apart(distances)
-}
-
-/// The mean distance of neighbours about the cycle.
-fn mean_step(distances: &[Vec<f64>]) -> f64 {
-    let count = distances.len();
-    let steps: f64 = (0..count).map(|n| distances[n][(n + 1) % count]).sum();
-    steps / count as f64
 }
 
 /// The mean distance of two.

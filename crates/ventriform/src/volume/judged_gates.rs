@@ -1,7 +1,8 @@
 //! A file of gates without the volumes that are none, or of volumes that are no gates although nothing in the header says so.
 
 use super::dicom::one_scan::ScanStatement;
-use super::gate_look::{GateLook, look};
+use super::gate_files::FILES_TAKEN_FOR_GATES;
+use super::gate_look::{GateLook, called_by, look};
 use super::gate_timing::GateTiming;
 use super::left_out::LeftOut;
 use super::nifti::{StatedGrid, TAKEN_FOR_GATES};
@@ -32,13 +33,17 @@ pub(super) fn judged(
     if header.frames < 2 || !(header.gated || assumed) {
         return Ok(file);
     }
-    let mut look = look(&mut *file, !assumed, monitor)?;
+    let called = called_by(&*file);
+    let mut look = look(&mut *file, &called, monitor)?;
     if !file.reads_again() {
         file = again()?;
     }
     let mut warnings = file.header().warnings.to_vec();
     if let Some(why) = &mut look.refusal {
-        warnings.retain(|warning| !warning.contains(TAKEN_FOR_GATES));
+        let taken = |warning: &String| {
+            warning.contains(TAKEN_FOR_GATES) || warning.contains(FILES_TAKEN_FOR_GATES)
+        };
+        warnings.retain(|warning| !taken(warning));
         let names = file.volume_names();
         if !names.is_empty() {
             let list = names.iter().enumerate();

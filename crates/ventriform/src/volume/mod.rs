@@ -52,6 +52,7 @@
 
 mod archive;
 mod array_file;
+mod beat_evidence;
 mod decode;
 pub mod dicom;
 pub mod error;
@@ -60,6 +61,7 @@ mod folder;
 mod foreign;
 mod gate_files;
 mod gate_look;
+mod gate_names;
 mod gate_timing;
 pub mod gates;
 pub mod given_mask;
@@ -87,6 +89,7 @@ pub use facts::{
     VolumeFacts,
 };
 pub use gate_files::order_by_numbers;
+pub use gate_names::{NamesSay, said_by_names};
 pub use gate_timing::{GateTiming, RR_MS};
 pub use gates::GatedReading;
 pub use limits::{ReadLimits, ReadOptions};

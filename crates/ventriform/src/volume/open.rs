@@ -7,6 +7,7 @@ use super::dicom::one_scan::ScanStatement;
 use super::facts::{
     AffineSource, ByteOrder, FileFormat, GateFacts, IntensitySummary, LengthUnit, VolumeFacts,
 };
+use super::gate_names::NamesSay;
 use super::gate_timing::GateTiming;
 use super::left_out::LeftOut;
 use super::limits::ReadOptions;
@@ -111,6 +112,11 @@ pub(super) trait OpenVolume {
     /// Whether nothing but their number calls its volumes gates.
     fn assumes_gates(&self) -> bool {
         false
+    }
+
+    /// What the names of files of one volume each say.
+    fn names_say(&self) -> NamesSay {
+        NamesSay::Nothing
     }
 
     /// Whether volumes can be decoded in any order and more than once.

@@ -4,18 +4,19 @@ use super::array_file::ArrayFile;
 use super::dicom::DicomFile;
 use super::dicom::one_scan::ScanStatement;
 use super::gate_files::{GateFiles, order_of, taken_for_gates};
-use super::gate_look::look;
+use super::gate_look::{CalledBy, look, look_at};
 use super::gate_timing::GateTiming;
 use super::gates::GatedReading;
 use super::judged_gates::judged;
-use super::left_out::LeftOut;
 use super::limits::{ReadLimits, ReadOptions};
 use super::open::{self, OpenVolume, Reading, is_rounded};
 use super::recognise::{Recognised, recognise};
 use super::source::{FOLDER, VolumeFile};
 use super::summary::LabelCounts;
 use super::surface_file::SurfaceFile;
-use super::{GateFacts, LabelCount, Provenance, Segment, VolumeError, VolumeFacts, archive, nifti};
+use super::{
+    GateFacts, LabelCount, Provenance, Segment, Volume, VolumeError, VolumeFacts, archive, nifti,
+};
 use crate::draw::Image;
 use crate::grid::gates::GATE_COUNTS;
 use crate::mesh::TriMesh;
@@ -107,10 +108,15 @@ pub fn read_gates(
                 Err(opened.err().unwrap_or(error))
             }
             read => {
-                let (readings, timing, said) = read?;
-                let frames = (0..readings.len()).collect();
-                let all = LeftOut::default();
-                let mut gated = GatedReading::of(readings, frames, &all, &[timing], &said)?;
+                let (mut readings, timing, said) = read?;
+                let volumes: Vec<&Volume> = readings.iter().map(|own| &own.volume).collect();
+                let mut look = look_at(&volumes, monitor)?;
+                let kept = (0..readings.len()).filter(|n| !look.left_out.extra.contains(n));
+                let kept: Vec<usize> = kept.collect();
+                let mut file = 0..;
+                readings.retain(|_| file.next().is_some_and(|file| kept.contains(&file)));
+                let mut gated = GatedReading::of(readings, kept, &look.left_out, &[timing], &said)?;
+                gated.facts.warnings.append(&mut look.warnings);
                 gated.facts.warnings.push(taken_for_gates(&order));
                 Ok(gated)
             }
@@ -133,7 +139,7 @@ pub fn read_gates(
         return Err(too_many_voxels(header.file, voxels, limits));
     }
     let timings = opened.file.gate_timings();
-    let mut look = look(&mut *opened.file, true, monitor)?;
+    let mut look = look(&mut *opened.file, &CalledBy::Header, monitor)?;
     if !opened.file.reads_again() {
         opened.file = open(files, limits, monitor)?.file;
     }

@@ -38,6 +38,7 @@ mod normals;
 mod reader;
 
 mod beat;
+mod gates_without_a_word;
 
 mod evaluate_reference;
 mod examples;

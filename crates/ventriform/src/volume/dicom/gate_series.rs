@@ -23,6 +23,8 @@ use crate::progress::Monitor;
 use crate::volume::gate_timing::GateTiming;
 use crate::volume::limits::ReadLimits;
 use crate::volume::source::VolumeFile;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash, Hasher};
 use std::mem;
 
 /// Numbers by which gates are ordered, the surest first.
@@ -53,6 +55,21 @@ impl Place {
             numbers: ORDERING_ATTRIBUTES.map(number),
             of: first(TIME_SLOTS) * first(RR_INTERVALS),
         }
+    }
+}
+
+impl Place {
+    /// Whether nothing but the series tells it from `other`.
+    fn is_that_of(&self, other: &Self) -> bool {
+        let pairs = self
+            .numbers
+            .iter()
+            .zip(&other.numbers)
+            .zip(ORDERING_ATTRIBUTES);
+        let same = |((own, other), attribute): ((&Option<f64>, &Option<f64>), Attribute)| {
+            own == other || attribute.name == SERIES_NUMBER.name
+        };
+        self.numbers.iter().any(Option::is_some) && { pairs }.all(same)
     }
 }
 
@@ -97,7 +114,7 @@ pub(super) fn open(
     limits: &ReadLimits,
     monitor: &Monitor,
 ) -> Result<Joined, VolumeError> {
-    if !GATE_COUNTS.contains(&files.len()) {
+    if files.len() < *GATE_COUNTS.start() {
         return Ok(Joined::No);
     }
     let (mut places, mut gates, mut said) = (Vec::new(), Vec::new(), Vec::new());
@@ -118,8 +135,7 @@ pub(super) fn open(
         }
         gates.push(gate);
     }
-    let said: Vec<&ScanStatement> = said.iter().collect();
-    Ok(joined(gates, &places, &said, "files"))
+    joined(gates, places, said, "files")
 }
 
 /// Whether so many volumes, whose places are these, are the gates that they say they are parts of.
@@ -128,25 +144,93 @@ fn are_all(places: &[Place]) -> bool {
     { said }.all(|of| of <= 1 || of == places.len())
 }
 
-/// All `gates`, which say that they are gates, as one file. `what` holds one gate each.
+/// All `gates`, which say that they are gates, as one file, without those that are there twice. `what` holds one gate each.
+///
+/// # Errors
+/// [`VolumeError`] if the pixels of a gate that may be there twice cannot be read.
 pub(super) fn joined(
-    gates: Vec<DicomFile>,
-    places: &[Place],
-    said: &[&ScanStatement],
+    mut gates: Vec<DicomFile>,
+    mut places: Vec<Place>,
+    mut said: Vec<ScanStatement>,
     what: &str,
-) -> Joined {
-    if let Some(reason) = contradiction(said, Reach::Gates) {
-        return Joined::Contradiction(format!(
+) -> Result<Joined, VolumeError> {
+    let statements: Vec<&ScanStatement> = said.iter().collect();
+    if let Some(reason) = contradiction(&statements, Reach::Gates) {
+        return Ok(Joined::Contradiction(format!(
             "they say that they are gates, but not of one scan: {reason}"
-        ));
+        )));
     }
-    if !on_one_grid(&gates) || !are_all(places) {
-        return Joined::No;
+    if !on_one_grid(&gates) {
+        return Ok(Joined::No);
     }
-    match order_of(places) {
-        Some((order, name)) => Joined::Gates(Box::new(in_order(gates, &order, name, what))),
-        None => Joined::No,
+    let repeats = match repeats(&gates, &places)? {
+        Ok(repeats) => repeats,
+        Err(reason) => return Ok(Joined::Contradiction(reason)),
+    };
+    for &(at, _) in repeats.iter().rev() {
+        let repeated = gates.remove(at);
+        places.remove(at);
+        said.remove(at);
+        drop(repeated);
     }
+    if !GATE_COUNTS.contains(&gates.len()) || !are_all(&places) {
+        return Ok(Joined::No);
+    }
+    let Some((order, name)) = order_of(&places) else {
+        return Ok(Joined::No);
+    };
+    let mut file = in_order(gates, &order, name, what);
+    let told = repeats.into_iter().map(|(_, told)| told);
+    file.warnings.extend(told);
+    Ok(Joined::Gates(Box::new(file)))
+}
+
+/// The gates that repeat an earlier one, in their order, and what is said of them; or why one of them can be none. A gate repeats
+/// another if both have one SOP Instance UID, or the same place among the gates, and the same pixels.
+fn repeats(
+    gates: &[DicomFile],
+    places: &[Place],
+) -> Result<Result<Vec<(usize, String)>, String>, VolumeError> {
+    let mut repeats = Vec::new();
+    for at in 1..gates.len() {
+        let gate = &gates[at];
+        let uid = gate.provenance.sop_instance_uid.as_ref();
+        for earlier in 0..at {
+            let other = &gates[earlier];
+            let one_uid = uid.is_some() && uid == other.provenance.sop_instance_uid.as_ref();
+            if !(one_uid || places[at].is_that_of(&places[earlier])) {
+                continue;
+            }
+            let [own, first] = [gate.parts[0].name(), other.parts[0].name()];
+            if same_pixels(gate, other)? {
+                let told = format!("{own} repeats the gate in {first} and was left out.");
+                repeats.push((at, told));
+                break;
+            }
+            if one_uid {
+                return Ok(Err(format!(
+                    "{first} and {own} have the same SOP Instance UID (0008,0018) and are different images; an export that gives each \
+                     image its own is needed"
+                )));
+            }
+        }
+    }
+    Ok(Ok(repeats))
+}
+
+/// Whether two gates have the same pixels at the same places.
+fn same_pixels(a: &DicomFile, b: &DicomFile) -> Result<bool, VolumeError> {
+    let hash = |gate: &DicomFile| {
+        let mut hasher = DefaultHasher::new();
+        let mut take = |first: usize, voxels: &[f32]| {
+            for (offset, value) in voxels.iter().enumerate() {
+                (first + offset, value.to_bits()).hash(&mut hasher);
+            }
+        };
+        gate.stream(Some(0), &mut take, &Monitor::silent())?;
+        Ok::<u64, VolumeError>(hasher.finish())
+    };
+    Ok(hash(a)? == hash(b)?)
 }
 
 fn on_one_grid(gates: &[DicomFile]) -> bool {

@@ -5,12 +5,16 @@ use super::super::VolumeError;
 use super::super::limits::ReadLimits;
 use super::super::source::VolumeFile;
 use super::attributes::{
-    Attribute, Attributes, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES, SERIES_UID, SOP_CLASS,
+    ACQUISITION_TIME, Attribute, Attributes, COLUMNS, IMAGE_TYPE, MODALITY, NUMBER_OF_FRAMES,
+    ORIENTATION, PIXEL_SPACING, ROWS, SERIES_DESCRIPTION, SERIES_UID, SLICE_THICKNESS, SOP_CLASS,
     SOP_INSTANCE, STUDY_DESCRIPTION, STUDY_UID,
 };
 use super::kind::Kind;
+use super::one_scan::ScanStatement;
 use super::{guarded, kind, scan, syntax, timing};
 use crate::progress::Monitor;
+use crate::text::hex;
+use sha2::{Digest, Sha256};
 use std::fmt;
 
 /// Longest UID (PS3.5, 9.1).
@@ -33,6 +37,9 @@ pub struct DicomHeader {
     pub series: String,
     /// Whether the object is one slice or one gate of its series, and not a volume of its own.
     pub is_part: bool,
+    /// What the objects of one gate each have in common, although each gate may be a series of its own: a hash. `None` if the object does
+    /// not say that it is one gate of several, or a slice of one.
+    pub gates: Option<String>,
     /// Modality (0008,0060).
     pub modality: Option<String>,
     /// The values of Image Type (0008,0008).
@@ -69,13 +76,18 @@ pub fn read_header(
     let mut source = syntax.open(file, longest)?;
     let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
     let sop_class = uid(&a, SOP_CLASS)?;
-    let is_part = Kind::of(&a).is_ok_and(|kind| {
+    let kind = Kind::of(&a).ok();
+    let is_gate = kind.is_some_and(|kind| {
+        timing::is_one_gate(&a, kind) || kind.is_single_slice() && timing::is_slice_of_a_gate(&a)
+    });
+    let is_part = kind.is_some_and(|kind| {
         let frames = a.decimals::<1>(NUMBER_OF_FRAMES).ok().flatten();
         let is_slice = matches!(kind, Kind::Nuclear { .. }) && frames == Some([1.0]);
         is_slice || timing::is_one_gate(&a, kind)
     });
     Ok(DicomHeader {
         is_part: kind::is_slice_class(&sop_class) || is_part,
+        gates: is_gate.then(|| gates_key(&a)),
         sop_class,
         sop_instance: uid(&a, SOP_INSTANCE)?,
         study: uid(&a, STUDY_UID)?,
@@ -85,6 +97,36 @@ pub fn read_header(
         study_description: a.prose(STUDY_DESCRIPTION),
         data_set: syntax.data_set,
     })
+}
+
+/// A hash of what the headers of all gates of one acquisition have in common: what they say of the scan, the time to the minute, the
+/// description without its numbers, and the grid of a slice.
+fn gates_key(a: &Attributes) -> String {
+    /// Characters of a time of day to the minute.
+    const TO_THE_MINUTE: usize = 4;
+    let mut hash = Sha256::new();
+    let mut add = |text: Option<String>| {
+        let text = text.unwrap_or_default();
+        hash.update((text.len() as u64).to_le_bytes());
+        hash.update(text);
+    };
+    for (attribute, value) in ScanStatement::of(a).stated() {
+        add(Some(attribute.to_owned()));
+        add(value.map(|value| match attribute == ACQUISITION_TIME.name {
+            true => value
+                .chars()
+                .filter(char::is_ascii_digit)
+                .take(TO_THE_MINUTE)
+                .collect(),
+            false => value.to_owned(),
+        }));
+    }
+    let description = a.prose(SERIES_DESCRIPTION);
+    add(description.map(|text| text.replace(|c: char| c.is_ascii_digit(), "")));
+    for attribute in [ROWS, COLUMNS, PIXEL_SPACING, ORIENTATION, SLICE_THICKNESS] {
+        add(a.text(attribute));
+    }
+    hex(&hash.finalize())
 }
 
 /// A UID that the object must have. Zeros before a number are accepted: objects are told apart by them all the

@@ -640,7 +640,7 @@ impl Series {
     /// The gates that `all` series are, one each.
     fn gates(all: Vec<Self>, limits: &ReadLimits) -> Result<Joined, VolumeError> {
         let is_gate = |series: &Self| series.of_a_gate == series.parts.len();
-        if !GATE_COUNTS.contains(&all.len()) || !all.iter().all(is_gate) {
+        if all.len() < *GATE_COUNTS.start() || !all.iter().all(is_gate) {
             return Ok(Joined::No);
         }
         let (mut gates, mut places) = (Vec::new(), Vec::new());
@@ -652,9 +652,8 @@ impl Series {
             gates.push(gate);
             places.push(place);
         }
-        let said: Vec<ScanStatement> = gates.iter().map(|gate| gate.statement.clone()).collect();
-        let said: Vec<&ScanStatement> = said.iter().collect();
-        Ok(gate_series::joined(gates, &places, &said, "series"))
+        let said = gates.iter().map(|gate| gate.statement.clone()).collect();
+        gate_series::joined(gates, places, said, "series")
     }
 
     /// The volumes that the files make up, with the place of the first slice among gates; of a series that is one gate of several

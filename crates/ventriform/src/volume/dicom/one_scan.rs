@@ -188,6 +188,14 @@ impl ScanStatement {
     }
 }
 
+impl ScanStatement {
+    /// The attributes by name, with what the file states.
+    pub(super) fn stated(&self) -> impl Iterator<Item = (&'static str, Option<&str>)> {
+        let rows = TABLE.iter().map(Row::name);
+        rows.zip(self.values.iter().map(Option::as_deref))
+    }
+}
+
 /// A value and the files that state it.
 struct Held<'a> {
     value: &'a str,
