@@ -252,7 +252,7 @@ impl ArchiveStore for SqlStore {
 
     async fn settle_send(
         &self,
-        id: &str,
+        send: &DueSend,
         settled: &SendSettlement,
         now: Timestamp,
     ) -> StoreResult<()> {
@@ -270,7 +270,7 @@ impl ArchiveStore for SqlStore {
         .bind(&settled.error)
         .bind(ended)
         .bind(settled.again_at)
-        .bind(id)
+        .bind(&send.id)
         .bind(errands::taken_back(settled.counts))
         .execute(&mut transaction)
         .await?;
@@ -279,11 +279,19 @@ impl ArchiveStore for SqlStore {
             "DELETE FROM sends WHERE id = $1 AND state != 'pending'
                  AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.id = sends.job)",
         )
-        .bind(id)
+        .bind(&send.id)
         .execute(&mut transaction)
         .await?;
-        transaction.commit().await?;
-        Ok(())
+        // Also if the delivery was taken back meanwhile: the object has left.
+        let outcome = match settled.state {
+            DeliveryState::Pending => None,
+            DeliveryState::Delivered => Some(Outcome::Success),
+            DeliveryState::Dead => Some(Outcome::Refused),
+        };
+        if let Some(outcome) = outcome {
+            record_outcome(&mut transaction, Activity::Read, outcome, &send.result).await?;
+        }
+        transaction.commit().await
     }
 
     async fn recall_sends(&self, now: Timestamp) -> StoreResult<u64> {

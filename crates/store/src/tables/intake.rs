@@ -1,7 +1,8 @@
 //! The tables of received objects.
 
-use super::access::{record, stored_bytes};
+use super::access::{append, record, stored_bytes};
 use super::erasure::{What, write_receipt};
+use super::owners::repaired;
 use super::pages::push_page;
 use super::rows;
 use crate::database::{SqlStore, Transaction};
@@ -303,13 +304,24 @@ impl SqlStore {
         rows::all(rows, |row| Ok((row.try_get(0)?, row.try_get(1)?)))
     }
 
-    /// Removes the object that has this file.
-    pub(crate) async fn forget_received(&self, file: &str) -> StoreResult<()> {
-        query("DELETE FROM intake_objects WHERE file = $1")
-            .bind(file)
-            .write(&self.writer)
-            .await?;
-        Ok(())
+    /// Removes the object that has this file, with a row of the trail at that time; with `None` there is no such row, as in a
+    /// copy, whose trail stays that of the original.
+    pub(crate) async fn forget_received(
+        &self,
+        file: &str,
+        now: Option<Timestamp>,
+    ) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        let removed =
+            query("DELETE FROM intake_objects WHERE file = $1 RETURNING tenant, group_id")
+                .bind(file)
+                .fetch_optional(&mut transaction)
+                .await?;
+        if let (Some(row), Some(now)) = (removed, now) {
+            let (tenant, group) = (rows::tenant(&row)?, row.try_get("group_id")?);
+            append(&mut transaction, &[repaired(group, Some(&tenant), now)]).await?;
+        }
+        transaction.commit().await
     }
 }
 
