@@ -503,9 +503,8 @@ async fn a_restored_copy_on_a_server_catches_up_by_the_newer_database() {
     store.close().await;
     // Another store, and none.
     let nothing = NewerStore::Server(reached(&server().database().await));
-    let mut store = Store::open(tempfile::tempdir().unwrap().path())
-        .await
-        .unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path()).await.unwrap();
     store.rows.append(&[read(1)]).await.unwrap();
     let other = missed(&store.rows, &newer).await.unwrap_err();
     assert!(other.to_string().contains("not a newer copy"), "{other}");

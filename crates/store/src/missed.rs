@@ -2,7 +2,8 @@
 //! legal holds set since the copy was made.
 //!
 //! In: the store, which no service uses, and the newer one: a data folder, whose database may be damaged, or a database of
-//! PostgreSQL. The engines need not be the same, and nothing is written to the newer one. Out: a list; and if asked for, the same done to the store.
+//! PostgreSQL. The engines need not be the same, and nothing is written to the newer one. Out: a list; and if asked for, the
+//! same done to the store.
 //!
 //! 1. Both are compared row by row, not by time: a revocation, a receipt or a hold of the newer store that this one lacks.
 //! 2. The rows of the newer trail that this one lacks are taken over as they are, if they follow its rows; the chain of

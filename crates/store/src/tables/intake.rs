@@ -141,7 +141,7 @@ impl IntakeStore for SqlStore {
              WHERE id = $4 AND state = 'filing'",
         )
         .bind(job)
-        .bind(failure.map(rows::to_json).transpose()?)
+        .bind(failure.map(rows::failure_json).transpose()?)
         .bind(now)
         .bind(group)
         .execute(&mut transaction)
@@ -165,7 +165,7 @@ impl IntakeStore for SqlStore {
             "UPDATE intake_groups SET state = 'failed', failure = $1, changed_at = $2
              WHERE id = $3 AND revision = $4 AND state = 'gathering'",
         )
-        .bind(rows::to_json(failure)?)
+        .bind(rows::failure_json(failure)?)
         .bind(now)
         .bind(group)
         .bind(revision)
@@ -217,8 +217,13 @@ impl IntakeStore for SqlStore {
         reason: ErasureReason,
         now: Timestamp,
     ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
-        self.making_room(|| self.remove_once(tenant, id, by, reason, now))
-            .await
+        let what = What {
+            tenant,
+            id,
+            by,
+            reason,
+        };
+        self.making_room(|| self.remove_once(what, now)).await
     }
 
     async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>> {
@@ -256,16 +261,14 @@ impl SqlStore {
     /// Tries the erasure of the method without `_once`.
     async fn remove_once(
         &self,
-        tenant: &Tenant,
-        id: &str,
-        by: &ErasureAgent,
-        reason: ErasureReason,
+        what: What<'_>,
         now: Timestamp,
     ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
+        let id = what.id;
         let mut transaction = self.writer.begin().await?;
         let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
             .bind(id)
-            .bind(tenant.as_str())
+            .bind(what.tenant.as_str())
             .fetch_optional(&mut transaction)
             .await?;
         if known.is_none() {
@@ -281,12 +284,6 @@ impl SqlStore {
             .bind(id)
             .execute(&mut transaction)
             .await?;
-        let what = What {
-            tenant,
-            id,
-            by,
-            reason,
-        };
         let receipt = write_receipt(&mut transaction, what, (vec![item], Vec::new()), now).await?;
         transaction.commit().await?;
         Ok(Some((files, receipt)))
@@ -511,7 +508,7 @@ fn group(row: DbRow) -> StoreResult<IntakeGroup> {
     let damaged = |what: &str| StoreError::database(format!("damaged row: {what}"));
     let instance: String = row.try_get("instance")?;
     let failure: Option<&str> = row.try_get("failure")?;
-    let failure = failure.map(serde_json::from_str).transpose();
+    let failure = failure.map(rows::failure).transpose();
     Ok(IntakeGroup {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -534,7 +531,7 @@ fn group(row: DbRow) -> StoreResult<IntakeGroup> {
         revision: row.try_get("revision")?,
         volume: row.try_get("volume")?,
         job: row.try_get("job")?,
-        failure: failure.map_err(|error| damaged(&error.to_string()))?,
+        failure: failure?,
         objects: rows::unsigned(row.try_get("objects")?),
         waiting_bytes: rows::unsigned(row.try_get("waiting_bytes")?),
         created_at: row.try_get("created_at")?,

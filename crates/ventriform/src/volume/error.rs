@@ -282,6 +282,18 @@ impl VolumeError {
             VolumeError::NotOneSeries { reason, .. } => {
                 if let Some((count, _)) = reason.split_once(" series: ") {
                     *reason = format!("{count} series; send the files of one of them alone");
+                } else if let Some(told) = without_values(reason) {
+                    *reason = told;
+                }
+            }
+            VolumeError::OtherGate { difference, .. } => {
+                if let Some(told) = without_values(difference) {
+                    *difference = told;
+                }
+            }
+            VolumeError::FrameNeeded { why: Some(why), .. } => {
+                if let Some(told) = without_values(why) {
+                    *why = told;
                 }
             }
             VolumeError::Unrecognised { start, .. } => *start = "other bytes".to_owned(),
@@ -290,6 +302,15 @@ impl VolumeError {
         }
         error
     }
+}
+
+/// The name of the attribute that files contradict each other on, without the values, which follow it in quotes; `None` if
+/// nothing is quoted.
+fn without_values(reason: &str) -> Option<String> {
+    let (told, _) = reason.split_once('"')?;
+    let told = told.trim_end();
+    let told = told.strip_suffix(" is").unwrap_or(told);
+    Some(format!("{told} differs"))
 }
 
 /// Words of this program in the place of a value.
@@ -399,6 +420,25 @@ mod tests {
             VolumeError::Unrecognised {
                 file: file(),
                 start: MARK.into(),
+            },
+            VolumeError::NotOneSeries {
+                count: 2,
+                reason: format!(
+                    "Patient's Name (0010,0010) is \"{MARK}\" in a.dcm, and \"{MARK} series: \" in 3 files, such as b.dcm"
+                ),
+            },
+            VolumeError::NotOneSeries {
+                count: 2,
+                reason: format!(
+                    "they say that they are gates, but not of one scan: Study ID (0020,0010) is \"{MARK}\" in a.dcm, and \"\" \
+                     in b.dcm; they differ in Tracer too"
+                ),
+            },
+            VolumeError::OtherGate {
+                gate: 2,
+                difference: format!(
+                    "is of another scan: Patient ID (0010,0020) is \"{MARK}\", and \"7\""
+                ),
             },
         ];
         for error in errors {
