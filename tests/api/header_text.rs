@@ -188,8 +188,8 @@ async fn marked_meshes(app: &Api, product: &str) -> Vec<(&'static str, Vec<u8>)>
     meshes
 }
 
-async fn ended(app: &Api, order: &Value) -> Value {
-    let filed = app.post("/v1/jobs").json(order).send().await.unwrap();
+async fn ended(app: &Api, path: &str, order: &Value) -> Value {
+    let filed = app.post(path).json(order).send().await.unwrap();
     let status = filed.status();
     let job: Value = filed.json().await.unwrap();
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");
@@ -350,7 +350,7 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         ),
         ("beat", &volumes[0], json!({})),
     ] {
-        let job = ended(&app, &order(kind, volume, more)).await;
+        let job = ended(&app, "/v1/jobs", &order(kind, volume, more)).await;
         println!("{kind} {} {}", job["state"], job["error"]);
     }
     let models: Value = app
@@ -383,8 +383,8 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         })
         .collect();
     let order = json!({"name": "few", "cases": cases});
-    let filed = app.post("/v1/normals").json(&order).send().await.unwrap();
-    println!("normals: {}", filed.status());
+    let job = ended(&app, "/v1/normals", &order).await;
+    println!("normals {} {}", job["state"], job["error"]);
     let profile = app
         .post("/v1/readers?name=anna")
         .json(&profile(1.25))

@@ -458,7 +458,11 @@ async fn a_restored_copy_on_a_server_catches_up_by_the_newer_database() {
         }
     };
     let identity = format!("/v1/volumes/{named}/identity");
-    put(identity.clone(), json!({"patient_id": "7"})).await;
+    put(
+        identity.clone(),
+        json!({"patient_id": "7", "study_uid": "1.2.3"}),
+    )
+    .await;
     let data = app.stop().await;
     // The copy, and what was done since.
     let (backup, copy) = (copied(data.path()), database_copied(&url).await);

@@ -278,12 +278,14 @@ impl VolumeError {
                     *text = name.to_owned();
                 }
             }
-            // The series are listed after a colon.
             VolumeError::NotOneSeries { reason, .. } => {
-                if let Some((count, _)) = reason.split_once(" series: ") {
-                    *reason = format!("{count} series; send the files of one of them alone");
-                } else if let Some(told) = without_values(reason) {
-                    *reason = told;
+                // The series are listed after a colon, unless that is within a value.
+                let listed = reason.split_once(" series: ");
+                match listed.filter(|(count, _)| !count.contains('"')) {
+                    Some((count, _)) => {
+                        *reason = format!("{count} series; send the files of one of them alone");
+                    }
+                    None => *reason = without_values(reason).unwrap_or_else(|| reason.clone()),
                 }
             }
             VolumeError::OtherGate { difference, .. } => {
@@ -314,7 +316,7 @@ fn without_values(reason: &str) -> Option<String> {
 }
 
 /// Words of this program in the place of a value.
-const OWN_WORDS: [&str; 9] = [
+const OWN_WORDS: [&str; 10] = [
     "missing",
     "contradictory",
     "present",
@@ -323,6 +325,7 @@ const OWN_WORDS: [&str; 9] = [
     "in fragments",
     "in more fragments",
     "not finite",
+    "not linear",
     "empty",
 ];
 
