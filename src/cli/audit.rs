@@ -3,13 +3,14 @@
 use super::data_args::{DataArgs, StoreArgs};
 use super::output::{json, note, say};
 use crate::server::store_settings;
-use anyhow::{Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
 use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
+use ventriform_service::config::{PostgresSettings, Settings};
 use ventriform_service::records::ListRequest;
-use ventriform_store::{IfNone, Store, apply, missed, require_store};
+use ventriform_store::{IfNone, NewerStore, Store, apply, missed, require_store};
 
 /// Check or print the audit trail, also while the service runs
 #[derive(Debug, Args)]
@@ -18,6 +19,7 @@ use ventriform_store::{IfNone, Store, apply, missed, require_store};
   ventriform audit print --data-dir data > audit.ndjson
   ventriform audit missed --from data.broken --data-dir data
   ventriform audit missed --from data.broken --data-dir data --apply
+  ventriform audit missed --from postgres://me@db/broken --database postgres://me@db/restored --data-dir data
 
 `verify` prints the newest hash. Keep it in another place: a trail that was written anew as a
 whole has other hashes.")]
@@ -39,9 +41,10 @@ enum AuditCommand {
 
 #[derive(Debug, Args)]
 struct MissedArgs {
-    /// Data folder with the newer trail, such as the one that was replaced; its database may be damaged
-    #[arg(long, value_name = "DIR")]
-    from: PathBuf,
+    /// Where the newer trail is, such as that of the store that was replaced: a data folder, whose database may be damaged, or
+    /// the URL of a PostgreSQL database. Nothing is written there
+    #[arg(long, value_name = "DIR|URL")]
+    from: String,
     /// Do here what was missed
     #[arg(long)]
     apply: bool,
@@ -97,13 +100,28 @@ async fn catch_up(args: &MissedArgs) -> Result<()> {
         require_store(folder, IfNone::Refuse).map_err(|error| service.explained(error))?;
     }
     let mut store = Store::open_with(folder, store_settings(&service.settings)).await?;
-    let told = tell_missed(args, &store).await;
+    let told = tell_missed(args, &service.settings, &store).await;
     store.close().await;
     told
 }
 
-async fn tell_missed(args: &MissedArgs, store: &Store) -> Result<()> {
-    let missed = missed(&store.rows, &args.from).await?;
+/// Where the newer store is: a URL names a database, all else a folder.
+fn newer(from: &str, service: &Settings) -> Result<NewerStore> {
+    if !from.contains("://") {
+        return Ok(NewerStore::Folder(PathBuf::from(from)));
+    }
+    let url = from
+        .parse()
+        .map_err(|why| anyhow!("--from: {why}; or give a data folder"))?;
+    Ok(NewerStore::Server(PostgresSettings {
+        url,
+        connections: 1,
+        patience: service.database_wait.0,
+    }))
+}
+
+async fn tell_missed(args: &MissedArgs, service: &Settings, store: &Store) -> Result<()> {
+    let missed = missed(&store.rows, &newer(&args.from, service)?).await?;
     for act in &missed.acts {
         say!("{act}");
     }

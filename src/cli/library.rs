@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
 use ventriform::volume::ReadLimits;
-use ventriform_service::access::{AccessStore, Activity, AuditEvent};
+use ventriform_service::access::{Agent, Recorder};
 use ventriform_service::items::{Items, NotAdded, TemplateSource};
-use ventriform_service::records::{Clock, Failure, ProductRoom, SystemClock, Tenant};
+use ventriform_service::records::{Failure, ProductRoom, SystemClock, Tenant};
 use ventriform_service::work::{Engine, TEMPLATE_BYTES};
 use ventriform_store::{IfNone, Store, require_store};
 
@@ -68,14 +68,14 @@ pub fn import(args: &ImportArgs) -> Result<()> {
             count: settings.template_limit,
             bytes: settings.quota_bytes.0.map(|size| size.0),
         };
+        let clock = Arc::new(SystemClock);
+        let recorder = Arc::new(Recorder::start(store.rows.clone(), clock.clone()));
+        let agent = Agent::new(recorder, clock, Tenant::default(), AUDIT_AGENT);
         for path in &args.models {
-            let (id, new) = add(&items, &engine, path, args, room)
+            let added = add(&items, &engine, path, args, room);
+            let id = Agent::scope(Some(agent.clone()), added)
                 .await
                 .with_context(|| format!("{}", path.display()))?;
-            let activity = Activity::of_added(new);
-            let now = SystemClock.now();
-            let event = AuditEvent::new(now, activity, Tenant::default(), AUDIT_AGENT.into());
-            store.rows.append(&[event.on(&id)]).await?;
             say!("{id} {}", name(path));
         }
         Ok(())
@@ -88,7 +88,7 @@ async fn add(
     path: &Path,
     args: &ImportArgs,
     room: ProductRoom,
-) -> Result<(String, bool)> {
+) -> Result<String> {
     let organ = &args.organ;
     let mesh = mesh_bytes(path, TEMPLATE_BYTES, "give one with fewer triangles")?;
     let output = engine
@@ -103,13 +103,13 @@ async fn add(
         library: args.library.then_some(true),
     };
     let added = items.add_template(source, organ, output, room).await;
-    let (template, new) = added.map_err(|error| match error {
+    let (template, _) = added.map_err(|error| match error {
         NotAdded::Refused(failure) | NotAdded::TooMany(failure) | NotAdded::TooLarge(failure) => {
             refused(&failure)
         }
         NotAdded::Store(error) => error.into(),
     })?;
-    Ok((template.item.id, new))
+    Ok(template.item.id)
 }
 
 fn refused(failure: &Failure) -> anyhow::Error {

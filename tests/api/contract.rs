@@ -309,6 +309,7 @@ contracts!(
     work_items_change_once,
     figures_are_counted,
     changes_and_their_rows_are_one,
+    failures_of_earlier_versions_quote_no_file,
     everything_stored_counts_for_its_tenant,
     a_full_queue_and_a_full_intake_keep_a_share_for_others,
     work_items_are_read_in_batches_of_few_bytes,
@@ -2017,7 +2018,7 @@ async fn series_are_fetched_and_results_sent(on: &Stores) {
     let begun = on.b.due_sends(&pacs, now(), 10).await.unwrap();
     let begun = begun.iter().find(|send| send.id == due[0].id).unwrap();
     assert_eq!((due[0].attempts, begun.attempts), (0, 1));
-    on.a.settle_send(&due[0].id, &stored, now()).await.unwrap();
+    on.a.settle_send(&due[0], &stored, now()).await.unwrap();
     let sends = &on.b.sends(&[&job.id]).await.unwrap()[&job.id];
     let settled = sends.iter().find(|send| send.id == due[0].id).unwrap();
     assert_eq!(
@@ -2326,10 +2327,97 @@ async fn work_items_change_once(on: &Stores) {
     assert_eq!(erase(&own).await.unwrap(), Erased::InUse);
 }
 
+/// A failure that an earlier version has stored may quote a header. It is read without the sentence; one of this version with it.
+async fn failures_of_earlier_versions_quote_no_file(on: &Stores) {
+    let sourced = NewJob {
+        source: Some(series_source()),
+        volume: None,
+        ..new_job("")
+    };
+    let pulled = on.file(&sourced).await.id;
+    let why = failure("invalid-header").at("Rescale Slope (0028,1053)");
+    on.a.pull_given_up(&pulled, &why, now()).await.unwrap();
+    let job = on.file(&new_job(&on.volume(&tenant()).await)).await.id;
+    let (_, lease) = on.claim().await.unwrap();
+    let why = failure("no-such-label");
+    on.a.finish(&lease, &JobOutcome::Failed(why), now())
+        .await
+        .unwrap();
+    let room = IntakeRoom {
+        objects: 99,
+        bytes: 9999,
+        tenant_bytes: None,
+    };
+    let added =
+        on.a.add(&received_object(&tenant(), "8"), room, now())
+            .await;
+    let Added::New(group, _) = added.unwrap() else {
+        panic!("the object is new");
+    };
+    let revision = on.a.group(&group).await.unwrap().unwrap().revision;
+    on.a.failed(&group, revision, &failure("unusable-volume"), now())
+        .await
+        .unwrap();
+    let told = async || {
+        let of_job = |id: String| async move { on.b.job(&id).await.unwrap().unwrap().failure };
+        let pulls = on.b.pulls(&[&pulled]).await.unwrap();
+        [
+            of_job(pulled.clone()).await.unwrap().detail,
+            of_job(job.clone()).await.unwrap().detail,
+            on.b.group(&group)
+                .await
+                .unwrap()
+                .unwrap()
+                .failure
+                .unwrap()
+                .detail,
+            pulls[&pulled].last_error.clone().unwrap(),
+        ]
+    };
+    assert_eq!(told().await, [(); 4].map(|()| "It failed.".to_owned()));
+    for earlier in [
+        "UPDATE jobs SET failure = '{\"code\":\"invalid-header\",\"fault\":\"content\",
+            \"field\":\"Rescale Slope (0028,1053)\",\"detail\":\"a.dcm: it is Zzyzx^Maria: no number.\"}'
+         WHERE failure LIKE '%invalid-header%'",
+        "UPDATE jobs SET failure = '{\"code\":\"no-such-label\",\"fault\":\"request\",
+            \"detail\":\"The mask holds 1 (Zzyzx^Maria).\"}' WHERE failure LIKE '%no-such-label%'",
+        "UPDATE pulls SET last_error = 'a.dcm: it is Zzyzx^Maria: no number.'",
+        "UPDATE intake_groups SET failure = '{\"code\":\"unusable-volume\",\"fault\":\"content\",
+            \"detail\":\"Patient Name is Zzyzx^Maria in a.dcm.\"}'",
+    ] {
+        assert!(on.tamper(earlier).await);
+    }
+    let told = told().await;
+    assert!(!told.join(" ").contains("Zzyzx"), "{told:?}");
+    assert!(
+        told[0].starts_with("Rescale Slope (0028,1053) cannot be used"),
+        "{told:?}"
+    );
+    // What the service says of itself, and figures, stay.
+    for (earlier, kept) in [
+        (
+            "UPDATE jobs SET failure = '{\"code\":\"job-time-limit\",\"fault\":\"service\",\"detail\":\"It took 1 h.\"}'
+             WHERE failure LIKE '%no-such-label%'",
+            "It took 1 h.",
+        ),
+        (
+            "UPDATE jobs SET failure = '{\"code\":\"no-heart\",\"fault\":\"content\",\"detail\":\"No heart: 3 of 7.\"}'
+             WHERE failure LIKE '%job-time-limit%'",
+            "No heart: 3 of 7.",
+        ),
+    ] {
+        assert!(on.tamper(earlier).await);
+        let read = on.b.job(&job).await.unwrap().unwrap().failure.unwrap();
+        assert_eq!(read.detail, kept);
+    }
+}
+
 /// A change that somebody makes: its name, the act and the item of its row, and how it is made; `true` if it was.
 struct Act<'a> {
     name: &'static str,
     activity: Activity,
+    /// Who the row says did it.
+    by: &'static str,
     object: String,
     make: Box<dyn Fn() -> BoxFuture<'a, StoreResult<bool>> + 'a>,
 }
@@ -2345,14 +2433,63 @@ where
     Act {
         name,
         activity,
+        by: "clerk",
         object: object.to_owned(),
         make: Box::new(move || Box::pin(make())),
     }
 }
 
+impl Act<'_> {
+    /// It is done by somebody else: a duty of the service.
+    fn by(mut self, by: &'static str) -> Self {
+        self.by = by;
+        self
+    }
+}
+
+/// A job whose result is delivered to the archive `pacs` by two sends, and whose end is told to a webhook: its id, and the
+/// ids of the delivery of the message and of the result.
+async fn told_and_sent(on: &Stores) -> (String, String, String) {
+    let volume = on.volume(&tenant()).await;
+    let job = on
+        .file(&NewJob {
+            send: Some(SendOrder {
+                names: vec!["mesh.dcm".into(), "report.dcm".into()],
+                to: "pacs".into(),
+            }),
+            webhook: Some(JobWebhook {
+                url: "https://own.example/".into(),
+                destination: "https://own.example:443".into(),
+                events: vec!["succeeded".into()],
+                secret: None,
+            }),
+            ..new_job(&volume)
+        })
+        .await;
+    let (_, lease) = on.claim().await.unwrap();
+    let result = model(&volume);
+    on.b.finish(&lease, &succeeded(&result), now())
+        .await
+        .unwrap()
+        .unwrap();
+    let told = on.a.deliveries(&tenant(), &job.id, 10).await.unwrap();
+    (job.id, told[0].id.clone(), result.id)
+}
+
 /// Every change of a store that is made for somebody: with the trail broken it is undone, else it leaves one row.
 async fn changes_and_their_rows_are_one(on: &Stores) {
     let (store, t) = (&on.a, &tenant());
+    let (told, message, sent) = told_and_sent(on).await;
+    let sends = store.due_sends(&lane(t, "pacs"), now(), 10).await.unwrap();
+    let settled = |state, outcome| SendSettlement {
+        state,
+        outcome,
+        error: None,
+        again_at: None,
+        counts: true,
+    };
+    let stored = settled(DeliveryState::Delivered, "stored");
+    let refused = settled(DeliveryState::Dead, "refused");
     let held = on.volume(t).await;
     let (volume, product) = (stored_volume("vol_new", 10), model(&held));
     let queued = on.file(&new_job(&held)).await.id;
@@ -2361,8 +2498,8 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         key: "once".into(),
         fingerprint: "f".into(),
     });
-    let ended = on.file(&new_job(&held)).await.id;
-    store.interrupt(&ended, now()).await.unwrap();
+    let cancelled = on.file(&new_job(&held)).await.id;
+    store.interrupt(&cancelled, now()).await.unwrap();
     let mut sourced = new_job("");
     (sourced.volume, sourced.source) = (None, Some(series_source()));
     let (pulled, lost) = (on.file(&sourced).await.id, on.file(&sourced).await.id);
@@ -2396,7 +2533,16 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
     store.add_workitem(&item("1.1"), 9).await.unwrap();
     let changed = store.workitem(t, "1.1").await.unwrap().unwrap();
     let (added, erased) = (item("1.2"), item("1.3"));
-    store.add_workitem(&erased, 9).await.unwrap();
+    let ended = Workitem {
+        state: WorkitemState::Completed,
+        ..item("1.4")
+    };
+    for item in [&erased, &ended] {
+        store.add_workitem(item, 9).await.unwrap();
+    }
+    let soon = cutoff(now() + 600_000);
+    let (retention, old) = (ErasureAgent::retention(), on.file(&new_job(&held)).await.id);
+    store.interrupt(&old, now()).await.unwrap();
     let room = IntakeRoom {
         objects: 99,
         bytes: 9999,
@@ -2439,8 +2585,8 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
     };
     let expected = [erased_volume.clone()];
     let why = failure("no-series");
-    let new_key = KeyRequest {
-        name: "k".into(),
+    let new_key = |name: &str| KeyRequest {
+        name: name.into(),
         tenant: t.clone(),
         scope: Scope::Read,
         quota: Quota::default(),
@@ -2448,13 +2594,30 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         maker: Maker::Operator,
         owner: None,
     };
-    let (api_key, _) = ApiKey::make(new_key, now()).unwrap();
+    let (api_key, _) = ApiKey::make(new_key("k"), now()).unwrap();
     let event = |activity| AuditEvent::new(now(), activity, t.clone(), "clerk".into());
     let (made, revoked) = (
         event(Activity::KeyCreated).on(&*api_key.id),
         event(Activity::KeyRevoked).on(&*api_key.id),
     );
-    use Activity::{Create, Delete, Execute, KeyCreated, KeyRevoked, Update};
+    let owned = KeyRequest {
+        owner: Some("dr-who".into()),
+        ..new_key("owned")
+    };
+    let (owned_key, _) = ApiKey::make(owned, now()).unwrap();
+    let opened = event(Activity::AccessOpened);
+    store
+        .add_key(&owned_key, &event(Activity::KeyCreated))
+        .await
+        .unwrap();
+    let of_patient = on.volume(t).await;
+    let stated = ScanFields(object(json!({"patient_id": "PAT_9"})));
+    assert!(store.state_scan(t, &of_patient, &stated).await.unwrap());
+    let patient = scan_erasure([("patient", "PAT_9")], true);
+    let selected = [of_patient.clone()];
+    use Activity::{
+        AccessOpened, AuditPruned, Create, Delete, Execute, KeyCreated, KeyRevoked, Read, Update,
+    };
     // In this order: some change what an earlier one has made. The id of a new job is not known before.
     let acts = [
         act("add_volume", (Create, "vol_new"), || {
@@ -2503,8 +2666,29 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
                 Interrupted::Cancelled(_)
             ))
         }),
-        act("delete_job", (Delete, &ended), || async {
-            Ok(store.delete_job(&ended, None, now()).await? == Deleted::Done)
+        act("delete_job", (Delete, &cancelled), || async {
+            Ok(store.delete_job(&cancelled, None, now()).await? == Deleted::Done)
+        }),
+        act("delete_job, by age", (Delete, &old), || async {
+            let deleted = store.delete_job(&old, Some(&retention), now());
+            Ok(deleted.await? == Deleted::Done)
+        })
+        .by("retention"),
+        act("settle_send", (Read, &sent), || async {
+            let settled = store.settle_send(&sends[0], &stored, now());
+            settled.await.map(|()| true)
+        }),
+        act("settle_send, given up", (Read, &sent), || async {
+            let settled = store.settle_send(&sends[1], &refused, now());
+            settled.await.map(|()| true)
+        }),
+        act("redeliver_object", (Update, &told), || async {
+            let again = store.redeliver_object(t, &told, &sends[0].id, now());
+            Ok(again.await?.is_some())
+        }),
+        act("redeliver", (Update, &told), || async {
+            let again = store.redeliver(t, &told, &message, now());
+            Ok(again.await?.is_some())
         }),
         act("pulled", (Create, &pulled), || async {
             Ok(store.pulled(&pulled, &held, now()).await?.is_some())
@@ -2533,6 +2717,10 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
                 Erased::Done(_)
             ))
         }),
+        act("delete_ended_workitems", (Delete, "1.4"), || async {
+            Ok(store.delete_ended_workitems(soon, now()).await? == 1)
+        })
+        .by("retention"),
         act("add a received object", (Create, &group), || async {
             Ok(matches!(
                 store.add(&received, room, now()).await?,
@@ -2551,12 +2739,29 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
                 Erased::Done(_)
             ))
         }),
+        act("erase_scans", (Delete, &of_patient), || async {
+            let erased = store.erase_scans(&patient, &selected, now()).await?;
+            Ok(matches!(erased, ScansErased::Done(_)))
+        })
+        .by("somebody"),
         act("add_key", (KeyCreated, &api_key.id), || async {
             store.add_key(&api_key, &made).await.map(|()| true)
         }),
         act("revoke_key", (KeyRevoked, &api_key.id), || {
             store.revoke_key(&api_key.id, now(), &revoked)
         }),
+        act("revoke_keys_of", (KeyRevoked, &owned_key.id), || async {
+            let event = event(KeyRevoked);
+            let revoked = store.revoke_keys_of("dr-who", None, now(), &event).await?;
+            Ok(revoked.len() == 1)
+        }),
+        act("open_access", (AccessOpened, ""), || {
+            store.open_access(now(), &opened)
+        }),
+        act("prune", (AuditPruned, ""), || async {
+            Ok(store.prune(soon, now()).await? > 0)
+        })
+        .by("ventriform"),
     ];
     let recorder = Arc::new(Recorder::start(store.clone(), Arc::new(SystemClock)));
     let agent = Agent::new(recorder, Arc::new(SystemClock), t.clone(), "clerk");
@@ -2576,7 +2781,7 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         assert_eq!(sequence, rows + 1, "{}: one row", act.name);
         assert_eq!(
             (event.activity, &*event.agent),
-            (act.activity, "clerk"),
+            (act.activity, act.by),
             "{}",
             act.name
         );

@@ -128,6 +128,15 @@ fn marked_nifti() -> Vec<u8> {
     ] {
         bytes[at..at + mark.len()].copy_from_slice(mark.as_bytes());
     }
+    // An extension of the kind comment, before the voxels.
+    let (size, mut extension) = (48_u16, b"QZXVKJEXTENSION".to_vec());
+    extension.resize(usize::from(size) - 8, 0);
+    let offset = f32::from_le_bytes(bytes[108..112].try_into().unwrap());
+    assert_eq!(offset, 352.0, "a file of its own, without extensions");
+    bytes[108..112].copy_from_slice(&(offset + f32::from(size)).to_le_bytes());
+    bytes[348] = 1;
+    let head = [u32::from(size), 6].map(u32::to_le_bytes).concat();
+    bytes.splice(352..352, head.into_iter().chain(extension));
     let mut file = flate2::GzBuilder::new()
         .filename("QZXVKJGZNAME.nii")
         .comment("QZXVKJGZCOMMENT")
@@ -136,8 +145,51 @@ fn marked_nifti() -> Vec<u8> {
     file.finish().unwrap()
 }
 
-async fn ended(app: &Api, order: &Value) -> Value {
-    let filed = app.post("/v1/jobs").json(order).send().await.unwrap();
+/// The meshes of a product in each format that has comments, with a mark in every place where a text can be.
+async fn marked_meshes(app: &Api, product: &str) -> Vec<(&'static str, Vec<u8>)> {
+    let mut meshes = Vec::new();
+    for format in ["stl", "ply", "obj", "vtk", "gltf"] {
+        let path = format!("{product}/mesh.{format}");
+        let answer = app.get(&path).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{path}");
+        let mut bytes = answer.bytes().await.unwrap().to_vec();
+        let after = |bytes: &[u8], word: &[u8]| {
+            let at = bytes.windows(word.len()).position(|part| part == word);
+            at.unwrap_or_else(|| panic!("{path} has no {word:?}")) + word.len()
+        };
+        match format {
+            "stl" => bytes[64..73].copy_from_slice(b"QZXVKJSTL"),
+            "ply" => {
+                let end = after(&bytes, b"1.0\n");
+                bytes.splice(end..end, *b"comment QZXVKJPLY\nobj_info QZXVKJINFO\n");
+            }
+            "obj" => {
+                bytes.splice(
+                    0..0,
+                    *b"# QZXVKJOBJ\nmtllib QZXVKJMTL.mtl\no QZXVKJNAME\ng QZXVKJGROUP\n",
+                );
+            }
+            "vtk" => {
+                let end = after(&bytes, b"Version 3.0\n");
+                bytes.splice(end..end, *b"QZXVKJVTK ");
+            }
+            _ => {
+                let mut scene: Value = serde_json::from_slice(&bytes).unwrap();
+                scene["asset"]["copyright"] = json!("QZXVKJCOPYRIGHT");
+                scene["asset"]["extras"] = json!({"patient": "QZXVKJEXTRAS"});
+                for named in ["nodes", "meshes"] {
+                    scene[named][0]["name"] = json!("QZXVKJNODE");
+                }
+                bytes = serde_json::to_vec(&scene).unwrap();
+            }
+        }
+        meshes.push((format, bytes));
+    }
+    meshes
+}
+
+async fn ended(app: &Api, path: &str, order: &Value) -> Value {
+    let filed = app.post(path).json(order).send().await.unwrap();
     let status = filed.status();
     let job: Value = filed.json().await.unwrap();
     assert_eq!(status, StatusCode::ACCEPTED, "{job}");
@@ -298,9 +350,41 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         ),
         ("beat", &volumes[0], json!({})),
     ] {
-        let job = ended(&app, &order(kind, volume, more)).await;
+        let job = ended(&app, "/v1/jobs", &order(kind, volume, more)).await;
         println!("{kind} {} {}", job["state"], job["error"]);
     }
+    let models: Value = app
+        .get("/v1/models")
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    let model = text(&models["models"][0]["links"]["self"]);
+    // Meshes as templates and as volumes; also one that cannot be read.
+    let mut meshes = marked_meshes(&app, &model).await;
+    meshes.push((
+        "ply",
+        b"ply\nformat ascii 1.0\ncomment QZXVKJBAD\nelement QZXVKJELEMENT x\nend_header\n".into(),
+    ));
+    for (format, bytes) in meshes {
+        let path = format!("/v1/templates?name={format}&organ=generic");
+        let answer = app.post(&path).body(bytes.clone()).send().await.unwrap();
+        println!("template {format}: {}", answer.status());
+        let answer = app.post("/v1/volumes").body(bytes).send().await.unwrap();
+        println!("volume {format}: {}", answer.status());
+    }
+    // Limits of so few people are refused, with a reason.
+    let cases: Vec<Value> = (volumes[..2].iter().zip(["one", "two"]))
+        .map(|(volume, case)| {
+            json!({"case": case, "volume": volume, "sex": "F", "protocol": "rest", "tracer": "Tc-99m",
+                "attenuation_corrected": false})
+        })
+        .collect();
+    let order = json!({"name": "few", "cases": cases});
+    let job = ended(&app, "/v1/normals", &order).await;
+    println!("normals {} {}", job["state"], job["error"]);
     let profile = app
         .post("/v1/readers?name=anna")
         .json(&profile(1.25))
@@ -314,6 +398,7 @@ async fn no_text_of_a_header_or_a_caller_is_shown_to_who_sees_no_patients() {
         "segmentations",
         "comparisons",
         "readers",
+        "templates",
         "jobs",
     ] {
         assert!(

@@ -17,8 +17,8 @@ use ventriform_service::access::{
 use ventriform_service::config::{BlobPlace, Settings};
 use ventriform_service::records::{Catalogue, ListRequest, Tenant};
 use ventriform_store::{
-    Examination, Repair, SqlStore, Store, apply, backup, examine, examine_on_server, missed,
-    open_database, open_rows,
+    Examination, NewerStore, Repair, SqlStore, Store, StoreSettings, apply, backup, examine,
+    examine_on_server, missed, open_database, open_rows,
 };
 
 /// A page of SQLite here, bytes.
@@ -70,6 +70,10 @@ impl Ward {
 
 fn read(at: i64) -> AuditEvent {
     AuditEvent::new(at, Activity::Read, Tenant::default(), "x".into()).on(format!("vol_{at}"))
+}
+
+fn folder_of(data: &TempDir) -> NewerStore {
+    NewerStore::Folder(data.path().to_owned())
 }
 
 fn copied(from: &Path) -> TempDir {
@@ -392,7 +396,7 @@ async fn a_restored_copy_is_told_by_the_trail_and_catches_up_with_what_it_missed
                 Some(BrokenLink::Missing { .. })
             ));
         }
-        let what = missed(&store.rows, newer.path()).await.unwrap();
+        let what = missed(&store.rows, &folder_of(&newer)).await.unwrap();
         assert_eq!(what.acts.len(), 3, "{what:?}");
         assert_eq!(apply(&store, &what).await.unwrap(), Vec::<String>::new());
         let revoked = store.rows.key(&leaked).await.unwrap().unwrap();
@@ -403,10 +407,128 @@ async fn a_restored_copy_is_told_by_the_trail_and_catches_up_with_what_it_missed
         assert_eq!(holders(&database, &held).await, [("ta".to_owned(), true)]);
         let report = verify(&*store.rows).await.unwrap();
         assert_eq!(report.broken, None, "{report:?}");
-        let again = missed(&store.rows, newer.path()).await.unwrap();
+        let again = missed(&store.rows, &folder_of(&newer)).await.unwrap();
         assert!(again.acts.is_empty() && again.rows.is_empty(), "{again:?}");
         store.close().await;
     }
+}
+
+/// The records on a server: the database of the backup beside the newer one, whose URL tells what was missed.
+#[tokio::test]
+async fn a_restored_copy_on_a_server_catches_up_by_the_newer_database() {
+    let url = server().database().await;
+    let address = url.clone();
+    let data = Arc::new(tempfile::tempdir().unwrap());
+    let on_server = |address: String| {
+        move |settings: &mut Settings| {
+            settings.database = address.parse().unwrap();
+            settings.blobs = BlobPlace::Folder;
+        }
+    };
+    let app = TestApp::on(data, fake_engine(), on_server(address.clone())).await;
+    let rows = open_database(app.data.path(), Some(&reached(&url)))
+        .await
+        .unwrap();
+    let make = |name: &str| {
+        let request = KeyRequest {
+            name: name.into(),
+            tenant: "ta".parse().unwrap(),
+            scope: Scope::Admin,
+            quota: Quota::default(),
+            maker: Maker::Operator,
+            owner: None,
+            expires_at: None,
+        };
+        ApiKey::make(request, 1).unwrap()
+    };
+    let event = AuditEvent::new(1, Activity::KeyCreated, Tenant::default(), "me".into());
+    let ((own, secret), (leaked, _)) = (make("own"), make("leaked"));
+    for key in [&own, &leaked] {
+        rows.add_key(key, &event).await.unwrap();
+    }
+    rows.close().await;
+    let as_a = app.seen_with(&secret);
+    let (erased, held) = (as_a.volume("erased").await, as_a.volume("held").await);
+    let named = as_a.volume("named").await;
+    let put = |path: String, body: serde_json::Value| {
+        let request = as_a.client.put(format!("{}{path}", app.url)).json(&body);
+        async move {
+            let done = request.send().await.unwrap();
+            assert!(done.status().is_success(), "{path}: {done:?}");
+        }
+    };
+    let identity = format!("/v1/volumes/{named}/identity");
+    put(
+        identity.clone(),
+        json!({"patient_id": "7", "study_uid": "1.2.3"}),
+    )
+    .await;
+    let data = app.stop().await;
+    // The copy, and what was done since.
+    let (backup, copy) = (copied(data.path()), database_copied(&url).await);
+    let app = TestApp::on(data, fake_engine(), on_server(address)).await;
+    let as_a = app.seen_with(&secret);
+    for path in [
+        format!("/v1/keys/{}", leaked.id),
+        format!("/v1/volumes/{erased}"),
+        identity,
+    ] {
+        let done = as_a.delete(&path).send().await.unwrap().status();
+        assert!(done.is_success(), "{path}: {done}");
+    }
+    let hold = as_a
+        .client
+        .put(format!("{}/v1/volumes/{held}/hold", app.url));
+    let hold = hold.json(&json!({"reason": "court"})).send().await.unwrap();
+    assert!(hold.status().is_success());
+    app.stop().await;
+
+    let newer = NewerStore::Server(reached(&url));
+    let settings = StoreSettings {
+        database: Some(reached(&copy)),
+        ..StoreSettings::default()
+    };
+    let mut store = Store::open_with(backup.path(), settings).await.unwrap();
+    let what = missed(&store.rows, &newer).await.unwrap();
+    assert_eq!((what.acts.len(), what.unread.len()), (4, 0), "{what:?}");
+    assert!(what.rows.len() >= 4, "{what:?}");
+    assert_eq!(apply(&store, &what).await.unwrap(), Vec::<String>::new());
+    let revoked = store.rows.key(&leaked.id).await.unwrap().unwrap();
+    assert!(revoked.revoked_at.is_some());
+    assert!(!backup.path().join("volumes").join(&erased).exists());
+    let ta = "ta".parse().unwrap();
+    let volume = store.rows.volume(&ta, &held).await.unwrap().unwrap();
+    assert!(volume.ownership.legal_hold.is_some());
+    assert!(store.rows.volume(&ta, &erased).await.unwrap().is_none());
+    let report = verify(&*store.rows).await.unwrap();
+    assert_eq!(report.broken, None, "{report:?}");
+    let again = missed(&store.rows, &newer).await.unwrap();
+    assert!(again.acts.is_empty() && again.rows.is_empty(), "{again:?}");
+    store.close().await;
+    // Another store, and none.
+    let nothing = NewerStore::Server(reached(&server().database().await));
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path()).await.unwrap();
+    store.rows.append(&[read(1)]).await.unwrap();
+    let other = missed(&store.rows, &newer).await.unwrap_err();
+    assert!(other.to_string().contains("not a newer copy"), "{other}");
+    let unread = missed(&store.rows, &nothing).await.unwrap().unread;
+    assert!(unread.len() >= 5, "{unread:?}");
+    store.close().await;
+}
+
+/// Copies a database that nobody uses. Returns the URL of the copy.
+async fn database_copied(url: &str) -> String {
+    let name = |url: &str| url.rsplit('/').next().unwrap().to_owned();
+    let made = server().database().await;
+    let (from, to) = (name(url), name(&made));
+    for statement in [
+        format!("DROP DATABASE {to}"),
+        format!("CREATE DATABASE {to} TEMPLATE {from}"),
+    ] {
+        server().run("postgres", &statement).await;
+    }
+    made
 }
 
 #[tokio::test]

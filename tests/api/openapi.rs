@@ -147,7 +147,17 @@ fn every_operation_has_an_id_of_its_own_and_examples() {
     for (path, method, operation) in operations(&document) {
         let what = format!("{method} {path}");
         assert!(ids.insert(text(&operation["operationId"])), "{what}");
-        assert!(text(&operation["x-codeSamples"][0]["source"]).starts_with("curl "));
+        let sample = text(&operation["x-codeSamples"][0]["source"]);
+        assert!(sample.starts_with("curl "));
+        let parameters = operation["parameters"].as_array().into_iter().flatten();
+        let needed = parameters.filter(|one| one["in"] == "query" && one["required"] == true);
+        for parameter in needed {
+            let given = format!("{}=", text(&parameter["name"]));
+            assert!(sample.contains(&given), "{what}: {sample}");
+        }
+        // What is erased by a filter is named, and looked at first.
+        let erases_all = method == "delete" && path == "/v1/volumes";
+        assert!(!erases_all || sample.contains("dry_run=true"), "{sample}");
         for (status, answer) in operation["responses"].as_object().unwrap() {
             let contents = answer.get("content").and_then(Value::as_object);
             for (media_type, content) in contents.into_iter().flatten() {

@@ -58,6 +58,13 @@ async fn a_patient_is_erased_with_one_receipt_that_does_not_name_him() {
         assert_eq!(plan[clear], json!([]), "{clear}");
     }
     assert_eq!(plan["unread_volumes"], 0);
+    assert_eq!(plan["stays"], json!([]));
+    // Without what was made of them, the plan says what would be left.
+    let few = app.delete("/v1/volumes?patient=PAT-1&dry_run=true&cascade=false");
+    let few: Value = few.send().await.unwrap().json().await.unwrap();
+    assert_eq!(ids(&few["items"]), volumes);
+    assert_eq!(ids(&few["stays"]), [model.clone()]);
+    assert_eq!(few["jobs"], json!([]));
 
     // A volume more, and the plan is another one.
     let third = volume_of(&app, "sphere 4", "PAT-1", "1.2.4").await;

@@ -2,6 +2,7 @@
 //! watches; here are the folders of a crate, and what may not be named by whom.
 
 mod ages;
+mod changes;
 mod imports;
 
 use imports::{ModulePath, Sources, circles, rust_files};

@@ -163,7 +163,7 @@ fn path(id: &str) -> String {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub struct CascadeQuery {
-    /// Whether to erase also the models, segmentations, beats, comparisons and templates that were made of the volume, and the records of its jobs
+    /// Whether to erase also the models, segmentations, beats, comparisons and templates that were made of the volume, and the records of its jobs. Unless this is true they stay: one volume may be sent again. The erasure by patient or study (DELETE /v1/volumes) takes them by default
     #[param(default = false)]
     pub cascade: Option<bool>,
 }

@@ -47,7 +47,7 @@ pub struct ScanErasureQuery {
     /// Only of scans with this Accession Number
     #[param(pattern = "^.{1,64}$")]
     accession: Option<String>,
-    /// Whether to erase also the models, segmentations, beats, comparisons and templates that were made of the volumes, and the records of their jobs
+    /// Whether to erase also the models, segmentations, beats, comparisons and templates that were made of the volumes, and the records of their jobs. Unlike in the erasure of one volume this is the default: who erases a patient or a study means all that is stored of it. With `false` a dry run lists in `stays` what would be left
     #[param(default = true)]
     cascade: Option<bool>,
     /// Whether to erase nothing, and only show what would go and what stands in the way
@@ -71,6 +71,8 @@ pub struct PlanBody {
     items: Vec<PlannedItemBody>,
     /// The ended jobs whose records would go.
     jobs: Vec<String>,
+    /// What was made of the volumes and would stay, with `cascade=false`: send `cascade=true` to erase it too.
+    stays: Vec<String>,
     /// Items on legal hold: selected, or another source of something that would go. Nothing is erased while there are any.
     legal_holds: Vec<String>,
     /// Jobs that have not ended and need one of the items. Nothing is erased while there are any.
@@ -112,6 +114,7 @@ impl From<ScanErasurePlan> for PlanBody {
             volumes: plan.volumes,
             items: plan.items.into_iter().map(PlannedItemBody::from).collect(),
             jobs: plan.jobs,
+            stays: plan.stays,
             legal_holds: plan.holds,
             unfinished_jobs: plan.unfinished_jobs,
             pinned: plan.pinned,

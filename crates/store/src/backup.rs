@@ -129,7 +129,7 @@ async fn copy_items(
                 Copied::Now => done.copied += 1,
                 Copied::Before => {}
                 Copied::Not(defect) => {
-                    rows.forget(id).await?;
+                    rows.forget(id, None).await?;
                     if folder.join(blobs::shelf_path(id)).exists() {
                         done.damaged.push(format!("{id}: {defect}"));
                     }
@@ -156,7 +156,7 @@ async fn copy_received(
     for (name, sha256) in rows.waiting_files().await? {
         match copy_object(folder, target, &name, &sha256)? {
             // It became part of a volume meanwhile, or is damaged.
-            Copied::Not(_) => rows.forget_received(&name).await?,
+            Copied::Not(_) => rows.forget_received(&name, None).await?,
             Copied::Now | Copied::Before => {
                 kept.insert(name);
             }

@@ -29,10 +29,7 @@ use super::blobs::{
 };
 use super::content;
 use super::database::SqlStore;
-use super::findings::{
-    DAMAGED_SET_ASIDE, Examination, GIVEN_TO_HEIR, HELD_SET_ASIDE, NO_HOLDER, NO_ROW, Repair,
-    UNOWNED_SET_ASIDE, repaired,
-};
+use super::findings::{Examination, GIVEN_TO_HEIR, NO_HOLDER, NO_ROW, Repair, UNOWNED_SET_ASIDE};
 use super::kept::{Doubt, HOW_TO_OPEN};
 use super::note::{Beside, NOTE_FILE};
 use super::received;
@@ -178,8 +175,6 @@ struct Doctor<'a> {
     unowned: BTreeSet<String>,
     /// Whether what products were made of has to be noted again.
     sources_lost: bool,
-    /// What was repaired, for the audit trail.
-    events: Vec<AuditEvent>,
 }
 
 impl<'a> Doctor<'a> {
@@ -204,7 +199,6 @@ impl<'a> Doctor<'a> {
             found: Examination::default(),
             unowned: BTreeSet::new(),
             sources_lost: false,
-            events: Vec::new(),
         })
     }
 
@@ -350,26 +344,27 @@ impl<'a> Doctor<'a> {
         if lacks("audit_anchors") {
             rows.restore_anchor().await?;
         }
+        self.know_the_trail(rows).await?;
         let mut holders: BTreeSet<Holder> = salvage.holders.iter().cloned().collect();
         holders.extend(rows.traces_of_holders().await?);
         let holders: Vec<Holder> = holders.into_iter().collect();
         rows.give_back(&holders, now).await?;
         for holder in holders {
-            let (tenant, id) = (Some(&holder.tenant), &holder.id);
-            self.events.push(repaired(id, tenant, now));
             let detail = format!(
                 "The record that tenant {} has it was lost, with its tags and with whether it is on legal hold.",
                 holder.tenant
             );
             let repair =
                 "it was given back to that tenant; a volume is on legal hold until that is lifted";
-            self.found.note("lost-holder", id, detail, Some(repair));
+            self.found
+                .note("lost-holder", &holder.id, detail, Some(repair));
         }
-        self.know_the_trail(rows).await?;
+        // The draft is in nobody's use yet: its rows and these are seen together.
+        let mut events = Vec::new();
         for table in &salvage.tables {
-            self.lost_rows(rows, table, now).await?;
+            events.extend(self.lost_rows(rows, table, now).await?);
         }
-        rows.append(&std::mem::take(&mut self.events)).await?;
+        rows.append(&events).await?;
         Ok(())
     }
 
@@ -394,9 +389,9 @@ impl<'a> Doctor<'a> {
         rows: &SqlStore,
         table: &Salvaged,
         now: Timestamp,
-    ) -> Result<(), DoctorError> {
+    ) -> Result<Option<AuditEvent>, DoctorError> {
         if table.lost == Some(0) {
-            return Ok(());
+            return Ok(None);
         }
         let name = &table.table;
         let how_many = match table.lost {
@@ -431,8 +426,7 @@ impl<'a> Doctor<'a> {
             count: table.lost.unwrap_or(1).max(1),
             ..AuditEvent::new(now, Activity::RowsLost, Tenant::default(), REPAIRER.into())
         };
-        self.events.push(event.on(object));
-        Ok(())
+        Ok(Some(event.on(object)))
     }
 
     /// The places of the notes about the database.
@@ -508,16 +502,12 @@ impl<'a> Doctor<'a> {
         if examined.is_ok() {
             self.without_item(rows).await?;
             if self.repair.is_some() && !rows.on_server() {
-                for (table, dropped) in rows.drop_orphans().await? {
+                for (table, dropped) in rows.drop_orphans(SystemClock.now()).await? {
                     let detail = format!("{dropped} rows name what nobody has any more.");
                     let repair = Some("they were removed");
                     self.found.note("orphaned-rows", table, detail, repair);
                 }
             }
-        }
-        let events = std::mem::take(&mut self.events);
-        if !events.is_empty() {
-            rows.append(&events).await?;
         }
         examined?;
         self.access(rows).await?;
@@ -533,10 +523,7 @@ impl<'a> Doctor<'a> {
         let lost: BTreeSet<Holder> = rows.without_item().await?.into_iter().collect();
         for holder in lost {
             if self.repair.is_some() {
-                rows.forget(&holder.id).await?;
-                let now = SystemClock.now();
-                self.events
-                    .push(repaired(&holder.id, Some(&holder.tenant), now));
+                rows.forget(&holder.id, Some(SystemClock.now())).await?;
             }
             let detail = format!(
                 "Tenant {} has it, and it has neither row nor files.",
@@ -587,7 +574,6 @@ impl<'a> Doctor<'a> {
                 rows,
                 repair: self.repair,
                 unowned: &self.unowned,
-                events: &mut self.events,
                 found: &mut self.found,
             };
             return Ok(doctor.examine().await?);
@@ -630,7 +616,7 @@ impl<'a> Doctor<'a> {
             if let Some(wrong) = wrong {
                 if self.repair.is_some() {
                     received::set_aside(self.folder, &name, SystemClock.now())?;
-                    rows.forget_received(&name).await?;
+                    rows.forget_received(&name, Some(SystemClock.now())).await?;
                 }
                 let repair = "its row was removed; the object can be sent again";
                 let repair = self.if_repairing(repair);
@@ -683,16 +669,10 @@ impl<'a> Doctor<'a> {
             } else {
                 blobs::set_aside(self.folder, id, SystemClock.now())?;
             }
-            rows.forget(id).await?;
+            rows.forget(id, Some(SystemClock.now())).await?;
         }
-        let repair = if on_hold {
-            HELD_SET_ASIDE
-        } else {
-            DAMAGED_SET_ASIDE
-        };
-        let repair = self.if_repairing(repair);
-        self.found
-            .note("damaged-item", id, wrong.join("; "), repair);
+        let repairing = self.repair.is_some();
+        self.found.note_damaged(id, &wrong, (repairing, on_hold));
         Ok(true)
     }
 
@@ -701,14 +681,13 @@ impl<'a> Doctor<'a> {
         let (id, now, heir) = (record.id(), SystemClock.now(), self.heir());
         let mut done = None;
         if self.repair.is_some() {
-            done = Some(if rows.restore(record, heir, now).await? {
+            done = Some(if rows.restore(record, (&[], heir), now).await? {
                 GIVEN_TO_HEIR
             } else {
                 blobs::set_aside_unowned(self.folder, id)?;
-                rows.forget(id).await?;
+                rows.forget(id, Some(now)).await?;
                 UNOWNED_SET_ASIDE
             });
-            self.events.push(repaired(id, heir, now));
         }
         self.found.note("unowned-item", id, NO_HOLDER, done);
         Ok(())
@@ -767,8 +746,7 @@ impl<'a> Doctor<'a> {
             let repair = match (self.repair, record) {
                 (None, _) => None,
                 (Some(_), Some(record)) if !erased => {
-                    Some(if rows.restore(&record, heir, now).await? {
-                        self.events.push(repaired(&id, heir, now));
+                    Some(if rows.restore(&record, (&[], heir), now).await? {
                         "its row was made from the record beside the files"
                     } else {
                         blobs::set_aside_unowned(self.folder, &id)?;
@@ -823,9 +801,7 @@ impl<'a> Doctor<'a> {
                     fs::rename(&place, &shelved)?;
                     blobs::sync(shelved.parent().unwrap_or(&shelved))?;
                     remove(&shelved.join(HOLDERS_FILE))?;
-                    rows.give_held(&id, &holdings).await?;
-                    rows.restore(&record, heir, now).await?;
-                    self.events.push(repaired(&id, heir, now));
+                    rows.restore(&record, (&holdings, heir), now).await?;
                     repair = Some("it was brought back");
                 }
                 let subject = format!("{QUARANTINE_FOLDER}/{day}/{name}");

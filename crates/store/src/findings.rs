@@ -1,9 +1,7 @@
 //! Findings of a check of the storage, and their repair.
 
-use crate::tables::REPAIRER;
 use serde::Serialize;
-use ventriform_service::access::{Activity, AuditEvent};
-use ventriform_service::records::{Tenant, Timestamp};
+use ventriform_service::records::Tenant;
 
 /// How to repair what is found.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -23,16 +21,9 @@ pub(super) const GIVEN_TO_HEIR: &str = "it was given to the tenant that --tenant
 pub(super) const UNOWNED_SET_ASIDE: &str = "it was moved into the quarantine, where it stays: `--repair --tenant NAME` gives it to that tenant";
 
 /// The repair of a damaged item.
-pub(super) const DAMAGED_SET_ASIDE: &str =
-    "its row was removed and its files moved into the quarantine";
+const DAMAGED_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine";
 /// The same for one on legal hold.
-pub(super) const HELD_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine, where they stay: it is on legal hold";
-
-/// The event about the repair of an item.
-pub(super) fn repaired(id: &str, heir: Option<&Tenant>, now: Timestamp) -> AuditEvent {
-    let tenant = heir.cloned().unwrap_or_default();
-    AuditEvent::new(now, Activity::Repaired, tenant, REPAIRER.into()).on(id)
-}
+const HELD_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine, where they stay: it is on legal hold";
 
 /// Something that is not as it should be.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -83,6 +74,21 @@ impl Examination {
             harmless: false,
             repair,
         });
+    }
+
+    /// Notes an item whose files are `wrong`, and what a repair did with it.
+    pub(super) fn note_damaged(
+        &mut self,
+        id: &str,
+        wrong: &[String],
+        (repairing, on_hold): (bool, bool),
+    ) {
+        let repair = match (repairing, on_hold) {
+            (false, _) => None,
+            (true, true) => Some(HELD_SET_ASIDE),
+            (true, false) => Some(DAMAGED_SET_ASIDE),
+        };
+        self.note("damaged-item", id, wrong.join("; "), repair);
     }
 
     pub(super) fn remark(

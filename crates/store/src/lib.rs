@@ -65,7 +65,7 @@ pub use migrate::{
     Destination, MigrateError, Migrated, MovedFiles, Progress, TableCount, migrate,
     note_moved_files,
 };
-pub use missed::{Act, Missed, MissedError, apply, missed};
+pub use missed::{Act, Missed, MissedError, NewerStore, apply, missed};
 pub use postgres::PostgresError;
 pub use s3::{S3Blobs, S3Location, S3Refusal};
 pub use space::DiskGauge;

@@ -1,8 +1,9 @@
 //! What a newer trail says and an older copy of the store does not know: keys revoked, items and identities erased, and
 //! legal holds set since the copy was made.
 //!
-//! In: the store, which no service uses, and the data folder of the newer one, whose database may be damaged. Out: a
-//! list; and if asked for, the same done to the store.
+//! In: the store, which no service uses, and the newer one: a data folder, whose database may be damaged, or a database of
+//! PostgreSQL. The engines need not be the same, and nothing is written to the newer one. Out: a list; and if asked for, the
+//! same done to the store.
 //!
 //! 1. Both are compared row by row, not by time: a revocation, a receipt or a hold of the newer store that this one lacks.
 //! 2. The rows of the newer trail that this one lacks are taken over as they are, if they follow its rows; the chain of
@@ -13,19 +14,21 @@
 //! is on hold here, is named and stays.
 
 use crate::Store;
-use crate::database::SqlStore;
-use crate::query::query;
+use crate::database::{Readers, SqlStore};
+use crate::query::{DbRow, query};
 use crate::tables::REPAIRER;
-use sqlx::sqlite::SqliteConnectOptions;
-use sqlx::{ConnectOptions, Connection, FromRow, SqliteConnection};
+use crate::{postgres, sqlite};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::fmt::{Display, Formatter};
+use std::path::PathBuf;
+use std::sync::Arc;
 use ventriform_service::access::{
-    AccessStore, Activity, Anchor, AuditEvent, AuditLink, NO_HASH, chain_hash,
+    AccessStore, Activity, Agent, Anchor, AuditEvent, AuditLink, NO_HASH, Recorder, chain_hash,
 };
+use ventriform_service::config::PostgresSettings;
 use ventriform_service::records::{
     Catalogue, Clock, Custody, Erased, ErasureAgent, ErasureOrder, LegalHold, Receipt, Scans,
-    StoreError, SystemClock, Tenant, Timestamp,
+    StoreError, StoreResult, SystemClock, Tenant, Timestamp,
 };
 
 /// Rows of a trail that are read at a time.
@@ -98,21 +101,21 @@ pub struct Missed {
 #[derive(Debug, thiserror::Error)]
 pub enum MissedError {
     /// The newer store cannot be read at all.
-    #[error("{path}: {reason}")]
+    #[error("{store}: {reason}")]
     Newer {
         /// Its database.
-        path: PathBuf,
+        store: String,
         /// The reason.
         reason: String,
     },
     /// The newer trail does not know the newest row here.
     #[error(
-        "row {sequence} of the audit trail here, with the hash {hash}, is not in the trail of {path}: it is not a newer \
+        "row {sequence} of the audit trail here, with the hash {hash}, is not in the trail of {store}: it is not a newer \
          copy of this store"
     )]
     OtherTrail {
         /// The newer store's database.
-        path: PathBuf,
+        store: String,
         /// Position of the row here.
         sequence: i64,
         /// Its hash.
@@ -123,37 +126,72 @@ pub enum MissedError {
     Store(#[from] StoreError),
 }
 
-/// Tenant, id, reason, time and name of a hold of the newer store; or of the erasure of an identity.
-type HeldRow = (String, String, String, i64, String);
+/// Where the newer store is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NewerStore {
+    /// A data folder, with a database of SQLite in it.
+    Folder(PathBuf),
+    /// A database of PostgreSQL.
+    Server(PostgresSettings),
+}
+
+impl Display for NewerStore {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Folder(folder) => write!(f, "{}", folder.join(crate::DATABASE_FILE).display()),
+            Self::Server(server) => write!(f, "{}", server.url),
+        }
+    }
+}
+
+/// A hold of the newer store, or the erasure of an identity there.
+struct HeldRow {
+    tenant: String,
+    id: String,
+    hold: LegalHold,
+}
 
 /// What [`missed`] reads of the newer store.
-struct Newer {
-    path: PathBuf,
-    connection: SqliteConnection,
+struct Newer<'a> {
+    place: &'a NewerStore,
+    readers: Readers,
     unread: Vec<String>,
 }
 
-impl Newer {
-    async fn open(folder: &Path) -> Result<Self, MissedError> {
-        let path = folder.join(crate::DATABASE_FILE);
-        let options = SqliteConnectOptions::new().filename(&path);
-        let connection = options.connect().await;
+impl<'a> Newer<'a> {
+    /// Connects to the store as it is: its tables stay those of the program that has made them.
+    async fn open(place: &'a NewerStore) -> Result<Self, MissedError> {
+        let unreadable = |reason: String| MissedError::Newer {
+            store: place.to_string(),
+            reason,
+        };
+        let readers = match place {
+            NewerStore::Folder(folder) => {
+                let opened = sqlite::open_as_it_is(&folder.join(crate::DATABASE_FILE)).await;
+                Readers::Sqlite(opened.map_err(|error| unreadable(error.to_string()))?)
+            }
+            NewerStore::Server(server) => {
+                let opened = postgres::open_as_it_is(server).await;
+                Readers::Postgres(opened.map_err(|error| unreadable(error.to_string()))?)
+            }
+        };
+        let (place, unread) = (place, Vec::new());
         Ok(Self {
-            connection: connection.map_err(|error| MissedError::Newer {
-                path: path.clone(),
-                reason: error.to_string(),
-            })?,
-            path,
-            unread: Vec::new(),
+            place,
+            readers,
+            unread,
         })
     }
 
     /// The rows of a query on a table; none if it cannot be read, which is noted.
-    async fn all<T>(&mut self, table: &str, text: &'static str) -> Vec<T>
-    where
-        T: for<'r> FromRow<'r, sqlx::sqlite::SqliteRow> + Send + Unpin,
-    {
-        match sqlx::query_as(text).fetch_all(&mut self.connection).await {
+    async fn all<T>(
+        &mut self,
+        table: &str,
+        text: &'static str,
+        read: impl Fn(DbRow) -> StoreResult<T>,
+    ) -> Vec<T> {
+        let found = query(text).fetch_all(&self.readers).await;
+        match found.and_then(|rows| rows.into_iter().map(read).collect()) {
             Ok(rows) => rows,
             Err(error) => {
                 self.unread.push(format!("{table}: {error}"));
@@ -167,22 +205,17 @@ impl Newer {
         let mut links: Vec<AuditLink> = Vec::new();
         loop {
             let last = links.last().map_or(after, |link| link.sequence);
-            let page = sqlx::query_as::<_, (i64, String, String)>(
-                "SELECT sequence, event, hash FROM audit WHERE sequence > ? ORDER BY sequence LIMIT ?",
+            let page = query(
+                "SELECT sequence, event, hash FROM audit WHERE sequence > $1 ORDER BY sequence LIMIT $2",
             )
             .bind(last)
             .bind(BATCH_ROWS)
-            .fetch_all(&mut self.connection)
+            .fetch_all(&self.readers)
             .await;
-            match page {
+            match page.and_then(|page| page.into_iter().map(link).collect::<StoreResult<Vec<_>>>())
+            {
                 Ok(page) if page.is_empty() => return links,
-                Ok(page) => {
-                    links.extend(page.into_iter().map(|(sequence, event, hash)| AuditLink {
-                        sequence,
-                        event,
-                        hash,
-                    }))
-                }
+                Ok(page) => links.extend(page),
                 Err(error) => {
                     self.unread.push(format!("audit: {error}"));
                     return links;
@@ -196,47 +229,76 @@ impl Newer {
         if row.sequence == 0 {
             return Some(true);
         }
-        let known = sqlx::query_scalar::<_, bool>(
-            "SELECT EXISTS (SELECT 1 FROM audit WHERE sequence = ?1 AND hash = ?2)
-                 OR ?1 <= coalesce((SELECT max(sequence) FROM audit_anchors), 0)",
+        let known = query(
+            "SELECT EXISTS (SELECT 1 FROM audit WHERE sequence = $1 AND hash = $2)
+                 OR $1 <= coalesce((SELECT max(sequence) FROM audit_anchors), 0)",
         )
         .bind(row.sequence)
         .bind(&row.hash)
-        .fetch_one(&mut self.connection)
+        .fetch_one(&self.readers)
         .await;
-        known.ok()
+        known.and_then(|row| row.try_get(0)).ok()
+    }
+
+    async fn close(self) -> Vec<String> {
+        match &self.readers {
+            Readers::Sqlite(shared) => shared.pool.close().await,
+            Readers::Postgres(shared) => shared.pool.close().await,
+        }
+        self.unread
     }
 }
 
-/// What the store of the data folder `newer` knows of and `rows` lacks.
+fn link(row: DbRow) -> StoreResult<AuditLink> {
+    Ok(AuditLink {
+        sequence: row.try_get(0)?,
+        event: row.try_get(1)?,
+        hash: row.try_get(2)?,
+    })
+}
+
+/// Tenant, id, reason, time and name.
+fn held(row: DbRow) -> StoreResult<HeldRow> {
+    Ok(HeldRow {
+        tenant: row.try_get(0)?,
+        id: row.try_get(1)?,
+        hold: LegalHold {
+            reason: row.try_get(2)?,
+            since: row.try_get(3)?,
+            by: row.try_get(4)?,
+        },
+    })
+}
+
+/// What the store at `newer` knows of and `rows` lacks.
 ///
 /// # Errors
 /// If the newer store cannot be read, or is that of another trail.
-pub async fn missed(rows: &SqlStore, newer: &Path) -> Result<Missed, MissedError> {
+pub async fn missed(rows: &SqlStore, newer: &NewerStore) -> Result<Missed, MissedError> {
     let mut newer = Newer::open(newer).await?;
     let common = common_end(rows, &mut newer).await?;
     let mut found = Missed::default();
     for key in newer
-        .all::<(String,)>(
+        .all(
             "api_keys",
             "SELECT id FROM api_keys WHERE revoked_at IS NOT NULL",
+            |row| row.try_get::<String, _>(0),
         )
         .await
     {
-        let here = rows.key(&key.0).await?;
+        let here = rows.key(&key).await?;
         if here.is_some_and(|key| key.revoked_at.is_none()) {
-            found.acts.push(Act::Revoked { key: key.0 });
+            found.acts.push(Act::Revoked { key });
         }
     }
-    let held = "SELECT tenant, id, coalesce(hold_reason, '') AS reason, held_at AS since,
-                       coalesce(held_by, '') AS by
-                FROM holdings WHERE held_at IS NOT NULL";
-    for held in newer.all::<HeldRow>("holdings", held).await {
-        found.acts.extend(held_later(rows, held).await?);
+    let holds = "SELECT tenant, id, coalesce(hold_reason, ''), held_at, coalesce(held_by, '')
+                 FROM holdings WHERE held_at IS NOT NULL ORDER BY sequence";
+    for hold in newer.all("holdings", holds, held).await {
+        found.acts.extend(held_later(rows, hold).await?);
     }
-    let scans = "SELECT tenant, volume AS id, '' AS reason, erased_at AS since, '' AS by
-                 FROM scans WHERE erased_at IS NOT NULL";
-    for scan in newer.all::<HeldRow>("scans", scans).await {
+    let scans = "SELECT tenant, volume, '', erased_at, '' FROM scans WHERE erased_at IS NOT NULL
+                 ORDER BY tenant, volume";
+    for scan in newer.all("scans", scans, held).await {
         found.acts.extend(identity_erased_later(rows, scan).await?);
     }
     found.acts.extend(erased_later(rows, &mut newer).await?);
@@ -246,8 +308,7 @@ pub async fn missed(rows: &SqlStore, newer: &Path) -> Result<Missed, MissedError
         hash: link.hash.clone(),
     });
     found.rows = following(rows, &common, later).await?;
-    found.unread = newer.unread;
-    let _ = newer.connection.close().await;
+    found.unread = newer.close().await;
     Ok(found)
 }
 
@@ -255,7 +316,7 @@ pub async fn missed(rows: &SqlStore, newer: &Path) -> Result<Missed, MissedError
 ///
 /// # Errors
 /// If it knows none of them.
-async fn common_end(rows: &SqlStore, newer: &mut Newer) -> Result<Anchor, MissedError> {
+async fn common_end(rows: &SqlStore, newer: &mut Newer<'_>) -> Result<Anchor, MissedError> {
     let anchor = rows.anchor().await?;
     let mut end = anchor.unwrap_or_else(|| Anchor {
         sequence: 0,
@@ -279,7 +340,7 @@ async fn common_end(rows: &SqlStore, newer: &mut Newer) -> Result<Anchor, Missed
             if newer.knows(&next).await == Some(false) {
                 if is_first {
                     return Err(MissedError::OtherTrail {
-                        path: newer.path.clone(),
+                        store: newer.place.to_string(),
                         sequence: next.sequence,
                         hash: next.hash,
                     });
@@ -340,7 +401,7 @@ async fn owner(rows: &SqlStore, tenant: String, item: &str) -> Result<Option<Ten
 }
 
 async fn held_later(rows: &SqlStore, held: HeldRow) -> Result<Option<Act>, StoreError> {
-    let (tenant, id, reason, since, by) = held;
+    let HeldRow { tenant, id, hold } = held;
     let Some(tenant) = owner(rows, tenant, &id).await? else {
         return Ok(None);
     };
@@ -352,12 +413,12 @@ async fn held_later(rows: &SqlStore, held: HeldRow) -> Result<Option<Act>, Store
     Ok(row.map(|_| Act::Held {
         tenant,
         item: id,
-        hold: LegalHold { reason, since, by },
+        hold,
     }))
 }
 
 async fn identity_erased_later(rows: &SqlStore, scan: HeldRow) -> Result<Option<Act>, StoreError> {
-    let (tenant, id, ..) = scan;
+    let HeldRow { tenant, id, .. } = scan;
     let Some(tenant) = owner(rows, tenant, &id).await? else {
         return Ok(None);
     };
@@ -370,16 +431,18 @@ async fn identity_erased_later(rows: &SqlStore, scan: HeldRow) -> Result<Option<
 }
 
 /// Items here that receipts of the newer store name, unless their tenant has them there again.
-async fn erased_later(rows: &SqlStore, newer: &mut Newer) -> Result<Vec<Act>, StoreError> {
-    let receipts: Vec<(String,)> = newer
-        .all("erasures", "SELECT receipt FROM erasures ORDER BY sequence")
-        .await;
+async fn erased_later(rows: &SqlStore, newer: &mut Newer<'_>) -> Result<Vec<Act>, StoreError> {
+    let receipts = "SELECT receipt FROM erasures ORDER BY sequence";
+    let receipts: Vec<String> = newer.all("erasures", receipts, |row| row.try_get(0)).await;
+    let there = "SELECT tenant, id FROM holdings";
     let there: Vec<(String, String)> = newer
-        .all("holdings", "SELECT tenant, id FROM holdings")
+        .all("holdings", there, |row| {
+            Ok((row.try_get(0)?, row.try_get(1)?))
+        })
         .await;
     let there: BTreeSet<(String, String)> = there.into_iter().collect();
     let (mut acts, mut named) = (Vec::new(), BTreeSet::new());
-    for (text,) in receipts {
+    for text in receipts {
         let Ok(receipt) = serde_json::from_str::<Receipt>(&text) else {
             newer.unread.push("erasures: a receipt is damaged".into());
             continue;
@@ -419,15 +482,13 @@ pub async fn apply(store: &Store, missed: &Missed) -> Result<Vec<String>, Missed
                 Ok(())
             }
             Act::Held { tenant, item, hold } => {
-                rows.set_legal_hold(tenant, item, Some(hold)).await?;
-                let event = event(Activity::Update, tenant.clone(), now).on(item);
-                rows.append(&[event]).await?;
+                let held = rows.set_legal_hold(tenant, item, Some(hold));
+                Agent::scope(Some(agent(store, tenant)), held).await?;
                 Ok(())
             }
             Act::IdentityErased { tenant, item } => {
-                if rows.erase_scan(tenant, item, now).await? {
-                    let event = event(Activity::Delete, tenant.clone(), now).on(item);
-                    rows.append(&[event]).await?;
+                let erased = rows.erase_scan(tenant, item, now);
+                if Agent::scope(Some(agent(store, tenant)), erased).await? {
                     Ok(())
                 } else {
                     Err("it is on legal hold here".to_owned())
@@ -510,6 +571,13 @@ async fn erase(
         deleted.map_err(StoreError::from)?;
     }
     Ok(Ok(()))
+}
+
+/// Who does it, for a tenant.
+fn agent(store: &Store, tenant: &Tenant) -> Agent {
+    let clock = Arc::new(SystemClock);
+    let recorder = Arc::new(Recorder::start(store.rows.clone(), clock.clone()));
+    Agent::new(recorder, clock, tenant.clone(), REPAIRER)
 }
 
 fn event(activity: Activity, tenant: Tenant, now: Timestamp) -> AuditEvent {

@@ -184,6 +184,30 @@ pub(super) async fn connect_unlimited(
     Ok(connection)
 }
 
+/// Connects to a database that another program may have made, for reading: its tables stay as they are. Statements may take
+/// any time.
+pub(super) async fn open_as_it_is(
+    settings: &PostgresSettings,
+) -> Result<Shared<PgPool>, PostgresError> {
+    let refused = |error: sqlx::Error| refusal(&settings.url, &error);
+    let options = with_few_parameters(options_of(&settings.url).map_err(refused)?);
+    let connection = reach(settings, &options).await?;
+    let _ = connection.close().await;
+    let pool = PgPoolOptions::new()
+        .max_connections(1)
+        .after_connect(|connection, _| {
+            Box::pin(async move {
+                let session = [
+                    ("statement_timeout", "0".into()),
+                    ("default_transaction_read_only", "on".into()),
+                ];
+                set_session(connection, &session).await
+            })
+        })
+        .connect_lazy_with(options);
+    Ok(Shared::new(pool, Arc::default(), 1, STATEMENT_TIMEOUT))
+}
+
 /// Whether a service has made its tables in the database.
 pub(super) async fn has_tables(settings: &PostgresSettings) -> Result<bool, sqlx::Error> {
     let options = with_few_parameters(options_of(&settings.url)?);

@@ -13,6 +13,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 const READ_CONNECTIONS: u32 = 4;
+/// Longest wait for the only connection, which one task uses.
+const ALONE_WAIT: Duration = Duration::from_secs(60);
 
 /// Opens the file, or creates it, and migrates its tables to the current version. `wait` is the longest
 /// time that a write waits for its turn.
@@ -43,6 +45,22 @@ pub(super) async fn open(
     let health = Arc::new(Health::default());
     let readers = Shared::new(readers, health.clone(), places, wait);
     Ok((Writer::new(&options, health, wait), readers))
+}
+
+/// Opens a file that another program may have made, for reading: its tables stay as they are.
+///
+/// # Errors
+/// If there is none, or it cannot be opened.
+pub(super) async fn open_as_it_is(path: &Path) -> Result<Shared<SqlitePool>, sqlx::Error> {
+    let options = SqliteConnectOptions::new()
+        .filename(path)
+        .pragma("query_only", "ON");
+    let readers = SqlitePoolOptions::new()
+        .max_connections(1)
+        .test_before_acquire(false)
+        .connect_with(options)
+        .await?;
+    Ok(Shared::new(readers, Arc::default(), 1, ALONE_WAIT))
 }
 
 /// Whether there is a database at `path` in which this program once made its tables. A file that is

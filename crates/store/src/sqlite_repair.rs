@@ -7,13 +7,14 @@
 
 use super::database::SqlStore;
 use super::query::query;
-use super::tables::Holder;
+use super::tables::{Holder, append, repaired};
 use crate::faults;
 use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
 use std::collections::BTreeMap;
 use std::path::Path;
-use ventriform_service::records::{StoreResult, Tenant};
+use ventriform_service::access::AuditEvent;
+use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// Tables whose rows are never deleted: their greatest number is how many there were.
 const NEVER_DELETED: &[&str] = &["api_keys", "erasures"];
@@ -88,8 +89,11 @@ impl SqlStore {
         Ok(salvaged)
     }
 
-    /// Removes rows that name an ownership which nobody has. Returns how many of each table.
-    pub(super) async fn drop_orphans(&self) -> StoreResult<Vec<(&'static str, u64)>> {
+    /// Removes rows that name an ownership which nobody has, with a row of the trail for each table. Returns how many of each.
+    pub(super) async fn drop_orphans(
+        &self,
+        now: Timestamp,
+    ) -> StoreResult<Vec<(&'static str, u64)>> {
         let mut dropped = Vec::new();
         for (table, orphans) in [
             (
@@ -108,10 +112,17 @@ impl SqlStore {
                  (SELECT 1 FROM intake_groups g WHERE g.id = intake_objects.group_id)",
             ),
         ] {
-            let rows = query(orphans).write(&self.writer).await?;
+            let mut transaction = self.writer.begin().await?;
+            let rows = query(orphans).execute(&mut transaction).await?;
             if rows > 0 {
                 dropped.push((table, rows));
+                let event = AuditEvent {
+                    count: rows,
+                    ..repaired(table, None, now)
+                };
+                append(&mut transaction, &[event]).await?;
             }
+            transaction.commit().await?;
         }
         Ok(dropped)
     }

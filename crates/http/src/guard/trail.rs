@@ -71,9 +71,6 @@ impl Act {
             return response;
         }
         let done = status.is_success() || status == StatusCode::NOT_MODIFIED;
-        if done && self.agent.lacks_rows() {
-            return not_recorded().into_response();
-        }
         if self.agent.has_acted() {
             return response;
         }

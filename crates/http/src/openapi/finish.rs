@@ -415,6 +415,12 @@ fn add_own(body: &mut Value, examples: &Value) {
     }
 }
 
+/// Queries of operations that are refused without one. The erasure is a dry run.
+const SAMPLE_QUERIES: [(&str, &str); 2] = [
+    ("delete_volumes", "patient=PAT-0042&dry_run=true"),
+    ("revoke_keys_of_owner", "owner=contractor-7"),
+];
+
 /// A command line for curl; `$U` stands for the service's address.
 fn command_line(path: &str, method: &str, operation: &Value, recorded: &Value) -> String {
     let id = operation["operationId"].as_str().unwrap_or_default();
@@ -436,6 +442,9 @@ fn command_line(path: &str, method: &str, operation: &Value, recorded: &Value) -
         ));
     } else if requests.get("application/json").is_some() {
         words.push("-H 'content-type: application/json' --data-binary @mesh.json".into());
+    }
+    if let Some((_, query)) = SAMPLE_QUERIES.iter().find(|(of, _)| *of == id) {
+        url = format!("{url}?{query}");
     }
     words.push(format!("\"$U{url}\""));
     let answers = operation["responses"]["200"]["content"].as_object();

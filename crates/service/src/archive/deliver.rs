@@ -3,12 +3,14 @@
 //! Nothing is stored twice: an object has the same UID and bytes in every attempt, and the archive
 //! is asked whether it has the object before it is sent. An archive that cannot be asked recognises the
 //! UID itself. An attempt is counted before it is made, so that one which ends the process is not repeated without end.
+//! The end of a delivery and its row of the audit trail are one transaction: if it fails, the attempt is made again.
 
 use super::end::{ExchangeCounts, ExchangeEnd};
 use super::exchange::{Exchange, means};
 use super::trouble::Trouble;
 use super::web::Stored;
 use super::{DueSend, SendSettlement, dimse};
+use crate::access::Agent;
 use crate::hooks::{AttemptEnd, DeliveryState, Errands, Lane, Rounds};
 use crate::records::{Job, JobState, StoreResult, Timestamp};
 use async_trait::async_trait;
@@ -154,11 +156,10 @@ impl Errands for Deliverer {
             tracing::info!(delivery = %due.id, job = %due.job, error, "an object was not delivered");
         }
         self.counts.add(end);
-        // What has left is in the audit trail, also if the process ends before the delivery is settled.
-        self.exchange.host.delivered(&due, end).await;
         let now = self.exchange.clock().now();
-        let written = self.exchange.store.settle_send(&due.id, &settlement, now);
-        match written.await {
+        let written = self.exchange.store.settle_send(&due, &settlement, now);
+        let agent = self.exchange.host.agent(&due.tenant);
+        match Agent::scope(Some(agent), written).await {
             Ok(()) => meaning,
             Err(error) => {
                 tracing::error!(delivery = %due.id, %error, "a delivery was not written down");

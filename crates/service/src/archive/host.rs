@@ -1,8 +1,8 @@
 //! The interface that the exchange with archives needs of the service around it.
 
+use super::ArchiveObject;
 use super::parts::SeriesParts;
 use super::trouble::Trouble;
-use super::{ArchiveObject, DueSend, ExchangeEnd};
 use crate::access::Agent;
 use crate::items::Pin;
 use crate::records::Tenant;
@@ -16,7 +16,7 @@ pub struct StoredSeries {
     pub pin: Pin,
 }
 
-/// Stores volumes, makes objects, keeps the audit trail.
+/// Stores volumes, makes objects, names who acts.
 #[async_trait]
 pub trait ExchangeHost: Send + Sync + 'static {
     /// Stores the files of a series as a volume, as if the tenant had uploaded them.
@@ -33,9 +33,6 @@ pub trait ExchangeHost: Send + Sync + 'static {
         name: &str,
     ) -> Result<ArchiveObject, Trouble>;
 
-    /// Who fetches for `tenant`, by the audit trail.
+    /// Who fetches and delivers for `tenant`, by the audit trail.
     fn agent(&self, tenant: &Tenant) -> Agent;
-
-    /// A delivery has ended.
-    async fn delivered(&self, send: &DueSend, end: ExchangeEnd);
 }

@@ -1,9 +1,9 @@
 //! The exchange with archives: series are fetched and stored as uploads are, objects of results are made and delivered.
 
-use crate::access::{Activity, Agent, Outcome};
+use crate::access::Agent;
 use crate::archive::{
-    ArchiveObject, Deliverer, DueSend, Exchange, ExchangeEnd, ExchangeHost, ExchangeSettings,
-    Puller, SeriesParts, StoredSeries, Trouble,
+    ArchiveObject, Deliverer, Exchange, ExchangeHost, ExchangeSettings, Puller, SeriesParts,
+    StoredSeries, Trouble,
 };
 use crate::error::{Refusal, ServiceError};
 use crate::hooks::RetrySchedule;
@@ -165,19 +165,6 @@ impl ExchangeHost for Service {
 
     fn agent(&self, tenant: &Tenant) -> Agent {
         Service::agent(self, tenant, AUDIT_AGENT)
-    }
-
-    async fn delivered(&self, send: &DueSend, end: ExchangeEnd) {
-        // Attempts that will be repeated are not noted.
-        let outcome = match end {
-            ExchangeEnd::Failed => return,
-            ExchangeEnd::Done | ExchangeEnd::Present => Outcome::Success,
-            ExchangeEnd::GivenUp => Outcome::Refused,
-        };
-        let by = Service::agent(self, &send.tenant, AUDIT_AGENT);
-        // One that cannot be written now is written later.
-        let result = send.result.clone();
-        let _ = by.record(Activity::Read, outcome, result).await;
     }
 }
 

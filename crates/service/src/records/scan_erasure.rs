@@ -75,6 +75,8 @@ pub struct ScanErasurePlan {
     pub items: Vec<ErasedItem>,
     /// The ended jobs whose records would go.
     pub jobs: Vec<String>,
+    /// What was made of the volumes and would stay, as the order leaves it out.
+    pub stays: Vec<String>,
     /// Items on legal hold: selected, or a further source of something that would go.
     pub holds: Vec<String>,
     /// Jobs that have not ended and need one of the items.

@@ -12,13 +12,9 @@ use crate::blobs::{
     shelf_name, shelf_path,
 };
 use crate::database::SqlStore;
-use crate::findings::{
-    DAMAGED_SET_ASIDE, Examination, GIVEN_TO_HEIR, HELD_SET_ASIDE, NO_HOLDER, NO_ROW, Repair,
-    UNOWNED_SET_ASIDE, repaired,
-};
+use crate::findings::{Examination, GIVEN_TO_HEIR, NO_HOLDER, NO_ROW, Repair, UNOWNED_SET_ASIDE};
 use crate::tables::{Holding, to_json};
 use std::collections::{BTreeMap, BTreeSet};
-use ventriform_service::access::AuditEvent;
 use ventriform_service::intake::ReceivedFiles;
 use ventriform_service::records::{
     BlobStore, Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreResult,
@@ -36,8 +32,6 @@ pub(crate) struct BucketDoctor<'a> {
     pub repair: Option<&'a Repair>,
     /// Items with a row that nobody has.
     pub unowned: &'a BTreeSet<String>,
-    /// What was repaired, for the audit trail.
-    pub events: &'a mut Vec<AuditEvent>,
     pub found: &'a mut Examination,
 }
 
@@ -96,16 +90,10 @@ impl BucketDoctor<'_> {
                         self.bucket().put(&path, text.clone().into()).await?;
                         self.blobs.set_publication_aside(id, place, &shelf).await?;
                     }
-                    self.rows.forget(id).await?;
+                    self.rows.forget(id, Some(SystemClock.now())).await?;
                 }
-                let repair = if on_hold {
-                    HELD_SET_ASIDE
-                } else {
-                    DAMAGED_SET_ASIDE
-                };
-                let repair = self.if_repairing(repair);
-                self.found
-                    .note("damaged-item", id, wrong.join("; "), repair);
+                let repairing = self.repair.is_some();
+                self.found.note_damaged(id, &wrong, (repairing, on_hold));
             }
         }
         Ok(known)
@@ -204,8 +192,7 @@ impl BucketDoctor<'_> {
         let (now, heir) = (SystemClock.now(), repair.heir.as_ref());
         let mut made = false;
         let done = match &record {
-            Some(record) if self.rows.restore(record, heir, now).await? => {
-                self.events.push(repaired(id, heir, now));
+            Some(record) if self.rows.restore(record, (&[], heir), now).await? => {
                 made = true;
                 "its row was made from the record beside the files"
             }
@@ -236,14 +223,13 @@ impl BucketDoctor<'_> {
             return Ok(true);
         };
         let (now, heir) = (SystemClock.now(), repair.heir.as_ref());
-        let given = self.rows.restore(record, heir, now).await?;
-        self.events.push(repaired(id, heir, now));
+        let given = self.rows.restore(record, (&[], heir), now).await?;
         if !given {
             for place in places {
                 let shelf = UNOWNED_SHELF;
                 self.blobs.set_publication_aside(id, place, shelf).await?;
             }
-            self.rows.forget(id).await?;
+            self.rows.forget(id, Some(now)).await?;
         }
         let done = if given {
             GIVEN_TO_HEIR
@@ -270,7 +256,8 @@ impl BucketDoctor<'_> {
             if let Some(wrong) = wrong {
                 if self.repair.is_some() {
                     self.blobs.quarantine(&name, SystemClock.now()).await?;
-                    self.rows.forget_received(&name).await?;
+                    let now = Some(SystemClock.now());
+                    self.rows.forget_received(&name, now).await?;
                 }
                 let repair = "its row was removed; the object can be sent again";
                 let repair = self.if_repairing(repair);
@@ -325,9 +312,7 @@ impl BucketDoctor<'_> {
                         self.bucket().shift(path, back).await?;
                     }
                     self.bucket().delete([beside]).await?;
-                    self.rows.give_held(id, &holdings).await?;
-                    self.rows.restore(&record, heir, now).await?;
-                    self.events.push(repaired(id, heir, now));
+                    self.rows.restore(&record, (&holdings, heir), now).await?;
                     repair = Some("it was brought back");
                 }
             }

@@ -418,7 +418,7 @@ pub(super) async fn record_outcome(
 
 /// Appends events to the chain, within a transaction that holds the database's write lock. Returns
 /// the end of the chain.
-pub(super) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> StoreResult<Anchor> {
+pub(crate) async fn append(to: &mut Transaction<'_>, events: &[AuditEvent]) -> StoreResult<Anchor> {
     let Anchor {
         mut sequence,
         mut hash,

@@ -130,7 +130,7 @@ impl ArchiveStore for SqlStore {
                     revision = revision + 1
              WHERE id = $3 AND state = 'queued' AND volume = '' RETURNING *",
         )
-        .bind(to_json(failure)?)
+        .bind(rows::failure_json(failure)?)
         .bind(now)
         .bind(job)
         .fetch_optional(&mut transaction)
@@ -149,10 +149,13 @@ impl ArchiveStore for SqlStore {
     }
 
     async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>> {
-        let rows = query("SELECT * FROM pulls WHERE job IN (SELECT value FROM json_each($1))")
-            .bind(to_json(&jobs)?)
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = query(
+            "SELECT p.*, j.failure FROM pulls AS p LEFT JOIN jobs AS j ON j.id = p.job
+             WHERE p.job IN (SELECT value FROM json_each($1))",
+        )
+        .bind(to_json(&jobs)?)
+        .fetch_all(&self.readers)
+        .await?;
         rows.iter()
             .map(|row| {
                 let state = match row.try_get("state")? {
@@ -164,7 +167,11 @@ impl ArchiveStore for SqlStore {
                     state,
                     attempts: rows::count(row, "attempts")?,
                     next_attempt_at: errands::next_attempt(row, state)?,
-                    last_error: row.try_get("last_error")?,
+                    last_error: match (state, row.try_get::<Option<&str>, _>("failure")?) {
+                        // Earlier versions wrote more into the row of the fetch.
+                        (DeliveryState::Dead, Some(text)) => Some(rows::failure(text)?.detail),
+                        _ => row.try_get("last_error")?,
+                    },
                 };
                 Ok((row.try_get("job")?, pull))
             })
@@ -252,7 +259,7 @@ impl ArchiveStore for SqlStore {
 
     async fn settle_send(
         &self,
-        id: &str,
+        send: &DueSend,
         settled: &SendSettlement,
         now: Timestamp,
     ) -> StoreResult<()> {
@@ -270,7 +277,7 @@ impl ArchiveStore for SqlStore {
         .bind(&settled.error)
         .bind(ended)
         .bind(settled.again_at)
-        .bind(id)
+        .bind(&send.id)
         .bind(errands::taken_back(settled.counts))
         .execute(&mut transaction)
         .await?;
@@ -279,11 +286,19 @@ impl ArchiveStore for SqlStore {
             "DELETE FROM sends WHERE id = $1 AND state != 'pending'
                  AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.id = sends.job)",
         )
-        .bind(id)
+        .bind(&send.id)
         .execute(&mut transaction)
         .await?;
-        transaction.commit().await?;
-        Ok(())
+        // Also if the delivery was taken back meanwhile: the object has left.
+        let outcome = match settled.state {
+            DeliveryState::Pending => None,
+            DeliveryState::Delivered => Some(Outcome::Success),
+            DeliveryState::Dead => Some(Outcome::Refused),
+        };
+        if let Some(outcome) = outcome {
+            record_outcome(&mut transaction, Activity::Read, outcome, &send.result).await?;
+        }
+        transaction.commit().await
     }
 
     async fn recall_sends(&self, now: Timestamp) -> StoreResult<u64> {

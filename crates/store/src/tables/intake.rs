@@ -1,7 +1,8 @@
 //! The tables of received objects.
 
-use super::access::{record, stored_bytes};
+use super::access::{append, record, stored_bytes};
 use super::erasure::{What, write_receipt};
+use super::owners::repaired;
 use super::pages::push_page;
 use super::rows;
 use crate::database::{SqlStore, Transaction};
@@ -141,7 +142,7 @@ impl IntakeStore for SqlStore {
              WHERE id = $4 AND state = 'filing'",
         )
         .bind(job)
-        .bind(failure.map(rows::to_json).transpose()?)
+        .bind(failure.map(rows::failure_json).transpose()?)
         .bind(now)
         .bind(group)
         .execute(&mut transaction)
@@ -165,7 +166,7 @@ impl IntakeStore for SqlStore {
             "UPDATE intake_groups SET state = 'failed', failure = $1, changed_at = $2
              WHERE id = $3 AND revision = $4 AND state = 'gathering'",
         )
-        .bind(rows::to_json(failure)?)
+        .bind(rows::failure_json(failure)?)
         .bind(now)
         .bind(group)
         .bind(revision)
@@ -217,8 +218,13 @@ impl IntakeStore for SqlStore {
         reason: ErasureReason,
         now: Timestamp,
     ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
-        self.making_room(|| self.remove_once(tenant, id, by, reason, now))
-            .await
+        let what = What {
+            tenant,
+            id,
+            by,
+            reason,
+        };
+        self.making_room(|| self.remove_once(what, now)).await
     }
 
     async fn failed_before(&self, before: Cutoff) -> StoreResult<Vec<(Tenant, String)>> {
@@ -256,16 +262,14 @@ impl SqlStore {
     /// Tries the erasure of the method without `_once`.
     async fn remove_once(
         &self,
-        tenant: &Tenant,
-        id: &str,
-        by: &ErasureAgent,
-        reason: ErasureReason,
+        what: What<'_>,
         now: Timestamp,
     ) -> StoreResult<Option<(Vec<String>, Receipt)>> {
+        let id = what.id;
         let mut transaction = self.writer.begin().await?;
         let known = query("SELECT 1 FROM intake_groups WHERE id = $1 AND tenant = $2")
             .bind(id)
-            .bind(tenant.as_str())
+            .bind(what.tenant.as_str())
             .fetch_optional(&mut transaction)
             .await?;
         if known.is_none() {
@@ -281,12 +285,6 @@ impl SqlStore {
             .bind(id)
             .execute(&mut transaction)
             .await?;
-        let what = What {
-            tenant,
-            id,
-            by,
-            reason,
-        };
         let receipt = write_receipt(&mut transaction, what, (vec![item], Vec::new()), now).await?;
         transaction.commit().await?;
         Ok(Some((files, receipt)))
@@ -304,13 +302,24 @@ impl SqlStore {
         rows::all(rows, |row| Ok((row.try_get(0)?, row.try_get(1)?)))
     }
 
-    /// Removes the object that has this file.
-    pub(crate) async fn forget_received(&self, file: &str) -> StoreResult<()> {
-        query("DELETE FROM intake_objects WHERE file = $1")
-            .bind(file)
-            .write(&self.writer)
-            .await?;
-        Ok(())
+    /// Removes the object that has this file, with a row of the trail at that time; with `None` there is no such row, as in a
+    /// copy, whose trail stays that of the original.
+    pub(crate) async fn forget_received(
+        &self,
+        file: &str,
+        now: Option<Timestamp>,
+    ) -> StoreResult<()> {
+        let mut transaction = self.writer.begin().await?;
+        let removed =
+            query("DELETE FROM intake_objects WHERE file = $1 RETURNING tenant, group_id")
+                .bind(file)
+                .fetch_optional(&mut transaction)
+                .await?;
+        if let (Some(row), Some(now)) = (removed, now) {
+            let (tenant, group) = (rows::tenant(&row)?, row.try_get("group_id")?);
+            append(&mut transaction, &[repaired(group, Some(&tenant), now)]).await?;
+        }
+        transaction.commit().await
     }
 }
 
@@ -556,7 +565,7 @@ fn group(row: DbRow) -> StoreResult<IntakeGroup> {
     let damaged = |what: &str| StoreError::database(format!("damaged row: {what}"));
     let instance: String = row.try_get("instance")?;
     let failure: Option<&str> = row.try_get("failure")?;
-    let failure = failure.map(serde_json::from_str).transpose();
+    let failure = failure.map(rows::failure).transpose();
     Ok(IntakeGroup {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -579,7 +588,7 @@ fn group(row: DbRow) -> StoreResult<IntakeGroup> {
         revision: row.try_get("revision")?,
         volume: row.try_get("volume")?,
         job: row.try_get("job")?,
-        failure: failure.map_err(|error| damaged(&error.to_string()))?,
+        failure: failure?,
         objects: rows::unsigned(row.try_get("objects")?),
         waiting_bytes: rows::unsigned(row.try_get("waiting_bytes")?),
         created_at: row.try_get("created_at")?,

@@ -20,6 +20,7 @@ mod scans;
 mod times;
 mod worklist;
 
+pub(crate) use access::append;
 pub(crate) use marks::{Access, Marks, anchor_of};
-pub(crate) use owners::{Holder, Holding, REPAIRER};
+pub(crate) use owners::{Holder, Holding, REPAIRER, repaired};
 pub(super) use rows::to_json;

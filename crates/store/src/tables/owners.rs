@@ -4,11 +4,13 @@
 //! operator names, else to nobody. Whether a volume of theirs was on legal hold is not known any more, so it is: such a hold
 //! is lifted as any other, by name.
 
+use super::access::append;
 use super::catalogue::{OTHER_VOLUMES, insert_content};
 use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::query;
 use serde::{Deserialize, Serialize};
+use ventriform_service::access::{Activity, AuditEvent};
 use ventriform_service::records::{
     ItemRecord, Product, Resource, StoreResult, StoredVolume, Tenant, Timestamp,
 };
@@ -75,58 +77,49 @@ impl SqlStore {
         })
     }
 
-    /// Gives an item that was set aside back to those who had it.
-    pub(crate) async fn give_held(&self, id: &str, holdings: &[Holding]) -> StoreResult<()> {
-        let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    /// Removes the row of an item, and every ownership of it, with a row of the trail for each tenant at that time. With `None`
+    /// there is no such row: in a copy, whose trail stays that of the original. Does not record an erasure.
+    pub(crate) async fn forget(&self, id: &str, now: Option<Timestamp>) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
-        for held in holdings {
-            query(
-                "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, external_id, labels, hold_reason,
-                                       held_at, held_by, library)
-                 VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) ON CONFLICT DO NOTHING",
-            )
-            .bind(held.tenant.as_str())
-            .bind(id)
-            .bind(kind.noun())
-            .bind(held.created_at)
-            .bind(held.renewed_at)
-            .bind(&held.external_id)
-            .bind(&held.labels)
-            .bind(&held.hold_reason)
-            .bind(held.held_at)
-            .bind(&held.held_by)
-            .bind(held.library)
-            .execute(&mut transaction)
-            .await?;
-        }
-        transaction.commit().await
-    }
-
-    /// Removes the row of an item, and every ownership of it. Does not record an erasure.
-    pub(crate) async fn forget(&self, id: &str) -> StoreResult<()> {
-        let mut transaction = self.writer.begin().await?;
+        let mut removed = 0;
         for statement in [
             "DELETE FROM volumes WHERE id = $1",
             "DELETE FROM products WHERE id = $1",
             "DELETE FROM sources WHERE id = $1",
             "DELETE FROM scans WHERE volume = $1",
-            "DELETE FROM holdings WHERE id = $1",
         ] {
-            query(statement).bind(id).execute(&mut transaction).await?;
+            removed += query(statement).bind(id).execute(&mut transaction).await?;
+        }
+        let holders = query("DELETE FROM holdings WHERE id = $1 RETURNING tenant")
+            .bind(id)
+            .fetch_all(&mut transaction)
+            .await?;
+        if let Some(now) = now {
+            let holders = rows::all(holders, |row| rows::tenant(&row))?;
+            let mut events: Vec<AuditEvent> = holders
+                .iter()
+                .map(|tenant| repaired(id, Some(tenant), now))
+                .collect();
+            if events.is_empty() && removed > 0 {
+                events.push(repaired(id, None, now));
+            }
+            append(&mut transaction, &events).await?;
         }
         transaction.commit().await
     }
 
-    /// Makes the row of an item anew. Unless somebody has the item, `heir` does from now on, with a legal hold in doubt.
-    /// Does nothing and returns `false` if nobody has it and there is no heir.
+    /// Makes the row of an item anew, with a row of the trail. It belongs to those who had it when it was set aside; unless
+    /// somebody has the item, `heir` does from now on, with a legal hold in doubt. Does nothing and returns `false` if nobody
+    /// has it and there is no heir.
     pub(crate) async fn restore(
         &self,
         record: &ItemRecord,
-        heir: Option<&Tenant>,
+        (held, heir): (&[Holding], Option<&Tenant>),
         now: Timestamp,
     ) -> StoreResult<bool> {
         let id = record.id();
         let mut transaction = self.writer.begin().await?;
+        give_held(&mut transaction, id, held).await?;
         if !is_held(&mut transaction, id).await? {
             let Some(heir) = heir else {
                 transaction.commit().await?;
@@ -145,6 +138,7 @@ impl SqlStore {
                 note_sources(&mut transaction, product).await?;
             }
         }
+        append(&mut transaction, &[repaired(id, heir, now)]).await?;
         transaction.commit().await?;
         Ok(true)
     }
@@ -165,11 +159,13 @@ impl SqlStore {
         transaction.commit().await
     }
 
-    /// Gives items to those who had them, with a legal hold in doubt on volumes.
+    /// Gives items to those who had them, with a legal hold in doubt on volumes and a row of the trail for each.
     pub(crate) async fn give_back(&self, holders: &[Holder], now: Timestamp) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
         for holder in holders {
             give(&mut transaction, holder, now).await?;
+            let event = repaired(&holder.id, Some(&holder.tenant), now);
+            append(&mut transaction, &[event]).await?;
         }
         transaction.commit().await
     }
@@ -239,6 +235,38 @@ impl SqlStore {
         transaction.commit().await?;
         Ok(made)
     }
+}
+
+/// The event about the repair of an item.
+pub(crate) fn repaired(id: &str, tenant: Option<&Tenant>, now: Timestamp) -> AuditEvent {
+    let tenant = tenant.cloned().unwrap_or_default();
+    AuditEvent::new(now, Activity::Repaired, tenant, REPAIRER.into()).on(id)
+}
+
+/// Gives an item that was set aside back to those who had it.
+async fn give_held(to: &mut Transaction<'_>, id: &str, holdings: &[Holding]) -> StoreResult<()> {
+    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    for held in holdings {
+        query(
+            "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, external_id, labels, hold_reason,
+                                   held_at, held_by, library)
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) ON CONFLICT DO NOTHING",
+        )
+        .bind(held.tenant.as_str())
+        .bind(id)
+        .bind(kind.noun())
+        .bind(held.created_at)
+        .bind(held.renewed_at)
+        .bind(&held.external_id)
+        .bind(&held.labels)
+        .bind(&held.hold_reason)
+        .bind(held.held_at)
+        .bind(&held.held_by)
+        .bind(held.library)
+        .execute(&mut *to)
+        .await?;
+    }
+    Ok(())
 }
 
 fn holder(row: crate::query::DbRow) -> StoreResult<Holder> {

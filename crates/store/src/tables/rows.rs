@@ -2,12 +2,12 @@
 
 use crate::database::SqlStore;
 use crate::query::{DbRow, Query};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use ventriform_service::records::{
-    Bounded, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority,
-    Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags,
-    Tenant, Timestamp,
+    Bounded, Failure, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan,
+    Priority, Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume,
+    Tags, Tenant, Timestamp,
 };
 
 pub(super) fn job(row: DbRow) -> StoreResult<Job> {
@@ -36,7 +36,7 @@ pub(super) fn job(row: DbRow) -> StoreResult<Job> {
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         finished_at: row.try_get("finished_at")?,
-        failure: failure.map(from_json).transpose()?,
+        failure: failure.map(self::failure).transpose()?,
         result: row.try_get("result")?,
         trace_parent: row.try_get("trace_parent")?,
     })
@@ -199,6 +199,38 @@ pub(super) fn page<T>(
 
 pub(crate) fn to_json(value: &impl Serialize) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::database(e.to_string()))
+}
+
+/// A failure as a table holds it: with the mark that it quotes no file, which earlier versions did.
+pub(super) fn failure_json(failure: &Failure) -> StoreResult<String> {
+    #[derive(Serialize)]
+    struct Stored<'a> {
+        #[serde(flatten)]
+        failure: &'a Failure,
+        quotes_file: bool,
+    }
+    to_json(&Stored {
+        failure,
+        quotes_file: false,
+    })
+}
+
+/// A stored failure; one of an earlier version without what it may quote.
+pub(super) fn failure(text: &str) -> StoreResult<Failure> {
+    #[derive(Deserialize)]
+    struct Stored {
+        #[serde(flatten)]
+        failure: Failure,
+        quotes_file: Option<bool>,
+    }
+    let Stored {
+        failure,
+        quotes_file,
+    } = from_json(text)?;
+    Ok(match quotes_file {
+        Some(false) => failure,
+        _ => failure.of_earlier_version(),
+    })
 }
 
 /// The value of a JSON column.

@@ -123,12 +123,14 @@ async fn plan(
         return Ok(plan);
     }
     let mut ids = plan.volumes.clone();
+    let mut made = BTreeSet::new();
+    for volume in &plan.volumes {
+        made.extend(made_of(&mut *from, tenant, volume).await?);
+    }
     if order.cascade {
-        let mut made = BTreeSet::new();
-        for volume in &plan.volumes {
-            made.extend(made_of(&mut *from, tenant, volume).await?);
-        }
         ids.extend(made);
+    } else {
+        plan.stays = made.into_iter().collect();
     }
     let (mut holds, mut unfinished, mut files) = (BTreeSet::new(), BTreeSet::new(), 0);
     for id in ids {

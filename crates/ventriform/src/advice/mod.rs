@@ -298,7 +298,7 @@ impl Explain for GatedError {
     fn explain(&self) -> Failure {
         match self {
             GatedError::Volume(VolumeError::FrameNeeded { frames, why }) => {
-                let why = why.as_deref().unwrap_or("its header does not say so");
+                let why = why.as_deref().unwrap_or("nothing says that they are");
                 let detail = format!(
                     "The {frames} volumes are taken for no gates of one heart beat: {why}."
                 );

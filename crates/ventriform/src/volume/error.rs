@@ -278,10 +278,24 @@ impl VolumeError {
                     *text = name.to_owned();
                 }
             }
-            // The series are listed after a colon.
             VolumeError::NotOneSeries { reason, .. } => {
-                if let Some((count, _)) = reason.split_once(" series: ") {
-                    *reason = format!("{count} series; send the files of one of them alone");
+                // The series are listed after a colon, unless that is within a value.
+                let listed = reason.split_once(" series: ");
+                match listed.filter(|(count, _)| !count.contains('"')) {
+                    Some((count, _)) => {
+                        *reason = format!("{count} series; send the files of one of them alone");
+                    }
+                    None => *reason = without_values(reason).unwrap_or_else(|| reason.clone()),
+                }
+            }
+            VolumeError::OtherGate { difference, .. } => {
+                if let Some(told) = without_values(difference) {
+                    *difference = told;
+                }
+            }
+            VolumeError::FrameNeeded { why: Some(why), .. } => {
+                if let Some(told) = without_values(why) {
+                    *why = told;
                 }
             }
             VolumeError::Unrecognised { start, .. } => *start = "other bytes".to_owned(),
@@ -292,8 +306,17 @@ impl VolumeError {
     }
 }
 
+/// The name of the attribute that files contradict each other on, without the values, which follow it in quotes; `None` if
+/// nothing is quoted.
+fn without_values(reason: &str) -> Option<String> {
+    let (told, _) = reason.split_once('"')?;
+    let told = told.trim_end();
+    let told = told.strip_suffix(" is").unwrap_or(told);
+    Some(format!("{told} differs"))
+}
+
 /// Words of this program in the place of a value.
-const OWN_WORDS: [&str; 9] = [
+const OWN_WORDS: [&str; 10] = [
     "missing",
     "contradictory",
     "present",
@@ -302,6 +325,7 @@ const OWN_WORDS: [&str; 9] = [
     "in fragments",
     "in more fragments",
     "not finite",
+    "not linear",
     "empty",
 ];
 
@@ -399,6 +423,25 @@ mod tests {
             VolumeError::Unrecognised {
                 file: file(),
                 start: MARK.into(),
+            },
+            VolumeError::NotOneSeries {
+                count: 2,
+                reason: format!(
+                    "Patient's Name (0010,0010) is \"{MARK}\" in a.dcm, and \"{MARK} series: \" in 3 files, such as b.dcm"
+                ),
+            },
+            VolumeError::NotOneSeries {
+                count: 2,
+                reason: format!(
+                    "they say that they are gates, but not of one scan: Study ID (0020,0010) is \"{MARK}\" in a.dcm, and \"\" \
+                     in b.dcm; they differ in Tracer too"
+                ),
+            },
+            VolumeError::OtherGate {
+                gate: 2,
+                difference: format!(
+                    "is of another scan: Patient ID (0010,0020) is \"{MARK}\", and \"7\""
+                ),
             },
         ];
         for error in errors {

@@ -3,6 +3,10 @@
 //! In: whose scan it is, as a file or an older record says it. Out: the same with dates, times and the patient's
 //! sex written as the standard writes them, and without identifiers, dates and times that are none. A file may
 //! hold anything; an archive refuses an object with such a value, or files it where nobody finds it.
+//!
+//! Texts may be longer than their representation. Objects state them as far as they fit ([`Provenance::fit`]), without those
+//! that name a patient or an order: cut off, they would name another. The record of the scan keeps them whole, since people
+//! look for what the header has.
 
 use super::Provenance;
 
@@ -62,6 +66,72 @@ const CHECKED_FIELDS: [(Representation, &str, &str); 9] = [
     ),
 ];
 
+/// The value representation of a text that may be too long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Text {
+    /// LO.
+    Long,
+    /// SH.
+    Short,
+    /// PN: up to three groups between equals signs.
+    Name,
+}
+
+/// The texts that objects state, whether each may be cut off, and their names in the standard.
+const TEXTS: [(Text, bool, &str, &str); 6] = [
+    (
+        Text::Name,
+        true,
+        "patient_name",
+        "Patient's Name (0010,0010)",
+    ),
+    (Text::Long, false, "patient_id", "Patient ID (0010,0020)"),
+    (Text::Short, true, "study_id", "Study ID (0020,0010)"),
+    (
+        Text::Short,
+        false,
+        "accession_number",
+        "Accession Number (0008,0050)",
+    ),
+    (
+        Text::Name,
+        true,
+        "referring_physician",
+        "Referring Physician's Name (0008,0090)",
+    ),
+    (
+        Text::Long,
+        true,
+        "position_reference_indicator",
+        "Position Reference Indicator (0020,1040)",
+    ),
+];
+
+impl Text {
+    /// Most characters of a value, of a name those of each group (PS3.5 6.2).
+    fn most(self) -> usize {
+        match self {
+            Self::Long | Self::Name => 64,
+            Self::Short => 16,
+        }
+    }
+
+    /// As much of `text` as fits; `None` if all does.
+    fn fitted(self, text: &str) -> Option<String> {
+        let cut = |part: &str| -> String { part.chars().take(self.most()).collect() };
+        let fitted = match self {
+            Self::Name => text
+                .split('=')
+                .take(3)
+                .map(cut)
+                .collect::<Vec<_>>()
+                .join("="),
+            _ => cut(text),
+        };
+        (fitted != text).then(|| fitted.trim_end().to_owned())
+    }
+}
+
 impl Representation {
     /// `text` as the standard writes it; `None` if it is no such value.
     fn settled(self, text: &str) -> Option<String> {
@@ -98,8 +168,39 @@ impl Provenance {
             "patient_birth_date" => &mut self.patient_birth_date,
             "study_time" => &mut self.study_time,
             "patient_sex" => &mut self.patient_sex,
+            "patient_name" => &mut self.patient_name,
+            "patient_id" => &mut self.patient_id,
+            "study_id" => &mut self.study_id,
+            "accession_number" => &mut self.accession_number,
+            "referring_physician" => &mut self.referring_physician,
+            "position_reference_indicator" => &mut self.position_reference_indicator,
             _ => return None,
         })
+    }
+
+    /// Makes texts that are longer than their representation fit: cut off, or left out where the rest would name somebody or
+    /// something else. Returns what was changed, for people to read, without any value of it.
+    pub(crate) fn fit(&mut self) -> Vec<String> {
+        let mut notes = Vec::new();
+        for (kind, may_be_cut, field, name) in TEXTS {
+            let Some(value) = self.field_of(field) else {
+                continue;
+            };
+            let Some(fitted) = value.as_deref().and_then(|text| kind.fitted(text)) else {
+                continue;
+            };
+            let done = if may_be_cut {
+                "DICOM objects state its beginning"
+            } else {
+                "no DICOM object states it, since its beginning could name another"
+            };
+            let most = kind.most();
+            notes.push(format!(
+                "{name} is longer than {most} characters, which the standard allows; {done}."
+            ));
+            *value = may_be_cut.then_some(fitted);
+        }
+        notes
     }
 
     /// Writes identifiers, dates, times and sex as the standard does and takes out those that are none. Returns what
@@ -280,6 +381,34 @@ mod tests {
         ] {
             assert_eq!(time(text).as_deref(), right, "{text}");
         }
+    }
+
+    #[test]
+    fn no_text_is_longer_than_its_representation() {
+        for (kind, may_be_cut, field, name) in TEXTS {
+            let (whole, long) = (
+                "\u{e4}".repeat(kind.most()),
+                "\u{e4}".repeat(kind.most() + 1),
+            );
+            let mut scan = Provenance::default();
+            for fits in [&whole, "7", ""] {
+                *scan.field_of(field).unwrap() = Some(fits.to_owned());
+                assert_eq!(scan.fit(), Vec::<String>::new(), "{field}");
+                assert_eq!(scan.stated(), [(field, fits)]);
+            }
+            *scan.field_of(field).unwrap() = Some(long);
+            let notes = scan.fit();
+            assert!(notes.len() == 1 && notes[0].starts_with(name), "{notes:?}");
+            assert!(!notes[0].contains('\u{e4}'), "{notes:?}");
+            let left = may_be_cut.then_some((field, &*whole));
+            assert_eq!(scan.stated(), Vec::from_iter(left));
+            assert_eq!(scan.fit(), Vec::<String>::new());
+        }
+        let group = "A".repeat(64);
+        assert_eq!(Text::Name.fitted(&format!("{group}={group}={group}")), None);
+        let long = format!("{group}B={group}={group}C=D");
+        let cut = format!("{group}={group}={group}");
+        assert_eq!(Text::Name.fitted(&long), Some(cut));
     }
 
     #[test]

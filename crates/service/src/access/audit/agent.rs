@@ -9,8 +9,8 @@
 //! refused after a part of it was done, leaves the rows of what it has done. What the service does of itself, without an
 //! agent, leaves no row.
 
-use super::event::{Activity, AuditEvent, Outcome};
-use super::recorder::{NotRecorded, Recorder};
+use super::event::{Activity, AuditEvent};
+use super::recorder::Recorder;
 use crate::memory::Requester;
 use crate::records::{Clock, ErasureAgent, StoreError, Tenant, Timestamp};
 use std::fmt::{Debug, Formatter};
@@ -23,20 +23,14 @@ tokio::task_local! {
     static ACTING: Agent;
 }
 
-/// What became of an agent's rows.
-#[derive(Debug, Default)]
-struct Rows {
-    written: AtomicBool,
-    missing: AtomicBool,
-}
-
 /// Who acts: a caller, a sender, a rule of the settings, a duty of the service. Clones are the same agent.
 #[derive(Clone)]
 pub struct Agent {
     who: Arc<AuditEvent>,
     recorder: Arc<Recorder>,
     clock: Arc<dyn Clock>,
-    rows: Arc<Rows>,
+    /// Whether a change of it has a row.
+    acted: Arc<AtomicBool>,
 }
 
 impl Debug for Agent {
@@ -66,7 +60,7 @@ impl Agent {
             who: Arc::new(who),
             recorder,
             clock,
-            rows: Arc::default(),
+            acted: Arc::default(),
         }
     }
 
@@ -131,42 +125,8 @@ impl Agent {
 
     /// The row of an act of this agent that is being done. The store commits it with the change.
     pub fn acts(&self, activity: Activity, object: &str) -> AuditEvent {
-        self.rows.written.store(true, Ordering::Relaxed);
+        self.acted.store(true, Ordering::Relaxed);
         self.event(activity, self.clock.now()).on(object)
-    }
-
-    /// Writes the row of an act that was done; returns when it is on disk. One that cannot be written is tried again each
-    /// second.
-    ///
-    /// # Errors
-    /// If it may not be on disk.
-    pub async fn did(&self, activity: Activity, object: String) -> Result<(), NotRecorded> {
-        self.record(activity, Outcome::Success, object).await
-    }
-
-    /// Writes the row of an act that ended in that way.
-    ///
-    /// # Errors
-    /// As [`Agent::did`].
-    pub async fn record(
-        &self,
-        activity: Activity,
-        outcome: Outcome,
-        object: String,
-    ) -> Result<(), NotRecorded> {
-        let event = AuditEvent {
-            outcome,
-            ..self.event(activity, self.clock.now()).on(object)
-        };
-        let recorded = self.recorder.record(event.clone()).await;
-        match recorded {
-            Ok(()) => self.rows.written.store(true, Ordering::Relaxed),
-            Err(NotRecorded) => {
-                self.rows.missing.store(true, Ordering::Relaxed);
-                self.recorder.note(event).await;
-            }
-        }
-        recorded
     }
 
     /// Writes the row of an act within a second, together with alike ones.
@@ -175,13 +135,8 @@ impl Agent {
         self.recorder.note(event).await;
     }
 
-    /// Whether a change has a row, or was tried to be recorded.
+    /// Whether a change was made that has a row.
     pub fn has_acted(&self) -> bool {
-        self.rows.written.load(Ordering::Relaxed) || self.lacks_rows()
-    }
-
-    /// Whether the row of a change could not be written at once.
-    pub fn lacks_rows(&self) -> bool {
-        self.rows.missing.load(Ordering::Relaxed)
+        self.acted.load(Ordering::Relaxed)
     }
 }

@@ -225,6 +225,7 @@ pub fn identity(
     let mut whole = file.cloned().unwrap_or_default();
     // Records of older versions hold what the file said.
     whole.put_right();
+    whole.fit();
     let mut undecoded = std::mem::take(&mut whole.undecoded);
     for (field, stated, known) in stated.beside(&mut whole) {
         let Some(value) = stated else { continue };
@@ -287,6 +288,7 @@ impl SourceScan {
     ) -> Self {
         // Where a scan comes from does not matter: an object states nothing that is no value of its VR.
         provenance.put_right();
+        provenance.fit();
         Self {
             provenance,
             frame,

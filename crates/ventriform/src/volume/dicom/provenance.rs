@@ -52,7 +52,8 @@ macro_rules! attributes_of_fields {
                     let reason = decoded.err()?;
                     Some(format!("{} cannot be decoded: {reason}.", attribute.name))
                 });
-                let right = Self::as_stated(a).put_right();
+                let mut stated = Self::as_stated(a);
+                let right = stated.put_right().into_iter().chain(stated.fit());
                 unknown.into_iter().chain(each).chain(right).chain(a.notes()).collect()
             }
         }
