@@ -513,11 +513,15 @@ fn gates_are_summed_and_what_is_none_needs_a_frame() {
         }
         file
     };
-    let gated: [(i16, Time); 4] = [
+    let gated: [(i16, Time); 7] = [
+        (8, (0, 1.0, 0)),
         (6, (16, 140.0, 0)),
         (16, (8, 0.05, 0)),
         (8, (16, 110.0, 2001)),
         (8, (24, 110_000.0, 0)),
+        // One unit of time is the default of writers.
+        (16, (8, 1.0, 0)),
+        (32, (0, 30.0, 0)),
     ];
     let held = |file: &File, stated: bool| {
         let files = [VolumeFile::in_memory("test", &file.bytes[..])];
@@ -545,23 +549,7 @@ fn gates_are_summed_and_what_is_none_needs_a_frame() {
         let expected: Vec<f32> = (0..12).map(|v| value(v, 1)).collect();
         assert_eq!(second, expected);
     }
-    let others: [(&[i16], Time, &str); 13] = [
-        // Nothing calls them gates, and they show no beat. One unit of time is the default of writers.
-        (
-            &[4, 3, 1, 8],
-            (0, 1.0, 0),
-            "nothing in the file calls them gates",
-        ),
-        (
-            &[4, 3, 1, 16],
-            (8, 1.0, 0),
-            "nothing in the file calls them gates",
-        ),
-        (
-            &[4, 3, 1, 32],
-            (0, 30.0, 0),
-            "nothing in the file calls them gates",
-        ),
+    let others: [(&[i16], Time, &str); 10] = [
         // Nothing calls them gates, and a beat has more.
         (&[4, 3, 1, 2], (8, 0.0, 0), "fewer than the 6"),
         (&[4, 3, 1, 5], (0, 0.0, 0), "fewer than the 6"),
