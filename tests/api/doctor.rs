@@ -7,8 +7,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use ventriform_service::records::Tenant;
-use ventriform_store::{Repair, backup, examine};
+use ventriform_service::access::{AccessStore, Activity, AuditFilter, verify};
+use ventriform_service::records::{ListRequest, Tenant};
+use ventriform_store::{Repair, backup, examine, open_rows};
 
 /// A volume and a model; returns the paths that must be served, and the folder's service.
 async fn filled(data: &Path) -> (Service, Vec<String>) {
@@ -115,6 +116,75 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     assert!(!shelf.exists());
     let again = examine(data.path(), None, None).await.unwrap();
     assert!(again.is_healthy() && again.items == 2, "{again:?}");
+    serves(data.path(), &paths).await;
+}
+
+/// What a repair takes away and what it brings back has a row of the trail each; a backup, which leaves out what is damaged, adds
+/// none to its own.
+#[tokio::test]
+async fn what_a_repair_changes_is_in_the_trail_and_what_a_backup_leaves_out_is_not() {
+    let data = tempfile::tempdir().unwrap();
+    let (service, paths) = filled(data.path()).await;
+    service.kill();
+    let id = paths[0].rsplit('/').next().unwrap();
+    let file = |place: &Path| {
+        let mut names = fs::read_dir(place).unwrap().map(|one| one.unwrap().path());
+        names.find(|path| path.ends_with("volume.nii.gz")).unwrap()
+    };
+    let whole = file(&data.path().join("volumes").join(id));
+    let content = fs::read(&whole).unwrap();
+    let rows_about = async |folder: &Path| {
+        let rows = open_rows(folder).await.unwrap();
+        let filter = AuditFilter {
+            object: Some(id.to_owned()),
+            ..AuditFilter::default()
+        };
+        let page = ListRequest {
+            before: None,
+            limit: 100,
+        };
+        let found = rows.audit(&filter, page).await.unwrap().items;
+        assert_eq!(verify(&*rows).await.unwrap().broken, None);
+        rows.close().await;
+        let repaired = found
+            .iter()
+            .filter(|row| row.event.activity == Activity::Repaired);
+        repaired
+            .map(|row| row.event.tenant.clone())
+            .collect::<Vec<_>>()
+    };
+    fs::write(&whole, "other").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("backup");
+    let copied = backup(data.path(), &copy).await.unwrap();
+    assert_eq!(copied.damaged.len(), 1, "{copied:?}");
+    assert_eq!(rows_about(&copy).await, []);
+    let found = examine(data.path(), None, None).await.unwrap();
+    assert_eq!(kinds(&found), ["damaged-item"]);
+    assert_eq!(rows_about(data.path()).await, [], "a look changes nothing");
+    examine(data.path(), None, Some(&to_default()))
+        .await
+        .unwrap();
+    assert_eq!(rows_about(data.path()).await, [Tenant::default()]);
+    // Put right by hand, it is brought back to who had it.
+    let mut folders = vec![data.path().join("quarantine")];
+    let aside = loop {
+        let place = folders.pop().unwrap();
+        if place.join("volume.nii.gz").exists() {
+            break place.join("volume.nii.gz");
+        }
+        let below = fs::read_dir(&place).unwrap().map(|one| one.unwrap().path());
+        folders.extend(below.filter(|path| path.is_dir()));
+    };
+    fs::write(aside, content).unwrap();
+    let back = examine(data.path(), None, Some(&Repair::default()))
+        .await
+        .unwrap();
+    assert!(back.is_healthy(), "{back:?}");
+    assert_eq!(
+        rows_about(data.path()).await,
+        [Tenant::default(), Tenant::default()]
+    );
     serves(data.path(), &paths).await;
 }
 
