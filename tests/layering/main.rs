@@ -301,6 +301,7 @@ const LIBRARY_USES: &[(&str, &[&str])] = &[
         "advice",
         &[
             "mesh_files",
+            "grid",
             "volume",
             "locate",
             "surface",

@@ -1505,6 +1505,8 @@ export interface components {
              * @example 9f86d081884c7d659a2feaa0c55ad015
              */
             plan: string;
+            /** @description What was made of the volumes and would stay, with `cascade=false`: send `cascade=true` to erase it too. */
+            stays: string[];
             /** @description Jobs that have not ended and need one of the items. Nothing is erased while there are any. */
             unfinished_jobs: string[];
             /**
