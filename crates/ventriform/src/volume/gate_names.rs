@@ -138,7 +138,10 @@ fn value(parts: &[Vec<String>], word: &str) -> Option<String> {
         return Some(rest);
     }
     let is_number = |text: &String| text.starts_with(|c: char| c.is_ascii_digit());
-    let next = parts.get(at + 1).map(|part| part.concat());
+    // The number of a gate is none of the scan that it belongs to (heart_gate1.nii).
+    let of_gate = |part: &&Vec<String>| part.iter().any(|run| GATES.contains(&run.as_str()));
+    let next = parts.get(at + 1).filter(|part| !of_gate(part));
+    let next = next.map(|part| part.concat());
     let before = match place.checked_sub(1) {
         Some(before) => Some(runs[before].clone()),
         None => at.checked_sub(1).map(|before| parts[before].concat()),
@@ -162,11 +165,13 @@ mod tests {
     #[test]
     fn words_beside_a_number_tell_gates_from_other_volumes() {
         for word in GATES {
-            for at in 0..4 {
+            for at in 0..6 {
                 let name = |n: usize| match at {
                     0 => format!("{word}{n}.nii.gz"),
                     1 => format!("stress-{word}_{n:02}.nii"),
                     2 => format!("P7 {n} {}.nii", word.to_uppercase()),
+                    3 => format!("heart_{word}{n}.nii"),
+                    4 => format!("patient {word} {n}.nii"),
                     _ => format!("patient_12_{word}-{n}of8.nii"),
                 };
                 assert_eq!(said(name), NamesSay::Gates, "{}", name(1));
