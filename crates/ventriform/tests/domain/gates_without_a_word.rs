@@ -1,5 +1,7 @@
 //! Volumes that nothing calls gates are summed only where they show a beat, however they are given.
 
+#![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
+
 use std::f64::consts::TAU;
 use ventriform::geometry::Vec3;
 use ventriform::grid::Affine;
@@ -140,7 +142,7 @@ fn a_beat_is_summed_without_a_word() {
 #[test]
 fn what_shows_no_beat_needs_a_frame_or_a_word() {
     // A step of 3 or 5 visits every number of volumes that has no such factor.
-    let stride = |count: usize| if count % 5 == 0 { 3 } else { 5 };
+    let stride = |count: usize| if count.is_multiple_of(5) { 3 } else { 5 };
     for count in [6, 7, 8, 12, 16] {
         let people = hearts(count, |n| Heart {
             radius_mm: 26.0 + 8.0 * ((stride(count) * n) % count) as f64 / count as f64,
