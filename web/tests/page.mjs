@@ -1000,7 +1000,9 @@ async function main() {
     for (const [width, dark] of [[1280, false], [400, true]]) {
       const { page, faults, close } = await tab(browser, address, { width, dark });
       await page.getByRole("link", { name: "Evaluation" }).click();
-      await page.waitForSelector(".drop");
+      // The list has a place to drop files, too, and goes on loading its pictures.
+      await page.waitForSelector("input[aria-label='Folder of an evaluation']", { state: "attached" });
+      await page.waitForLoadState("networkidle");
       const asked = [];
       page.on("request", request => !/^blob:/.test(request.url()) && asked.push(`${request.method()} ${request.url()}`));
       const open = chosen => page.setInputFiles("input[aria-label='Folder of an evaluation']", chosen);
