@@ -472,6 +472,10 @@ async fn erased_later(rows: &SqlStore, newer: &mut Newer<'_>) -> Result<Vec<Act>
 /// If the store fails; what was done so far stays done, and doing it again goes on.
 pub async fn apply(store: &Store, missed: &Missed) -> Result<Vec<String>, MissedError> {
     let (rows, now) = (&*store.rows, SystemClock.now());
+    let clock = Arc::new(SystemClock);
+    let recorder = Arc::new(Recorder::start(store.rows.clone(), clock.clone()));
+    let agent =
+        |tenant: &Tenant| Agent::new(recorder.clone(), clock.clone(), tenant.clone(), REPAIRER);
     rows.take_over(&missed.rows).await?;
     let mut left = Vec::new();
     for act in &missed.acts {
@@ -483,12 +487,12 @@ pub async fn apply(store: &Store, missed: &Missed) -> Result<Vec<String>, Missed
             }
             Act::Held { tenant, item, hold } => {
                 let held = rows.set_legal_hold(tenant, item, Some(hold));
-                Agent::scope(Some(agent(store, tenant)), held).await?;
+                Agent::scope(Some(agent(tenant)), held).await?;
                 Ok(())
             }
             Act::IdentityErased { tenant, item } => {
                 let erased = rows.erase_scan(tenant, item, now);
-                if Agent::scope(Some(agent(store, tenant)), erased).await? {
+                if Agent::scope(Some(agent(tenant)), erased).await? {
                     Ok(())
                 } else {
                     Err("it is on legal hold here".to_owned())
@@ -571,13 +575,6 @@ async fn erase(
         deleted.map_err(StoreError::from)?;
     }
     Ok(Ok(()))
-}
-
-/// Who does it, for a tenant.
-fn agent(store: &Store, tenant: &Tenant) -> Agent {
-    let clock = Arc::new(SystemClock);
-    let recorder = Arc::new(Recorder::start(store.rows.clone(), clock.clone()));
-    Agent::new(recorder, clock, tenant.clone(), REPAIRER)
 }
 
 fn event(activity: Activity, tenant: Tenant, now: Timestamp) -> AuditEvent {
