@@ -84,6 +84,10 @@ fn files(volumes: &[Volume], name: impl Fn(usize) -> String) -> Vec<VolumeFile> 
 
 /// The volumes as one file of four dimensions.
 fn four_dimensions(volumes: &[Volume]) -> VolumeFile {
+    VolumeFile::in_memory("volumes.nii", nifti_of(volumes))
+}
+
+fn nifti_of(volumes: &[Volume]) -> Vec<u8> {
     let mut bytes = nifti::write(&volumes[0], StoredType::Float32, false).unwrap();
     let shape = [4, EDGE, EDGE, EDGE, volumes.len()];
     for (at, extent) in shape.into_iter().enumerate() {
@@ -92,7 +96,7 @@ fn four_dimensions(volumes: &[Volume]) -> VolumeFile {
     for volume in &volumes[1..] {
         bytes.extend(volume.voxels.iter().flat_map(|value| value.to_le_bytes()));
     }
-    VolumeFile::in_memory("volumes.nii", bytes)
+    bytes
 }
 
 /// The volumes in all the ways in which nothing calls them gates.
@@ -201,15 +205,9 @@ fn a_time_of_a_beat_is_a_word() {
     gates.swap(2, 6);
     let timed = four_dimensions(&gates);
     needs_a_frame(std::slice::from_ref(&timed), "no heart that beats");
-    let mut bytes = nifti::write(&gates[0], StoredType::Float32, false).unwrap();
-    for (at, extent) in [4, EDGE, EDGE, EDGE, 8].into_iter().enumerate() {
-        bytes[40 + 2 * at..][..2].copy_from_slice(&(extent as i16).to_le_bytes());
-    }
+    let mut bytes = nifti_of(&gates);
     bytes[92..96].copy_from_slice(&0.11_f32.to_le_bytes());
     bytes[123] = 2 | 8;
-    for gate in &gates[1..] {
-        bytes.extend(gate.voxels.iter().flat_map(|value| value.to_le_bytes()));
-    }
     assert_eq!(
         gates_summed(&[VolumeFile::in_memory("timed.nii", bytes)]).unwrap(),
         8

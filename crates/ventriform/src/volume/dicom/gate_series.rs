@@ -56,9 +56,7 @@ impl Place {
             of: first(TIME_SLOTS) * first(RR_INTERVALS),
         }
     }
-}
 
-impl Place {
     /// Whether nothing but the series tells it from `other`.
     fn is_that_of(&self, other: &Self) -> bool {
         let pairs = self
@@ -168,10 +166,9 @@ pub(super) fn joined(
         Err(reason) => return Ok(Joined::Contradiction(reason)),
     };
     for &(at, _) in repeats.iter().rev() {
-        let repeated = gates.remove(at);
+        gates.remove(at);
         places.remove(at);
         said.remove(at);
-        drop(repeated);
     }
     if !GATE_COUNTS.contains(&gates.len()) || !are_all(&places) {
         return Ok(Joined::No);

@@ -186,9 +186,7 @@ impl ScanStatement {
             values: TABLE.iter().map(stated).collect(),
         }
     }
-}
 
-impl ScanStatement {
     /// The attributes by name, with what the file states.
     pub(super) fn stated(&self) -> impl Iterator<Item = (&'static str, Option<&str>)> {
         let rows = TABLE.iter().map(Row::name);
