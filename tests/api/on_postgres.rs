@@ -6,7 +6,10 @@ use crate::postgres::{Server, database_of, server};
 use serde_json::json;
 use std::process::Command;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
 use ventriform_service::access::AccessStore;
 use ventriform_store::open_database;
 
@@ -117,6 +120,72 @@ async fn a_database_that_is_away_is_answered_with_503_and_named() {
     app.json(&text(&model["links"]["self"])).await;
     // What was computed meanwhile is written down now.
     app.until(&running, &["succeeded"]).await;
+}
+
+/// Relays to a server. All connections are cut after this many answers; those made later are whole.
+struct Cut {
+    answers_left: AtomicUsize,
+    upstream: u16,
+}
+
+impl Cut {
+    /// Starts it; its port.
+    async fn start(self: Arc<Self>) -> u16 {
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let port = listener.local_addr().unwrap().port();
+        tokio::spawn(async move {
+            while let Ok((client, _)) = listener.accept().await {
+                tokio::spawn(self.clone().relay(client));
+            }
+        });
+        port
+    }
+
+    async fn relay(self: Arc<Self>, client: TcpStream) {
+        let server = TcpStream::connect(("127.0.0.1", self.upstream)).await;
+        let (mut from_client, mut to_client) = client.into_split();
+        let (mut from_server, mut to_server) = server.unwrap().into_split();
+        let asked = tokio::spawn(async move {
+            let _ = tokio::io::copy(&mut from_client, &mut to_server).await;
+        });
+        let whole = self.answers_left.load(Ordering::SeqCst) == 0;
+        let mut answer = vec![0; 1 << 16];
+        while let Ok(length @ 1..) = from_server.read(&mut answer).await {
+            let count = |left: usize| left.checked_sub(1);
+            let left = self
+                .answers_left
+                .fetch_update(Ordering::SeqCst, Ordering::SeqCst, count);
+            if !whole && left.is_err() || left == Ok(1) {
+                break;
+            }
+            if to_client.write_all(&answer[..length]).await.is_err() {
+                break;
+            }
+        }
+        asked.abort();
+    }
+}
+
+#[tokio::test]
+async fn a_server_that_goes_away_in_the_middle_of_a_start_is_waited_for() {
+    let cuts = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 20, 30, 50];
+    let starts = cuts.map(|cut| async move {
+        let url = server().database().await;
+        let mut url = reqwest::Url::parse(&url).unwrap();
+        let cutter = Arc::new(Cut {
+            answers_left: AtomicUsize::new(cut),
+            upstream: url.port().unwrap(),
+        });
+        url.set_port(Some(cutter.clone().start().await)).unwrap();
+        let data = tempfile::tempdir().unwrap();
+        let settings = crate::postgres::reached(url.as_str());
+        let opened = open_database(data.path(), Some(&settings)).await;
+        if let Err(error) = opened {
+            panic!("cut after {cut} answers: {error}");
+        }
+        assert_eq!(cutter.answers_left.load(Ordering::SeqCst), 0, "{cut}");
+    });
+    futures::future::join_all(starts).await;
 }
 
 #[tokio::test]

@@ -129,9 +129,9 @@ pub(super) async fn open(
     let refused = |error: sqlx::Error| refusal(url, &error);
     let options = options_of(url).map_err(refused)?;
     let options = with_few_parameters(options);
-    let mut connection = reach(settings, &options).await?;
     let names = session_names(run);
-    let made = async {
+    let made = while_away(settings, async || {
+        let mut connection = connect(url, &options).await?;
         check_sessions(url, &mut connection, &options, run).await?;
         set_session(&mut connection, &names)
             .await
@@ -139,10 +139,10 @@ pub(super) async fn open(
         check_server(url, &mut connection).await?;
         bring_up(&mut connection)
             .await
-            .map_err(|error| migration_failure(url, error))
-    };
-    made.await?;
-    let _ = connection.close().await;
+            .map_err(|error| migration_failure(url, error))?;
+        Ok(connection)
+    });
+    let _ = made.await?.close().await;
     let session: Arc<[_]> = names.into_iter().chain(session_limits(wait)).collect();
     let pool = PgPoolOptions::new()
         .max_connections(settings.connections)
@@ -191,8 +191,8 @@ pub(super) async fn open_as_it_is(
 ) -> Result<Shared<PgPool>, PostgresError> {
     let refused = |error: sqlx::Error| refusal(&settings.url, &error);
     let options = with_few_parameters(options_of(&settings.url).map_err(refused)?);
-    let connection = reach(settings, &options).await?;
-    let _ = connection.close().await;
+    let reached = while_away(settings, async || connect(&settings.url, &options).await);
+    let _ = reached.await?.close().await;
     let pool = PgPoolOptions::new()
         .max_connections(1)
         .after_connect(|connection, _| {
@@ -330,32 +330,42 @@ fn session_limits(wait: Duration) -> [(&'static str, String); 7] {
     ]
 }
 
-/// Connects as soon as the server answers.
-async fn reach(
-    settings: &PostgresSettings,
+/// One attempt to connect.
+async fn connect(
+    url: &PostgresUrl,
     options: &PgConnectOptions,
 ) -> Result<PgConnection, PostgresError> {
-    let url = &settings.url;
+    match tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await {
+        Ok(connected) => connected.map_err(|error| refusal(url, &error)),
+        Err(_) => Err(PostgresError::Unreachable {
+            url: url.clone(),
+            waited: CONNECT_TIMEOUT,
+            reason: "it does not answer".into(),
+        }),
+    }
+}
+
+/// Attempts again, from its beginning, what fails because the server is away, for as long as the settings allow.
+async fn while_away<T>(
+    settings: &PostgresSettings,
+    mut attempt: impl AsyncFnMut() -> Result<T, PostgresError>,
+) -> Result<T, PostgresError> {
     let started = Instant::now();
     let mut said = false;
     loop {
-        let reason = match tokio::time::timeout(CONNECT_TIMEOUT, options.connect()).await {
-            Ok(Ok(connection)) => return Ok(connection),
-            Ok(Err(error)) if faults::connection_was_lost(&error) && !is_final(&error) => {
-                said_by_server(&error)
-            }
-            Ok(Err(error)) => return Err(refusal(url, &error)),
-            Err(_) => "it does not answer".to_owned(),
+        let reason = match attempt().await {
+            Err(PostgresError::Unreachable { reason, .. }) => reason,
+            ended => return ended,
         };
         if started.elapsed() >= settings.patience {
             return Err(PostgresError::Unreachable {
-                url: url.clone(),
+                url: settings.url.clone(),
                 waited: settings.patience,
                 reason,
             });
         }
         if !said {
-            tracing::warn!(database = %url, reason, "waiting for the database");
+            tracing::warn!(database = %settings.url, reason, "waiting for the database");
             said = true;
         }
         let left = settings.patience.saturating_sub(started.elapsed());
@@ -435,8 +445,11 @@ fn is_final(error: &sqlx::Error) -> bool {
     .iter()
     .chain(&AUTHENTICATION_CODES)
     .any(refused)
+        || said.contains(STATEMENT_POOLING)
 }
 
+/// Part of what PgBouncer says where each statement gets a session of its own.
+const STATEMENT_POOLING: &str = "pooling mode";
 /// Beginnings of what PgBouncer says of a user or a password that it does not accept, under a code of its own.
 const AUTHENTICATION_CODES: [&str; 4] = [
     "password authentication failed",
@@ -445,12 +458,19 @@ const AUTHENTICATION_CODES: [&str; 4] = [
     "login rejected",
 ];
 
-/// Why the server refuses a connection or a statement at the start, and what to do.
+/// Why a connection or a statement fails at the start: the server is away, or refuses it, and what to do.
 fn refusal(url: &PostgresUrl, error: &sqlx::Error) -> PostgresError {
     let said = said_by_server(error);
+    if faults::connection_was_lost(error) && !is_final(error) {
+        return PostgresError::Unreachable {
+            url: url.clone(),
+            waited: Duration::ZERO,
+            reason: said,
+        };
+    }
     let fix = match error {
         // Statement mode refuses every transaction.
-        _ if said.contains("pooling mode") => USE_SESSIONS,
+        _ if said.contains(STATEMENT_POOLING) => USE_SESSIONS,
         _ if AUTHENTICATION_CODES
             .iter()
             .any(|text| said.starts_with(text)) =>
@@ -486,7 +506,8 @@ fn migration_failure(url: &PostgresUrl, error: MigrateError) -> PostgresError {
             PostgresError::Newer(url.clone())
         }
         MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _)
-            if faults::sqlstate(&error).as_deref() == Some("42501") =>
+            if faults::connection_was_lost(&error)
+                || faults::sqlstate(&error).as_deref() == Some("42501") =>
         {
             refusal(url, &error)
         }
