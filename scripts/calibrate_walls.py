@@ -50,7 +50,7 @@ The committed tables have the cohort and the scans with a heart, not refused, of
 of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and 2104 with 14 of all
 kinds. signal_ends.csv has the cohort, the first scans of seeds 9001 and 9101 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct)
 and 94 of seed 9111 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,in,infarct,apex) on 64 x 64 pixels of 6.4, 6.0 and 6.8 mm in turn, as
-make_cases.draw and simulate.N, NF = 64, 128 make them. smoothness.csv has the cohort and every third scan of the first 118 of seed 5001. docs/evaluation.md says how far the estimate is from the committed constants, and why: do not --write it without judging
+make_cases.draw and simulate.N, NF = 64, 128 make them. smoothness.csv has the cohort and every third scan of the first 118 of seed 5001. docs/log/walls.md says how far the estimate is from the committed constants, and why: do not --write it without judging
 the fits anew, since every result depends on them."""
 
 # Sets of the simulator, by the seed that they were made with. "cohort" is the cohort of 19 hearts.

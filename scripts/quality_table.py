@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints tables of docs/quality.md: the gain of the paper's flips, the figures of the refined
+"""Prints tables of docs/log/quality.md: the gain of the paper's flips, the figures of the refined
 route, and the effect of curvature-adaptive density where the surface is strongly curved.
 
     python3 scripts/quality_table.py [--binary PATH] [--seeds 5] [--points 67,110,150,200,300]

@@ -1,4 +1,4 @@
-//! Credentials, scopes, quotas, the audit trail, and what browsers may do. `docs/security.md` lists
+//! Credentials, scopes, quotas, the audit trail, and what browsers may do. `docs/log/security.md` lists
 //! these tests beside the OWASP API Security Top 10 (2023).
 
 use crate::helpers::{TestApp, closed, cutoff, fake_engine, key, problem, text, volume};

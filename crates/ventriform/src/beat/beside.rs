@@ -6,7 +6,8 @@
 //!
 //! 1. Each gate is blurred, so that noise of single voxels does not count.
 //! 2. Samples lie [`DISTANCES_MM`] outside of the wall, on its rays, at the same places in all gates: those of the outer surface in the
-//!    mean of the beat. A wall that moves changes them by up to .14 of its own uptake, at less than .8 of it (thirty simulated studies, `docs/evaluation.md`).
+//!    mean of the beat. A wall that moves changes them by up to .14 of its own uptake,
+//!    at less than .8 of it (thirty simulated studies, `docs/log/beat.md`).
 //! 3. Of the samples that reach [`LEAST_SHARE`] of the wall's uptake in a gate, that with the greatest amplitude of the first harmonic is
 //!    taken, if this is at least [`LEAST_CHANGE`].
 //!

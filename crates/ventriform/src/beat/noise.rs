@@ -10,7 +10,7 @@
 //! 3. A phase is off by the angle whose tangent is that deviation over the harmonic's amplitude. The mean square over
 //!    the wall, weighted as in [`super::phase`].
 //!
-//! Not guaranteed: noise that all gates share, and what is wrong with the model. docs/evaluation.md compares the result with
+//! Not guaranteed: noise that all gates share, and what is wrong with the model. docs/log/beat.md compares the result with
 //! the errors of phases in simulated hearts.
 
 use super::curvature::Curvature;

@@ -7,7 +7,7 @@
 //! 3. Gates are noisy where the first order, which holds most of a beat, has less than [`ENERGY_OVER_NOISE`] times the noise.
 //!    They have two harmonics, since a third follows the noise; others three, and four from [`GATES_OF_FOUR`] gates on.
 //!
-//! docs/evaluation.md compares two and three harmonics.
+//! docs/log/beat.md compares two and three harmonics.
 
 use nalgebra::Complex;
 use std::f64::consts::TAU;

@@ -17,7 +17,7 @@
 //!
 //! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
 //! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
-//! by shape and 2.9 with the ends of the signal (docs/evaluation.md). Not guaranteed: an infarct over half of the base
+//! by shape and 2.9 with the ends of the signal (docs/log/walls.md). Not guaranteed: an infarct over half of the base
 //! moves the shape itself; a wall that is short where its base is dark stays too long. A model whose orientation is unknown
 //! keeps its rim.
 

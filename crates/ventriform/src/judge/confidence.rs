@@ -15,7 +15,7 @@
 //! Guaranteed: a chance rises or falls with each figure alone but the size of the cavity: fits of very small and very large
 //! hearts are worse than others. Not guaranteed: that a displaced heart is noticed. A
 //! displacement in the last views only leaves an image of one heart in one position, which may not be its position in
-//! another image. docs/evaluation.md has the sets, the areas under the curve, and what else was tried.
+//! another image. docs/log/confidence.md has the sets, the areas under the curve, and what else was tried.
 
 use super::calibration::{self, USUAL_CAVITY_ML};
 use super::evidence::Evidence;

@@ -12,7 +12,7 @@
 //!    heart at all.
 //! 5. [`consensus`]: of several models' fits to one volume, the judgement of the chosen one by all of them.
 //!
-//! Guaranteed: the model is not changed. Not guaranteed: that a wrong fit is noticed; docs/evaluation.md has the
+//! Guaranteed: the model is not changed. Not guaranteed: that a wrong fit is noticed; docs/log/confidence.md has the
 //! figures of hearts that were held out.
 
 pub mod calibration;

@@ -3,7 +3,7 @@
 //! In: both volumes and the share of the wall that is dark. Out: intervals that hold the true volumes in nine of ten hearts,
 //! as those of a beat do ([`crate::numeric::error_terms`]): wider where the wall is dark and, of the cavity, where it is small.
 //! The constants ([`super::volume_calibration`]) are estimated from simulated hearts of all kinds, lost fits among them.
-//! docs/evaluation.md has the figures of held-out hearts.
+//! docs/log/walls.md has the figures of held-out hearts.
 //!
 //! Not guaranteed: other ways of drawing where the ventricle ends at its base. The simulator's true cavity ends at the
 //! plane of the rim.

@@ -13,8 +13,8 @@
 //!    at the fit. In between it ends in between.
 //! 4. The ends are smoothed over neighbouring columns.
 //!
-//! The three distances were chosen on simulated hearts and phantoms; docs/normals.md has their figures, and those of
-//! hearts that took no part.
+//! The three distances were chosen on simulated hearts and phantoms; docs/log/normals.md has their figures,
+//! docs/normals.md those of hearts that took no part.
 //!
 //! Not guaranteed: a defect of half the base or more moves the fit itself.
 

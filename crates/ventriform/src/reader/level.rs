@@ -35,7 +35,7 @@ pub const BAND_MM: f64 = 8.0;
 const EDGE_MM: f64 = 5.0;
 const MAX_SUBDIVISIONS: usize = 3;
 /// Uptake of an infarct, as a share of the level: so that infarcts stay wall, more than the 0.6 that agrees best with simulated
-/// readers who draw a level (docs/evaluation.md).
+/// readers who draw a level (docs/log/evaluation.md).
 const INFARCT_SHARE_OF_LEVEL: f64 = 0.8;
 /// Step along a line, mm.
 const STEP_MM: f64 = 0.5;

@@ -15,7 +15,7 @@
 //!
 //! Guaranteed: volumes in another order that is the same cycle, forwards or backwards, have the same course. Not guaranteed: that
 //! volumes in a chance order are refused; by chance one of 30 to 100 orders passes. The bounds are those of `scripts/gate_look.py`, figures
-//! are in `docs/evaluation.md`.
+//! are in `docs/log/beat.md`.
 
 use crate::grid::blur::{Kernel, blur};
 use crate::progress::{Cancelled, Monitor};

@@ -1,7 +1,7 @@
 //! Our models against the reference model, a surface thinned out by quadric error, at the
 //! same number of points and on simulated hearts.
 //!
-//! Fitness only: which of them segments better depends on the cohort (`docs/evaluation.md`).
+//! Fitness only: which of them segments better depends on the cohort (`docs/log/evaluation.md`).
 
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
