@@ -32,7 +32,7 @@ package=$PWD/target/test-tools/python-package/bin/python
 # A copy of the pages laid out as in this folder: the links between them are those of the repository.
 rm -rf target/site
 mkdir -p "$source/python" "$source/openapi" "$source/crates/ventriform" "$source/site"
-cp -r README.md ARCHITECTURE.md CONTRIBUTING.md CHANGELOG.md docs "$source/"
+cp -r README.md ARCHITECTURE.md CONTRIBUTING.md CHANGELOG.md SECURITY.md docs "$source/"
 cp -r python/examples "$source/python/"
 ran=$PWD/target/test-tools/notebooks
 sha256sum --status -c "$ran/sources" 2>/dev/null || scripts/check_python.sh --notebooks
