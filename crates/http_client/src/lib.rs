@@ -54,5 +54,10 @@ impl ClientFactory for ReqwestFactory {
     }
 }
 
+/// The examples of README.md, compiled as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 #[cfg(test)]
 mod tests;
