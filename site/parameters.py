@@ -1,6 +1,6 @@
 """Gives the Python reference the parameters that come from the library's tables: in the sources they are `**parameters`.
 
-In: target/site/reference.json, which scripts/python_types.py writes of the installed package. Out: signature and docstring of each
+In: target/site/reference.json, which scripts/release/python_types.py writes of the installed package. Out: signature and docstring of each
 function there, as `help` shows them.
 """
 import json

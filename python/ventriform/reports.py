@@ -1,6 +1,6 @@
 """The reports as classes, one for each document of the service's OpenAPI description.
 
-Written by scripts/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
+Written by scripts/release/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
 millilitres, angles degrees, as the names' endings say. Positions are LPS.
 """
 

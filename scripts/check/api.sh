@@ -10,9 +10,9 @@
 #
 # PYTHON: an interpreter that has schemathesis. EXAMPLES: examples per operation (15).
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 python=${PYTHON:-python3}
-[ -n "${SERVICE_URL:-}" ] || SERVICE_FLAGS='--auth-failure-limit 1000000' exec scripts/with_service.sh scripts/check_api.sh
+[ -n "${SERVICE_URL:-}" ] || SERVICE_FLAGS='--auth-failure-limit 1000000' exec scripts/with_service.sh scripts/check/api.sh
 # The service asks for credentials as soon as there is a key; schemathesis checks that it does.
 key=$(target/debug/ventriform keys create --name schemathesis --scope admin \
   --requests-per-minute 1000000 --data-dir "$SERVICE_DATA/data" 2>/dev/null)
@@ -23,7 +23,7 @@ try() {
     --exclude-checks positive_data_acceptance --no-color "$@"
 }
 # Schemathesis makes no bodies of application/dicom and multipart/related, the only ones of STOW-RS;
-# scripts/check_intake.sh sends these.
+# scripts/check/intake.sh sends these.
 # Revoking keys comes last: it takes ids from answers, among them that of the key of the requests.
 try --exclude-operation-id revoke_key --exclude-path-regex '^/dicom-web/studies'
 try --include-operation-id revoke_key

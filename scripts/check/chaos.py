@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Breaks a service of several replicas in every way that this machine allows, and checks all it has promised.
 
-    scripts/chaos.py [--program target/release/ventriform] [--rounds 200] [--seed 1] [--only FAULT]
+    scripts/check/chaos.py [--program target/release/ventriform] [--rounds 200] [--seed 1] [--only FAULT]
 
 Two replicas answer requests, two compute (one of them in a network namespace of its own), over PostgreSQL and an
 S3 store (moto) behind a proxy. Every round, under mixed load, one of these happens: a replica of either role is

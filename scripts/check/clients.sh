@@ -4,8 +4,8 @@
 # PYTHON: an interpreter that has openapi-python-client. NODE_PATH: a folder with openapi-typescript,
 # openapi-fetch, typescript and @types/node.
 set -euo pipefail
-cd "$(dirname "$0")/.."
-[ -n "${SERVICE_URL:-}" ] || exec scripts/with_service.sh scripts/check_clients.sh
+cd "$(dirname "$0")/../.."
+[ -n "${SERVICE_URL:-}" ] || exec scripts/with_service.sh scripts/check/clients.sh
 python=${PYTHON:-python3}
 modules=${NODE_PATH:-node_modules}
 out=$(mktemp -d)
@@ -13,7 +13,7 @@ trap 'rm -rf "$out"' EXIT
 target/debug/ventriform phantom -o "$out/phantom" --size 64 --spacing 6.4 --seed 2 >/dev/null 2>&1
 scan=$out/phantom/spect.nii.gz
 gated=$out/gated.nii.gz
-"$python" scripts/gated_phantom.py "$out/phantom" "$gated"
+"$python" scripts/lib/gated_phantom.py "$out/phantom" "$gated"
 
 # The generator has no bodies of multipart/related, and says so for each. They are left out: the same
 # operations take bytes.
@@ -27,13 +27,13 @@ for item in document["paths"].values():
 json.dump(document, open(sys.argv[1], "w"))
 PY
 "$(dirname "$python")/openapi-python-client" generate --path "$out/document.json" \
-  --config scripts/clients/openapi-python-client.yaml --meta none --output-path "$out/ventriform_client" >"$out/log" 2>&1
+  --config scripts/check/clients/openapi-python-client.yaml --meta none --output-path "$out/ventriform_client" >"$out/log" 2>&1
 # The generator drops what it cannot read, with a message, and carries on.
 if grep -iE 'unable|warning|error|removal|unsupported' "$out/log"; then cat "$out/log"; exit 1; fi
 echo "Python:"
-PYTHONPATH=$out "$python" scripts/clients/try_client.py "$scan" "$gated"
+PYTHONPATH=$out "$python" scripts/check/clients/try_client.py "$scan" "$gated"
 
-cp scripts/clients/try_client.ts "$out/"
+cp scripts/check/clients/try_client.ts "$out/"
 ln -s "$modules" "$out/node_modules"
 echo '{"type": "module"}' >"$out/package.json"
 "$modules/.bin/openapi-typescript" openapi/ventriform.json --default-non-nullable false \

@@ -1,9 +1,9 @@
 """Runs the shell commands of the README and the docs.
 
-    python scripts/check_commands.py PROGRAM            all pages
-    python scripts/check_commands.py PROGRAM docs/x.md  some; -v tells of every command
+    python scripts/check/commands.py PROGRAM            all pages
+    python scripts/check/commands.py PROGRAM docs/x.md  some; -v tells of every command
 
-In: the fenced blocks (```sh) of every committed page, and scripts/commands.toml. A command is run there, or named in that file
+In: the fenced blocks (```sh) of every committed page, and scripts/check/commands.toml. A command is run there, or named in that file
 with the reason why not, and the file that tries it instead; one that is neither is a fault, and so is an entry there that no
 command needs. Of a command of ventriform that is not run, the flags are looked up in `--help`.
 
@@ -31,14 +31,16 @@ import time
 import tomllib
 import urllib.request
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
-import check_dicom
-import gated_phantom
 import nibabel
 import numpy as np
+import pydicom
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-LISTED = ROOT / "scripts/commands.toml"
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from lib import gated_phantom
+from lib.nm import LPS, nm
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+LISTED = ROOT / "scripts/check/commands.toml"
 FENCE = re.compile(r"^(?P<indent> *)```(?:sh|bash|shell|console)\n(?P<text>.*?)^ *```", re.M | re.S)
 # A fence without a language that holds commands: they would escape this check.
 UNTOLD = re.compile(r"^ *```\n(?: *[$#].*\n)* *(?:\$ )?(?:(?:ventriform|curl|docker|pip|cargo) [-a-z.]|scripts/\S).*$", re.M)
@@ -112,7 +114,7 @@ class Scans:
         voxels, affine = np.asarray(image.dataobj, float), image.affine
         if gates > 1:
             voxels, affine = gated_phantom.beat(self.phantom(*name), gates)
-        check_dicom.nm(path, voxels.clip(0).round(), check_dicom.LPS @ affine, number, gates)
+        nm(path, voxels.clip(0).round(), LPS @ affine, number, gates)
 
     def make(self, page, name, folder):
         """Puts the file or folder `name` of a page into its folder; `settings.toml` has the settings that the page shows."""
@@ -133,7 +135,7 @@ class Scans:
             elif name == "stress.dcm":
                 # The same patient in another study.
                 self.dicom(path, stress, 2)
-                check = check_dicom.pydicom.dcmread(path)
+                check = pydicom.dcmread(path)
                 check.PatientID = "PH1"
                 check.save_as(path)
             elif name == "gated.dcm":
@@ -174,7 +176,7 @@ class Scans:
                 (folder / "src/lib.rs").touch()
                 (folder.parent / "ventriform").symlink_to(ROOT)
             else:
-                raise ValueError(f"scripts/commands.toml asks for a file that this script does not make: {name}")
+                raise ValueError(f"scripts/check/commands.toml asks for a file that this script does not make: {name}")
 
     def gated(self, path):
         voxels, affine = gated_phantom.beat(self.phantom("rest", "--seed", "2"))
@@ -354,7 +356,7 @@ def main():
                     if verbose:
                         print(f"{time.monotonic() - at:6.2f} s  {command.short}", flush=True)
                     if fault:
-                        found.append(f"{command.short}\n    {fault}\n    Correct it, or name it in scripts/commands.toml with the reason why it cannot be run.")
+                        found.append(f"{command.short}\n    {fault}\n    Correct it, or name it in scripts/check/commands.toml with the reason why it cannot be run.")
             finally:
                 if state:
                     state.stop()

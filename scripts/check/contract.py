@@ -1,8 +1,8 @@
 """Compares the published document with what a running service answers.
 
     export SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m'
-    scripts/with_service.sh python scripts/check_contract.py            checks
-    scripts/with_service.sh python scripts/check_contract.py --record   writes the examples anew
+    scripts/with_service.sh python scripts/check/contract.py            checks
+    scripts/with_service.sh python scripts/check/contract.py --record   writes the examples anew
 
 1. The document is valid OpenAPI 3.1, and every operationId is unique.
 2. Every example in it satisfies its schema, and every operation has an example of its request and answer.
@@ -15,14 +15,16 @@ import copy, csv, gzip, io, json, math, os, re, subprocess, sys, time, urllib.er
 
 import pydicom
 from jsonschema import Draft202012Validator
-from nifti import nifti
 from openapi_spec_validator import validate
 from pydicom.uid import ExplicitVRLittleEndian, NuclearMedicineImageStorage, generate_uid
 from referencing import Registry, Resource
 from referencing.jsonschema import DRAFT202012
 
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.nifti import nifti
+
 URL = os.environ["SERVICE_URL"]
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 DOCUMENT = os.path.join(ROOT, "openapi", "ventriform.json")
 EXAMPLES = os.path.join(ROOT, "crates", "http", "src", "openapi", "examples.json")
 PROGRAM = os.path.join(ROOT, "target", "debug", "ventriform")

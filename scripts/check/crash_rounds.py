@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills the service with SIGKILL at random moments, starts it again, and checks all it has promised.
 
-    scripts/crash_rounds.py [--program target/release/ventriform] [--rounds 1000] [--seed 1]
+    scripts/check/crash_rounds.py [--program target/release/ventriform] [--rounds 1000] [--seed 1]
 
 Of every ten rounds, eight are kills under mixed load (uploads, models, segmentations, deletions,
 cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while an
@@ -13,7 +13,7 @@ corrupt, orphaned, made twice or without its row.
 import argparse, gzip, hashlib, http.client, json, os, random, shutil, socket, sqlite3, struct, subprocess
 import sys, tempfile, threading, time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 FINAL = ("succeeded", "failed", "cancelled")
 SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
 

@@ -1,6 +1,6 @@
 """Writes NM files of one scan, segments them with ventriform and reads the DICOM objects back.
 
-usage: check_dicom.py VENTRIFORM DIR [--orientations]
+usage: dicom.py VENTRIFORM DIR [--orientations]
 
 DIR/phantom/spect.nii.gz is the scan; with --orientations it is stored along the axes in each of the 48
 orders and directions instead of in the cases of cases(). For every case below the file's geometry is computed here, after PS3.3
@@ -28,78 +28,17 @@ import sys
 from pathlib import Path
 
 import highdicom
-import gated_phantom
 import nibabel
 import numpy as np
 import pydicom
 from highdicom import _standard_utils as standard
-from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.sr._concepts_dict import concepts
-from pydicom.uid import ExplicitVRLittleEndian
 
-NM = "1.2.840.10008.5.1.4.1.1.20"
-LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lib import gated_phantom
+from lib.nm import LPS, nm
+
 NAMES = ["mask", "contours", "mesh", "surface", "measurements", "polar", "page"]
-
-
-def nm(path, voxels, affine, number, gates=1):
-    """A reconstructed NM image of voxels[i, j, k], the same in all gates, or voxels[i, j, k, gate]; `affine` maps indices
-    to LPS mm and has right angles."""
-    steps = affine[:3, :3]
-    spacing = np.linalg.norm(steps, axis=0)
-    rows, columns = steps[:, 0] / spacing[0], steps[:, 1] / spacing[1]
-    sign = np.sign(np.dot(np.cross(rows, columns), steps[:, 2]))
-    data = Dataset()
-    data.SOPClassUID = NM
-    data.SOPInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.3"
-    data.StudyInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.1"
-    data.SeriesInstanceUID = f"1.2.826.0.1.3680043.10.999.{number}.2"
-    data.FrameOfReferenceUID = f"1.2.826.0.1.3680043.10.999.{number}.4"
-    data.SpecificCharacterSet = "ISO_IR 192"
-    data.PatientName, data.PatientID = "Phantom^Fritz", f"PH{number}"
-    data.PatientBirthDate, data.PatientSex = "19600102", "O"
-    data.StudyDate, data.StudyTime, data.StudyID = "20250115", "103000", "1"
-    data.AccessionNumber, data.ReferringPhysicianName = "ACC", ""
-    data.Modality, data.SeriesNumber, data.InstanceNumber = "NM", 2, 1
-    data.Manufacturer = "none"
-    kind = "RECON GATED TOMO" if gates > 1 else "RECON TOMO"
-    data.ImageType = ["DERIVED", "PRIMARY", kind, "EMISSION"]
-    data.Rows, data.Columns = voxels.shape[1], voxels.shape[0]
-    data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
-    data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 0
-    data.PixelSpacing = [float(f"{spacing[1]:.9g}"), float(f"{spacing[0]:.9g}")]
-    data.SpacingBetweenSlices = float(f"{sign * spacing[2]:.9g}")
-    data.SliceThickness = float(f"{spacing[2]:.9g}")
-    slices = voxels.shape[2]
-    order = np.arange(gates * slices)[::-1]  # the file's frames in another order than the slices
-    data.NumberOfFrames = len(order)
-    data.SliceVector = [int(f) % slices + 1 for f in order]
-    if gates > 1:
-        data.FrameIncrementPointer = [0x00540060, 0x00540070, 0x00540080]
-        data.RRIntervalVector = [1] * len(order)
-        data.TimeSlotVector = [int(f) // slices + 1 for f in order]
-        beats, gating = Dataset(), Dataset()
-        beats.FrameTime = f"{gated_phantom.RR_MS / gates:.6g}"
-        beats.NominalInterval, beats.LowRRValue, beats.HighRRValue = gated_phantom.RR_MS, 800, 1000
-        beats.IntervalsAcquired, beats.IntervalsRejected = 400, 20
-        gating.DataInformationSequence = [beats]
-        data.GatedInformationSequence = [gating]
-    else:
-        data.FrameIncrementPointer = 0x00540080
-    detector = Dataset()
-    detector.ImageOrientationPatient = [float(f"{x:.10f}") for x in (*rows, *columns)]
-    detector.ImagePositionPatient = [float(f"{x:.6f}") for x in affine[:3, 3]]
-    data.DetectorInformationSequence = [detector]
-    if voxels.ndim == 3:
-        voxels = np.stack([voxels] * gates, 3)
-    frames = voxels.transpose(3, 2, 1, 0).reshape(-1, *voxels.shape[1::-1])[order]
-    data.PixelData = frames.astype("<u2").tobytes()
-    data["PixelData"].VR = "OW"
-    meta = FileMetaDataset()
-    meta.MediaStorageSOPClassUID, meta.MediaStorageSOPInstanceUID = NM, data.SOPInstanceUID
-    meta.TransferSyntaxUID = ExplicitVRLittleEndian
-    data.file_meta = meta
-    data.save_as(path, enforce_file_format=True)
 
 
 def cases(voxels, affine):

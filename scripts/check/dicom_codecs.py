@@ -1,4 +1,4 @@
-"""Compares the codecs of compressed DICOM with other decoders. See check_codecs.sh.
+"""Compares the codecs of compressed DICOM with other decoders. See dicom_codecs.sh.
 
 A case is a file with one image in frames, and what its voxels must be: exactly the image, exactly what another
 decoder gives, that within a tolerance, or a refusal whose message matches a pattern. Every lossless encoding is also

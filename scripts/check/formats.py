@@ -1,6 +1,6 @@
 """Reads exported meshes with trimesh and VTK and compares them with the JSON of the same name.
 
-usage: check_formats.py DIR
+usage: formats.py DIR
 
 Vertices must come back in the same order, equal to the last bit of the precision that format and
 reader keep. STL stores no shared vertices; there the distinct positions and the triangles over them

@@ -1,6 +1,6 @@
 """Compares exact geodesics with pygeodesic (MMP, Kirsanov's implementation) on random surfaces.
 
-usage: check_geodesics.py PROGRAM [SURFACES]
+usage: geodesics.py PROGRAM [SURFACES]
 
 PROGRAM is the example `geodesics`: it reads a mesh with points on it as JSON and prints the distances
 between all points. pygeodesic measures between vertices only, so the points become vertices of the

@@ -1,4 +1,4 @@
-"""Sends DICOM objects to a service of its own in every way that docs/pacs.md names. See check_intake.sh."""
+"""Sends DICOM objects to a service of its own in every way that docs/pacs.md names. See intake.sh."""
 
 import os
 import random

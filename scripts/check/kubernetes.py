@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks rendered manifests of Kubernetes on standard input: schemas, hardening, and settings the program knows.
 
-    kubectl kustomize deploy/kubernetes | scripts/check_kubernetes.py target/debug/ventriform
+    kubectl kustomize deploy/kubernetes | scripts/check/kubernetes.py target/debug/ventriform
 
 Every object fits the schemas of every version of Kubernetes that kubernetes_validate has, unknown fields forbidden. Every container runs as a user that is not root, on a read-only root, without capabilities, with
 probes and limits, and has no secret but by reference. Selectors find pods. Every setting in a variable and

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What is cheap to ask for is cheap to answer: attacks by one client on the built program, under a limit of memory.
 
-    scripts/check_limits.py --program target/debug/ventriform
+    scripts/check/limits.py --program target/debug/ventriform
 
 Each attack runs against a service of its own that may have 1 GiB of data (`prlimit --data`), and 60 s of
 processor time. Meanwhile another client, told apart by a trusted proxy's header, asks for its lists, health and small

@@ -1,6 +1,6 @@
 """Segments scans whose headers state their place in every way, and asks SimpleITK, nibabel and pynrrd where masks are.
 
-usage: check_masks.py PROGRAM DIR
+usage: masks.py PROGRAM DIR
 
 For each header the program writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd; ITK and nibabel must find them exactly
 where they find the scan, and the labels must be the mask (1) and, outside of it, the cavity (2). Of a sheared grid, which

@@ -1,6 +1,6 @@
 """Meshes that trimesh and VTK write, read as experts' masks: the mask of a fit is what lies inside its mesh.
 
-usage: check_meshes.py PROGRAM FIT DIR
+usage: meshes.py PROGRAM FIT DIR
 
 FIT is a folder of `ventriform segment` with mesh.json (and other formats of it) and mask.nii.gz. Each of its meshes, and its mesh
 written by trimesh and VTK in every way they know, must agree with the mask in every voxel, in LPS and RAS, in

@@ -49,10 +49,10 @@ PROFILE = [
     "--config", "profile.dev.package.ventriform.debug=false",
 ]
 MEMORY = 8 << 30  # A mutant that pushes for ever must not take the machine's.
-ACCEPTED = Path("scripts/mutants_accepted.txt")
+ACCEPTED = Path("scripts/check/mutants_accepted.txt")
 
 SWITCH = """
-//! The switch of mutants (scripts/mutants.py).
+//! The switch of mutants (scripts/check/mutants.py).
 use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,22 +1,22 @@
 #!/usr/bin/env bash
 # Changes the code that makes and fits models in one place at a time, and tells which changes no test notices.
 #
-#   scripts/mutants.sh [SIZE] [OFFSET]    SIZE mutants (100) from number OFFSET (0) on, in a random order
-#   scripts/mutants.sh all                all of them: many hours
-#   scripts/mutants.sh only REGEX         those whose names match
+#   scripts/check/mutants.sh [SIZE] [OFFSET]    SIZE mutants (100) from number OFFSET (0) on, in a random order
+#   scripts/check/mutants.sh all                all of them: many hours
+#   scripts/check/mutants.sh only REGEX         those whose names match
 #
 # Mutants come from cargo-mutants (installed if it is missing) and are made in a clone of the last commit, under
-# target/mutants. All of them are in one build, each behind a switch (scripts/mutants.py), and each is tested by the
+# target/mutants. All of them are in one build, each behind a switch (scripts/check/mutants.py), and each is tested by the
 # library's own tests, the domain tests and the commands' tests that enter the changed function, until one fails.
 # The quality gate is one of them.
 #
-# Prints the mutants missed, those of them that scripts/mutants_accepted.txt accepts, and the share caught; writes one
+# Prints the mutants missed, those of them that scripts/check/mutants_accepted.txt accepts, and the share caught; writes one
 # JSON line for each mutant to target/mutants/results.jsonl. Exits with an error if a mutant was missed that is not
 # accepted.
 #
 # FAST: most seconds of tests for one mutant (no limit). What they do not notice counts as missed.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 work=$PWD/target/mutants
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$work/build}
 
@@ -37,4 +37,4 @@ for clone in clean tree; do
     fi
 done
 
-python3 -B scripts/mutants.py "$work/clean" "$work/tree" "$work/results.jsonl" "${choice[@]}"
+python3 -B scripts/check/mutants.py "$work/clean" "$work/tree" "$work/results.jsonl" "${choice[@]}"

@@ -1,6 +1,6 @@
 """Texts that pydicom encodes in every character set of DICOM, and those of David Clunie's example files, read back.
 
-usage: check_names.py PROGRAM DIR
+usage: names.py PROGRAM DIR
 
 The example files (which pydicom brings along) hold the names of PS3.5, annexes H to K, as the standard encodes them; the names
 they stand for are below, as pydicom's own tests have them. Beside them, every character of every set is

@@ -1,15 +1,15 @@
 """Fetching from and delivering to Orthanc.
 
-usage: check_pacs.py VENTRIFORM DIR
+usage: pacs.py VENTRIFORM DIR
 
-DIR/phantom/spect.nii.gz is the scan. The NM files of check_dicom.py (both signs of Spacing Between Slices,
+DIR/phantom/spect.nii.gz is the scan. The NM files of dicom.py (both signs of Spacing Between Slices,
 oblique, gated) are stored in Orthanc by C-STORE and STOW-RS. For each, a job fetches the series, segments it and
 delivers every object, by STOW-RS or C-STORE; a further job makes a model. Meanwhile Orthanc and the service are
 killed and started again. Then:
 
 - the archive has each source and each object once, under the same study, and nothing else;
 - what it returns is what the service offers, byte by byte (by C-STORE: data set by data set);
-- the objects' geometry is as check_dicom.py computes it from the NM file;
+- the objects' geometry is as dicom.py computes it from the NM file;
 - a wrong password and a series that does not exist fail the job and say so;
 - a work item with the code of a procedure is performed and names its output, which the archive has;
 - Orthanc sends to the service, by C-STORE and by STOW-RS: every voxel comes as it was stored there.
@@ -31,7 +31,10 @@ import nibabel
 import numpy as np
 import pydicom
 
-from check_dicom import LPS, NAMES, cases, check_object, check_results, nm
+from dicom import NAMES, cases, check_object, check_results
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lib.nm import LPS, nm
 
 MODEL_NAMES = ["mesh", "surface"]
 PATIENCE = 300

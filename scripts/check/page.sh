@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # Tests the page in Debian's Chromium: from an upload to a corrected fit, at two widths, light and dark.
 #
-#   scripts/check_page.sh             against a service of its own
-#   scripts/check_page.sh --bundle    also makes web/src/generated, web/dist and the script of reports anew and compares
+#   scripts/check/page.sh             against a service of its own
+#   scripts/check/page.sh --bundle    also makes web/src/generated, web/dist and the script of reports anew and compares
 #                                     them with what is committed
-#   scripts/check_page.sh NAME        only the checks with NAME in their name
+#   scripts/check/page.sh NAME        only the checks with NAME in their name
 #
 # The time from a correction to its new contours, with a program built for speed and nothing else running:
-#   PROGRAM=target/release/ventriform scripts/check_page.sh "fitted again"
+#   PROGRAM=target/release/ventriform scripts/check/page.sh "fitted again"
 #
 # Screenshots of every view are kept in target/page. Needs node, npm and chromium.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 # The packages are laid under target/, so that the sources stay clean.
 tools=$PWD/target/test-tools/web
 mkdir -p "$tools"

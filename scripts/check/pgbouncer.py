@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The service on PostgreSQL behind PgBouncer, each of which this script starts for itself.
 
-    scripts/check_pgbouncer.py --program target/debug/ventriform          (scripts/check_pgbouncer.sh installs both)
+    scripts/check/pgbouncer.py --program target/debug/ventriform          (scripts/check/pgbouncer.sh installs both)
 
 In session mode with PgBouncer's defaults the service starts and computes, each session has its limits before it reads or
 writes anything, a lock that somebody holds ends a request in time, and a PgBouncer that is started anew is found again.

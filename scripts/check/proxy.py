@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Asks services of its own through nginx: uploads, early refusals, waiting, events, paths, TLS, idle connections.
 
-    scripts/check_proxy.py target/debug/ventriform FOLDER
+    scripts/check/proxy.py target/debug/ventriform FOLDER
 
-See check_proxy.sh. nginx has its defaults unless a check is about another setting. What is right: every client gets the
+See proxy.sh. nginx has its defaults unless a check is about another setting. What is right: every client gets the
 service's own answer (nginx answers 502 or 504 where it got none), at once, with addresses that the client can use.
 """
 

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # Builds the Python package's wheel, installs it into an environment of its own and tests it there.
 #
-#   scripts/check_python.sh            everything
-#   scripts/check_python.sh --install  only the environment of the tests
-#   scripts/check_python.sh --build    only the wheel in it, which scripts/test.sh does beforehand: it needs cargo's lock
-#   scripts/check_python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
-#   scripts/check_python.sh --notebooks    only the notebooks, whose copies with outputs scripts/site.sh shows
-#   scripts/check_python.sh --write    writes the generated stubs anew
+#   scripts/check/python.sh            everything
+#   scripts/check/python.sh --install  only the environment of the tests
+#   scripts/check/python.sh --build    only the wheel in it, which scripts/test.sh does beforehand: it needs cargo's lock
+#   scripts/check/python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
+#   scripts/check/python.sh --notebooks    only the notebooks, whose copies with outputs scripts/release/site.sh shows
+#   scripts/check/python.sh --write    writes the generated stubs anew
 #
 # The wheel has the dev profile, in which the library is optimised. VENTRIFORM_WHEEL: a wheel to test instead.
 # CARGO_CONFIG: a file of further settings for cargo.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 tools=$PWD/target/test-tools
 venv=$tools/python-package
 wheels=$tools/wheels
@@ -60,9 +60,9 @@ case ${1:-} in
   --test) run_tests ;;
   --notebooks) run_notebooks ;;
   --write)
-    python3 scripts/python_types.py write reports
+    python3 scripts/release/python_types.py write reports
     build
-    "$venv/bin/python" scripts/python_types.py write
+    "$venv/bin/python" scripts/release/python_types.py write
     ;;
   *)
     build

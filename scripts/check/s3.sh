@@ -1,16 +1,16 @@
 #!/usr/bin/env bash
 # Runs the tests of the S3 store over moto, a second S3 server; `cargo test` runs them over s3s-fs.
 #
-#   scripts/check_s3.sh            the contract, the service over S3, a failing network
-#   scripts/check_s3.sh --all      every test of the service, its files in S3
+#   scripts/check/s3.sh            the contract, the service over S3, a failing network
+#   scripts/check/s3.sh --all      every test of the service, its files in S3
 #
 # PYTHON: an interpreter that has moto. Without it the script installs moto under target/. Takes seconds, with
 # --all minutes. Exits with 1 if a test fails.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 
-# shellcheck source=scripts/dicom_tools.sh
-. scripts/dicom_tools.sh
+# shellcheck source=scripts/lib/dicom_tools.sh
+. scripts/lib/dicom_tools.sh
 python_with moto
 
 port=$("$PYTHON" -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')

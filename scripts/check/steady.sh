@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Runs the tests where they waver: on busy processors, on one thread, and in shuffled order.
 #
-#   scripts/check_steady.sh                 ten rounds beside a busy loop for each processor, one on one thread,
+#   scripts/check/steady.sh                 ten rounds beside a busy loop for each processor, one on one thread,
 #                                           one in shuffled order: three hours on two processors
-#   scripts/check_steady.sh 3 contract::    three rounds, of the tests with `contract::` in their names
+#   scripts/check/steady.sh 3 contract::    three rounds, of the tests with `contract::` in their names
 #
 # Not part of CI, whose machine has no time for it. Prints a line for each run and the names of tests that failed;
-# exits with 1 if any did. A shuffled run prints the seed that repeats it: SEED=N scripts/check_steady.sh 0.
+# exits with 1 if any did. A shuffled run prints the seed that repeats it: SEED=N scripts/check/steady.sh 0.
 set -uo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 rounds=${1:-10}
 shift || true
 out=$(mktemp -d)

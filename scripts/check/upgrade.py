@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 """Upgrades a service of several replicas, one replica after the other, while it works.
 
-    scripts/check_upgrade.py --old OLD_PROGRAM --new NEW_PROGRAM        (scripts/check_upgrade.sh builds both)
+    scripts/check/upgrade.py --old OLD_PROGRAM --new NEW_PROGRAM        (scripts/check/upgrade.sh builds both)
 
 Two replicas answer requests and two compute, over PostgreSQL and an S3 store (moto), all of the old version. Under the
-load of scripts/chaos.py, one of each role becomes the new version, whose start changes the tables; then one that stayed
+load of scripts/check/chaos.py, one of each role becomes the new version, whose start changes the tables; then one that stayed
 old is started once more, as a crash would; then the others become new. At the end everything acknowledged is read back,
-as scripts/chaos.py does it. A request may meet a closed connection or 503, which its client repeats, and no other fault.
+as scripts/check/chaos.py does it. A request may meet a closed connection or 503, which its client repeats, and no other fault.
 
-Needs what scripts/chaos.py needs. The last line is a JSON object; the exit status is 0 if nothing was lost.
+Needs what scripts/check/chaos.py needs. The last line is a JSON object; the exit status is 0 if nothing was lost.
 """
 import argparse, json, os, random, sys, tempfile
 

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Builds an older revision and this one, and upgrades replicas from one to the other under load.
 #
-#   scripts/check_upgrade.sh REVISION
+#   scripts/check/upgrade.sh REVISION
 #
 # Not part of scripts/test.sh, which has a test without a second build: a process goes on while the next version adds to
 # the tables. PYTHON: one with scripts/requirements.txt. PROFILE: release unless given.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 revision=${1:?give the older revision, such as a tag}
 profile=${PROFILE:-release}
 tree=target/upgrade/tree
@@ -23,4 +23,4 @@ trap 'git worktree remove --force "$tree"' EXIT
 cp "$built" "$programs/old"
 cargo build --profile "$profile" --bin ventriform
 cp "$built" "$programs/new"
-"${PYTHON:-python3}" scripts/check_upgrade.py --old "$programs/old" --new "$programs/new"
+"${PYTHON:-python3}" scripts/check/upgrade.py --old "$programs/old" --new "$programs/new"

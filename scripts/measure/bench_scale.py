@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
 """Measures what several replicas do on this machine; docs/scale.md says what it gave.
 
-    scripts/bench_scale.py [--program target/release/ventriform] [--jobs 120] [--rows 1000000]
+    scripts/measure/bench_scale.py [--program target/release/ventriform] [--jobs 120] [--rows 1000000]
 
 One replica that answers requests, over PostgreSQL and an S3 store (moto).
 1. Jobs per second (models of 67 points) with 1, 2 and 4 workers of one thread, in turn, three times.
 2. Uploads of 8 MiB through the replica, beside PUTs of the same bytes to the store itself, in turn.
 3. Lists, figures and jobs per second with few jobs and with ROWS ended ones in the table, and its size.
 4. With ROWS ended jobs: 100 claims a second, and 1, 2 and 4 processes whose jobs sleep (benches/queue.rs).
-Prints medians; quiet machines only. Needs what scripts/chaos.py needs.
+Prints medians; quiet machines only. Needs what scripts/check/chaos.py needs.
 """
-import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, tempfile, time
+import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, sys, tempfile, time
 
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(1, os.path.join(sys.path[0], "check"))
 from chaos import Postgres, run, s3_server
 from crash_rounds import ROOT, Service
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Uploads and small requests per second, beside Orthanc and an earlier version in the same run.
 
-    target/test-tools/python/bin/python scripts/bench_service.py [--program target/release/ventriform] [--rounds 4]
+    target/test-tools/python/bin/python scripts/measure/bench_service.py [--program target/release/ventriform] [--rounds 4]
                                                                  [--before PROGRAM]
 
 All listen on loopback, keep their files under the same temporary folder, sync them (Orthanc:
@@ -19,13 +19,16 @@ import re
 import socket
 import statistics
 import subprocess
+import sys
 import tempfile
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
-from check_dicom import nm
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lib.nm import nm
 
 USER, PASSWORD = "bench", "bench"
 

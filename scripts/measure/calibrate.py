@@ -7,7 +7,7 @@
     calibrate.py --held-out --table TABLE   the same by the committed constants, of scans that those do not come from
     calibrate.py --layout                   write the file again with the constants as they are
 
-The table (scripts/calibration/features.csv, --table for another one) has one row for each scan. It is made by
+The table (scripts/measure/calibration/features.csv, --table for another one) has one row for each scan. It is made by
 
     make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
     cargo run --release -p ventriform-tools --bin calibration_features -- COHORT CASES/SET... > features.csv
@@ -27,9 +27,9 @@ import sys
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 OUTPUT = ROOT / "crates/ventriform/src/judge/calibration.rs"
-TABLE = ROOT / "scripts/calibration/features.csv"
+TABLE = ROOT / "scripts/measure/calibration/features.csv"
 # Size of a cavity from which that of others is counted.
 USUAL_CAVITY_ML = 55.0
 
@@ -145,7 +145,7 @@ MODELS = {
 }
 
 HEADER = f"""\
-//! Constants of the logistic models. Written by `scripts/calibrate.py`: do not edit.
+//! Constants of the logistic models. Written by `scripts/measure/calibrate.py`: do not edit.
 //!
 //! In: figures of fits to simulated hearts. Out: for each model of `confidence.rs` the intercept, and
 //! of each term the mean and the standard deviation over the calibration set and the weight.

@@ -2,7 +2,7 @@
 """Estimates how much two scans of an unchanged heart differ, from a table of simulated pairs.
 
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
-    calibrate_comparison.py --write         estimates the constants from scripts/calibration/comparisons.csv and writes
+    calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and writes
                                             crates/ventriform/src/comparison/calibration.rs
 
 A table is what the tool `comparisons` prints; the committed one has the 20 pairs of seed 610
@@ -21,13 +21,13 @@ import pathlib
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-TABLE = ROOT / "scripts/calibration/comparisons.csv"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TABLE = ROOT / "scripts/measure/calibration/comparisons.csv"
 CONSTANTS = ROOT / "crates/ventriform/src/comparison/calibration.rs"
 FOUND_PERCENT = 3
 TURN_MARGIN, MUSCLE_SDS = 2.5, 4
 HEADER = """\
-//! Constants of comparisons. Written by `scripts/calibrate_comparison.py`: do not edit.
+//! Constants of comparisons. Written by `scripts/measure/calibrate_comparison.py`: do not edit.
 //!
 //! In: comparisons of simulated pairs of scans, and what truly changed. Out: how much unchanged hearts differ.
 """

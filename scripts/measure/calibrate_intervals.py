@@ -5,9 +5,9 @@
                                                  NAME, `beats` or `volumes`, or of the committed ones
     calibrate_intervals.py --write               estimates the constants from the committed tables and writes them
 
-The tables are what the tools `beats` and `volumes` print. scripts/calibration/beats.csv, for
+The tables are what the tools `beats` and `volumes` print. scripts/measure/calibration/beats.csv, for
 crates/ventriform/src/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the simulator of
-gated hearts; scripts/calibration/volumes.csv, for crates/ventriform/src/judge/volume_calibration.rs, the first 118 scans of seed
+gated hearts; scripts/measure/calibration/volumes.csv, for crates/ventriform/src/judge/volume_calibration.rs, the first 118 scans of seed
 5001 of the simulator of scans (neither is part of this project):
 
     gated.py --out CASES --seed 500 --n 20
@@ -25,8 +25,8 @@ import pathlib
 import numpy as np
 from scipy.optimize import minimize
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-TABLES = ROOT / "scripts/calibration"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+TABLES = ROOT / "scripts/measure/calibration"
 SMALL_CAVITY_ML, HALF_WIDTH_SDS = 60.0, 1.645
 TERMS = ("bias", "usual", "dark", "small")
 # For each table: the file of the constants with their visibility and the head of its page, the columns of cavity and dark share, and
@@ -109,7 +109,7 @@ def report(name, table):
 def write(name):
     path, head, method, _, figures = FILES[name]
     of, cavity, dark = errors(name, TABLES / f"{name}.csv")
-    text = f"{head} Written by `scripts/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse crate::numeric::error_terms::ErrorTerms;\n"
+    text = f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse crate::numeric::error_terms::ErrorTerms;\n"
     for constant, (_, doc) in figures.items():
         terms = zip(TERMS, estimate(of[constant], cavity, dark))
         fields = "".join(f"    {key}: {float(f'{value:.3f}')},\n" for key, value in terms)

@@ -6,7 +6,7 @@
     calibrate_walls.py --layout             write the files again with the constants as they are
 
 The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs. The
-tables (scripts/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are made by
+tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are made by
 
     make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
     cargo run --release -p ventriform-tools --bin wall_features -- TABLES COHORT CASES/SET...
@@ -40,10 +40,10 @@ import sys
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 WALLS = ROOT / "crates/ventriform/src/deform/calibration.rs"
 NODES = ROOT / "crates/ventriform/src/judge/uncertainty_calibration.rs"
-TABLES = ROOT / "scripts/calibration"
+TABLES = ROOT / "scripts/measure/calibration"
 
 REPRODUCED = """\
 The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with 42 scans
@@ -97,7 +97,7 @@ TERMS = {
 }
 
 WALLS_HEADER = """\
-//! Constants of the models of rim and wall. Written by `scripts/calibrate_walls.py`: do not edit.
+//! Constants of the models of rim and wall. Written by `scripts/measure/calibrate_walls.py`: do not edit.
 //!
 //! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
 //! the distances from the apparent to the anatomical wall.
@@ -108,7 +108,7 @@ use super::rim_model::{
 };
 """
 NODES_HEADER = """\
-//! Constants of the uncertainty of nodes. Written by `scripts/calibrate_walls.py`: do not edit.
+//! Constants of the uncertainty of nodes. Written by `scripts/measure/calibrate_walls.py`: do not edit.
 //!
 //! In: nodes of fits to simulated hearts, and their distances from the walls. Out: the logarithm of the distance within
 //! which 68 % of the nodes lie, mm.

@@ -1,4 +1,4 @@
-"""Times ventriform against other tools. Run by scripts/compare_peers.sh."""
+"""Times ventriform against other tools. Run by scripts/measure/compare_peers.sh."""
 import argparse
 import functools
 import json

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Times ventriform against other tools for the same jobs, in turns on one core.
 #
-#   scripts/compare_peers.sh [PART...]     PART: speed sizes reading threads memory scaling (default: all)
+#   scripts/measure/compare_peers.sh [PART...]     PART: speed sizes reading threads memory scaling (default: all)
 #
 # Prints tables and writes target/compare-peers/PART.json; `scaling` also writes docs/scaling-*.svg.
 # Installs the peers' Python packages under target/compare-peers and builds the C++ peers whose headers
@@ -12,7 +12,7 @@
 # NATIVE=1: ventriform and the C++ peers use all that this machine's processor has; otherwise what every x86-64 has, as published
 # binaries and the wheels of the other peers do. Results then go to target/compare-peers/native.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 work=$PWD/target/compare-peers
 mkdir -p "$work"
 
@@ -31,11 +31,11 @@ if [ -n "${NATIVE:-}" ]; then
     export CARGO_TARGET_DIR=$work/target RUSTFLAGS="-C target-cpu=native ${RUSTFLAGS:-}"
 fi
 
-cpp() { # cpp NAME FLAGS...: builds scripts/peers/NAME.cpp if it can
+cpp() { # cpp NAME FLAGS...: builds scripts/measure/peers/NAME.cpp if it can
     local name=$1
     shift
-    [ "$work/$name.so" -nt "scripts/peers/$name.cpp" ] && return
-    g++ -O3 "${march[@]}" -DNDEBUG -std=c++17 -fPIC -shared "scripts/peers/$name.cpp" \
+    [ "$work/$name.so" -nt "scripts/measure/peers/$name.cpp" ] && return
+    g++ -O3 "${march[@]}" -DNDEBUG -std=c++17 -fPIC -shared "scripts/measure/peers/$name.cpp" \
         -o "$work/$name.so" "$@" -Wl,--no-undefined 2>"$work/$name.log" ||
         echo "skipping $name: it does not build here (see $work/$name.log)"
 }
@@ -49,5 +49,5 @@ fi
 
 cargo build --release --quiet --package ventriform-program --package ventriform-tools --bin ventriform --bin stopwatch
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 VTK_SMP_MAX_THREADS=1
-exec "$PYTHON" scripts/compare_peers.py --work "$work" --docs docs \
+exec "$PYTHON" scripts/measure/compare_peers.py --work "$work" --docs docs \
     --binaries "${CARGO_TARGET_DIR:-target}/release" --rounds "${ROUNDS:-15}" ${CORE:+--core "$CORE"} "$@"

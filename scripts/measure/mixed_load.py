@@ -26,7 +26,8 @@ import threading
 import time
 from pathlib import Path
 
-from nifti import nifti
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lib.nifti import nifti
 
 # Rises that are allowed from the middle of the run to its end.
 ALLOWED = {"memory_mib": 2, "files": 5, "disk_mib": 20}

@@ -2,7 +2,7 @@
 """Prints tables of docs/quality.md: the gain of the paper's flips, the figures of the refined
 route, and the effect of curvature-adaptive density where the surface is strongly curved.
 
-    python3 scripts/quality_table.py [--binary PATH] [--seeds 5] [--points 67,110,150,200,300]
+    python3 scripts/measure/quality_table.py [--binary PATH] [--seeds 5] [--points 67,110,150,200,300]
 
 `ventriform generate` makes models of simulated scans (`ventriform phantom`). Fitness is read from
 its reports. Distances and dihedral angles are measured here, against an iso-surface from VTK's
@@ -19,7 +19,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 WORK = ROOT / "target" / "quality"
 NEEDED = ("numpy", "nibabel", "vtk")
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures how soon the service is ready on a data folder with many volumes.
 
-    scripts/start_time.py [--program target/release/ventriform] [--volumes 100000] [--starts 20]
+    scripts/measure/start_time.py [--program target/release/ventriform] [--volumes 100000] [--starts 20]
 
 Uploads one small volume, then writes the others beside it as the service would have: a folder with the
 file and its record, and rows in the database, under the id that the content has. Starts the service again
@@ -9,10 +9,11 @@ and again, each time after SIGKILL, and measures the time from the start of the 
 of `/readyz`; then reads some of the volumes back and compares every byte. Loopback only; stops by itself;
 needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JSON object.
 """
-import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, tempfile
+import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, sys, tempfile
 
-from crash_rounds import Service
-from nifti import FLOAT32, nifti
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from check.crash_rounds import Service
+from lib.nifti import FLOAT32, nifti
 
 
 def numbered(number):

@@ -5,9 +5,9 @@
 # Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for machines that cannot
 # reach the published port from outside of the engine's network. IMAGE: an image that was built before, else it is built.
 #
-#   scripts/check_backup.sh
+#   scripts/release/check_backup.sh
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 export COMPOSE_PROJECT_NAME=ventriform
 page=$PWD/docs/operations.md
 out=$(mktemp -d)

@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
 # Builds the image, starts the service with docker compose and makes a model through it.
 #
-#   scripts/check_container.sh [TARBALL]      TARBALL: an image of scripts/release.sh, which is loaded and not built
+#   scripts/release/check_container.sh [TARBALL]      TARBALL: an image of scripts/release.sh, which is loaded and not built
 #
 # Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for
 # machines that cannot reach the published port from outside of the engine's network.
 set -euo pipefail
 tarball=${1:+$(realpath "$1")}
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 out=$(mktemp -d)
 trap 'docker compose logs --tail 20 >&2 || true; docker compose down -v >/dev/null 2>&1 || true; rm -rf "$out"' EXIT
 url=http://127.0.0.1:8080

@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
 # Installs what scripts/release.sh made in a bare Debian and tries it there.
 #
-#   scripts/check_release.sh [SUITE [ARCHITECTURE]]      trixie and this machine's unless given
+#   scripts/release/check_release.sh [SUITE [ARCHITECTURE]]      trixie and this machine's unless given
 #
 # Needs root and Debian's packages, of which mmdebstrap makes a chroot; for another architecture qemu runs what is in it. Checked: checksums; the Debian package installs, its
 # program makes and measures a model, its user and folders exist, its unit is well formed, and it can be removed; the archive's
 # program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan, and has its bill of materials and its licence texts; the
 # library and the program need no newer glibc than 2.17; the image's service makes a model as the image's user.
 #
-# The image, which is for amd64, is tried by scripts/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
+# The image, which is for amd64, is tried by scripts/release/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
 # runs its program in a chroot, with the image's user and environment; its health check is then run by this script.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 suite=${1:-trixie}
 architecture=${2:-$(dpkg --print-architecture)}
 case $architecture in
@@ -102,7 +102,7 @@ if [ "$architecture" != amd64 ]; then
   exit
 fi
 if docker version >/dev/null 2>&1; then
-  scripts/check_container.sh "$dist"/ventriform-*.image.tar.gz
+  scripts/release/check_container.sh "$dist"/ventriform-*.image.tar.gz
   exit
 fi
 command -v buildah >/dev/null ||

@@ -4,9 +4,9 @@
 # Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for
 # machines that cannot reach the published port from outside of the engine's network.
 #
-#   scripts/check_scale.sh
+#   scripts/release/check_scale.sh
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 export COMPOSE_FILE=compose.scale.yml
 out=$(mktemp -d)
 trap 'docker compose logs --tail 20 >&2 || true; docker compose down -v >/dev/null 2>&1 || true; rm -rf "$out"' EXIT

@@ -2,15 +2,16 @@
 # Compares the public interface of the crate `ventriform` with that of the newest release: a change that breaks its users
 # fails unless the version in Cargo.toml says so.
 #
-#   scripts/check_semver.sh [REVISION]      the newest tag v* unless given
+#   scripts/release/check_semver.sh [REVISION]      the newest tag v* unless given
 #
 # In: the work tree and a revision. Out: the changes that break, by cargo-semver-checks. Guaranteed: 0 if it found none, or there
 # is no release yet, which is said. It knows many kinds of breaking changes, not all.
 #
 # crates.io has the tool as sources only: it is compiled once, under target/test-tools.
 set -euo pipefail
-cd "$(dirname "$0")/.."
-revision=${1:-$(git tag --list 'v[0-9]*' --sort=-version:refname | head -n 1)}
+cd "$(dirname "$0")/../.."
+# A release is compared with the one before, also when its own tag is there already.
+revision=${1:-$(git tag --list 'v[0-9]*' --no-contains HEAD --sort=-version:refname | head -n 1)}
 if [ -z "$revision" ]; then
   echo "no release yet: no tag v*"
   exit

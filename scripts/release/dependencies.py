@@ -1,9 +1,9 @@
 """Judges the dependencies by deny.toml, and lists them in a software bill of materials.
 
-    python scripts/dependencies.py check     licences, bans and sources; the bill is valid and up to date
-    python scripts/dependencies.py write     writes ventriform.cdx.json anew
-    python scripts/dependencies.py python            prints the bill of the Python package
-    python scripts/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of scripts/image.sh
+    python scripts/release/dependencies.py check     licences, bans and sources; the bill is valid and up to date
+    python scripts/release/dependencies.py write     writes ventriform.cdx.json anew
+    python scripts/release/dependencies.py python            prints the bill of the Python package
+    python scripts/release/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of scripts/release/image.sh
 
 The bill is CycloneDX 1.6. It holds what the program is built of: every crate that the default features need at run
 time or at build time on Linux, the C libraries inside of them, and the npm packages inside of the page. That of the
@@ -20,7 +20,7 @@ from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from license_expression import get_spdx_licensing
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 BILL = ROOT / "ventriform.cdx.json"
 PLATFORM = "x86_64-unknown-linux-gnu"
 
@@ -182,7 +182,7 @@ def main():
         return
     faults = list(judge())
     if not BILL.exists() or BILL.read_text() != text:
-        faults.append(f"{BILL.name} is out of date; write it anew: python scripts/dependencies.py write")
+        faults.append(f"{BILL.name} is out of date; write it anew: python scripts/release/dependencies.py write")
     print(*faults, sep="\n")
     print(f"{text.count('bom-ref')} components, {len(faults)} faults")
     sys.exit(bool(faults))

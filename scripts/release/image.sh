@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Packs a program as an image of a container, by the last stage of the Dockerfile and without an engine.
 #
-#   SOURCE_DATE_EPOCH=SECONDS scripts/image.sh PROGRAM LICENCES OUT
+#   SOURCE_DATE_EPOCH=SECONDS scripts/release/image.sh PROGRAM LICENCES OUT
 #
 # In: a program for x86_64, and the licence texts of what it contains. Out: OUT.image.tar.gz, named ventriform:VERSION, which
 # `docker load` and `podman load` read; and OUT.image.packages, the Debian packages in it: name, version, architecture, source, version of the source.
@@ -15,7 +15,7 @@
 #
 # Needs root.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 program=$(realpath "$1")
 licences=$(realpath "$2")
 out=$(realpath -m "$3")

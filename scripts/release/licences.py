@@ -1,6 +1,6 @@
 """Writes the licence texts of all crates that a package is built of, one after the other.
 
-    python scripts/licences.py PACKAGE > THIRD-PARTY
+    python scripts/release/licences.py PACKAGE > THIRD-PARTY
 
 Of every crate that PACKAGE (`ventriform-program`, `ventriform-python`) needs at run time on Linux: name, version, the
 licence that it states, and the texts that lie beside its sources; crates with the same text share it. Crates that come
@@ -8,7 +8,7 @@ without a text are listed at the end. Needs cargo alone.
 """
 import json, pathlib, subprocess, sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLATFORM = "x86_64-unknown-linux-gnu"
 # Names of files with licences.
 NAMES = ("license", "licence", "copying", "unlicense", "notice", "copyright")

@@ -1,4 +1,4 @@
-// The pictures of scripts/pictures.sh, which sets PROGRAM, CHROMIUM and PICTURES: a service of its own, a phantom, the page.
+// The pictures of scripts/release/pictures.sh, which sets PROGRAM, CHROMIUM and PICTURES: a service of its own, a phantom, the page.
 
 import { spawnSync } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";

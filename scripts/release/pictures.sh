@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Makes the README's pictures anew: the page with a fitted phantom, and the fitted wall in three dimensions.
 #
-#   scripts/pictures.sh        writes docs/pictures/page.png and docs/pictures/wall.png
+#   scripts/release/pictures.sh        writes docs/pictures/page.png and docs/pictures/wall.png
 #
 # PROGRAM: a program that is built already; CHROMIUM: a browser. Needs node, npm, chromium and pngquant (Debian packages).
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 missing=()
 for name in node npm chromium pngquant; do
   command -v "$name" >/dev/null || missing+=("${name/#node/nodejs}")
@@ -13,7 +13,7 @@ done
 [ ${#missing[@]} -eq 0 ] || { apt-get update -qq && apt-get install -y -qq "${missing[@]}"; } >/dev/null
 tools=$PWD/target/test-tools/pictures
 mkdir -p "$tools" docs/pictures
-cp web/package.json web/package-lock.json scripts/pictures.mjs web/tests/service.mjs "$tools/"
+cp web/package.json web/package-lock.json scripts/release/pictures.mjs web/tests/service.mjs "$tools/"
 [ -d "$tools/node_modules/playwright-core" ] || (cd "$tools" && npm install --silent --no-fund --no-audit)
 export PROGRAM=$(realpath -m "${PROGRAM:-target/debug/ventriform}") CHROMIUM=${CHROMIUM:-/usr/bin/chromium} PICTURES=$PWD/docs/pictures
 [ -x "$PROGRAM" ] || cargo build --quiet --bins

@@ -1,16 +1,16 @@
 """Writes what the Python package knows of the library's tables and documents.
 
-    python scripts/python_types.py check     the committed files are those that would be written
-    python scripts/python_types.py write     writes them anew
-    python scripts/python_types.py reference FILE     writes signatures and docstrings as JSON, for the site
+    python scripts/release/python_types.py check     the committed files are those that would be written
+    python scripts/release/python_types.py write     writes them anew
+    python scripts/release/python_types.py reference FILE     writes signatures and docstrings as JSON, for the site
 
 `python/ventriform/reports.py` has the reports' classes, from openapi/ventriform.json; `_functions.pyi` the signatures of
 the functions that take parameters, from the tables of the installed package (so install it first, or run
-scripts/check_python.sh --write, which does).
+scripts/check/python.sh --write, which does).
 """
 import ast, inspect, json, keyword, pathlib, sys, textwrap
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python/ventriform"
 
 # The documents that the package returns; what they refer to follows.
@@ -104,7 +104,7 @@ def reports():
         wanted += found
     head = '''"""The reports as classes, one for each document of the service's OpenAPI description.
 
-Written by scripts/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
+Written by scripts/release/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
 millilitres, angles degrees, as the names' endings say. Positions are LPS.
 """
 
@@ -127,7 +127,7 @@ def stub():
 
     source = (PACKAGE / "_functions.py").read_text()
     tree = ast.parse(source)
-    lines = ['"""Signatures of `_functions`. Written by scripts/python_types.py: change that, or the library\'s tables."""', ""]
+    lines = ['"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library\'s tables."""', ""]
     results = [alias.name for node in tree.body if getattr(node, "module", "") == "_results" for alias in node.names]
     lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from datetime import datetime", "from typing import Any, Literal", ""]
     lines += [f"from ._results import {', '.join(name for name in results if name[0].isupper())}", ""]
@@ -205,7 +205,7 @@ def main():
         elif not path.exists() or path.read_text() != text:
             stale.append(path.relative_to(ROOT))
     if stale:
-        sys.exit(f"out of date: {', '.join(map(str, stale))}; write anew: scripts/check_python.sh --write")
+        sys.exit(f"out of date: {', '.join(map(str, stale))}; write anew: scripts/check/python.sh --write")
 
 
 if __name__ == "__main__":

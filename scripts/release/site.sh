@@ -2,17 +2,17 @@
 # Builds the site of the docs into target/site/html: README and docs/, the notebooks, the references of the HTTP API and of
 # the Python package, with a search. Nothing in it is loaded from elsewhere.
 #
-# The reference has the parameters of the installed package, whose wheel scripts/check_python.sh builds where there is none; the
+# The reference has the parameters of the installed package, whose wheel scripts/check/python.sh builds where there is none; the
 # notebooks have the outputs of their last run there, or are run.
 #
-#   scripts/site.sh            builds it
-#   scripts/site.sh --check    and checks it: links and anchors of the sources and of the pages, parameters of the reference and
+#   scripts/release/site.sh            builds it
+#   scripts/release/site.sh --check    and checks it: links and anchors of the sources and of the pages, parameters of the reference and
 #                              outputs of the notebooks, and every page in Chromium, which must not ask any other host; what the search finds, from a web server and from the disk
-#   scripts/site.sh --serve    builds it and shows it on 127.0.0.1:8000
+#   scripts/release/site.sh --serve    builds it and shows it on 127.0.0.1:8000
 #
 # Needs python3 with venv, and npm; --check needs chromium. The packages are laid under target/.
 set -euo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/../.."
 tools=$PWD/target/test-tools/site
 source=target/site/source
 mkdir -p "$tools"
@@ -27,7 +27,7 @@ if ! cmp -s site/package.json "$tools/package.done"; then
   cp site/package.json "$tools/package.done"
 fi
 package=$PWD/target/test-tools/python-package/bin/python
-"$package" -c 'import ventriform' 2>/dev/null || scripts/check_python.sh --build
+"$package" -c 'import ventriform' 2>/dev/null || scripts/check/python.sh --build
 
 # A copy of the pages laid out as in this folder: the links between them are those of the repository.
 rm -rf target/site
@@ -35,9 +35,9 @@ mkdir -p "$source/python" "$source/openapi" "$source/crates/ventriform" "$source
 cp -r README.md ARCHITECTURE.md CONTRIBUTING.md CHANGELOG.md SECURITY.md docs "$source/"
 cp -r python/examples "$source/python/"
 ran=$PWD/target/test-tools/notebooks
-sha256sum --status -c "$ran/sources" 2>/dev/null || scripts/check_python.sh --notebooks
+sha256sum --status -c "$ran/sources" 2>/dev/null || scripts/check/python.sh --notebooks
 cp "$ran"/*.ipynb "$source/python/examples/"
-"$package" scripts/python_types.py reference target/site/reference.json
+"$package" scripts/release/python_types.py reference target/site/reference.json
 cp -r crates/ventriform/examples "$source/crates/ventriform/"
 cp openapi/ventriform.json "$source/openapi/"
 cp site/*.md "$source/site/"

@@ -166,7 +166,7 @@ fn every_operation_has_an_id_of_its_own_and_examples() {
                 let json = ["application/json", "application/problem+json"];
                 assert!(
                     !json.contains(&media_type.as_str()) || shared || !example.is_null(),
-                    "{what} {status}: record its examples: scripts/check_contract.py --record"
+                    "{what} {status}: record its examples: scripts/check/contract.py --record"
                 );
             }
         }

@@ -1,4 +1,4 @@
-//! The service behind a proxy, and what clients and proxies send in many ways. scripts/check_proxy.sh tries the same with
+//! The service behind a proxy, and what clients and proxies send in many ways. scripts/check/proxy.sh tries the same with
 //! nginx.
 
 use crate::helpers::{Service, TestApp, closed, key, problem, text, volume};

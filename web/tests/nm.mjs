@@ -158,7 +158,7 @@ export function pair(nifti) {
 /** How much shorter every length about the heart is at end systole, and when that is, in turns of the cycle. */
 const [SHRINKAGE, SYSTOLE] = [0.1, 0.375];
 
-/** The gates of a beat as `scripts/gated_phantom.py` makes them: the scan drawn together about the heart and let go again. */
+/** The gates of a beat as `scripts/lib/gated_phantom.py` makes them: the scan drawn together about the heart and let go again. */
 function beat(nifti, truth, gates) {
   const file = gunzipSync(nifti);
   const [nx, ny, nz] = [42, 44, 46].map(at => file.readInt16LE(at));

@@ -1,4 +1,4 @@
-// The page in a browser, as a person uses it. Run by scripts/check_page.sh, which sets PROGRAM, SCREENSHOTS and CHROMIUM.
+// The page in a browser, as a person uses it. Run by scripts/check/page.sh, which sets PROGRAM, SCREENSHOTS and CHROMIUM.
 //
 // Every view is looked at by axe-core; anything that the console reports, that the policy forbids, or that leaves this
 // machine fails the check.

@@ -57,7 +57,7 @@ def area(surface):
 
 
 class Remesher:
-    """A library built from scripts/peers/*.cpp. `remesh(V, nv, F, nf, target)` returns the number of
+    """A library built from scripts/measure/peers/*.cpp. `remesh(V, nv, F, nf, target)` returns the number of
     vertices it made."""
 
     def __init__(self, library):

@@ -1,4 +1,4 @@
-//! Writes the table of features from which `scripts/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
+//! Writes the table of features from which `scripts/measure/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
 //! `crates/ventriform/src/deform/calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz` of every case in

@@ -1,4 +1,4 @@
-//! Writes the table of volumes from which `scripts/calibrate_intervals.py` estimates the constants of
+//! Writes the table of volumes from which `scripts/measure/calibrate_intervals.py` estimates the constants of
 //! `crates/ventriform/src/judge/volume_calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every case in the

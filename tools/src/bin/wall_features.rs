@@ -1,4 +1,4 @@
-//! Writes the tables of features from which `scripts/calibrate_walls.py` estimates the constants of
+//! Writes the tables of features from which `scripts/measure/calibrate_walls.py` estimates the constants of
 //! `crates/ventriform/src/deform/calibration.rs` and `crates/ventriform/src/judge/uncertainty_calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of

@@ -11,7 +11,7 @@
 //! 4. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
 //! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
-//!    `scripts/check_contract.py`, and a command line for curl.
+//!    `scripts/check/contract.py`, and a command line for curl.
 //! 6. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;

@@ -13,7 +13,7 @@
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
-//! The coefficients are a least-squares fit to simulated hearts whose walls are known; `scripts/calibrate_walls.py`
+//! The coefficients are a least-squares fit to simulated hearts whose walls are known; `scripts/measure/calibrate_walls.py`
 //! estimates them again. Two other
 //! ways were tried on the same hearts and came out behind. A fixed shift of both surfaces makes
 //! small hearts too thin. A forward model (the wall rendered, blurred and compared with the image)

@@ -15,7 +15,7 @@
 //! 5. Nodes within [`STRETCHED_LENGTH_MM`](super::rim_frame::STRETCHED_LENGTH_MM) of the rim move along the axis, those
 //!    at the rim by the whole, so that the wall is stretched or compressed there.
 //!
-//! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
+//! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/measure/calibrate_walls.py`
 //! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
 //! by shape and 2.9 with the ends of the signal (docs/evaluation.md). Not guaranteed: an infarct over half of the base
 //! moves the shape itself; a wall that is short where its base is dark stays too long. A model whose orientation is unknown

@@ -7,7 +7,7 @@
 //! - [`of_motion`]: that the patient moved during the scan;
 //! - [`of_heart`]: that what was fitted is a left ventricle.
 //!
-//! 1. All are [logistic models](super::logistic) whose constants `scripts/calibrate.py` estimates from fits to simulated
+//! 1. All are [logistic models](super::logistic) whose constants `scripts/measure/calibrate.py` estimates from fits to simulated
 //!    hearts ([`calibration`]). Hearts that are hard to fit are over-represented, so the chances are cautious.
 //! 2. Of several fits the mean logarithm of the odds scatters less than that of one.
 //! 3. Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join the chances.

@@ -47,7 +47,7 @@ impl AxisPair {
     /// Both.
     pub const ALL: [Self; 2] = [Self::SidesAndLength, Self::DepthAndLength];
 
-    /// The score below which these axes count as exchanged. `scripts/calibrate_axes.py` estimates it, .1 below the lowest of
+    /// The score below which these axes count as exchanged. `scripts/measure/calibrate_axes.py` estimates it, .1 below the lowest of
     /// 280 images that are right or cut out about the heart (.01, -.18). Held out, it tells 69 of 69 exchanged ones and none of
     /// 276 right ones, for either pair; the highest score of an exchanged one of the estimate is -.32, -.34.
     pub fn flag_score(self) -> f64 {

@@ -14,7 +14,7 @@
 //! beginning that is as large as its range, and so have scans at rest after scans under stress.
 //!
 //! Guaranteed: volumes in another order that is the same cycle, forwards or backwards, have the same course. Not guaranteed: that
-//! volumes in a chance order are refused; by chance one of 30 to 100 orders passes. The bounds are those of `scripts/gate_look.py`, figures
+//! volumes in a chance order are refused; by chance one of 30 to 100 orders passes. The bounds are those of `scripts/measure/gate_look.py`, figures
 //! are in `docs/evaluation.md`.
 
 use crate::grid::blur::{Kernel, blur};

@@ -15,7 +15,7 @@
 //! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes are moments of
 //! one beat; a fit tells ([`crate::beat`]).
 //!
-//! The bounds are those of `scripts/gate_look.py`, which measures simulated beats, hearts of several people and
+//! The bounds are those of `scripts/measure/gate_look.py`, which measures simulated beats, hearts of several people and
 //! reconstructions of scans.
 
 use super::beat_evidence::{Blocks, Course};
