@@ -14,84 +14,17 @@ Loopback, and two addresses of its own namespace; stops by itself. Needs Postgre
 (scripts/requirements.txt), and root for PostgreSQL's user and the namespace. About 5 s a round on two cores.
 The last line is a JSON object; the exit status is 0 if nothing was lost, corrupt or made twice.
 """
-import argparse, glob, gzip, hashlib, json, os, random, shutil, signal, socket, struct, subprocess, sys
+import argparse, gzip, hashlib, json, os, random, shutil, signal, socket, struct, subprocess, sys
 import tempfile, threading, time
 
-from crash_rounds import FINAL, ROOT, Service
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.servers import Postgres, run, s3_server
+from lib.service import FINAL, ROOT, Service
 
 LEASE = 3
 # Jobs of a round; the checks wait for all of them.
 JOBS = 8
 NEAR, FAR = "10.213.77.1", "10.213.77.2"
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
-
-
-def run(*command, **options):
-    return subprocess.run(command, check=True, capture_output=True, text=True, **options).stdout
-
-
-def s3_server():
-    """Starts moto with the bucket `hearts`; the process and its port."""
-    port = free_port()
-    process = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    for _ in range(300):
-        if subprocess.run(["curl", "-fs", "-X", "PUT", f"http://127.0.0.1:{port}/hearts"], capture_output=True).returncode == 0:
-            return process, port
-        time.sleep(0.1)
-    process.kill()
-    raise SystemExit("moto does not start")
-
-
-class Postgres:
-    """A database server of its own, on loopback and on the address that the other namespace sees."""
-
-    def __init__(self, folder, addresses, settings=()):
-        self.settings = [part for setting in settings for part in ("-c", setting)]
-        self.bin = sorted(glob.glob("/usr/lib/postgresql/*/bin"))[-1] + "/"
-        self.data, self.port, self.addresses = folder + "/postgres", free_port(), addresses
-        os.makedirs(self.data)
-        shutil.chown(self.data, "postgres", "postgres")
-        self.command(self.bin + "initdb", "-A", "trust", "-U", "ventriform", "-E", "UTF8", "--no-locale", self.data)
-        with open(self.data + "/pg_hba.conf", "a") as file:
-            file.write(f"host all all {FAR}/32 trust\n")
-        self.start()
-        self.query("CREATE DATABASE ventriform", "postgres")
-
-    def command(self, *command):
-        return run("setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups", *command, cwd="/")
-
-    def start(self):
-        """Starts the server, again if what a kill left of the one before is still there."""
-        command = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups", self.bin + "postgres", "-D", self.data,
-                   "-p", str(self.port), "-k", "", "-c", "listen_addresses=" + ",".join(self.addresses), *self.settings]
-        ready = [self.bin + "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform"]
-        deadline = time.time() + 60
-        self.process = None
-        while time.time() < deadline:
-            if self.process is None or self.process.poll() is not None:
-                with open(self.data + ".log", "ab") as log:
-                    self.process = subprocess.Popen(command, cwd="/", stdout=log, stderr=log)
-            if subprocess.run(ready).returncode == 0:
-                return
-            time.sleep(0.05)
-        raise SystemExit(f"PostgreSQL does not start; see {self.data}.log")
-
-    def query(self, text, database="ventriform"):
-        out = run(self.bin + "psql", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform", "-Atqc", text, database)
-        return [line.split("|") for line in out.splitlines()]
-
-    def url(self, address):
-        return f"postgres://ventriform@{address}:{self.port}/ventriform?sslmode=disable"
-
-    def end(self, how):
-        self.process.send_signal(how)
-        self.process.wait(60)
 
 
 class Proxy:
@@ -174,7 +107,7 @@ class Chaos:
             print(f"no partition: this machine gives no network namespace ({getattr(error, 'stderr', error)})", flush=True)
             self.kinds = [kind for kind in self.kinds if kind != "partition"]
         near = self.far_address()
-        self.postgres = Postgres(self.folder, ["127.0.0.1", *near])
+        self.postgres = Postgres(self.folder, ["127.0.0.1", *near], others=[FAR])
         self.store, port = s3_server()
         self.proxy = Proxy(port, near)
         os.environ |= {"AWS_ACCESS_KEY_ID": "chaos", "AWS_SECRET_ACCESS_KEY": "chaos", "AWS_REGION": "us-east-1"}

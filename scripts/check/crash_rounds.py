@@ -10,62 +10,13 @@ old database is migrated. Loopback only; stops by itself; needs Python 3 and not
 has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
 corrupt, orphaned, made twice or without its row.
 """
-import argparse, gzip, hashlib, http.client, json, os, random, shutil, socket, sqlite3, struct, subprocess
+import argparse, gzip, hashlib, json, os, random, shutil, sqlite3, struct, subprocess
 import sys, tempfile, threading, time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-FINAL = ("succeeded", "failed", "cancelled")
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.service import FINAL, ROOT, Service
+
 SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
-
-
-class Service:
-    """The program on a data folder and a free port."""
-
-    def __init__(self, program, data, *arguments, wait=True, prefix=()):
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            self.port = s.getsockname()[1]
-        started = time.perf_counter()
-        self.log = open(data + ".log", "ab")
-        command = [*prefix, program, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", data, *arguments]
-        self.process = subprocess.Popen(command, stdout=self.log, stderr=self.log)
-        while wait:
-            if self.process.poll() is not None:
-                raise SystemExit(f"the service ended; see {data}.log")
-            try:
-                if self.ask("GET", "/readyz", timeout=2)[0] == 200:
-                    break
-            except OSError:
-                pass
-            if time.perf_counter() - started > 30:
-                raise SystemExit("not ready after 30 s")
-            time.sleep(0.002)
-        self.ready_ms = (time.perf_counter() - started) * 1e3
-
-    def ask(self, method, path, body=None, headers={}, timeout=30):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=timeout)
-        try:
-            connection.request(method, path, body, headers)
-            answer = connection.getresponse()
-            return answer.status, answer.read()
-        except http.client.HTTPException as error:
-            raise OSError(str(error)) from error
-        finally:
-            connection.close()
-
-    def json(self, *request, **options):
-        status, body = self.ask(*request, **options)
-        return status, json.loads(body) if body else None
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-        self.log.close()
-
-    def stop(self):
-        self.process.terminate()
-        self.process.wait(60)
-        self.log.close()
 
 
 class Rounds:

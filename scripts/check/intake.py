@@ -6,8 +6,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.request
-import json
 from io import BytesIO
 from pathlib import Path
 
@@ -28,6 +26,9 @@ from pydicom.uid import (
 )
 from pynetdicom import AE, build_context
 from pynetdicom.sop_class import Verification
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from lib.service import Service
 
 AE_TITLE = "VENTRIFORM"
 # Long, for machines that do much else.
@@ -100,29 +101,12 @@ def as_file(data, syntax=ExplicitVRLittleEndian):
     return pydicom.dcmread(buffer)
 
 
-class Service:
+class Receiver(Service):
+    """The service with a DICOM listener, and what it has received."""
+
     def __init__(self, program, folder, *flags):
-        self.program, self.folder, self.flags = program, folder, flags
-        self.start()
-
-    def start(self):
-        log = open(self.folder / "log", "ab")
-        self.process = subprocess.Popen(
-            [self.program, "serve", "--listen", "127.0.0.1:0", "--dicom-listen", "127.0.0.1:0",
-             "--data-dir", str(self.folder / "data"), "--series-quiet", "500ms", "--series-patience", "4s",
-             "--shutdown-grace", "5s", *self.flags],
-            stdout=subprocess.PIPE, stderr=log, text=True)
-        words = self.process.stdout.readline().split()
-        self.url = next(word for word in words if word.startswith("http"))
-        self.port = int(words[-1].rsplit(":", 1)[1])
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-
-    def get(self, path):
-        with urllib.request.urlopen(self.url + path, timeout=PATIENCE) as answer:
-            return json.load(answer)
+        quick = ["--series-quiet", "500ms", "--series-patience", "4s", "--shutdown-grace", "5s"]
+        super().__init__(program, folder / "data", *quick, *flags, log=folder / "log", dicom=True)
 
     def groups(self):
         return self.get("/v1/intake?limit=100")["intake"]
@@ -141,14 +125,14 @@ class Service:
         return self.get(group["links"]["volume"])["shape"]
 
     def echo(self):
-        done = subprocess.run(["echoscu", "-aec", AE_TITLE, "127.0.0.1", str(self.port)], check=False)
+        done = subprocess.run(["echoscu", "-aec", AE_TITLE, "127.0.0.1", str(self.dicom_port)], check=False)
         check(done.returncode == 0, "echoscu")
 
     def associate(self, *contexts):
         ae = AE("PYNETDICOM")
         ae.acse_timeout = ae.dimse_timeout = ae.network_timeout = PATIENCE
         ae.requested_contexts = [build_context(Verification), *contexts]
-        association = ae.associate("127.0.0.1", self.port, ae_title=AE_TITLE)
+        association = ae.associate("127.0.0.1", self.dicom_port, ae_title=AE_TITLE)
         check(association.is_established, "pynetdicom: association")
         return association
 
@@ -159,7 +143,7 @@ def storescu(service, folder, files, *flags):
     for number, file in enumerate(files):
         paths.append(folder / f"{number}.dcm")
         file.save_as(paths[-1])
-    command = ["storescu", "-aec", AE_TITLE, *flags, "127.0.0.1", str(service.port), *map(str, paths)]
+    command = ["storescu", "-aec", AE_TITLE, *flags, "127.0.0.1", str(service.dicom_port), *map(str, paths)]
     return subprocess.run(command, check=False, stderr=subprocess.DEVNULL).returncode
 
 
@@ -206,7 +190,7 @@ def send_by_other_programs(service, folder):
     data = nuclear(12)
     as_file(data).save_as(plain)
     subprocess.run(["dcmcjpls", plain, jpeg_ls], check=True)
-    send = ["storescu", "-xt", "-aec", AE_TITLE, "127.0.0.1", str(service.port), jpeg_ls]
+    send = ["storescu", "-xt", "-aec", AE_TITLE, "127.0.0.1", str(service.dicom_port), jpeg_ls]
     check(subprocess.run(send, check=False).returncode == 0, "storescu: JPEG-LS")
     number += 1
     found = service.get(service.settled(number)[data.SeriesInstanceUID]["links"]["volume"])
@@ -260,11 +244,11 @@ def kills(service, number, rounds=5):
     group = service.settled(number + 1)[series]
     check(group["objects"] == acknowledged, f"{group['objects']} of {acknowledged} objects")
     check(service.shape(group) == [16, 16, acknowledged], "shape after the kills")
-    left = os.listdir(service.folder / "data" / "received")
+    left = os.listdir(f"{service.data}/received")
     end = time.time() + PATIENCE
     while len(left) > 1 and time.time() < end:
         time.sleep(0.1)
-        left = os.listdir(service.folder / "data" / "received")
+        left = os.listdir(f"{service.data}/received")
     check(len(left) == 1, f"only the projection's file is left, not {left}")
     return acknowledged
 
@@ -272,9 +256,9 @@ def kills(service, number, rounds=5):
 def garbage(service):
     """Connections that are none; then the service still answers."""
     rng = random.Random(1)
-    silent = [socket.create_connection(("127.0.0.1", service.port)) for _ in range(500)]
+    silent = [socket.create_connection(("127.0.0.1", service.dicom_port)) for _ in range(500)]
     for number in range(500):
-        with socket.create_connection(("127.0.0.1", service.port)) as stream:
+        with socket.create_connection(("127.0.0.1", service.dicom_port)) as stream:
             kind = bytes([rng.randrange(256) if number % 2 else rng.randrange(1, 8)])
             length = rng.choice([0, 4, 70, 0xFFFF, 0xFFFFFFFF]).to_bytes(4, "big")
             try:
@@ -284,8 +268,8 @@ def garbage(service):
     service.echo()
     for stream in silent:
         stream.close()
-    memory = next(l for l in open(f"/proc/{service.process.pid}/status") if l.startswith("VmHWM"))
-    check(int(memory.split()[1]) < 400_000, memory)
+    memory_kib = service.figure("VmHWM")
+    check(memory_kib < 400_000, f"at most {memory_kib} KiB of memory")
     service.echo()
 
 
@@ -303,7 +287,7 @@ def encrypted(program, folder):
         openssl("req", *new, "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")
         openssl("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
                 "-extfile", "leaf", "-out", f"{name}.pem")
-    service = Service(program, folder, "--dicom-tls-cert", str(folder / "service.pem"),
+    service = Receiver(program, folder, "--dicom-tls-cert", str(folder / "service.pem"),
                       "--dicom-tls-key", str(folder / "service.key"),
                       "--dicom-tls-client-ca", str(folder / "ca.pem"))
     try:
@@ -323,7 +307,7 @@ def encrypted(program, folder):
 
 def main():
     program, folder = sys.argv[1], Path(sys.argv[2])
-    service = Service(program, folder)
+    service = Receiver(program, folder)
     try:
         number = send_by_other_programs(service, folder)
         number = stow(service, number)
@@ -331,8 +315,7 @@ def main():
         garbage(service)
         log = (folder / "log").read_text()
         check("CANARY" not in log and "Canary" not in log, "the log names no patient")
-        service.process.terminate()
-        check(service.process.wait(30) == 0, "the service ends in order")
+        check(service.stop(30) == 0, "the service ends in order")
     finally:
         service.process.kill()
     encrypted(program, folder / "tls")

@@ -12,7 +12,6 @@ import http.server
 import json
 import os
 import random
-import re
 import selectors
 import socket
 import struct
@@ -21,9 +20,10 @@ import sys
 import tempfile
 import threading
 import time
-import urllib.error
-import urllib.request
 import zlib
+
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.service import Service
 
 GIB = 1 << 30
 NM_CLASS, PET_CLASS = b"1.2.840.10008.5.1.4.1.1.20", b"1.2.840.10008.5.1.4.1.1.128"
@@ -34,58 +34,24 @@ HOST = b"Host: localhost\r\nX-Forwarded-For: 192.0.2.66\r\n"
 HONEST = {"X-Forwarded-For": "192.0.2.7"}
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+def start(program, folder, *flags):
+    """The service with a limit of memory, behind a proxy that says for whom a request is."""
+    prefix = ["prlimit", f"--data={GIB}", "--cpu=60", "--nofile=16384"]
+    return Service(program, folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", *flags, prefix=prefix, dicom=True)
 
 
-class Service:
-    def __init__(self, program, folder, *arguments):
-        self.port, self.dicom_port, self.folder = free_port(), free_port(), folder
-        self.url = f"http://127.0.0.1:{self.port}"
-        self.log = open(folder + ".log", "wb")
-        command = ["prlimit", f"--data={GIB}", "--cpu=60", "--nofile=16384", program, "serve", "--listen", f"127.0.0.1:{self.port}",
-                   "--data-dir", folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", "--dicom-listen", f"127.0.0.1:{self.dicom_port}", *arguments]
-        self.process = subprocess.Popen(command, stdout=self.log, stderr=subprocess.STDOUT)
-        end = time.time() + 30
-        while time.time() < end and self.process.poll() is None:
-            try:
-                urllib.request.urlopen(self.url + "/readyz", timeout=2).read()
-                return
-            except OSError:
-                time.sleep(0.05)
-        sys.exit(f"the service did not start: {open(folder + '.log').read()[-500:]}")
+def connect(service):
+    s = socket.create_connection(("127.0.0.1", service.port), 10)
+    s.settimeout(10)
+    return s
 
-    def figure(self, name):
-        status = open(f"/proc/{self.process.pid}/status").read()
-        return int(re.search(name + r":\s+(\d+)", status)[1])
 
-    def memory(self, what="VmHWM"):
-        return self.figure(what) >> 10
-
-    def ask(self, method, path, body=None, headers=None, timeout=30):
-        request = urllib.request.Request(self.url + path, data=body, method=method, headers=headers or {})
+def stop(service):
+    if service.process.poll() is None:
         try:
-            with urllib.request.urlopen(request, timeout=timeout) as answer:
-                return answer.status, answer.read()
-        except urllib.error.HTTPError as answer:
-            return answer.code, answer.read()
-
-    def connect(self):
-        s = socket.create_connection(("127.0.0.1", self.port), 10)
-        s.settimeout(10)
-        return s
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(20)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
-        self.log.close()
+            service.stop(20)
+        except subprocess.TimeoutExpired:
+            pass  # killed
 
 
 class Honest(threading.Thread):
@@ -149,7 +115,7 @@ def held(service, requests, count, seconds=2):
     open_ones, refused = [], 0
     for number in range(count):
         try:
-            s = service.connect()
+            s = connect(service)
             s.sendall(requests(number))
             open_ones.append(s)
         except OSError:
@@ -552,7 +518,7 @@ def header_bombs(service, seconds=4):
     def stow():
         while time.time() < end:
             try:
-                with service.connect() as s:
+                with connect(service) as s:
                     s.sendall(head("POST", "/dicom-web/studies", len(whole), "application/dicom") + whole)
                     sent["STOW-RS"] += 1
                     time.sleep(0.3)
@@ -643,7 +609,7 @@ def repeated(service, request, connections=2000, seconds=8):
     waiting, said, end = selectors.DefaultSelector(), {}, time.time() + seconds
     for number in range(connections):
         try:
-            s = service.connect()
+            s = connect(service)
             s.sendall(request(number, 0))
             waiting.register(s, selectors.EVENT_READ, [number, 0])
         except OSError:
@@ -708,7 +674,7 @@ MOST_MEBIBYTES = 640
 def attempt(attack, program, patience):
     began = time.time()
     with tempfile.TemporaryDirectory() as folder:
-        service = Service(program, folder + "/data", "--queue-limit", "1000", *FLAGS.get(attack, []))
+        service = start(program, folder + "/data", "--queue-limit", "1000", *FLAGS.get(attack, []))
         honest = Honest(service, nifti())
         honest.start()
         said, wrong = "", []
@@ -721,7 +687,7 @@ def attempt(attack, program, patience):
         if service.process.poll() is not None:
             wrong.append(f"the service died: {service.process.poll()}")
         else:
-            most = service.memory()
+            most = service.figure("VmHWM") >> 10
             said += f", at most {most} MiB"
             if most > MOST_MEBIBYTES:
                 wrong.append("the budgets do not bound the memory")
@@ -732,7 +698,7 @@ def attempt(attack, program, patience):
             wrong.append(f"refused: {honest.refused[:3]}")
         if honest.slowest[0] > patience:
             wrong.append("an honest request took too long")
-        service.stop()
+        stop(service)
         slowest = f"slowest of {honest.asked} honest requests {honest.slowest[0]:.2f} s ({honest.slowest[1]})"
         took = time.time() - began
         print(f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {took:.0f} s; {slowest} {'; '.join(wrong)}", flush=True)

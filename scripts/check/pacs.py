@@ -19,7 +19,6 @@ import io
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -35,15 +34,10 @@ from dicom import NAMES, cases, check_object, check_results
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lib.nm import LPS, nm
+from lib.service import FINAL, Service, free_port
 
 MODEL_NAMES = ["mesh", "surface"]
 PATIENCE = 300
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def until(what, found, limit=PATIENCE):
@@ -134,11 +128,10 @@ class Archive:
               {**self.headers, "Content-Type": kind, "Accept": "application/dicom+json"})
 
 
-class Service:
-    """The service on loopback, with three archives that are all the same one."""
+class Exchange(Service):
+    """The service with three archives that are all the same one."""
 
     def __init__(self, program, folder, archive):
-        self.program, self.folder, self.archive = program, folder, archive
         folder.mkdir()
         (folder / "ventriform.toml").write_text(f'''
 archive_backoff = "500ms"
@@ -167,33 +160,17 @@ send = ["mesh.dcm"]
 ae_title = "ORTHANC"
 addresses = ["127.0.0.1"]
 ''')
-        self.start()
-
-    def start(self):
-        environment = {**os.environ, "CHECK_USER": self.archive.user,
-                       "CHECK_PASSWORD": self.archive.password, "CHECK_WRONG": "wrong"}
-        command = [self.program, "serve", "--listen", "127.0.0.1:0", "--dicom-listen", "127.0.0.1:0",
-                   "--data-dir", self.folder / "data", "--config", self.folder / "ventriform.toml"]
-        log = open(self.folder / "log", "ab")
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=environment, text=True)
-        words = self.process.stdout.readline().split()
-        self.url = next(word for word in words if word.startswith("http"))
-        self.dicom = int(words[-1].rsplit(":", 1)[1])
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-
-    def json(self, path):
-        return json.loads(fetch(self.url + path)[0])
+        passwords = {"CHECK_USER": archive.user, "CHECK_PASSWORD": archive.password, "CHECK_WRONG": "wrong"}
+        super().__init__(program, folder / "data", "--config", folder / "ventriform.toml", log=folder / "log",
+                         environment=passwords, dicom=True)
 
     def file(self, **job):
         body = json.dumps(job).encode()
         return json.loads(fetch(self.url + "/v1/jobs", body, {"Content-Type": "application/json"})[0])
 
     def ended(self, job):
-        job = self.json(f"/v1/jobs/{job['id']}")
-        return job if job["state"] in ("succeeded", "failed", "cancelled") else None
+        job = self.get(f"/v1/jobs/{job['id']}")
+        return job if job["state"] in FINAL else None
 
 
 def source(archive, data):
@@ -201,7 +178,7 @@ def source(archive, data):
 
 
 def delivered(service, jobs):
-    return [d for job in jobs for d in service.json(f"/v1/jobs/{job['id']}").get("deliveries", [])
+    return [d for job in jobs for d in service.get(f"/v1/jobs/{job['id']}").get("deliveries", [])
             if d["state"] == "delivered"]
 
 
@@ -246,7 +223,7 @@ def run(archive, service, folder):
     assert archive.count() == len(scans) + wanted, archive.count()
 
     for name, here, affine, to, names, job in scans:
-        job = service.json(f"/v1/jobs/{job['id']}")
+        job = service.get(f"/v1/jobs/{job['id']}")
         nm_file = pydicom.dcmread(here / "nm.dcm")
         held = archive.instances(nm_file.StudyInstanceUID)
         extra = len(MODEL_NAMES) if name == "plain" else 0
@@ -305,7 +282,7 @@ def perform(archive, service, source, delivery):
     path = headers["Location"]
 
     def completed():
-        state = service.json(path)[0]
+        state = service.get(path)[0]
         assert state["00741000"]["Value"][0] != "CANCELED", state
         return state if state["00741000"]["Value"][0] == "COMPLETED" else None
 
@@ -319,7 +296,7 @@ def perform(archive, service, source, delivery):
 def receive(archive, service, scans):
     """Orthanc sends one scan by C-STORE and another by STOW-RS."""
     archive.ask("PUT", "/modalities/ventriform",
-                {"AET": "VENTRIFORM", "Host": "127.0.0.1", "Port": service.dicom})
+                {"AET": "VENTRIFORM", "Host": "127.0.0.1", "Port": service.dicom_port})
     archive.ask("PUT", "/dicom-web/servers/ventriform", {"Url": f"{service.url}/dicom-web/"})
     ways = [("c-store", "/modalities/ventriform/store", {"Synchronous": True}),
             ("stow-rs", "/dicom-web/servers/ventriform/stow", {"Synchronous": True})]
@@ -330,13 +307,13 @@ def receive(archive, service, scans):
         archive.ask("POST", path, {"Resources": [found], **order})
 
         def stored():
-            groups = service.json("/v1/intake")["intake"]
+            groups = service.get("/v1/intake")["intake"]
             groups = [g for g in groups if g["series"] == source.SeriesInstanceUID]
             return groups[0] if groups and groups[0]["state"] == "stored" else None
 
         group = until(protocol, stored)
         assert group["protocol"] == protocol and group["sender"], group
-        volume = service.json(group["links"]["volume"])
+        volume = service.get(group["links"]["volume"])
         frames = source.pixel_array.reshape(-1, source.Rows, source.Columns)
         # Of a gated scan the gates are summed.
         gates = len(frames) // volume["shape"][2]
@@ -351,7 +328,7 @@ def main():
     archive = Archive(folder / "orthanc")
     service = None
     try:
-        service = Service(program, folder / "service", archive)
+        service = Exchange(program, folder / "service", archive)
         run(archive, service, folder)
     except BaseException:
         for log in ("orthanc/log", "service/log"):

@@ -7,11 +7,12 @@ In session mode with PgBouncer's defaults the service starts and computes, each 
 writes anything, a lock that somebody holds ends a request in time, and a PgBouncer that is started anew is found again.
 In the other modes, and where PgBouncer refuses a connection, the service ends at once, and its message begins with the
 cause. Uses the standard library alone; the last line counts the checks."""
-import argparse, glob, json, os, re, shutil, signal, socket, subprocess, sys, tempfile, time, urllib.error, urllib.request
+import argparse, json, os, re, shutil, signal, socket, subprocess, sys, tempfile, time
 
-# Neither PostgreSQL nor PgBouncer runs as root.
-AS_USER = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"] if os.getuid() == 0 else []
-BIN = sorted(glob.glob("/usr/lib/postgresql/*/bin"))[-1] + "/"
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.servers import AS_POSTGRES, Postgres
+from lib.service import Service, free_port
+
 MOST_SECONDS = 60
 passed = failed = 0
 
@@ -20,12 +21,6 @@ def check(fine, what, *more):
     global passed, failed
     passed, failed = passed + bool(fine), failed + (not fine)
     print(("ok: " if fine else "FAILED: ") + what, *([] if fine else more), flush=True)
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def until(condition, what, seconds=MOST_SECONDS):
@@ -46,46 +41,17 @@ def answers(port):
         return False
 
 
-class Postgres:
-    """A server whose log has every statement with its values, by the process that ran it."""
-
-    def __init__(self, folder):
-        self.data = folder + "/postgres"
-        subprocess.run([*AS_USER, BIN + "initdb", "-A", "trust", "-U", "ventriform", "-E", "UTF8", "--no-locale", "-N", self.data],
-                       check=True, cwd="/", stdout=subprocess.DEVNULL)
-        settings = ["listen_addresses=127.0.0.1", "fsync=off", "log_statement=all", "log_line_prefix=%p ", "unix_socket_directories="]
-        settings = [word for setting in settings for word in ("-c", setting)]
-        self.log = open(folder + "/postgres.log", "wb")
-        # Another check may have taken the port before the server does.
-        for _ in range(3):
-            self.port = free_port()
-            command = [*AS_USER, BIN + "postgres", "-D", self.data, "-p", str(self.port), *settings]
-            self.process = subprocess.Popen(command, cwd="/", stdout=self.log, stderr=self.log)
-            ready = [BIN + "pg_isready", "-q", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform"]
-            until(lambda: self.process.poll() is not None or subprocess.run(ready).returncode == 0, "PostgreSQL", 60)
-            if self.process.poll() is None:
-                return
-        raise SystemExit("PostgreSQL does not start: " + open(self.log.name, errors="replace").read()[-2000:])
-
-    def psql(self, text, database="ventriform", **more):
-        command = [BIN + "psql", "-h", "127.0.0.1", "-p", str(self.port), "-U", "ventriform", "-Atqc", text, database]
-        return subprocess.run(command, check=True, capture_output=True, text=True, **more).stdout
-
-    def statements(self):
-        """For each process the statements in order, each with the line of its values."""
-        found, last = {}, None
-        for line in open(self.log.name, errors="replace"):
-            match = re.match(r"(\d+) (LOG|DETAIL):  (?:execute [^:]*: |statement: |parameters: )(.*)", line, re.I)
-            if match and match[2] == "LOG":
-                last = found.setdefault(match[1], [])
-                last.append(match[3])
-            elif match and last:
-                last[-1] += " -- " + match[3]
-        return found
-
-    def end(self):
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(MOST_SECONDS)
+def statements(log):
+    """For each process of the server the statements in order, each with the line of its values."""
+    found, last = {}, None
+    for line in open(log, errors="replace"):
+        match = re.match(r"(\d+) (LOG|DETAIL):  (?:execute [^:]*: |statement: |parameters: )(.*)", line, re.I)
+        if match and match[2] == "LOG":
+            last = found.setdefault(match[1], [])
+            last.append(match[3])
+        elif match and last:
+            last[-1] += " -- " + match[3]
+    return found
 
 
 class PgBouncer:
@@ -104,7 +70,7 @@ auth_file = {users}
 pool_mode = {mode}
 {settings}
 """)
-        self.command = [*AS_USER, shutil.which("pgbouncer", path=os.environ["PATH"] + ":/usr/sbin"), "-q", ini]
+        self.command = [*AS_POSTGRES, shutil.which("pgbouncer", path=os.environ["PATH"] + ":/usr/sbin"), "-q", ini]
         self.start()
 
     def start(self):
@@ -121,80 +87,65 @@ pool_mode = {mode}
         return f"postgres://{user}@127.0.0.1:{self.port}/{database}?sslmode=disable{more}"
 
 
-class Service:
-    def __init__(self, program, folder, url):
-        self.port = free_port()
-        self.url = f"http://127.0.0.1:{self.port}"
-        self.log = folder + "/service.log"
-        command = [program, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", folder + "/data", "--workers", "1",
-                   "--database", url, "--database-wait", "60s", "--min-free", "0B", "--wait-limit", "10m"]
-        self.started = time.time()
-        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=open(self.log, "wb"))
+def start(program, folder, url):
+    return Service(program, folder + "/data", "--workers", "1", "--database", url, "--database-wait", "60s", "--min-free", "0B",
+                   "--wait-limit", "10m", log=folder + "/service.log", wait=False)
 
-    def ask(self, method, path, body=None, headers=None):
-        request = urllib.request.Request(self.url + path, data=body, method=method, headers=headers or {})
-        try:
-            with urllib.request.urlopen(request, timeout=660) as answer:
-                return answer.status, answer.read()
-        except urllib.error.HTTPError as answer:
-            return answer.code, answer.read()
-        except OSError as error:
-            return 0, str(error).encode()
 
-    def is_ready(self):
-        return self.ask("GET", "/readyz")[0] == 200
+def ask(service, *request):
+    try:
+        return service.ask(*request, timeout=660)
+    except OSError as error:
+        return 0, str(error).encode()
 
-    def end(self):
-        self.process.terminate()
-        self.process.wait(60)
 
-    def refusal(self):
-        """What it says, once it has ended, and after how many seconds that was."""
-        try:
-            status = self.process.wait(40)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return "it goes on: " + open(self.log, errors="replace").read()[-600:], 40
-        said = open(self.log, errors="replace").read().strip().splitlines() or [""]
-        return f"status {status}: {said[-1]}", time.time() - self.started
+def refusal(service):
+    """What it says, once it has ended, and after how many seconds that was."""
+    try:
+        status = service.process.wait(40)
+    except subprocess.TimeoutExpired:
+        service.kill()
+        return "it goes on: " + service.said()[-600:], 40
+    said = service.said().strip().splitlines() or [""]
+    return f"status {status}: {said[-1]}", time.perf_counter() - service.started
 
 
 def session_mode(program, folder, postgres, scan):
     # Few connections to the server, so that each has several clients one after the other.
     pooler = PgBouncer(folder, postgres, "session", "default_pool_size = 18")
-    service = Service(program, folder, pooler.url())
+    service = start(program, folder, pooler.url())
     try:
-        check(until(service.is_ready, "the service"), "session mode: the service starts", open(service.log).read()[-600:])
-        made = service.ask("POST", "/v1/models?points=100", scan, {"Prefer": "wait=600"})[0]
+        check(until(service.is_ready, "the service"), "session mode: the service starts", service.said()[-600:])
+        made = ask(service, "POST", "/v1/models?points=100", scan, {"Prefer": "wait=600"})[0]
         check(made in (200, 201, 303), "session mode: a model is made", made)
-        statuses = {service.ask("GET", "/v1/jobs")[0] for _ in range(100)}
+        statuses = {ask(service, "GET", "/v1/jobs")[0] for _ in range(100)}
         check(statuses == {200}, "session mode: a hundred lists", statuses)
 
         # Somebody holds a lock: the session's limit ends the wait.
-        command = [BIN + "psql", "-h", "127.0.0.1", "-p", str(postgres.port), "-U", "ventriform", "-qc",
+        command = [postgres.bin + "psql", *postgres.place(), "-qc",
                    "BEGIN; LOCK TABLE jobs; SELECT pg_sleep(60)", "ventriform"]
         holder = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-        until(lambda: "AccessExclusiveLock" in postgres.psql("SELECT mode FROM pg_locks"), "the lock")
+        until(lambda: ["AccessExclusiveLock"] in postgres.query("SELECT mode FROM pg_locks"), "the lock")
         since = time.time()
-        status = service.ask("GET", "/v1/jobs?limit=3")[0]
+        status = ask(service, "GET", "/v1/jobs?limit=3")[0]
         took = time.time() - since
         check(status == 503 and took < 30, "session mode: a lock ends a request by lock_timeout", status, took)
         holder.kill()
         holder.wait()
-        postgres.psql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != pg_backend_pid()")
+        postgres.query("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != pg_backend_pid()")
         check(until(service.is_ready, "readiness"), "session mode: ready again after the lock")
 
         pooler.end()
-        away = until(lambda: service.ask("GET", "/readyz")[0] == 503, "the loss")
+        away = until(lambda: ask(service, "GET", "/readyz")[0] == 503, "the loss")
         check(away, "PgBouncer is away: not ready")
         pooler.start()
         check(until(service.is_ready, "readiness"), "PgBouncer is back: ready again")
-        check(service.ask("GET", "/v1/models")[0] == 200, "PgBouncer is back: lists are read")
+        check(ask(service, "GET", "/v1/models")[0] == 200, "PgBouncer is back: lists are read")
         # The sessions of the pool, one after the other in each process of the server: limits first.
         sessions = unlimited = 0
-        for statements in postgres.statements().values():
+        for session in statements(postgres.log).values():
             limited = None
-            for text in statements:
+            for text in session:
                 if "DISCARD ALL" in text:
                     limited = None
                 elif "set_config(name, value" in text:
@@ -207,14 +158,14 @@ def session_mode(program, folder, postgres, scan):
         check(sessions > 1, "session mode: sessions with all limits", sessions)
         check(unlimited == 0, "session mode: nothing is read before the limits are set", unlimited)
     finally:
-        service.end()
+        service.stop()
         pooler.end()
 
 
 def refused(program, folder, postgres):
     for mode in ["transaction", "statement"]:
         pooler = PgBouncer(folder, postgres, mode)
-        said, seconds = Service(program, folder, pooler.url()).refusal()
+        said, seconds = refusal(start(program, folder, pooler.url()))
         pooler.end()
         check("status 0" not in said and "pool_mode = session" in said and seconds < 20, f"{mode} mode is refused: {said}", seconds)
     for what, auth, more, begins in [
@@ -224,7 +175,7 @@ def refused(program, folder, postgres):
         ("a wrong password", "scram-sha-256", dict(user="ventriform:wrong"), "(password|SASL) authentication failed"),
     ]:
         pooler = PgBouncer(folder, postgres, "session", auth=auth)
-        said, seconds = Service(program, folder, pooler.url(**more)).refusal()
+        said, seconds = refusal(start(program, folder, pooler.url(**more)))
         pooler.end()
         quoted = re.match(r"status [^0]\d*: ([Ee]rror: |ventriform: )?(data folder [^:]*: |database: )?" + begins, said)
         check(quoted and seconds < 20, f"{what} is refused: {said}", seconds)
@@ -235,17 +186,16 @@ def main():
     parser.add_argument("--program", required=True)
     program = os.path.abspath(parser.parse_args().program)
     folder = tempfile.mkdtemp(prefix="ventriform-pgbouncer-", dir="/tmp")
-    if AS_USER:
+    if AS_POSTGRES:
         shutil.chown(folder, "postgres", "postgres")
-    postgres = Postgres(folder)
+    postgres = Postgres(folder, settings=["fsync=off", "log_statement=all", "log_line_prefix=%p "])
     try:
-        postgres.psql("CREATE DATABASE ventriform", "postgres")
         subprocess.run([program, "phantom", "-o", folder + "/scan"], check=True, capture_output=True)
         scan = open(folder + "/scan/spect.nii.gz", "rb").read()
         refused(program, folder, postgres)
         session_mode(program, folder, postgres, scan)
     finally:
-        postgres.end()
+        postgres.end(signal.SIGINT)
     if failed:
         print("logs:", folder)
     else:

@@ -20,6 +20,9 @@ import threading
 import time
 import urllib.parse
 
+sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+from lib.service import Service, free_port, make_key
+
 PROGRAM, FOLDER = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 # Long, for machines that do much else.
 PATIENCE = 300
@@ -36,12 +39,6 @@ def check(condition, what):
     failures += not condition
 
 
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
 def listening(port):
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
@@ -53,18 +50,15 @@ def listening(port):
     sys.exit(f"nothing listens on {port}")
 
 
-class Service:
-    def __init__(self, name, *flags, keys=()):
-        self.data, self.port = f"{FOLDER}/{name}", free_port()
-        self.keys = {}
-        os.makedirs(self.data, exist_ok=True)
-        for scope in keys:
-            make = [PROGRAM, "keys", "create", "--name", scope, "--scope", scope, "--data-dir", self.data]
-            self.keys[scope] = subprocess.run(make, check=True, capture_output=True, text=True).stdout.strip()
-        serve = [PROGRAM, "serve", "--listen", f"127.0.0.1:{self.port}", "--data-dir", self.data, "--workers", "1"]
-        with open(f"{FOLDER}/{name}.log", "w") as log:
-            children.append(subprocess.Popen(serve + list(flags), stdout=log, stderr=log))
-        listening(self.port)
+def start(name, *flags, keys=()):
+    """A service, with a key for each of these scopes."""
+    data = f"{FOLDER}/{name}"
+    os.makedirs(data, exist_ok=True)
+    made = {scope: make_key(PROGRAM, data, scope) for scope in keys}
+    service = Service(PROGRAM, data, "--workers", "1", *flags)
+    service.keys = made
+    children.append(service.process)
+    return service
 
 
 def nginx(server, outside="", tls=False):
@@ -233,17 +227,17 @@ def main():
     volume = scan()
     certificate = ("--tls-cert", f"{FOLDER}/cert.pem", "--tls-key", f"{FOLDER}/key.pem")
     early_refusals(
-        Service("keys", "--body-limit", "1MiB", keys=["submit"]),
-        Service("tls", "--body-limit", "1MiB", *certificate, keys=["submit"]),
+        start("keys", "--body-limit", "1MiB", keys=["submit"]),
+        start("tls", "--body-limit", "1MiB", *certificate, keys=["submit"]),
     )
-    trusting = Service("trusting", "--trusted-proxies", "127.0.0.1", "--wait-limit", "3s")
+    trusting = start("trusting", "--trusted-proxies", "127.0.0.1", "--wait-limit", "3s")
     events(trusting, volume)
     waiting(trusting, volume)
-    based = Service("based", "--base-path", "/apps/heart")
+    based = start("based", "--base-path", "/apps/heart")
     for one in (trusting, based):
         ask(one.port, "POST", "/v1/models?points=67", volume, Prefer="wait=3")
-    addresses(trusting, based, Service("stranger"))
-    idle_connections(Service("idle", "--header-timeout", "1s"))
+    addresses(trusting, based, start("stranger"))
+    idle_connections(start("idle", "--header-timeout", "1s"))
 
 
 try:

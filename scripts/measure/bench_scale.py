@@ -13,9 +13,8 @@ Prints medians; quiet machines only. Needs what scripts/check/chaos.py needs.
 import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, sys, tempfile, time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-sys.path.insert(1, os.path.join(sys.path[0], "check"))
-from chaos import Postgres, run, s3_server
-from crash_rounds import ROOT, Service
+from lib.servers import Postgres, run, s3_server
+from lib.service import ROOT, Service
 
 
 class Bench:

@@ -16,7 +16,6 @@ import http.client
 import json
 import queue
 import re
-import socket
 import statistics
 import subprocess
 import sys
@@ -29,29 +28,17 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lib.nm import nm
+from lib.service import Service, free_port, make_key
 
 USER, PASSWORD = "bench", "bench"
-
-
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 class Server:
     """A program that listens, and what its requests need."""
 
-    def __init__(self, name, command, port, authorization, probe, upload):
-        self.name, self.port, self.headers, self.upload_path = name, port, {"Authorization": authorization}, upload
-        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        for _ in range(500):
-            try:
-                if self.ask("GET", probe)[0] == 200:
-                    return
-            except OSError:
-                time.sleep(0.02)
-        raise SystemExit(f"{name} does not answer")
+    def __init__(self, name, process, port, authorization, upload):
+        self.name, self.process, self.port = name, process, port
+        self.headers, self.upload_path = {"Authorization": authorization}, upload
 
     def ask(self, method, path, body=None):
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
@@ -123,13 +110,11 @@ def compare(what, unit, rounds, sides):
 
 
 def ventriform(name, program, folder):
-    data, port = folder / name, free_port()
+    data = folder / name
     data.mkdir(parents=True, exist_ok=True)
-    made = [program, "keys", "create", "--name", "bench", "--scope", "submit", "--requests-per-minute", "1000000000",
-            "--data-dir", str(data)]
-    key = subprocess.run(made, capture_output=True, text=True, check=True).stdout.split()[-1]
-    command = [program, "serve", "--listen", f"127.0.0.1:{port}", "--data-dir", str(data)]
-    return Server(name, command, port, f"Bearer {key}", "/readyz", "/v1/volumes")
+    key = make_key(program, str(data), "submit", "--requests-per-minute", "1000000000")
+    service = Service(program, data)
+    return Server(name, service.process, service.port, f"Bearer {key}", "/v1/volumes")
 
 
 def orthanc(folder):
@@ -141,7 +126,15 @@ def orthanc(folder):
     }
     (folder / "orthanc.json").write_text(json.dumps(settings))
     basic = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
-    return Server("Orthanc", ["Orthanc", str(folder / "orthanc.json")], port, f"Basic {basic}", "/system", "/instances")
+    process = subprocess.Popen(["Orthanc", str(folder / "orthanc.json")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    server = Server("Orthanc", process, port, f"Basic {basic}", "/instances")
+    for _ in range(500):
+        try:
+            if server.ask("GET", "/system")[0] == 200:
+                return server
+        except OSError:
+            time.sleep(0.02)
+    raise SystemExit("Orthanc does not answer")
 
 
 def main():

@@ -19,7 +19,6 @@ import random
 import socket
 import statistics
 import struct
-import subprocess
 import sys
 import tempfile
 import threading
@@ -28,6 +27,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lib.nifti import nifti
+from lib.service import Service
 
 # Rises that are allowed from the middle of the run to its end.
 ALLOWED = {"memory_mib": 2, "files": 5, "disk_mib": 20}
@@ -50,42 +50,20 @@ def volume(seed, side=64):
     return nifti(side, voxels)
 
 
-class Service:
-    """The program, and what the system says about its process."""
-
-    def __init__(self, program, folder):
-        self.data = folder / "data"
-        self.log = open(folder / "log", "wb")
-        self.process = subprocess.Popen(
-            [program, "serve", "--listen", "127.0.0.1:0", "--data-dir", str(self.data)],
-            stdout=subprocess.PIPE,
-            stderr=self.log,
-        )
-        line = self.process.stdout.readline().decode()
-        self.port = int(line.split("http://127.0.0.1:")[1].split()[0])
-
-    def figures(self):
-        process = Path(f"/proc/{self.process.pid}")
-        status = dict(
-            line.split(":", 1) for line in (process / "status").read_text().splitlines()
-        )
-        files = 0
-        for path in self.data.rglob("*"):
-            try:
-                files += path.stat().st_blocks * 512
-            except FileNotFoundError:
-                pass
-        return {
-            "memory_mib": int(status["VmRSS"].split()[0]) / 1024,
-            "files": len(list((process / "fd").iterdir())),
-            "threads": int(status["Threads"]),
-            "disk_mib": files / 2**20,
-        }
-
-    def stop(self):
-        self.process.terminate()
-        self.process.wait(60)
-        self.log.close()
+def figures(service):
+    """What the system says about its process and its files."""
+    bytes_on_disk = 0
+    for path in Path(service.data).rglob("*"):
+        try:
+            bytes_on_disk += path.stat().st_blocks * 512
+        except FileNotFoundError:
+            pass
+    return {
+        "memory_mib": service.figure("VmRSS") / 1024,
+        "files": len(os.listdir(f"/proc/{service.process.pid}/fd")),
+        "threads": service.figure("Threads"),
+        "disk_mib": bytes_on_disk / 2**20,
+    }
 
 
 class Client:
@@ -180,7 +158,7 @@ def main():
     minutes = min(float(sys.argv[2]) if len(sys.argv) > 2 else 60, 240)
     clients = min(int(sys.argv[3]) if len(sys.argv) > 3 else 4, 64)
     with tempfile.TemporaryDirectory() as folder:
-        service = Service(program, Path(folder))
+        service = Service(program, Path(folder) / "data")
         try:
             end = time.monotonic() + 60 * minutes
             shape = volume(0)
@@ -191,7 +169,7 @@ def main():
             rows = []
             while time.monotonic() < end:
                 time.sleep(max(0, min(60, end - time.monotonic())))
-                row = service.figures()
+                row = figures(service)
                 rows.append(row)
                 shown = "  ".join(f"{name} {value:.1f}" for name, value in row.items())
                 rounds = sum(client.done for client in work)

@@ -12,8 +12,8 @@ needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JS
 import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, sys, tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-from check.crash_rounds import Service
 from lib.nifti import FLOAT32, nifti
+from lib.service import Service
 
 
 def numbered(number):
