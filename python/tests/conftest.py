@@ -69,6 +69,7 @@ def gated(folder: pathlib.Path) -> pathlib.Path:
     sys.path.insert(0, str(ROOT / "scripts"))
     import nibabel
     import numpy as np
+
     from lib import gated_phantom  # type: ignore[import-not-found]
 
     voxels, affine = gated_phantom.beat(str(folder / "rest"))

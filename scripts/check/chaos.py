@@ -14,8 +14,21 @@ Loopback, and two addresses of its own namespace; stops by itself. Needs Postgre
 (scripts/requirements.txt), and root for PostgreSQL's user and the namespace. About 5 s a round on two cores.
 The last line is a JSON object; the exit status is 0 if nothing was lost, corrupt or made twice.
 """
-import argparse, gzip, hashlib, json, os, random, shutil, signal, socket, struct, subprocess, sys
-import tempfile, threading, time
+import argparse
+import gzip
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.servers import Postgres, run, s3_server
@@ -157,7 +170,7 @@ class Chaos:
         body = bytes(body)
         return number, body, hashlib.sha256(body).hexdigest()
 
-    def ask(self, method, path, body=None, headers={}):
+    def ask(self, method, path, body=None, headers=None):
         """The answer of either replica; None if it could not serve the request."""
         service = self.services[random.choice(("api-0", "api-1"))]
         try:

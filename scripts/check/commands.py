@@ -3,17 +3,17 @@
     python scripts/check/commands.py PROGRAM            all pages
     python scripts/check/commands.py PROGRAM docs/x.md  some; -v tells of every command
 
-In: the fenced blocks (```sh) of every committed page, and scripts/check/commands.toml. A command is run there, or named in that file
-with the reason why not, and the file that tries it instead; one that is neither is a fault, and so is an entry there that no
-command needs. Of a command of ventriform that is not run, the flags are looked up in `--help`.
+In: the fenced blocks (```sh) of every committed page, and scripts/check/commands.toml. A command is run there, or named
+in that file with the reason why not, and the file that tries it instead; one that is neither is a fault, and so is an
+entry there that no command needs. Of a command of ventriform that is not run, the flags are looked up in `--help`.
 
-A page runs in a folder of its own, its commands in their order, with the files that it names (`files`): simulated scans, which
-`ventriform phantom` makes smaller here than it would. `ventriform serve` is started on a free port, and addresses of the page
-lead to it; `systemctl stop` and `start` do as they would. JOB, VOLUME, MODEL and so on are the newest of their kind in that
-service. Variables hold to the end of their block.
+A page runs in a folder of its own, its commands in their order, with the files that it names (`files`): simulated
+scans, which `ventriform phantom` makes smaller here than it would. `ventriform serve` is started on a free port, and
+addresses of the page lead to it; `systemctl stop` and `start` do as they would. JOB, VOLUME, MODEL and so on are the
+newest of their kind in that service. Variables hold to the end of their block.
 
-Out: the faults, and a count. Guaranteed: every command that was run ended with 0. What it printed or wrote is not looked at;
-the tests do that. Needs nibabel, pydicom and highdicom, and bash and curl. Exits with 1 if there is a fault.
+Out: the faults, and a count. Guaranteed: every command that was run ended with 0. What it printed or wrote is not
+looked at; the tests do that. Needs nibabel, pydicom and highdicom, and bash and curl. Exits with 1 if there is a fault.
 """
 import concurrent.futures
 import dataclasses
@@ -28,12 +28,12 @@ import sys
 import tempfile
 import threading
 import time
-import tomllib
 import urllib.request
 
 import nibabel
 import numpy as np
 import pydicom
+import tomllib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from lib import gated_phantom
@@ -47,9 +47,11 @@ UNTOLD = re.compile(r"^ *```\n(?: *[$#].*\n)* *(?:\$ )?(?:(?:ventriform|curl|doc
 SETTINGS = re.compile(r"^ *```toml\n(.*?)^ *```", re.M | re.S)
 ASSIGNMENT = re.compile(r"[A-Z_]+=")
 PLACEHOLDER = re.compile(r"\b(JOB|VOLUME|MODEL|SEGMENTATION|BEAT|COMPARISON|NORMALS|TEMPLATE|READER)\b")
-# For words that stand for the result of a certain scan: `made PATH FILE` uploads the file and prints the id of what comes of it.
+# For words that stand for the result of a certain scan: `made PATH FILE` uploads the file and prints the id of what
+# comes of it.
 MADE = """made() {
-  curl -fsS -o /dev/null -D - --data-binary "@$2" -H 'Prefer: wait=600' "$U/v1/$1" | tr -d '\\r' | sed -n 's#^location: .*/##p'
+  curl -fsS -o /dev/null -D - --data-binary "@$2" -H 'Prefer: wait=600' "$U/v1/$1" |
+    tr -d '\\r' | sed -n 's#^location: .*/##p'
 }"""
 COMMAND_SECONDS = 600
 SMALL = ["--size", "64", "--spacing", "6.4"]
@@ -117,7 +119,8 @@ class Scans:
         nm(path, voxels.clip(0).round(), LPS @ affine, number, gates)
 
     def make(self, page, name, folder):
-        """Puts the file or folder `name` of a page into its folder; `settings.toml` has the settings that the page shows."""
+        """Puts the file or folder `name` of a page into its folder; `settings.toml` has the settings that the page
+        shows."""
         rest, stress = ("rest", "--seed", "2"), ("stress", "--seed", "2", "--defect", "8:0.7")
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -356,7 +359,7 @@ def main():
                     if verbose:
                         print(f"{time.monotonic() - at:6.2f} s  {command.short}", flush=True)
                     if fault:
-                        found.append(f"{command.short}\n    {fault}\n    Correct it, or name it in scripts/check/commands.toml with the reason why it cannot be run.")
+                        found.append(f"{command.short}\n    {fault}\n    Correct it, or name it in " f"scripts/check/commands.toml with the reason why it cannot be run.")
             finally:
                 if state:
                     state.stop()

@@ -11,7 +11,20 @@
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
-import copy, csv, gzip, io, json, math, os, re, subprocess, sys, time, urllib.error, urllib.parse, urllib.request
+import copy
+import csv
+import gzip
+import io
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.parse
+import urllib.request
 
 import pydicom
 from jsonschema import Draft202012Validator
@@ -140,7 +153,7 @@ class Walk:
         name = operation["operationId"]
         path = template
         for key, value in parameters.items():
-            path = path.replace("{%s}" % key, value)
+            path = path.replace("{" + key + "}", value)
         headers = {**self.credentials, **(headers or {})}
         own = self.recorded["operations"].setdefault(name, {})
         if parameters:
@@ -277,7 +290,8 @@ def workitems(walk):
 def beating():
     """A heart in eight gates, as NIfTI: half an ellipsoid about an axis, which shrinks and thickens."""
     side, axis, base_mm, blur_mm = 40, (-0.64, 0.6, -0.48), 14.0, 2.4
-    within = lambda distance: 1 / (1 + math.exp(min(distance / blur_mm, 50)))
+    def within(distance):
+        return 1 / (1 + math.exp(min(distance / blur_mm, 50)))
     # Distance along and across the axis of every voxel, mm; i runs fastest.
     places = []
     for k in range(side):

@@ -10,8 +10,20 @@ old database is migrated. Loopback only; stops by itself; needs Python 3 and not
 has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
 corrupt, orphaned, made twice or without its row.
 """
-import argparse, gzip, hashlib, json, os, random, shutil, sqlite3, struct, subprocess
-import sys, tempfile, threading, time
+import argparse
+import gzip
+import hashlib
+import json
+import os
+import random
+import shutil
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.service import FINAL, ROOT, Service
@@ -313,7 +325,7 @@ class Rounds:
             checksum BLOB NOT NULL, execution_time BIGINT NOT NULL)""")
         version, description = name.removesuffix(".sql").split("_", 1)
         database.execute(
-            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) VALUES (?, ?, 1, ?, 0)",
+            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) VALUES (?, ?, " "1, ?, 0)",
             (int(version), description.replace("_", " "), hashlib.sha384(script.encode()).digest()))
         jobs = []
         for row in rows:

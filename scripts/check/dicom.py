@@ -3,8 +3,8 @@
 usage: dicom.py VENTRIFORM DIR [--orientations]
 
 DIR/phantom/spect.nii.gz is the scan; with --orientations it is stored along the axes in each of the 48
-orders and directions instead of in the cases of cases(). For every case below the file's geometry is computed here, after PS3.3
-C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the same run:
+orders and directions instead of in the cases of cases(). For every case below the file's geometry is computed here,
+after PS3.3 C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the same run:
 
 - mask.dcm, read by highdicom and by dcmqi: every voxel of segment 1, by its place in the patient; segment 2, the
   cavity, has the volume of report.json and shares no voxel;
@@ -14,8 +14,8 @@ C.8.4.15, and the objects are compared with mask.nii.gz and mesh.json of the sam
   and anatomical ones in a group whose site and method say which it is;
 - of a beat of 16 gates: mask_ed.dcm and mask_es.dcm, as mask.dcm, whose frames refer to the frames of their own gate;
   measurements.dcm, read by highdicom and by dcmqi: the figures of beat.json;
-- of a comparison of two studies: measurements.dcm, read likewise: the figures of comparison.json, the images of both studies;
-  pictures, which belong to the study of the scan at stress;
+- of a comparison of two studies: measurements.dcm, read likewise: the figures of comparison.json, the images of both
+  studies; pictures, which belong to the study of the scan at stress;
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
@@ -331,7 +331,8 @@ def check_comparison(program, folder):
         both = figures["Left ventricle myocardium, rest and stress"]
         assert np.isclose(both["428832008"], report["tid"]) and np.isclose(both["REVERSIBLE"], report["reversible_percent"])
         for segment in report["segments"]:
-            of = lambda state: figures[f"Segment {segment['segment']}, {state}"]
+            def of(state):
+                return figures[f"Segment {segment['segment']}, {state}"]
             assert np.isclose(of("stress")["251053005"], segment["stress_percent"]), segment
             assert np.isclose(of("rest")["251053005"], segment["rest_percent"]), segment
             assert np.isclose(of("change")["DIFFERENCE"], segment["difference_points"]), segment

@@ -8,8 +8,8 @@ are compared.
 
 Figures of vertices (`uncertainty_mm` and `fields` of the JSON) must be the point arrays of the VTP and the VTK file,
 by their names, lengths and values, and no others, and properties of the PLY file; the part of each triangle (`part`)
-their cell array and face property, the groups of the OBJ file and the primitives of the glTF files; the uncertainty also the attribute `_UNCERTAINTY` of
-glTF files, whose vertices have a colour where there is a field.
+their cell array and face property, the groups of the OBJ file and the primitives of the glTF files; the uncertainty
+also the attribute `_UNCERTAINTY` of glTF files, whose vertices have a colour where there is a field.
 """
 import json
 import sys

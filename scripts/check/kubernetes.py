@@ -3,15 +3,18 @@
 
     kubectl kustomize deploy/kubernetes | scripts/check/kubernetes.py target/debug/ventriform
 
-Every object fits the schemas of every version of Kubernetes that kubernetes_validate has, unknown fields forbidden. Every container runs as a user that is not root, on a read-only root, without capabilities, with
-probes and limits, and has no secret but by reference. Selectors find pods. Every setting in a variable and
-every flag is accepted by the program. Exits with 1 and the list of what is wrong.
+Every object fits the schemas of every version of Kubernetes that kubernetes_validate has, unknown fields forbidden.
+Every container runs as a user that is not root, on a read-only root, without capabilities, with probes and limits, and
+has no secret but by reference. Selectors find pods. Every setting in a variable and every flag is accepted by the
+program. Exits with 1 and the list of what is wrong.
 """
-import os, subprocess, sys
+import os
+import subprocess
+import sys
 
 import kubernetes_validate
-from kubernetes_validate import utils
 import yaml
+from kubernetes_validate import utils
 
 VERSIONS = list(dict.fromkeys(utils.major_minor(version) for version in utils.all_versions()))
 

@@ -220,8 +220,8 @@ def slow_downloads(service):
 
 
 def wavelet_frame(side):
-    """A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data: the costliest for its
-    size, and not to be interrupted (tests/api/bombs.rs)."""
+    """A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data: the costliest
+    for its size, and not to be interrupted (tests/api/bombs.rs)."""
     out = b"\xff\x4f\xff\x51" + struct.pack(">HH8I", 41, 0, side, side, 0, 0, side, side, 0, 0) + bytes([0, 1, 15, 1, 1])
     # No levels, blocks of 64 x 64, reversible; 31 bit-planes.
     out += bytes([0xFF, 0x52, 0, 12, 0, 0, 0, 1, 0, 0, 4, 4, 0, 1, 0xFF, 0x5C, 0, 4, 0x20, 31 << 3])
@@ -258,7 +258,8 @@ def dicom_image(syntax, side, frames, frame):
         content += b"\0" * (len(content) % 2)
         return b"\xfe\xff\x00\xe0" + struct.pack("<I", len(content)) + content
 
-    us = lambda *numbers: struct.pack(f"<{len(numbers)}H", *numbers)
+    def us(*numbers):
+        return struct.pack(f"<{len(numbers)}H", *numbers)
     place = element(0x20, 0x32, b"DS", b"0\\0\\0") + element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0")
     data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"), element(8, 0x16, b"UI", NM_CLASS),
             element(8, 0x18, b"UI", b"1.2.3.4"), element(8, 0x60, b"CS", b"NM"), element(0x18, 0x50, b"DS", b"4"), element(0x18, 0x88, b"DS", b"4"),
@@ -410,7 +411,8 @@ def half_patches(service):
 
 def pet_slice(number):
     """One of many slices of a PET scan."""
-    us = lambda value: struct.pack("<H", value)
+    def us(value):
+        return struct.pack("<H", value)
     instance = f"1.2.9.{number + 1}".encode()
     data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY"), element(8, 0x16, b"UI", PET_CLASS), element(8, 0x18, b"UI", instance), element(8, 0x60, b"CS", b"PT"),
             element(0x18, 0x50, b"DS", b"1"), element(0x20, 0xD, b"UI", b"1.2.9"), element(0x20, 0xE, b"UI", b"1.2.9.9"),
@@ -558,7 +560,8 @@ def c_store(service, data_set):
 
     request = struct.pack(">H", 1) + bytes(2) + b"VENTRIFORM".ljust(16) + b"ATTACKER".ljust(16) + bytes(32) + item(0x10, b"1.2.840.10008.3.1.1.1")
     request += item(0x20, bytes([1, 0, 0, 0]) + item(0x30, NM_CLASS) + item(0x40, DEFLATED)) + item(0x50, item(0x51, struct.pack(">I", 1 << 20)))
-    short = lambda number: struct.pack("<H", number)
+    def short(number):
+        return struct.pack("<H", number)
     elements = command(2, NM_CLASS) + command(0x100, short(1)) + command(0x110, short(1)) + command(0x700, short(0)) + command(0x800, short(0))
     elements += command(0x1000, b"1.2.3.4")
     with socket.create_connection(("127.0.0.1", service.dicom_port), 5) as s:

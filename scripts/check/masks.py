@@ -2,9 +2,9 @@
 
 usage: masks.py PROGRAM DIR
 
-For each header the program writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd; ITK and nibabel must find them exactly
-where they find the scan, and the labels must be the mask (1) and, outside of it, the cavity (2). Of a sheared grid, which
-ITK does not read, the masks on an orthogonal grid must lie where nibabel finds the scan.
+For each header the program writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd; ITK and nibabel must find them
+exactly where they find the scan, and the labels must be the mask (1) and, outside of it, the cavity (2). Of a sheared
+grid, which ITK does not read, the masks on an orthogonal grid must lie where nibabel finds the scan.
 """
 import subprocess
 import sys
@@ -48,7 +48,8 @@ def same_place(scan, mask):
     """The first difference of two files' places to ITK, as text; None if there is none."""
     a, b = sitk.ReadImage(str(scan)), sitk.ReadImage(str(mask))
     n = min(a.GetDimension(), b.GetDimension(), 3)
-    grid = lambda image: np.array(image.GetDirection()).reshape(image.GetDimension(), -1)[:n, :n]
+    def grid(image):
+        return np.array(image.GetDirection()).reshape(image.GetDimension(), -1)[:n, :n]
     pairs = (a.GetSize()[:n], b.GetSize()[:n]), (a.GetOrigin()[:n], b.GetOrigin()[:n]), (a.GetSpacing()[:n], b.GetSpacing()[:n]), (grid(a), grid(b))
     for what, (x, y) in zip(("size", "origin", "spacing", "direction"), pairs):
         if not np.array_equal(np.array(x), np.array(y)):

@@ -2,9 +2,10 @@
 
 usage: meshes.py PROGRAM FIT DIR
 
-FIT is a folder of `ventriform segment` with mesh.json (and other formats of it) and mask.nii.gz. Each of its meshes, and its mesh
-written by trimesh and VTK in every way they know, must agree with the mask in every voxel, in LPS and RAS, in
-millimetres, centimetres and metres where that is stated; without a statement, other units and open surfaces must be refused.
+FIT is a folder of `ventriform segment` with mesh.json (and other formats of it) and mask.nii.gz. Each of its meshes,
+and its mesh written by trimesh and VTK in every way they know, must agree with the mask in every voxel, in LPS and RAS,
+in millimetres, centimetres and metres where that is stated; without a statement, other units and open surfaces must be
+refused.
 """
 import json
 import subprocess

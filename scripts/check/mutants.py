@@ -12,7 +12,8 @@ Constants, `const fn` and functions that return `impl Trait` cannot be switched;
 Every test is run once without mutants, noting its time and the mutated functions that it enters. A mutant
 is then tested by what enters its function: tests of its own folder first, of these the quickest, in
 batches; the first batch that fails ends its turn. A mutant in a function that no test enters is missed.
-The tests of the four folders judge first, then the library's other tests judge what is left, then the domain tests, then those of the commands.
+The tests of the four folders judge first, then the library's other tests judge what is left, then the domain tests,
+then those of the commands.
 
 The order of the mutants is that of a hash of their names, so [offset, offset + size) is a random sample, and
 samples that do not overlap as numbers share no mutant.

@@ -2,10 +2,10 @@
 
 usage: names.py PROGRAM DIR
 
-The example files (which pydicom brings along) hold the names of PS3.5, annexes H to K, as the standard encodes them; the names
-they stand for are below, as pydicom's own tests have them. Beside them, every character of every set is
-encoded by pydicom, by its term alone and as a code extension, and must come back from `inspect` as it was (of Unicode and
-GB18030, sixty values).
+The example files (which pydicom brings along) hold the names of PS3.5, annexes H to K, as the standard encodes them;
+the names they stand for are below, as pydicom's own tests have them. Beside them, every character of every set is
+encoded by pydicom, by its term alone and as a code extension, and must come back from `inspect` as it was (of Unicode
+and GB18030, sixty values).
 """
 import json
 import re

@@ -29,7 +29,6 @@ from pathlib import Path
 import nibabel
 import numpy as np
 import pydicom
-
 from dicom import NAMES, cases, check_object, check_results
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

@@ -3,11 +3,21 @@
 
     scripts/check/pgbouncer.py --program target/debug/ventriform          (scripts/check/pgbouncer.sh installs both)
 
-In session mode with PgBouncer's defaults the service starts and computes, each session has its limits before it reads or
-writes anything, a lock that somebody holds ends a request in time, and a PgBouncer that is started anew is found again.
-In the other modes, and where PgBouncer refuses a connection, the service ends at once, and its message begins with the
-cause. Uses the standard library alone; the last line counts the checks."""
-import argparse, json, os, re, shutil, signal, socket, subprocess, sys, tempfile, time
+In session mode with PgBouncer's defaults the service starts and computes, each session has its limits before it reads
+or writes anything, a lock that somebody holds ends a request in time, and a PgBouncer that is started anew is found
+again. In the other modes, and where PgBouncer refuses a connection, the service ends at once, and its message begins
+with the cause. Uses the standard library alone; the last line counts the checks."""
+import argparse
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.servers import AS_POSTGRES, Postgres
@@ -132,7 +142,7 @@ def session_mode(program, folder, postgres, scan):
         check(status == 503 and took < 30, "session mode: a lock ends a request by lock_timeout", status, took)
         holder.kill()
         holder.wait()
-        postgres.query("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != pg_backend_pid()")
+        postgres.query("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != " "pg_backend_pid()")
         check(until(service.is_ready, "readiness"), "session mode: ready again after the lock")
 
         pooler.end()

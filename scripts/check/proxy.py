@@ -184,7 +184,7 @@ def usable(port, page_path, tls, prefix):
 
 
 def addresses(trusting, based, stranger):
-    told = "proxy_set_header X-Forwarded-Prefix /heart; proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header X-Forwarded-Host $http_host;"
+    told = "proxy_set_header X-Forwarded-Prefix /heart; proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header " "X-Forwarded-Host $http_host;"
     stripped = nginx(f"location /heart/ {{ proxy_pass http://127.0.0.1:{trusting.port}/; {told} }}")
     usable(stripped, "/heart/", False, "/heart")
     tls = nginx(f"location /heart/ {{ proxy_pass http://127.0.0.1:{trusting.port}/; {told} }}", tls=True)

@@ -4,13 +4,19 @@
     scripts/check/upgrade.py --old OLD_PROGRAM --new NEW_PROGRAM        (scripts/check/upgrade.sh builds both)
 
 Two replicas answer requests and two compute, over PostgreSQL and an S3 store (moto), all of the old version. Under the
-load of scripts/check/chaos.py, one of each role becomes the new version, whose start changes the tables; then one that stayed
-old is started once more, as a crash would; then the others become new. At the end everything acknowledged is read back,
-as scripts/check/chaos.py does it. A request may meet a closed connection or 503, which its client repeats, and no other fault.
+load of scripts/check/chaos.py, one of each role becomes the new version, whose start changes the tables; then one that
+stayed old is started once more, as a crash would; then the others become new. At the end everything acknowledged is
+read back, as scripts/check/chaos.py does it. A request may meet a closed connection or 503, which its client repeats,
+and no other fault.
 
 Needs what scripts/check/chaos.py needs. The last line is a JSON object; the exit status is 0 if nothing was lost.
 """
-import argparse, json, os, random, sys, tempfile
+import argparse
+import json
+import os
+import random
+import sys
+import tempfile
 
 import chaos
 from chaos import Chaos

@@ -2,9 +2,9 @@
 
 usage: gated_phantom.py FOLDER OUT.nii.gz [GATES]
 
-FOLDER holds spect.nii.gz and lv_truth.nii.gz of `ventriform phantom`. Writes a 4-D NIfTI file of 8 gates (or GATES). End
-systole lies at three eighths of the cycle, where every length about the heart is a tenth shorter and the counts are the
-same: a beat for checks of files, not of figures.
+FOLDER holds spect.nii.gz and lv_truth.nii.gz of `ventriform phantom`. Writes a 4-D NIfTI file of 8 gates (or GATES).
+End systole lies at three eighths of the cycle, where every length about the heart is a tenth shorter and the counts are
+the same: a beat for checks of files, not of figures.
 """
 import sys
 

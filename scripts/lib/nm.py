@@ -10,8 +10,8 @@ LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
 def nm(path, voxels, affine, number, gates=1):
-    """A reconstructed NM image of voxels[i, j, k], the same in all gates, or voxels[i, j, k, gate]; `affine` maps indices
-    to LPS mm and has right angles."""
+    """A reconstructed NM image of voxels[i, j, k], the same in all gates, or voxels[i, j, k, gate]; `affine` maps
+    indices to LPS mm and has right angles."""
     steps = affine[:3, :3]
     spacing = np.linalg.norm(steps, axis=0)
     rows, columns = steps[:, 0] / spacing[0], steps[:, 1] / spacing[1]

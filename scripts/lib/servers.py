@@ -36,7 +36,8 @@ def s3_server():
 class Postgres:
     """A database server with the database `ventriform`, on the given addresses of this machine.
 
-    `settings` are its own (`fsync=off`), `others` are addresses from which it may be reached, too. Its log is FOLDER/postgres.log.
+    `settings` are its own (`fsync=off`), `others` are addresses from which it may be reached, too. Its log is
+    FOLDER/postgres.log.
     """
 
     def __init__(self, folder, addresses=("127.0.0.1",), settings=(), others=()):

@@ -1,4 +1,5 @@
-"""The service as a process of a script's own: started on ports that are free, asked over HTTP, killed and started again.
+"""The service as a process of a script's own: started on ports that are free, asked over HTTP, killed and started
+again.
 
 Needs Python and nothing else. Its log is DATA.log unless another is named.
 """
@@ -33,8 +34,8 @@ def free_port():
 class Service:
     """`ventriform serve` on a data folder.
 
-    `prefix` are words before the program (`ip netns exec ...`), `environment` further variables. With `dicom` it receives
-    C-STORE, too. With `wait=False` nothing is known of it but its process.
+    `prefix` are words before the program (`ip netns exec ...`), `environment` further variables. With `dicom` it
+    receives C-STORE, too. With `wait=False` nothing is known of it but its process.
     """
 
     def __init__(self, program, data, *flags, log=None, prefix=(), environment=None, dicom=False, wait=True):

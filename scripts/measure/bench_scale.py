@@ -10,7 +10,17 @@ One replica that answers requests, over PostgreSQL and an S3 store (moto).
 4. With ROWS ended jobs: 100 claims a second, and 1, 2 and 4 processes whose jobs sleep (benches/queue.rs).
 Prints medians; quiet machines only. Needs what scripts/check/chaos.py needs.
 """
-import argparse, gzip, http.client, json, os, shutil, statistics, subprocess, sys, tempfile, time
+import argparse
+import gzip
+import http.client
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.servers import Postgres, run, s3_server
@@ -64,7 +74,7 @@ class Bench:
             for workers, rates in found.items():
                 rates.append(self.jobs_per_second(workers, 10 * turn + workers))
         for workers, rates in found.items():
-            print(f"{workers} workers: {statistics.median(rates):.2f} jobs/s, {statistics.median(rates) / workers:.2f} each "
+            print(f"{workers} workers: {statistics.median(rates):.2f} jobs/s, " f"{statistics.median(rates) / workers:.2f} each "
                   f"({', '.join(f'{rate:.2f}' for rate in rates)})", flush=True)
 
     def uploads(self):
@@ -104,7 +114,7 @@ class Bench:
                 started = time.perf_counter()
                 assert self.api.ask("GET", path)[0] == 200
                 times.append(time.perf_counter() - started)
-            print(f"{when}, GET {path}: median {statistics.median(times) * 1e3:.1f} ms, p99 {sorted(times)[98] * 1e3:.1f} ms", flush=True)
+            print(f"{when}, GET {path}: median {statistics.median(times) * 1e3:.1f} ms, p99 " f"{sorted(times)[98] * 1e3:.1f} ms", flush=True)
 
     def copies(self, state, count):
         """Rows of jobs in the table, like one that succeeded."""

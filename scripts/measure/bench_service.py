@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Uploads and small requests per second, beside Orthanc and an earlier version in the same run.
 
-    target/test-tools/python/bin/python scripts/measure/bench_service.py [--program target/release/ventriform] [--rounds 4]
-                                                                 [--before PROGRAM]
+    target/test-tools/python/bin/python scripts/measure/bench_service.py
+        [--program target/release/ventriform] [--rounds 4] [--before PROGRAM]
 
 All listen on loopback, keep their files under the same temporary folder, sync them (Orthanc:
 SyncStorageArea) and check credentials. They get the same DICOM NM files of 8 MiB and take turns, round by
@@ -198,14 +198,16 @@ class Stored:
 
 def bench(servers, files, scan, rounds):
     for turn, clients in enumerate((1, 4)):
-        part = lambda i: files[10 * (turn * rounds + i):][:10]
+        def part(i):
+            return files[10 * (turn * rounds + i):][:10]
         compare(f"uploads of 8 MiB, {clients} at a time", "MiB/s", rounds,
                 sides(servers, lambda server, i: server.upload(part(i), clients)))
     *versions, theirs = servers
     stored = [Stored(server, scan) for server in versions]
     instance = theirs.json("GET", "/instances")[0]
     of_orthanc = ["/system", *[f"/instances/{instance}"] * 3, f"/instances/{instance}/simplified-tags"]
-    idle = lambda each, measure: measure()
+    def idle(each, measure):
+        return measure()
     for state, beside in (("idle", idle), ("all workers busy", Stored.beside_its_work)):
         for number, other in enumerate(of_orthanc):
             measured = {each.server.name: lambda i, each=each: beside(

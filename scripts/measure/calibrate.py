@@ -3,7 +3,8 @@
 
     calibrate.py --check                    compare an estimate from the table with the constants as committed
     calibrate.py --write [MODEL...]         write the file with the constants estimated from the table
-    calibrate.py --reliability              how often fits are good, by the chance that constants from other scans give them
+    calibrate.py --reliability              how often fits are good, by the chance that constants from other scans give
+                                            them
     calibrate.py --held-out --table TABLE   the same by the committed constants, of scans that those do not come from
     calibrate.py --layout                   write the file again with the constants as they are
 
@@ -36,16 +37,16 @@ USUAL_CAVITY_ML = 55.0
 REPRODUCED = """\
 The committed table has the cohort, 316 scans of the simulator's seeds 2101, 701, 911, 2103 and 411 (42 scans each of
 all kinds), 1101 with 28, 2104 with 14, 702 with 18 (motion,rv,infarct), 1102 with 18 (motion), 703 with 14 (rv), 704
-with 14 (motion,apex), the first 111 of seed 5001 (all kinds), and 1000 of seed 9301 (all kinds; the simulator's draw() with a matrix of 64 and a
-spacing of 6.0, 6.4 or 6.8 mm). The constants of GOOD_SET_* are estimated from all of it: --check shows equal ones. The others are
-older. Seeds, models and terms are those of the committed constants, three things are not: how many
-scans of a seed had been taken and of which kinds was not written down; the constants were estimated one
-after the other, on fits of the versions of their time (the mean of ln thickness spread, 0.61 then, is 0.44 now); and
-the scans whose heart was erased, 59 with those of kind none in HEART_FITTED, are not in the table. So the estimate is near,
-not equal. On this table the logarithms of the odds by committed and by estimated constants correlate by 0.89
-(BAD_FIT_ANATOMICAL) to 1.00, the chances differ by 0.01 (MOTION_BY_PROJECTIONS) to 0.10 (BAD_FIT_ANATOMICAL) in the
-mean, and the areas under the curve by -0.001 to 0.025. HEART_FITTED has the intercept 3.5 instead of 1.6, for want of scans
-without a heart: do not --write it from this table. --write MODEL... writes some."""
+with 14 (motion,apex), the first 111 of seed 5001 (all kinds), and 1000 of seed 9301 (all kinds; the simulator's draw()
+with a matrix of 64 and a spacing of 6.0, 6.4 or 6.8 mm). The constants of GOOD_SET_* are estimated from all of it:
+--check shows equal ones. The others are older. Seeds, models and terms are those of the committed constants, three
+things are not: how many scans of a seed had been taken and of which kinds was not written down; the constants were
+estimated one after the other, on fits of the versions of their time (the mean of ln thickness spread, 0.61 then, is
+0.44 now); and the scans whose heart was erased, 59 with those of kind none in HEART_FITTED, are not in the table. So
+the estimate is near, not equal. On this table the logarithms of the odds by committed and by estimated constants
+correlate by 0.89 (BAD_FIT_ANATOMICAL) to 1.00, the chances differ by 0.01 (MOTION_BY_PROJECTIONS) to 0.10
+(BAD_FIT_ANATOMICAL) in the mean, and the areas under the curve by -0.001 to 0.025. HEART_FITTED has the intercept 3.5
+instead of 1.6, for want of scans without a heart: do not --write it from this table. --write MODEL... writes some."""
 
 # Sets of the simulator, by the seed that they were made with. "cohort" is the cohort of 19 hearts.
 ONE_FIT = ["cohort", "411", "701", "702"]
@@ -105,7 +106,8 @@ def log_size(row):
 
 
 def of_set(wall):
-    """Terms of a good fit by several models. The wall of a small or a large heart agrees less with a fitted one that lies off by as much."""
+    """Terms of a good fit by several models. The wall of a small or a large heart agrees less with a fitted one that
+    lies off by as much."""
     return {"mean log odds": figure(f"log_odds_{wall}"), f"ln cavity / {USUAL_CAVITY_ML:g} ml": log_size,
             "its square": lambda row: log_size(row) ** 2}
 
@@ -179,7 +181,7 @@ def layout(models):
         intercept, terms = models[name]
         calls = [f"Term::new(\"{t['name']}\", {literal(t['mean'], 4)}, {literal(t['sd'], 4)}, {literal(t['weight'], 3)})" for t in terms]
         array = f"[{calls[0]}]" if len(calls) == 1 else "[\n" + "".join(f"        {call},\n" for call in calls) + "    ]"
-        text += f"/// {model['doc']}\npub const {name}: Logistic = Logistic {{\n    intercept: {literal(intercept, 3)},\n    terms: &{array},\n}};\n\n"
+        text += f"/// {model['doc']}\npub const {name}: Logistic = Logistic {{\n    intercept: " f"{literal(intercept, 3)},\n    terms: &{array},\n}};\n\n"
     return text.rstrip("\n") + "\n"
 
 
@@ -259,8 +261,8 @@ def compare(table):
         for a, b in zip(before[name][1], after[1]):
             cells = [f"{t['mean']:9.4f} {t['sd']:8.4f} {t['weight']:8.3f}" for t in (a, b)]
             print(f"  {a['name']:26}{cells[0]:>27}{cells[1]:>27}{b['weight'] - a['weight']:+20.3f}")
-        print(f"  area under the curve {auc(old, y):.3f} committed, {auc(new, y):.3f} estimated (in-sample); chances differ by "
-              f"{np.mean(np.abs(chance[0] - chance[1])):.3f} in the mean, {np.abs(chance[0] - chance[1]).max():.3f} at most, "
+        print(f"  area under the curve {auc(old, y):.3f} committed, {auc(new, y):.3f} estimated (in-sample); chances " f"differ by "
+              f"{np.mean(np.abs(chance[0] - chance[1])):.3f} in the mean, {np.abs(chance[0] - chance[1]).max():.3f} " f"at most, "
               f"correlation of the log odds {np.corrcoef(old, new)[0, 1]:.3f}\n")
 
 
@@ -283,7 +285,8 @@ def left_out(name, table):
 
 
 def held_out(name, table):
-    """`chances` by the committed constants, of scans of any set: none of them may be in the table that those come from."""
+    """`chances` by the committed constants, of scans of any set: none of them may be in the table that those come
+    from."""
     return chances({**MODELS[name], "sets": {row["set"] for row in table}}, committed()[name], table)
 
 
@@ -298,7 +301,7 @@ def reliability(table, chances_of):
             inside = (10 * p).astype(int).clip(0, 9) == tenth
             if inside.any():
                 error = math.sqrt(max(p[inside].mean() * (1 - p[inside].mean()), 1e-9) / inside.sum())
-                print(f"  {tenth / 10:.1f} to {(tenth + 1) / 10:.1f}: {int(inside.sum()):4} scans, mean chance {p[inside].mean():.2f}, "
+                print(f"  {tenth / 10:.1f} to {(tenth + 1) / 10:.1f}: {int(inside.sum()):4} scans, mean chance " f"{p[inside].mean():.2f}, "
                       f"good {y[inside].mean():.2f} (standard error {error:.2f})")
 
 

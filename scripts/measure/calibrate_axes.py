@@ -1,11 +1,13 @@
-"""Estimates the scores below which axes of an image count as exchanged (AxisPair::flag_score of judge/exchanged_axes.rs).
+"""Estimates the scores below which axes of an image count as exchanged (AxisPair::flag_score of
+judge/exchanged_axes.rs).
 
     cargo build --release --bin ventriform && cargo build --release --package ventriform-tools --bin exchanged_axes
     python scripts/measure/calibrate_axes.py OUT [--cases 120] [--seed 1] [--also FOLDER...]
 
-Makes simulated scans of many sizes, spacings, livers and right ventricles in OUT (kept if they are there), and takes other folders with
-spect.nii.gz and lv_truth.nii.gz from --also. Each is scored as it is, as three cut-outs about the heart with random margins, and
-with two axes exchanged. Every second scan takes part in the estimate; the others are held out and judged by it.
+Makes simulated scans of many sizes, spacings, livers and right ventricles in OUT (kept if they are there), and takes
+other folders with spect.nii.gz and lv_truth.nii.gz from --also. Each is scored as it is, as three cut-outs about the
+heart with random margins, and with two axes exchanged. Every second scan takes part in the estimate; the others are
+held out and judged by it.
 
 The estimate is 0.1 below the lowest score of the estimating scans as they are and cut out, and at most -0.15.
 """
@@ -36,7 +38,8 @@ def make(program, out, seed, cases):
 
 def lowest(rows, pair):
     """The lowest score of right images, and the highest of those whose axes were exchanged."""
-    total = lambda row: float(row[f"{pair}_ends"]) + float(row[f"{pair}_side"])
+    def total(row):
+        return float(row[f"{pair}_ends"]) + float(row[f"{pair}_side"])
     right = [total(row) for row in rows if row["kind"] in ("whole", "cut-out")]
     exchanged = [total(row) for row in rows if row["kind"] == pair]
     return right, exchanged

@@ -2,7 +2,8 @@
 """Estimates how much two scans of an unchanged heart differ, from a table of simulated pairs.
 
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
-    calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and writes
+    calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and
+                                            writes
                                             crates/ventriform/src/comparison/calibration.rs
 
 A table is what the tool `comparisons` prints; the committed one has the 20 pairs of seed 610
@@ -12,7 +13,8 @@ of the simulator of pairs (no part of this project):
     cargo run --release -p ventriform-tools --bin comparisons -- PAIRS/* > TABLE
 
 - Deviation of the difference: root mean square over the pairs without reversible wall.
-- Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies down again.
+- Gain of a turn: a significant one is 2.5 times the largest of these pairs, whose turns are those of a patient who lies
+  down again.
 - Quotient of the walls: four deviations of its logarithm.
 """
 import argparse
@@ -54,7 +56,7 @@ def write():
     muscle = np.exp(MUSCLE_SDS * np.sqrt(np.mean(np.log(column(rows, "muscle")) ** 2)))
     constants = [
         ("pub const DIFFERENCE_SD_POINTS", sd, 1,
-         "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's reference."),
+         "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's " "reference."),
         ("pub(super) const SIGNIFICANT_TURN_GAIN", gain, 2, "Share by which a turn must lower the mean squared difference."),
         ("pub const MOST_MUSCLE_QUOTIENT", muscle, 2, "Quotient of the walls' volumes beyond which they are hardly of one heart."),
     ]
@@ -71,9 +73,9 @@ def check(table):
     print(f"TID: {len(rows)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, worst {abs(error).max():.3f}")
     sure = [row for row in rows if "tid_uncertain" not in row["flags"]]
     error = column(sure, "tid") - column(sure, "true_tid")
-    print(f"TID where it is not flagged: {len(sure)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, worst {abs(error).max():.3f}")
+    print(f"TID where it is not flagged: {len(sure)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, " f"worst {abs(error).max():.3f}")
     unchanged = without_reversible(rows)
-    print(f"unchanged: {len(unchanged)} pairs, largest reversible share {column(unchanged, 'reversible').max():.1f} per cent")
+    print(f"unchanged: {len(unchanged)} pairs, largest reversible share {column(unchanged, 'reversible').max():.1f} " f"per cent")
     for strength in (20, 40, 60):
         own = [row for row in rows if row["kind"].endswith(str(strength))]
         found = [row for row in own if float(row["reversible"]) > FOUND_PERCENT]

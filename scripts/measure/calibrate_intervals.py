@@ -6,9 +6,10 @@
     calibrate_intervals.py --write               estimates the constants from the committed tables and writes them
 
 The tables are what the tools `beats` and `volumes` print. scripts/measure/calibration/beats.csv, for
-crates/ventriform/src/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the simulator of
-gated hearts; scripts/measure/calibration/volumes.csv, for crates/ventriform/src/judge/volume_calibration.rs, the first 118 scans of seed
-5001 of the simulator of scans (neither is part of this project):
+crates/ventriform/src/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
+simulator of gated hearts; scripts/measure/calibration/volumes.csv, for
+crates/ventriform/src/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans (neither
+is part of this project):
 
     gated.py --out CASES --seed 500 --n 20
     cargo run --release -p ventriform-tools --bin beats -- CASES/* > TABLE
@@ -29,8 +30,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLES = ROOT / "scripts/measure/calibration"
 SMALL_CAVITY_ML, HALF_WIDTH_SDS = 60.0, 1.645
 TERMS = ("bias", "usual", "dark", "small")
-# For each table: the file of the constants with their visibility and the head of its page, the columns of cavity and dark share, and
-# for each constant the figure's column and what it is.
+# For each table: the file of the constants with their visibility and the head of its page, the columns of cavity and
+# dark share, and for each constant the figure's column and what it is.
 FILES = {
     "beats": (
         ROOT / "crates/ventriform/src/beat/calibration.rs",
@@ -62,7 +63,8 @@ def errors(name, table):
     with open(table, newline="") as file:
         lines = [line for line in file if line.count(",") > 5]
     rows = list(csv.DictReader(lines))
-    column = lambda name: np.array([float(row[name]) for row in rows])
+    def column(name):
+        return np.array([float(row[name]) for row in rows])
     of = {}
     for constant, (figure, _) in figures.items():
         found, true = column(figure), column(f"true_{figure}")
@@ -103,13 +105,13 @@ def report(name, table):
     terms = committed(name)
     for constant, error in of.items():
         off = np.abs(error - terms[constant][0]) / deviation(terms[constant], cavity, dark)
-        print(f"{constant}: {np.mean(off < HALF_WIDTH_SDS):.0%} of {len(off)} within the interval of 90 %; standard deviation of error over deviation {np.sqrt(np.mean(off**2)):.2f}")
+        print(f"{constant}: {np.mean(off < HALF_WIDTH_SDS):.0%} of {len(off)} within the interval of 90 %; standard " f"deviation of error over deviation {np.sqrt(np.mean(off**2)):.2f}")
 
 
 def write(name):
     path, head, method, _, figures = FILES[name]
     of, cavity, dark = errors(name, TABLES / f"{name}.csv")
-    text = f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse crate::numeric::error_terms::ErrorTerms;\n"
+    text = f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse " f"crate::numeric::error_terms::ErrorTerms;\n"
     for constant, (_, doc) in figures.items():
         terms = zip(TERMS, estimate(of[constant], cavity, dark))
         fields = "".join(f"    {key}: {float(f'{value:.3f}')},\n" for key, value in terms)

@@ -2,31 +2,34 @@
 """Estimates the constants of rims, walls and nodes from tables of features.
 
     calibrate_walls.py --check              compare an estimate from the tables with the constants as committed
-    calibrate_walls.py --write [NAME...]    write the files with the constants (of these names) estimated from the tables
+    calibrate_walls.py --write [NAME...]    write the files with the constants (of these names) estimated from the
+                                            tables
     calibrate_walls.py --layout             write the files again with the constants as they are
 
-The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs. The
-tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are made by
+The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs.
+The tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are
+made by
 
     make_cases.py --out CASES/SET --seed SET --n N [--kinds ...]      (the simulator; it is no part of this project)
     cargo run --release -p ventriform-tools --bin wall_features -- TABLES COHORT CASES/SET...
     cargo run --release -p ventriform-tools --bin smoothness_features -- TABLES/smoothness.csv COHORT CASES/SET...
 
-- RIM_SHAPE: mean and inverse covariance of the harmonics of the true rims, each by least squares, over the heart's length.
-- RIM_REGRESSION: ridge regression (a weight of {RIDGE:g} on standardised terms) of the coefficients of the distance from the sensed to
-  the true rim, by the heart's length, the coefficients of what shape and correction make of the rim, and those of where the
-  image's signal ends. signal_ends.csv has its own hearts.
-- RIM_DEVIATION: weighted least squares of the squared errors of that regression, each tenth of the hearts left out, by the square of
-  the scatter of the directions' own ends.
-- RIM_CORRECTION: least squares of the distance from the sensed to the true rim, by the distance of the sensed rim from its
-  shape. Bend and range are chosen, not estimated.
-- INNER_SHIFT_MM, OUTER_SHIFT_MM: least squares of the distances from the apparent to the true surfaces, of the rays of fits
-  in which no such distance has a median beyond 6 mm.
-- NARROW_CAVITY_SHIFT, CAVITY_SIZE_SHIFT: least squares of what those leave in the mean of a heart, by the size of the cavity.
-  The size from which a cavity is narrow is chosen.
-- SMOOTHNESS_SHIFT: least squares of what all those leave in the mean of a fit, by the logarithm of the image's smoothness. Each
-  heart has three fits: as it is and behind two further filters. The usual smoothness is the mean of the scans as they are, the
-  range that of all fits.
+- RIM_SHAPE: mean and inverse covariance of the harmonics of the true rims, each by least squares, over the heart's
+  length.
+- RIM_REGRESSION: ridge regression (a weight of {RIDGE:g} on standardised terms) of the coefficients of the distance
+  from the sensed to the true rim, by the heart's length, the coefficients of what shape and correction make of the rim,
+  and those of where the image's signal ends. signal_ends.csv has its own hearts.
+- RIM_DEVIATION: weighted least squares of the squared errors of that regression, each tenth of the hearts left out, by
+  the square of the scatter of the directions' own ends.
+- RIM_CORRECTION: least squares of the distance from the sensed to the true rim, by the distance of the sensed rim from
+  its shape. Bend and range are chosen, not estimated.
+- INNER_SHIFT_MM, OUTER_SHIFT_MM: least squares of the distances from the apparent to the true surfaces, of the rays of
+  fits in which no such distance has a median beyond 6 mm.
+- NARROW_CAVITY_SHIFT, CAVITY_SIZE_SHIFT: least squares of what those leave in the mean of a heart, by the size of the
+  cavity. The size from which a cavity is narrow is chosen.
+- SMOOTHNESS_SHIFT: least squares of what all those leave in the mean of a fit, by the logarithm of the image's
+  smoothness. Each heart has three fits: as it is and behind two further filters. The usual smoothness is the mean of
+  the scans as they are, the range that of all fits.
 - APPARENT_TERMS, ANATOMICAL_TERMS: quantile regression (68 %) of the logarithm of the distance of nodes from the wall.
 
 {reproduced}
@@ -46,12 +49,14 @@ NODES = ROOT / "crates/ventriform/src/judge/uncertainty_calibration.rs"
 TABLES = ROOT / "scripts/measure/calibration"
 
 REPRODUCED = """\
-The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with 42 scans
-of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and 2104 with 14 of all
-kinds. signal_ends.csv has the cohort, the first scans of seeds 9001 and 9101 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct)
-and 94 of seed 9111 (in,basal,infarct,large,rv,liver,basal,noise,gut,small,in,infarct,apex) on 64 x 64 pixels of 6.4, 6.0 and 6.8 mm in turn, as
-make_cases.draw and simulate.N, NF = 64, 128 make them. smoothness.csv has the cohort and every third scan of the first 118 of seed 5001. docs/evaluation.md says how far the estimate is from the committed constants, and why: do not --write it without judging
-the fits anew, since every result depends on them."""
+The committed tables have the cohort and the scans with a heart, not refused, of the simulator: seeds 411 and 701 with
+42 scans of all kinds, 702 with 18 (motion,rv,infarct), 703 with 14 (rv), 704 with 14 (motion,apex), 2101 with 42 and
+2104 with 14 of all kinds. signal_ends.csv has the cohort, the first scans of seeds 9001 and 9101
+(in,basal,infarct,large,rv,liver,basal,noise,gut,small,coarse,infarct) and 94 of seed 9111
+(in,basal,infarct,large,rv,liver,basal,noise,gut,small,in,infarct,apex) on 64 x 64 pixels of 6.4, 6.0 and 6.8 mm in
+turn, as make_cases.draw and simulate.N, NF = 64, 128 make them. smoothness.csv has the cohort and every third scan of
+the first 118 of seed 5001. docs/evaluation.md says how far the estimate is from the committed constants, and why: do
+not --write it without judging the fits anew, since every result depends on them."""
 
 # Sets of the simulator, by the seed that they were made with. "cohort" is the cohort of 19 hearts.
 RIM_SETS = ["cohort", "411", "701"]
@@ -88,7 +93,7 @@ TERMS = {
     "RIM_DEVIATION": (WALLS, "RimDeviation", "Standard deviation of the height of a rim."),
     "INNER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the inner surface moves outward, mm."),
     "OUTER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the outer surface moves outward, mm."),
-    "NARROW_CAVITY_SHIFT": (WALLS, "SizeShift", "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as the blur\n"
+    "NARROW_CAVITY_SHIFT": (WALLS, "SizeShift", "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as " "the blur\n"
                             "/// hardly moves its edge any more when it shrinks."),
     "CAVITY_SIZE_SHIFT": (WALLS, "SizeShift", "Distance by which the outer surface moves outward of that, the more, the smaller the cavity looks."),
     "SMOOTHNESS_SHIFT": (WALLS, "SmoothnessShift", "Distances by which both surfaces move outward of that, where the image is smoother than usual."),
@@ -99,8 +104,8 @@ TERMS = {
 WALLS_HEADER = """\
 //! Constants of the models of rim and wall. Written by `scripts/measure/calibrate_walls.py`: do not edit.
 //!
-//! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
-//! the distances from the apparent to the anatomical wall.
+//! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction,
+//! and the distances from the apparent to the anatomical wall.
 
 use super::ray_terms::{RayTerms, SizeShift, SmoothnessShift};
 use super::rim_model::{
@@ -158,13 +163,13 @@ def literal(x, digits=3):
 def layout(constants):
     """{file: text} with these constants."""
     shape, correction = constants["RIM_SHAPE"], constants["RIM_CORRECTION"]
-    harmonics = "".join(f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n        }},\n"
+    harmonics = "".join(f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n     " f"   }},\n"
                         for c, s in zip(shape["mean"][::2], shape["mean"][1::2]))
     rows = "".join("        [" + ", ".join(literal(round(x), 1) for x in row) + "],\n" for row in shape["precision"])
     text = {WALLS: WALLS_HEADER, NODES: NODES_HEADER}
     text[WALLS] += ("\n/// Shape of the rims of hearts.\npub const RIM_SHAPE: RimShape = RimShape {\n"
                     f"    mean: [\n{harmonics}    ],\n    precision: [\n{rows}    ],\n}};\n"
-                    "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: RimCorrection = RimCorrection {\n"
+                    "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: " "RimCorrection = RimCorrection {\n"
                     + "".join(f"    {field}: {literal(correction[field])},\n" for field in [*CORRECTION_FIELDS, "range_mm"]) + "};\n")
     regression = constants["RIM_REGRESSION"]
     text[WALLS] += ("\n/// The rim's distance from where the sensors left it, by its shape and the ends of the signal.\n"
@@ -238,8 +243,8 @@ def waves(distances):
 
 
 def rim_evidence(tables, constants):
-    """Rows of signal_ends.csv, what tells where their rims are, the distances from the sensed to the true rims, and what limits
-    their moves: the shifts by shape and the ends of the signal."""
+    """Rows of signal_ends.csv, what tells where their rims are, the distances from the sensed to the true rims, and
+    what limits their moves: the shifts by shape and the ends of the signal."""
     rows = [row for row in table(tables / "signal_ends.csv", END_SETS) if not row["case"].startswith("motion")]
     by_shape = corrected(from_shape(rows, constants["RIM_SHAPE"]), constants["RIM_CORRECTION"])
     x = np.column_stack([column(rows, "length_mm"), *(waves(d) for d in (by_shape, heights(rows, "heart"), heights(rows, "direction")))])
@@ -300,7 +305,8 @@ def of_rims(error):
 
 
 def rays(tables, sets):
-    """Rows of the fits that found the wall, their numbers in the order of RAY_FIELDS, and the shifts of both surfaces."""
+    """Rows of the fits that found the wall, their numbers in the order of RAY_FIELDS, and the shifts of both
+    surfaces."""
     rows = table(tables / "rays.csv", sets)
     of_case = {}
     for row in rows:
@@ -351,7 +357,8 @@ def of_size(rows, constants, surface):
 
 
 def filtered(tables, constants):
-    """Rows of smoothness.csv of the hearts whose fits all found the wall. `constants` tell where the true surfaces are expected."""
+    """Rows of smoothness.csv of the hearts whose fits all found the wall. `constants` tell where the true surfaces are
+    expected."""
     rows = table(tables / "smoothness.csv", SMOOTHNESS_SETS)
     rest = [left(rows, constants, surface) for surface in ("inner", "outer")]
     lost = {(row["set"], row["case"]) for row, distances in zip(rows, zip(*rest)) if max(np.abs(distances)) > LOST_MEAN_MM}
@@ -453,8 +460,8 @@ def compare(tables, before, after):
     show("RIM_CORRECTION", before["RIM_CORRECTION"], after["RIM_CORRECTION"])
     error = heights(rows, "sensed") - heights(rows, "true")
     shift = [corrected(from_shape(rows, c["RIM_SHAPE"]), c["RIM_CORRECTION"]) for c in (before, after)]
-    print(f"  {len(rows)} rims: rms error {rms(error):.2f} mm as sensed, {rms(error - shift[0]):.2f} committed, {rms(error - shift[1]):.2f} estimated; "
-          f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation {np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n")
+    print(f"  {len(rows)} rims: rms error {rms(error):.2f} mm as sensed, {rms(error - shift[0]):.2f} committed, " f"{rms(error - shift[1]):.2f} estimated; "
+          f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation " f"{np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n")
     for sets in (RAY_SETS, SIZE_SETS):
         rows, x, both = rays(tables, sets)
         for surface, y in zip(("inner", "outer"), both):
@@ -462,13 +469,13 @@ def compare(tables, before, after):
             if sets is RAY_SETS:
                 show(name, before[name], after[name])
             shift = [linear(c[name], x) + of_size(rows, c, surface) for c in (before, after)]
-            print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} left by committed, "
-                  f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm (rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
+            print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} " f"left by committed, "
+                  f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm " f"(rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
                   f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n")
     rows, x, distance, limits = rim_evidence(tables, before)
     error = distance - left_out(x, distance, limits)
-    print(f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone {of_rims(distance - limits[0])}; "
-          f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION'], limits))}; each tenth left out {of_rims(error)}\n")
+    print(f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone " f"{of_rims(distance - limits[0])}; "
+          f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION'], limits))}; each tenth left out " f"{of_rims(error)}\n")
     show("RIM_DEVIATION", before["RIM_DEVIATION"], after["RIM_DEVIATION"])
     share = np.abs(error) / np.hypot(before["RIM_DEVIATION"]["least_mm"], before["RIM_DEVIATION"]["per_scatter"] * scatter(rows))[:, None]
     quarters = np.array_split(share[np.argsort(scatter(rows))], 4)
@@ -491,8 +498,8 @@ def compare(tables, before, after):
         _, x, distance = nodes(tables, wall)
         sd = [np.exp(linear(c[name], x)).clip(0.5, 15.0) for c in (before, after)]
         within = [f"{np.mean(distance <= s):.0%} / {np.mean(distance <= 2 * s):.0%}" for s in sd]
-        print(f"  {len(distance)} nodes within one / two standard deviations: {within[0]} committed, {within[1]} estimated; "
-              f"they differ by a factor of {np.exp(rms(np.log(sd[0] / sd[1]))):.2f} (rms), correlation of the logarithms {np.corrcoef(*np.log(sd))[0, 1]:.3f}\n")
+        print(f"  {len(distance)} nodes within one / two standard deviations: {within[0]} committed, {within[1]} " f"estimated; "
+              f"they differ by a factor of {np.exp(rms(np.log(sd[0] / sd[1]))):.2f} (rms), correlation of the " f"logarithms {np.corrcoef(*np.log(sd))[0, 1]:.3f}\n")
     print(f"MEDIAN_SPREAD_MM{before['MEDIAN_SPREAD_MM']:24.3f}{after['MEDIAN_SPREAD_MM']:12.3f}")
 
 

@@ -1,12 +1,14 @@
-"""Estimates the bounds of crates/ventriform/src/volume/gate_look.rs and beat_evidence.rs, and counts what they let pass.
+"""Estimates the bounds of crates/ventriform/src/volume/gate_look.rs and beat_evidence.rs, and counts what they let
+pass.
 
 usage: gate_look.py --people SCAN.nii.gz... --gated GATED.nii.gz...
 
-Each file of --gated holds the gates of a study, each of --people one scan; people of one grid are compared. Of both lists every other
-file estimates, and the rest is held out. From them it makes what is no beat: people in chance orders, one heart in chance sizes, scans under a
-ladder of filters (in order and not), one scan with more and more of its detail (iterations), two scans with several filters each, and noise. Prints
-for the estimating half the range of every figure and the bounds that follow, then for both halves how many beats are summed and how
-many others are refused with the constants that stand in the sources.
+Each file of --gated holds the gates of a study, each of --people one scan; people of one grid are compared. Of both
+lists every other file estimates, and the rest is held out. From them it makes what is no beat: people in chance orders,
+one heart in chance sizes, scans under a ladder of filters (in order and not), one scan with more and more of its detail
+(iterations), two scans with several filters each, and noise. Prints for the estimating half the range of every figure
+and the bounds that follow, then for both halves how many beats are summed and how many others are refused with the
+constants that stand in the sources.
 """
 import argparse
 import ast
@@ -92,7 +94,8 @@ def course(product, orders):
 
 
 def groups(distances):
-    """The largest distance between groups over that within them, of groups of two or more volumes; 0 if there are none."""
+    """The largest distance between groups over that within them, of groups of two or more volumes; 0 if there are
+    none."""
     count = len(distances)
     inside, links = [0], []
     while len(inside) < count:
@@ -116,7 +119,8 @@ def groups(distances):
 
 
 def coarse(volumes, spacing):
-    """The figures on blocks of 18 mm: least correlation, groups, lone mean, least distance, distance over contrast, counts."""
+    """The figures on blocks of 18 mm: least correlation, groups, lone mean, least distance, distance over contrast,
+    counts."""
     images = np.array([blocks(volume, spacing, BLOCK_MM)[0].ravel() for volume in volumes])
     count = len(images)
     others = (images.sum(0) - images) / (count - 1)
@@ -156,7 +160,8 @@ def zoomed(image, scale):
 def others(people, rng):
     """What is no beat, of people on one grid: kind, volumes, and whether any order of them is none."""
     for count in COUNTS:
-        picked = lambda: people[rng.integers(len(people))]
+        def picked():
+            return people[rng.integers(len(people))]
         if len(people) >= count:
             for _ in range(2):
                 yield "people", [people[n] for n in rng.choice(len(people), count, False)], True
@@ -182,7 +187,7 @@ def measured(gated, people, rng):
         gates = np.moveaxis(np.asarray(image.dataobj, float), 3, 0)
         spacing = image.header.get_zooms()[:3]
         own = course(products(gates, spacing), np.arange(len(gates))[None])
-        print(f"{'/'.join(Path(path).parts[-3:-1]):32s} {len(gates):2d} gates, once {own[0, 0]:.3f}, twice {own[0, 1]:.3f}, step {own[0, 2]:.3f}")
+        print(f"{'/'.join(Path(path).parts[-3:-1]):32s} {len(gates):2d} gates, once {own[0, 0]:.3f}, twice " f"{own[0, 1]:.3f}, step {own[0, 2]:.3f}")
         courses["beat"].append((len(gates), own))
         figures["beat"].append(coarse(gates, spacing))
         figures["with its mean"].append(coarse(with_mean(gates), spacing))
@@ -204,8 +209,8 @@ def passes(values, bounds):
 
 
 def estimated(courses, many):
-    """The bounds on the course, of few or of many volumes, that let the fewest others pass and keep KEPT_SHARE of the beats that any
-    bounds keep; with the share of the others that pass."""
+    """The bounds on the course, of few or of many volumes, that let the fewest others pass and keep KEPT_SHARE of the
+    beats that any bounds keep; with the share of the others that pass."""
     own = {kind: [value for count, value in values if (count >= MANY_GATES) == many] for kind, values in courses.items()}
     beats = np.concatenate(own["beat"])
     rest = [np.concatenate(values) for kind, values in own.items() if kind != "beat"]
@@ -231,7 +236,7 @@ def report(name, courses, figures, known):
         apart = [own["GROUPS_APART"] < known["GROUPS_APART"] and own["LEAST_CORRELATION"] >= known["LEAST_CORRELATION"] for own in figures[kind]]
         summed = sum(p * a for p, a in zip(passed, apart))
         orders = sum(len(own) for _, own in values)
-        print(f"  {kind:20s} {summed:7.2f} of {len(values)} summed ({orders} orders; by the course alone {sum(passed):.2f})")
+        print(f"  {kind:20s} {summed:7.2f} of {len(values)} summed ({orders} orders; by the course alone " f"{sum(passed):.2f})")
 
 
 def main():
@@ -248,7 +253,7 @@ def main():
         print(f"  {figure} {known.get(figure)}: " + "; ".join(ranges))
     for many, what in ((False, "fewer than"), (True, "from")):
         passed, bounds = estimated(courses, many)
-        print(f"  course, {what} {MANY_GATES} volumes: once {bounds[0]:.2f}, twice {bounds[1]:.2f}, step {bounds[2]:.2f}; {100 * passed:.2f} % of the others pass")
+        print(f"  course, {what} {MANY_GATES} volumes: once {bounds[0]:.2f}, twice {bounds[1]:.2f}, step " f"{bounds[2]:.2f}; {100 * passed:.2f} % of the others pass")
     for name, half in zip(("in-sample", "held-out"), halves):
         report(name, *half, known)
 

@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
 """Judges beats of simulated gated studies by their truth, beside the goals.
 
-    judge_beats.py PROGRAM CASES...       CASES are folders of the simulator of gated hearts (no part of this project), each with
+    judge_beats.py PROGRAM CASES...       CASES are folders of the simulator of gated hearts (no part of this project),
+                                          each with
                                           spect.nii.gz's gates in gated.nii.gz and the truth in params.json
 
-Printed are bias and deviation of EF, EDV and ESV; thickening and motion of the segments, pooled and within hearts; the area under the
-curve of akinetic segments; the spread of phases of hearts without delay and akinesia; how late a delayed wall is found; and for each study
-its own last gate with a quarter of the counts taken off (unless it lacks counts already), and its gates in another order round the cycle. EF, EDV and ESV are also
-given without the studies that were made with lost counts or rotated gates. Needs numpy and nibabel.
+Printed are bias and deviation of EF, EDV and ESV; thickening and motion of the segments, pooled and within hearts; the
+area under the curve of akinetic segments; the spread of phases of hearts without delay and akinesia; how late a delayed
+wall is found; and for each study its own last gate with a quarter of the counts taken off (unless it lacks counts
+already), and its gates in another order round the cycle. EF, EDV and ESV are also given without the studies that were
+made with lost counts or rotated gates. Needs numpy and nibabel.
 """
 import argparse
 import json
@@ -18,6 +20,7 @@ import tempfile
 
 import nibabel
 import numpy as np
+
 
 def beat(program, gated, out):
     environment = {**os.environ, "RAYON_NUM_THREADS": "1"}
@@ -102,7 +105,8 @@ def main():
                 continue
             if not options.no_variants:
                 for name, path in variants(case / "gated.nii.gz", folder):
-                    # Together with what it lacks already, the last gate would lack so much that it is left out of the curve.
+                    # Together with what it lacks already, the last gate would lack so much that it is left out of the
+                    # curve.
                     if name == "lost" and "count_loss" in [flag["code"] for flag in found["flags"]]:
                         continue
                     other = beat(program, path, folder / name)
@@ -127,7 +131,8 @@ def main():
                      found["esv_ml"], result["esv_ml"], swing, [f["code"] for f in found["flags"]]))
         print(f"{case.name:24} EF {found['ef_percent']:5.1f} of {100 * result['ef']:5.1f}  EDV {found['edv_ml']:6.1f} of "
               f"{result['edv_ml']:6.1f}  ESV {found['esv_ml']:6.1f} of {result['esv_ml']:6.1f}  {' '.join(rows[-1][-1])}", flush=True)
-    number = lambda column: np.array([row[column] for row in rows])
+    def number(column):
+        return np.array([row[column] for row in rows])
     ef = number(2) - number(3)
     line(f"EF of {len(rows)}: bias, SD, points", spread(ef), "<= 1.5, <= 4")
     line("EF within 5 points; worst", f"{100 * np.mean(abs(ef) <= 5):.0f} %; {abs(ef).max():.1f}", ">= 85 %, <= 10")
@@ -139,7 +144,8 @@ def main():
     if small.any():
         line("EF of hearts below 95 ml: worst", f"{abs(ef[small]).max():.1f} of {small.sum()}", "<= 6")
     line("muscle over the beat: worst swing", f"{number(8).max():.1f} %", "<= 3 %")
-    of = lambda column: np.array([segment[column] for segment in segments])
+    def of(column):
+        return np.array([segment[column] for segment in segments])
     for name, at, goal in ("thickening", 1, "r >= .85, SD <= 8"), ("motion", 3, "r >= .85, SD <= 1.3"):
         known = np.isfinite(of(at + 1))
         if known.any():

@@ -1,12 +1,16 @@
-"""Flags judged on simulated hearts: dark apices, images that were cut and resliced, and files whose sides are exchanged.
+"""Flags judged on simulated hearts: dark apices, images that were cut and resliced, and files whose sides are
+exchanged.
 
-    python scripts/measure/judge_flags.py SIMULATOR OUT --apices SEED                makes hearts whose apex is dark in whole or in part, and healthy ones
-    python scripts/measure/judge_flags.py SIMULATOR OUT --cuts SEED --cases CASE...  cuts images of cases at four sides, and reslices them obliquely
+    python scripts/measure/judge_flags.py SIMULATOR OUT --apices SEED                makes hearts whose apex is dark in
+                                                                                     whole or in part, and healthy ones
+    python scripts/measure/judge_flags.py SIMULATOR OUT --cuts SEED --cases CASE...  cuts images of cases at four sides,
+                                                                                     and reslices them obliquely
     python scripts/measure/judge_flags.py SIMULATOR OUT --mirrored --cases CASE...   exchanges left and right of cases
     python scripts/measure/judge_flags.py SIMULATOR OUT --judge [--program target/release/ventriform]
 
-SIMULATOR is the folder of make_cases.py. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the truth beside it, the
-error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in OUT; what is there already is kept.
+SIMULATOR is the folder of make_cases.py. --judge segments every OUT/*/spect.nii.gz and prints flags, and, against the
+truth beside it, the error of the cavity and, against OUT/NAME_whole, the change of the wall. The images are made in
+OUT; what is there already is kept.
 """
 
 import argparse

@@ -1,10 +1,12 @@
 """Normal limits judged on simulated hearts that took no part in them.
 
-    python scripts/measure/judge_normals.py SIMULATOR OUT --seed 3720 [--protocol stress_nac] [--programs target/release]
+    python scripts/measure/judge_normals.py SIMULATOR OUT --seed 3720
+        [--protocol stress_nac] [--programs target/release]
 
-SIMULATOR is the folder of make_healthy.py. Makes, under OUT and with seeds from --seed on, healthy hearts for the limits (30), healthy hearts (20), hearts with
-one defect (20) and hearts with one dark basal segment (18) to judge by; what is there already is kept. Then runs `ventriform normals build` and the
-instrument `perfusion`, whose page says what the figures are. Constants were chosen on seeds 3701 to 3704 and 3711 to 3714: say which seeds a figure is of.
+SIMULATOR is the folder of make_healthy.py. Makes, under OUT and with seeds from --seed on, healthy hearts for the
+limits (30), healthy hearts (20), hearts with one defect (20) and hearts with one dark basal segment (18) to judge by;
+what is there already is kept. Then runs `ventriform normals build` and the instrument `perfusion`, whose page says what
+the figures are. Constants were chosen on seeds 3701 to 3704 and 3711 to 3714: say which seeds a figure is of.
 """
 
 import argparse

@@ -9,7 +9,16 @@ and again, each time after SIGKILL, and measures the time from the start of the 
 of `/readyz`; then reads some of the volumes back and compares every byte. Loopback only; stops by itself;
 needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JSON object.
 """
-import argparse, hashlib, json, os, random, shutil, sqlite3, statistics, sys, tempfile
+import argparse
+import hashlib
+import json
+import os
+import random
+import shutil
+import sqlite3
+import statistics
+import sys
+import tempfile
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.nifti import FLOAT32, nifti

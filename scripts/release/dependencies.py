@@ -3,19 +3,27 @@
     python scripts/release/dependencies.py check     licences, bans and sources; the bill is valid and up to date
     python scripts/release/dependencies.py write     writes ventriform.cdx.json anew
     python scripts/release/dependencies.py python            prints the bill of the Python package
-    python scripts/release/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of scripts/release/image.sh
+    python scripts/release/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of
+                                                             scripts/release/image.sh
 
 The bill is CycloneDX 1.6. It holds what the program is built of: every crate that the default features need at run
 time or at build time on Linux, the C libraries inside of them, and the npm packages inside of the page. That of the
-Python package has no page; NumPy, which it needs, is not inside of it. That of an image has the program's and the Debian
-packages. None has a date, so that the same Cargo.lock gives the same bytes. Needs
+Python package has no page; NumPy, which it needs, is not inside of it. That of an image has the program's and the
+Debian packages. None has a date, so that the same Cargo.lock gives the same bytes. Needs
 cyclonedx-python-lib[json-validation]; no network beyond what cargo needs to have the crates.
 
 `cargo deny check` judges by the same deny.toml and by the advisories of rustsec.org as well; it needs
 cargo-deny and the network.
 """
-import json, pathlib, re, subprocess, sys, tomllib, urllib.parse, uuid
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import urllib.parse
+import uuid
 
+import tomllib
 from cyclonedx.schema import SchemaVersion
 from cyclonedx.validation.json import JsonStrictValidator
 from license_expression import get_spdx_licensing
@@ -94,7 +102,8 @@ def debian(packages):
 
 
 def bill(of="program", installed=None):
-    """The bill of materials of the program, of the Python package (`python`), or of an image with Debian packages, as text."""
+    """The bill of materials of the program, of the Python package (`python`), or of an image with Debian packages, as
+    text."""
     graph = metadata("--filter-platform", PLATFORM)
     packages = {package["id"]: package for package in graph["packages"]}
     nodes = {node["id"]: node for node in graph["resolve"]["nodes"]}

@@ -6,7 +6,10 @@ Of every crate that PACKAGE (`ventriform-program`, `ventriform-python`) needs at
 licence that it states, and the texts that lie beside its sources; crates with the same text share it. Crates that come
 without a text are listed at the end. Needs cargo alone.
 """
-import json, pathlib, subprocess, sys
+import json
+import pathlib
+import subprocess
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLATFORM = "x86_64-unknown-linux-gnu"
@@ -14,7 +17,7 @@ PLATFORM = "x86_64-unknown-linux-gnu"
 NAMES = ("license", "licence", "copying", "unlicense", "notice", "copyright")
 # Works of third parties inside a crate whose licence its own file does not name.
 INSIDE = {
-    "noto-sans-mono-bitmap": "Its glyphs are drawn from the font Noto Sans Mono, copyright The Noto Project Authors, under the SIL Open Font License "
+    "noto-sans-mono-bitmap": "Its glyphs are drawn from the font Noto Sans Mono, copyright The Noto Project Authors, " "under the SIL Open Font License "
     "1.1: https://openfontlicense.org"
 }
 # Licences whose texts are these, whoever holds the copyright.

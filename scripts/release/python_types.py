@@ -4,11 +4,17 @@
     python scripts/release/python_types.py write     writes them anew
     python scripts/release/python_types.py reference FILE     writes signatures and docstrings as JSON, for the site
 
-`python/ventriform/reports.py` has the reports' classes, from openapi/ventriform.json; `_functions.pyi` the signatures of
-the functions that take parameters, from the tables of the installed package (so install it first, or run
+`python/ventriform/reports.py` has the reports' classes, from openapi/ventriform.json; `_functions.pyi` the signatures
+of the functions that take parameters, from the tables of the installed package (so install it first, or run
 scripts/check/python.sh --write, which does).
 """
-import ast, inspect, json, keyword, pathlib, sys, textwrap
+import ast
+import inspect
+import json
+import keyword
+import pathlib
+import sys
+import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python/ventriform"
@@ -104,8 +110,8 @@ def reports():
         wanted += found
     head = '''"""The reports as classes, one for each document of the service's OpenAPI description.
 
-Written by scripts/release/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
-millilitres, angles degrees, as the names' endings say. Positions are LPS.
+Written by scripts/release/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres,
+volumes millilitres, angles degrees, as the names' endings say. Positions are LPS.
 """
 
 from __future__ import annotations
@@ -127,7 +133,7 @@ def stub():
 
     source = (PACKAGE / "_functions.py").read_text()
     tree = ast.parse(source)
-    lines = ['"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library\'s tables."""', ""]
+    lines = ['"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library\'s ' 'tables."""', ""]
     results = [alias.name for node in tree.body if getattr(node, "module", "") == "_results" for alias in node.names]
     lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from datetime import datetime", "from typing import Any, Literal", ""]
     lines += [f"from ._results import {', '.join(name for name in results if name[0].isupper())}", ""]

@@ -2,7 +2,12 @@
 
     SERVICE_URL=... PYTHONPATH=<folder of ventriform_client> python try_client.py scan.nii.gz gated.nii.gz
 """
-import importlib, io, os, pkgutil, sys, time
+import importlib
+import io
+import os
+import pkgutil
+import sys
+import time
 
 import ventriform_client
 from ventriform_client import Client
@@ -10,8 +15,20 @@ from ventriform_client.api.beats import get_beat, get_beat_mesh_glb, get_beat_re
 from ventriform_client.api.jobs import create_job, get_job
 from ventriform_client.api.models import get_model, get_model_mesh_glb, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import (Beat, BeatJobRequest, BeatParameters, BeatReport, Job, JobState, Model, ModelJobRequest, ModelParameters,
-                                      ModelReport, Problem, Volume)
+from ventriform_client.models import (
+    Beat,
+    BeatJobRequest,
+    BeatParameters,
+    BeatReport,
+    Job,
+    JobState,
+    Model,
+    ModelJobRequest,
+    ModelParameters,
+    ModelReport,
+    Problem,
+    Volume,
+)
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
