@@ -59,8 +59,8 @@ const isDrawn = canvas => canvas.evaluate(element => {
 });
 
 /**
- * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the uptake
- * in the colours of both.
+ * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the
+ * uptake in the colours of both.
  */
 const likeness = (page, path) => page.evaluate(async path => {
   const picture = await createImageBitmap(await (await fetch(path)).blob());
@@ -113,7 +113,7 @@ async function cutOff(page) {
 const number = (value, digits, unit = "") => value.toFixed(digits) + (unit && `\u2009${unit}`);
 
 export async function comparisons(tools) {
-  const { browser, service, tab, check, look, printed, choose, SCREENSHOTS } = tools;
+  const { browser, service, tab, check, look, printed, choose } = tools;
   let files;
   const data = () => (files ??= made(tools));
   const read = async (address, path) => (await fetch(address + path)).json();

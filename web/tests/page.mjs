@@ -1,4 +1,5 @@
-// The page in a browser, as a person uses it. Run by scripts/check/page.sh, which sets PROGRAM, SCREENSHOTS and CHROMIUM.
+// The page in a browser, as a person uses it. Run by scripts/check/page.sh, which sets PROGRAM, SCREENSHOTS and
+// CHROMIUM.
 //
 // Every view is looked at by axe-core; anything that the console reports, that the policy forbids, or that leaves this
 // machine fails the check.
@@ -149,7 +150,10 @@ async function printed(page, name) {
   return readFileSync(path, "latin1").split(/\/Type\s*\/Page\b/).length - 1;
 }
 
-/** A way to the service that breaks, or holds on, once so many bytes were sent on one connection; it is whole again after `mend`. */
+/**
+ * A way to the service that breaks, or holds on, once so many bytes were sent on one connection; it is whole again
+ * after `mend`.
+ */
 async function fragile(address, bytes, { holds = false } = {}) {
   let whole = false;
   const server = net.createServer(from => {
@@ -228,7 +232,7 @@ async function main() {
 
   await check("packed files hold what the plain ones do", async () => {
     const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
-    const names = [...(await read("/", "identity")).toString().matchAll(/"[.\/]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
+    const names = [...(await read("/", "identity")).toString().matchAll(/"[./]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
     const program = (await read(names.find(name => name.endsWith(".js")), "identity")).toString();
     for (const [, chunk] of program.matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g)) names.push(`/assets/${chunk}`);
     assert.ok(names.some(name => name.includes("viewer")) && names.some(name => name.includes("docs")), names.join());
