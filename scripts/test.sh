@@ -83,8 +83,6 @@ need() { # need COMMAND PACKAGE...: installs the packages if the command is miss
 }
 
 install_external_tools() {
-  need node nodejs npm
-  need npm npm
   need dciodvfy dicom3tools dcmtk
   need chromium chromium fonts-dejavu-core
   need ip iproute2
@@ -93,7 +91,6 @@ install_external_tools() {
   [ -x /usr/sbin/pgbouncer ] || need pgbouncer pgbouncer
   need promtool prometheus
   need kubectl kubernetes-client
-  python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
       "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
@@ -129,6 +126,8 @@ run_programs() {
 }
 
 need cc build-essential
+need npm nodejs npm
+python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
 # The tests start a server of their own; Debian keeps its programs off the path.
 ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || need no-such-command postgresql
 command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or newer"; failed=1; finish; }
@@ -137,6 +136,8 @@ command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or new
 
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
+check "format and lint of scripts and package (ruff)" scripts/check/style.sh python
+check "format and lint of the page (biome)" scripts/check/style.sh web
 check "clippy" cargo clippy --quiet --workspace --all-targets -- -D warnings
 check "library without the service" library_alone
 check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
