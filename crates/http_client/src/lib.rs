@@ -1,7 +1,7 @@
 //! The HTTP client of the service: the traits of [`ventriform_service::http_client`] on `reqwest`.
 //!
-//! In: [`ClientOptions`]. Out: clients that connect as these say, over HTTP/1.1 and TLS by rustls. The process's provider
-//! of cryptography has to be installed before the first client is made.
+//! In: [`ClientOptions`]. Out: clients that connect as these say, over HTTP/1.1 and TLS by rustls. The process's
+//! provider of cryptography has to be installed before the first client is made.
 
 mod client;
 mod error;

@@ -3,8 +3,8 @@
 //!
 //! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
 //!    64 bits.
-//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave the
-//!    fields in one object, as generators of clients want them.
+//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave
+//!    the fields in one object, as generators of clients want them.
 //! 3. A path `.../{file}` becomes one path per file, so that each file has one media type and one
 //!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
 //!    names of a form: the meshes and labels of the gates of a beat.
