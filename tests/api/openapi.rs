@@ -64,7 +64,8 @@ fn every_parameter_of_a_job_is_documented_twice() {
     }
 }
 
-/// A generated client tells the parameters of one kind of job from those of another by `kind`, and fills in no others' defaults.
+/// A generated client tells the parameters of one kind of job from those of another by `kind`, and fills in no others'
+/// defaults.
 #[test]
 fn a_request_for_a_job_is_told_by_its_kind() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
