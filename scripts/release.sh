@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a Debian
-# package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
+# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a
+# Debian package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
 #
 #   scripts/release.sh              x86_64; also aarch64 where the compiler has that target
 #
-# The target aarch64 comes from `rustup target add`, or beside Debian's compiler rustc-web from libstd-rust-web-dev:arm64.
-# The image is for x86_64; scripts/release/image.sh makes it, which needs root.
+# The target aarch64 comes from `rustup target add`, or beside Debian's compiler rustc-web from
+# libstd-rust-web-dev:arm64. The image is for x86_64; scripts/release/image.sh makes it, which needs root.
 #
 # First scripts/release/check_semver.sh compares the library's interface with the newest release's.
 #
-# Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same commit
-# gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. Only the image has
-# Debian's packages of the day, which its bill of materials lists, and depends on the version of buildah. What was changed since the
-# commit is refused, unless DIRTY=1.
+# Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same
+# commit gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. Only
+# the image has Debian's packages of the day, which its bill of materials lists, and depends on the version of buildah.
+# What was changed since the commit is refused, unless DIRTY=1.
 #
 # WHEELS, PROGRAM: a folder of wheels and a program to pack instead of building them, to try this script.
 set -euo pipefail

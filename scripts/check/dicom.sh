@@ -5,8 +5,9 @@
 #   scripts/check/dicom.sh --orientations     all 48 orders and directions of the axes
 #
 # scripts/check/dicom.py writes NM files of one simulated scan (both signs of Spacing Between Slices, oblique,
-# gated) and of one simulated beat, segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy (dicom3tools) checks
-# every object, dcmdump (dcmtk) reads it. scripts/check/names.py compares every character set with pydicom. Exits with 1 if anything is wrong.
+# gated) and of one simulated beat, segments them and reads the objects with pydicom, highdicom and dcmqi. dciodvfy
+# (dicom3tools) checks every object, dcmdump (dcmtk) reads it. scripts/check/names.py compares every character set with
+# pydicom. Exits with 1 if anything is wrong.
 #
 # PYTHON: an interpreter that has numpy, nibabel, pydicom, highdicom and dcmqi. Without it the script installs
 # them under target/. Debian packages that are missing are installed.

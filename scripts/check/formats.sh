@@ -6,13 +6,14 @@
 #
 # For every NAME.json in a folder, Khronos' glTF validator, trimesh and VTK read
 # NAME.{glb,gltf,stl,ply,obj,vtp,vtk} and the result is compared with NAME.json: the mesh, the figures of
-# its vertices and the parts of its triangles. SimpleITK, nibabel and pynrrd must find mask and labels of the fit where the
-# scan is (scripts/check/masks.py). The validator also reads a beat's mesh.glb, which moves. Meshes that trimesh and VTK write in every way must be the masks they enclose
-# (scripts/check/meshes.py). Prints the number of files that passed and failed; exits with 1 if any failed.
+# its vertices and the parts of its triangles. SimpleITK, nibabel and pynrrd must find mask and labels of the fit where
+# the scan is (scripts/check/masks.py). The validator also reads a beat's mesh.glb, which moves. Meshes that trimesh and
+# VTK write in every way must be the masks they enclose (scripts/check/meshes.py). Prints the number of files that
+# passed and failed; exits with 1 if any failed.
 #
 # PROGRAM: the program that makes fit and model (default: target/debug/ventriform).
-# PYTHON: an interpreter that has nibabel, numpy, pynrrd, SimpleITK, trimesh and vtk. NODE_PATH: a folder that has gltf-validator.
-# Without these variables the script installs the packages under target/.
+# PYTHON: an interpreter that has nibabel, numpy, pynrrd, SimpleITK, trimesh and vtk. NODE_PATH: a folder that has
+# gltf-validator. Without these variables the script installs the packages under target/.
 set -euo pipefail
 
 root=$(cd "$(dirname "$0")/../.." && pwd)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Runs the fuzzers of fuzz/ with libFuzzer and the address sanitiser, one after the other, on one core.
 #
-#   scripts/check/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, mesh, parameters, multipart and association
+#   scripts/check/fuzz.sh [SECONDS] [TARGET...]     60 seconds each of nifti, dicom, mesh, parameters, multipart and
+#                                                   association
 #
 # Needs cargo-fuzz's compiler flags, which only a nightly compiler takes; RUSTC_BOOTSTRAP=1 makes the stable one
 # take them. New inputs go to fuzz/corpus/, inputs that fail to fuzz/artifacts/; neither is committed.

@@ -6,12 +6,12 @@
 #   scripts/check/mutants.sh only REGEX         those whose names match
 #
 # Mutants come from cargo-mutants (installed if it is missing) and are made in a clone of the last commit, under
-# target/mutants. All of them are in one build, each behind a switch (scripts/check/mutants.py), and each is tested by the
-# library's own tests, the domain tests and the commands' tests that enter the changed function, until one fails.
+# target/mutants. All of them are in one build, each behind a switch (scripts/check/mutants.py), and each is tested by
+# the library's own tests, the domain tests and the commands' tests that enter the changed function, until one fails.
 # The quality gate is one of them.
 #
-# Prints the mutants missed, those of them that scripts/check/mutants_accepted.txt accepts, and the share caught; writes one
-# JSON line for each mutant to target/mutants/results.jsonl. Exits with an error if a mutant was missed that is not
+# Prints the mutants missed, those of them that scripts/check/mutants_accepted.txt accepts, and the share caught; writes
+# one JSON line for each mutant to target/mutants/results.jsonl. Exits with an error if a mutant was missed that is not
 # accepted.
 #
 # FAST: most seconds of tests for one mutant (no limit). What they do not notice counts as missed.

@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Checks the service on PostgreSQL behind PgBouncer: in session mode it works and its sessions keep their limits, every other
-# mode and every refusal by PgBouncer ends the start with the cause.
+# Checks the service on PostgreSQL behind PgBouncer: in session mode it works and its sessions keep their limits, every
+# other mode and every refusal by PgBouncer ends the start with the cause.
 #
 #   scripts/check/pgbouncer.sh
 #
 # scripts/check/pgbouncer.py starts both servers and the service on loopback; as root it starts the servers as the user
-# `postgres`. Takes half a minute. Exits with 1 if anything is wrong. Debian's postgresql and pgbouncer are installed if they
-# are missing.
+# `postgres`. Takes half a minute. Exits with 1 if anything is wrong. Debian's postgresql and pgbouncer are installed if
+# they are missing.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Format and lint of what is not Rust, by tools of the versions that are pinned: scripts/requirements.txt, web/package.json.
+# Format and lint of what is not Rust, by tools of the versions that are pinned: scripts/requirements.txt,
+# web/package.json.
 #
-#   scripts/check/style.sh python            Python of scripts, tests, site and package, by ruff (settings: pyproject.toml)
+#   scripts/check/style.sh python            Python of scripts, tests, site and package, by ruff (settings:
+#                                            pyproject.toml)
 #   scripts/check/style.sh web               the page and its tests, by biome (settings: web/biome.json)
 #   scripts/check/style.sh python --write    formats instead, and mends what the linter can
 #

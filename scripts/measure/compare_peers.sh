@@ -9,8 +9,8 @@
 #
 # PYTHON: an interpreter that has the packages. ROUNDS: turns of each program (15).
 # CORE: the core to run on (the last one).
-# NATIVE=1: ventriform and the C++ peers use all that this machine's processor has; otherwise what every x86-64 has, as published
-# binaries and the wheels of the other peers do. Results then go to target/compare-peers/native.
+# NATIVE=1: ventriform and the C++ peers use all that this machine's processor has; otherwise what every x86-64 has, as
+# published binaries and the wheels of the other peers do. Results then go to target/compare-peers/native.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 work=$PWD/target/compare-peers

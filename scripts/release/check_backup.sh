@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Backs up and restores the named volume of docker-compose.yml by the commands of docs/operations.md, which are read from
-# the page: a model that was acknowledged before the backup is there after the restore, and what came later is not.
+# Backs up and restores the named volume of docker-compose.yml by the commands of docs/operations.md, which are read
+# from the page: a model that was acknowledged before the backup is there after the restore, and what came later is not.
 #
-# Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for machines that cannot
-# reach the published port from outside of the engine's network. IMAGE: an image that was built before, else it is built.
+# Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for machines that
+# cannot reach the published port from outside of the engine's network. IMAGE: an image that was built before, else it
+# is built.
 #
 #   scripts/release/check_backup.sh
 set -euo pipefail

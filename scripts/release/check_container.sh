@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds the image, starts the service with docker compose and makes a model through it.
 #
-#   scripts/release/check_container.sh [TARBALL]      TARBALL: an image of scripts/release.sh, which is loaded and not built
+#   scripts/release/check_container.sh [TARBALL]      TARBALL: an image of scripts/release.sh, which is loaded and not
+#                                                     built
 #
 # Not part of scripts/test.sh: it needs docker with compose. IN_ENGINE: a command prefix for curl, for
 # machines that cannot reach the published port from outside of the engine's network.

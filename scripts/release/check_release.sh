@@ -3,13 +3,15 @@
 #
 #   scripts/release/check_release.sh [SUITE [ARCHITECTURE]]      trixie and this machine's unless given
 #
-# Needs root and Debian's packages, of which mmdebstrap makes a chroot; for another architecture qemu runs what is in it. Checked: checksums; the Debian package installs, its
-# program makes and measures a model, its user and folders exist, its unit is well formed, and it can be removed; the archive's
-# program runs; the wheel installs into a fresh environment with NumPy alone and segments a scan, and has its bill of materials and its licence texts; the
-# library and the program need no newer glibc than 2.17; the image's service makes a model as the image's user.
+# Needs root and Debian's packages, of which mmdebstrap makes a chroot; for another architecture qemu runs what is in
+# it. Checked: checksums; the Debian package installs, its program makes and measures a model, its user and folders
+# exist, its unit is well formed, and it can be removed; the archive's program runs; the wheel installs into a fresh
+# environment with NumPy alone and segments a scan, and has its bill of materials and its licence texts; the library and
+# the program need no newer glibc than 2.17; the image's service makes a model as the image's user.
 #
-# The image, which is for amd64, is tried by scripts/release/check_container.sh where docker answers (IN_ENGINE: see there). Elsewhere buildah unpacks it and
-# runs its program in a chroot, with the image's user and environment; its health check is then run by this script.
+# The image, which is for amd64, is tried by scripts/release/check_container.sh where docker answers (IN_ENGINE: see
+# there). Elsewhere buildah unpacks it and runs its program in a chroot, with the image's user and environment; its
+# health check is then run by this script.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 suite=${1:-trixie}

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Compares the public interface of the crate `ventriform` with that of the newest release: a change that breaks its users
-# fails unless the version in Cargo.toml says so.
+# Compares the public interface of the crate `ventriform` with that of the newest release: a change that breaks its
+# users fails unless the version in Cargo.toml says so.
 #
 #   scripts/release/check_semver.sh [REVISION]      the newest tag v* unless given
 #
-# In: the work tree and a revision. Out: the changes that break, by cargo-semver-checks. Guaranteed: 0 if it found none, or there
-# is no release yet, which is said. It knows many kinds of breaking changes, not all.
+# In: the work tree and a revision. Out: the changes that break, by cargo-semver-checks. Guaranteed: 0 if it found none,
+# or there is no release yet, which is said. It knows many kinds of breaking changes, not all.
 #
 # crates.io has the tool as sources only: it is compiled once, under target/test-tools.
 set -euo pipefail

@@ -3,15 +3,17 @@
 #
 #   SOURCE_DATE_EPOCH=SECONDS scripts/release/image.sh PROGRAM LICENCES OUT
 #
-# In: a program for x86_64, and the licence texts of what it contains. Out: OUT.image.tar.gz, named ventriform:VERSION, which
-# `docker load` and `podman load` read; and OUT.image.packages, the Debian packages in it: name, version, architecture, source, version of the source.
+# In: a program for x86_64, and the licence texts of what it contains. Out: OUT.image.tar.gz, named ventriform:VERSION,
+# which `docker load` and `podman load` read; and OUT.image.packages, the Debian packages in it: name, version,
+# architecture, source, version of the source.
 #
-# mmdebstrap makes the base layer: the essential packages of the suite that the Dockerfile names, without apt, translations and
-# manuals. buildah executes the Dockerfile's last stage on it, so that user, environment, volume, port, health check and labels
-# are written there alone. The format is Docker's, because the image of an OCI archive cannot have a health check.
+# mmdebstrap makes the base layer: the essential packages of the suite that the Dockerfile names, without apt,
+# translations and manuals. buildah executes the Dockerfile's last stage on it, so that user, environment, volume, port,
+# health check and labels are written there alone. The format is Docker's, because the image of an OCI archive cannot
+# have a health check.
 #
-# The same program, Dockerfile and Debian packages give the same bytes, by the same versions of mmdebstrap and buildah. Debian's
-# packages are those of the day, with its security updates.
+# The same program, Dockerfile and Debian packages give the same bytes, by the same versions of mmdebstrap and buildah.
+# Debian's packages are those of the day, with its security updates.
 #
 # Needs root.
 set -euo pipefail
@@ -34,7 +36,8 @@ work=$(mktemp -d)
 buildah=(buildah --root "$work/storage" --runroot "$work/run" --storage-driver vfs)
 trap '"${buildah[@]}" rm --all >/dev/null 2>&1 || true; rm -rf "$work"' EXIT
 
-# In the base: an engine puts its own over hostname, hosts and resolv.conf; mmdebstrap would leave those of this machine.
+# In the base: an engine puts its own over hostname, hosts and resolv.conf; mmdebstrap would leave those of this
+# machine.
 cat >"$work/settle.sh" <<'SETTLE'
 set -eu
 cd "$1"

@@ -3,7 +3,8 @@
 #
 #   scripts/release/pictures.sh        writes docs/pictures/page.png and docs/pictures/wall.png
 #
-# PROGRAM: a program that is built already; CHROMIUM: a browser. Needs node, npm, chromium and pngquant (Debian packages).
+# PROGRAM: a program that is built already; CHROMIUM: a browser. Needs node, npm, chromium and pngquant (Debian
+# packages).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 missing=()
