@@ -37,7 +37,9 @@ from lib.service import FINAL, ROOT, Service
 LEASE = 3
 # Jobs of a round; the checks wait for all of them.
 JOBS = 8
-NEAR, FAR = "10.213.77.1", "10.213.77.2"
+# Of this process alone: another run may go on beside it.
+NEAR, FAR = (f"10.213.{os.getpid() % 256}.{host}" for host in (1, 2))
+LINE = [f"vt{os.getpid()}{end}" for end in "ab"]
 
 
 class Proxy:
@@ -142,11 +144,11 @@ class Chaos:
     def separate(self):
         """Makes the other namespace and the line to it."""
         run("ip", "netns", "add", self.space)
-        run("ip", "link", "add", "vtchaos0", "type", "veth", "peer", "name", "vtchaos1", "netns", self.space)
-        run("ip", "addr", "add", NEAR + "/30", "dev", "vtchaos0")
-        run("ip", "link", "set", "vtchaos0", "up")
-        run("ip", "-n", self.space, "addr", "add", FAR + "/30", "dev", "vtchaos1")
-        run("ip", "-n", self.space, "link", "set", "vtchaos1", "up")
+        run("ip", "link", "add", LINE[0], "type", "veth", "peer", "name", LINE[1], "netns", self.space)
+        run("ip", "addr", "add", NEAR + "/30", "dev", LINE[0])
+        run("ip", "link", "set", LINE[0], "up")
+        run("ip", "-n", self.space, "addr", "add", FAR + "/30", "dev", LINE[1])
+        run("ip", "-n", self.space, "link", "set", LINE[1], "up")
         run("ip", "-n", self.space, "link", "set", "lo", "up")
 
     def start(self, name):
@@ -287,9 +289,9 @@ class Chaos:
         self.proxy.mode = "pass"
 
     def partition(self):
-        run("ip", "link", "set", "vtchaos0", "down")
+        run("ip", "link", "set", LINE[0], "down")
         time.sleep(self.random.uniform(0.5, 2 * LEASE))
-        run("ip", "link", "set", "vtchaos0", "up")
+        run("ip", "link", "set", LINE[0], "up")
 
     def stop_worker(self):
         process = self.services["worker-0"].process
@@ -399,7 +401,7 @@ class Chaos:
             self.store.kill()
         if hasattr(self, "postgres"):
             self.postgres.end(signal.SIGQUIT)
-        subprocess.run(["ip", "link", "del", "vtchaos0"], capture_output=True)
+        subprocess.run(["ip", "link", "del", LINE[0]], capture_output=True)
         subprocess.run(["ip", "netns", "del", self.space], capture_output=True)
 
 
