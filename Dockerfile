@@ -33,7 +33,7 @@ RUN install -d -o 10001 -g 10001 -m 0750 /data
 COPY --from=build /build/target/dist/ventriform /usr/local/bin/ventriform
 # For S3 stores, archives, webhooks and OpenID issuers behind HTTPS; mount your own over it for a private authority.
 COPY --from=build /etc/ssl/certs/ca-certificates.crt /etc/ssl/certs/
-# THIRD-PARTY has the licence texts of the dependencies; scripts/image.sh adds it.
+# THIRD-PARTY has the licence texts of the dependencies; scripts/release/image.sh adds it.
 COPY LICENSE-APACHE LICENSE-MIT ventriform.cdx.json THIRD-PARTY* /usr/share/doc/ventriform/
 # The service listens beyond loopback, so it asks callers for keys unless VENTRIFORM_ALLOW_ANONYMOUS=true.
 ENV VENTRIFORM_LISTEN=0.0.0.0:8080 \

@@ -1,6 +1,6 @@
 //! The queue on PostgreSQL: claims beside the ended jobs of the table, and processes whose jobs sleep.
 //!
-//! `scripts/bench_scale.py` starts the servers, fills the table and runs this. The settings come from the
+//! `scripts/measure/bench_scale.py` starts the servers, fills the table and runs this. The settings come from the
 //! environment, as those of the service do: `VENTRIFORM_DATABASE`, `VENTRIFORM_BLOBS`, `AWS_*`.
 //!
 //! Jobs that sleep need no processor, so the second measurement shows what the queue itself costs with more
@@ -42,7 +42,7 @@ async fn main() -> Outcome<()> {
     let environment = |name: &str| std::env::var(name).ok();
     let (mut settings, _) = Settings::load(&Flags::default(), environment)?;
     let Some(url) = settings.database.0.clone() else {
-        println!("VENTRIFORM_DATABASE is not set: run scripts/bench_scale.py");
+        println!("VENTRIFORM_DATABASE is not set: run scripts/measure/bench_scale.py");
         return Ok(());
     };
     settings.read_credentials(environment)?;

@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a Debian
-# package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
+# Builds what is handed out, into dist/: the Python package as a wheel and as sources, the program as tar.gz, as a
+# Debian package and as an image of a container, the bill of materials of each, licence texts, and the checksums of all.
 #
 #   scripts/release.sh              x86_64; also aarch64 where the compiler has that target
 #
-# The target aarch64 comes from `rustup target add`, or beside Debian's compiler rustc-web from libstd-rust-web-dev:arm64.
-# The image is for x86_64; scripts/image.sh makes it, which needs root.
+# The target aarch64 comes from `rustup target add`, or beside Debian's compiler rustc-web from
+# libstd-rust-web-dev:arm64. The image is for x86_64; scripts/release/image.sh makes it, which needs root.
 #
-# First scripts/check_semver.sh compares the library's interface with the newest release's.
+# First scripts/release/check_semver.sh compares the library's interface with the newest release's.
 #
-# Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same commit
-# gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. Only the image has
-# Debian's packages of the day, which its bill of materials lists, and depends on the version of buildah. What was changed since the
-# commit is refused, unless DIRTY=1.
+# Programs and wheels run on any Linux with glibc 2.17 or newer: zig, which PyPI has, is compiler and linker. The same
+# commit gives the same bytes wherever it lies: paths are mapped, times are the commit's, and archives are sorted. Only
+# the image has Debian's packages of the day, which its bill of materials lists, and depends on the version of buildah.
+# What was changed since the commit is refused, unless DIRTY=1.
 #
 # WHEELS, PROGRAM: a folder of wheels and a program to pack instead of building them, to try this script.
 set -euo pipefail
@@ -26,7 +26,7 @@ if [ -n "$(git status --porcelain)" ] && [ -z "${DIRTY:-}" ]; then
   echo "there are changes that no commit has; commit them, or set DIRTY=1"
   exit 1
 fi
-scripts/check_semver.sh
+scripts/release/check_semver.sh
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
 export SOURCE_DATE_EPOCH
 # The order of file names is that of the locale.
@@ -57,7 +57,7 @@ archive() {
 # accompany FOLDER: what goes with the program: licences and the bill of materials.
 accompany() {
   install -m 0644 LICENSE-MIT LICENSE-APACHE README.md CHANGELOG.md ventriform.cdx.json "$1"
-  python3 scripts/licences.py ventriform-program >"$1/THIRD-PARTY"
+  python3 scripts/release/licences.py ventriform-program >"$1/THIRD-PARTY"
 }
 
 # helpers PROGRAM FOLDER: completions and manual pages, which the program prints itself.
@@ -146,10 +146,10 @@ rm -rf "$dist"
 mkdir "$dist"
 
 # maturin's own bill has the paths of this machine, so pyproject.toml turns it off.
-python3 scripts/dependencies.py python >"$dist/ventriform-python.cdx.json"
+python3 scripts/release/dependencies.py python >"$dist/ventriform-python.cdx.json"
 maturin sdist --out "$dist" >"$work/sdist.log" 2>&1 || { cat "$work/sdist.log"; exit 1; }
 # The wheel contains the work of others; the sources, above, do not.
-python3 scripts/licences.py ventriform-python >"$third_party"
+python3 scripts/release/licences.py ventriform-python >"$third_party"
 for target in "${targets[@]}"; do
   if [ -n "${WHEELS:-}" ]; then
     cp "$WHEELS"/*.whl "$dist"
@@ -174,9 +174,9 @@ for target in "${targets[@]}"; do
     x86_64-*)
       debian "$program" "$work/helpers" amd64
       if [ "$(id -u)" = 0 ]; then
-        scripts/image.sh "$program" "$work/$name/THIRD-PARTY" "$work/ventriform-$version-x86_64"
+        scripts/release/image.sh "$program" "$work/$name/THIRD-PARTY" "$work/ventriform-$version-x86_64"
         mv "$work/ventriform-$version-x86_64.image.tar.gz" "$dist"
-        python3 scripts/dependencies.py image "$work/ventriform-$version-x86_64.image.packages" >"$dist/ventriform-image.cdx.json"
+        python3 scripts/release/dependencies.py image "$work/ventriform-$version-x86_64.image.packages" >"$dist/ventriform-image.cdx.json"
       else
         echo "without an image: call this as root"
       fi

@@ -83,8 +83,6 @@ need() { # need COMMAND PACKAGE...: installs the packages if the command is miss
 }
 
 install_external_tools() {
-  need node nodejs npm
-  need npm npm
   need dciodvfy dicom3tools dcmtk
   need chromium chromium fonts-dejavu-core
   need ip iproute2
@@ -93,13 +91,12 @@ install_external_tools() {
   [ -x /usr/sbin/pgbouncer ] || need pgbouncer pgbouncer
   need promtool prometheus
   need kubectl kubernetes-client
-  python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
   if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
     python3 -m venv "$tools/python" &&
       "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
       cp scripts/requirements.txt "$tools/python.done"
   fi
-  scripts/check_python.sh --install || return
+  scripts/check/python.sh --install || return
   if ! cmp -s scripts/package.json "$tools/node.done"; then
     cp scripts/package.json "$tools/package.json" &&
       npm install --silent --no-fund --no-audit --prefix "$tools" &&
@@ -129,6 +126,8 @@ run_programs() {
 }
 
 need cc build-essential
+need npm nodejs npm
+python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
 # The tests start a server of their own; Debian keeps its programs off the path.
 ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || need no-such-command postgresql
 command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or newer"; failed=1; finish; }
@@ -137,6 +136,8 @@ command -v cargo >/dev/null || { echo "cargo not found: install Rust 1.95 or new
 
 # --- the project's own tests ------------------------------------------------------------
 check "format" cargo fmt --check
+check "format and lint of scripts and package (ruff)" scripts/check/style.sh python
+check "format and lint of the page (biome)" scripts/check/style.sh web
 check "clippy" cargo clippy --quiet --workspace --all-targets -- -D warnings
 check "library without the service" library_alone
 check "documentation" env RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc --quiet --no-deps --document-private-items
@@ -168,26 +169,26 @@ if wait "${running[install]}"; then
   # `cargo test` does. The Python package has features of its own, and its wheel is built before the checks, which
   # would wait for cargo's lock.
   cargo build --quiet --workspace --exclude ventriform-python --bins --examples --test layering
-  check "wheel of the Python package" scripts/check_python.sh --build
-  start python scripts/check_python.sh --test
-  start formats scripts/check_formats.sh
-  start geodesics scripts/check_geodesics.sh
-  start codecs scripts/check_codecs.sh
-  start api scripts/check_api.sh
-  start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m' scripts/with_service.sh "$PYTHON" scripts/check_contract.py
-  start clients scripts/check_clients.sh
-  start crashes "$PYTHON" scripts/crash_rounds.py --program target/debug/ventriform --rounds 10
-  start dicom scripts/check_dicom.sh
-  start intake scripts/check_intake.sh
-  start pacs scripts/check_pacs.sh
-  start s3 scripts/check_s3.sh
-  start chaos "$PYTHON" scripts/chaos.py --program target/debug/ventriform --rounds 10
-  start kubernetes scripts/check_kubernetes.sh
-  start proxy scripts/check_proxy.sh
-  start pgbouncer scripts/check_pgbouncer.sh
+  check "wheel of the Python package" scripts/check/python.sh --build
+  start python scripts/check/python.sh --test
+  start formats scripts/check/formats.sh
+  start geodesics scripts/check/geodesics.sh
+  start codecs scripts/check/dicom_codecs.sh
+  start api scripts/check/api.sh
+  start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m' scripts/with_service.sh "$PYTHON" scripts/check/contract.py
+  start clients scripts/check/clients.sh
+  start crashes "$PYTHON" scripts/check/crash_rounds.py --program target/debug/ventriform --rounds 10
+  start dicom scripts/check/dicom.sh
+  start intake scripts/check/intake.sh
+  start pacs scripts/check/pacs.sh
+  start s3 scripts/check/s3.sh
+  start chaos "$PYTHON" scripts/check/chaos.py --program target/debug/ventriform --rounds 10
+  start kubernetes scripts/check/kubernetes.sh
+  start proxy scripts/check/proxy.sh
+  start pgbouncer scripts/check/pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
-  start commands "$PYTHON" scripts/check_commands.py target/debug/ventriform
-  start dependencies "$PYTHON" scripts/dependencies.py check
+  start commands "$PYTHON" scripts/check/commands.py target/debug/ventriform
+  start dependencies "$PYTHON" scripts/release/dependencies.py check
   collect python "Python package: tests, types, notebooks"
   collect formats "formats read by trimesh, vtk and the glTF validator"
   collect geodesics "geodesics against pygeodesic"
@@ -214,8 +215,8 @@ else
 fi
 # Alone, since they measure how long a request takes, and a browser on busy processors is slow.
 [ -n "${PYTHON:-}" ] && check "attacks of one client under a limit of memory" \
-  "$PYTHON" scripts/check_limits.py --program target/debug/ventriform --patience 3
-check "page in a browser" scripts/check_page.sh --bundle
-check "site of the docs: links, search, nothing from elsewhere" scripts/site.sh --check
-check "demo" scripts/check_demo.sh
+  "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 3
+check "page in a browser" scripts/check/page.sh --bundle
+check "site of the docs: links, search, nothing from elsewhere" scripts/release/site.sh --check
+check "demo" scripts/check/demo.sh
 finish

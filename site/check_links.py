@@ -2,9 +2,9 @@
 
     python site/check_links.py target/site/html
 
-Sources: a relative link leads to a committed file or folder, and its anchor to a heading there. Pages: every link inside leads
-to a file of the site and an anchor in it; scripts, styles, pictures and frames are files of the site. Links to elsewhere are
-`https://` with a host (`http://` for this machine only); they are not visited.
+Sources: a relative link leads to a committed file or folder, and its anchor to a heading there. Pages: every link
+inside leads to a file of the site and an anchor in it; scripts, styles, pictures and frames are files of the site.
+Links to elsewhere are `https://` with a host (`http://` for this machine only); they are not visited.
 """
 import html.parser
 import pathlib

@@ -2,8 +2,8 @@
 
     python site/check_reference.py target/site
 
-In: reference.json, and the pages in html/. Guaranteed: every parameter of every function has a row in the reference, with its
-default; every notebook has a picture, and no cell ended with an error.
+In: reference.json, and the pages in html/. Guaranteed: every parameter of every function has a row in the reference,
+with its default; every notebook has a picture, and no cell ended with an error.
 """
 import html
 import json

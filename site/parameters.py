@@ -1,7 +1,8 @@
-"""Gives the Python reference the parameters that come from the library's tables: in the sources they are `**parameters`.
+"""Gives the Python reference the parameters that come from the library's tables: in the sources they are
+`**parameters`.
 
-In: target/site/reference.json, which scripts/python_types.py writes of the installed package. Out: signature and docstring of each
-function there, as `help` shows them.
+In: target/site/reference.json, which scripts/release/python_types.py writes of the installed package. Out: signature
+and docstring of each function there, as `help` shows them.
 """
 import json
 import pathlib
@@ -15,8 +16,8 @@ TOGETHER = re.compile(r"^(\w+(?:, \w+)+)\n( +.*)$", re.M)
 
 
 def readable(docstring):
-    """A docstring without what griffe reads otherwise than meant: the first of {...} and of several names would be the default of
-    the parameter, and of them all."""
+    """A docstring without what griffe reads otherwise than meant: the first of {...} and of several names would be the
+    default of the parameter, and of them all."""
     docstring = CHOICES.sub(lambda found: found[1] + " | ".join(found[2].split(", ")), docstring)
     return TOGETHER.sub(lambda found: "\n".join(f"{name}\n{found[2]}" for name in found[1].split(", ")), docstring)
 

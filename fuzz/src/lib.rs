@@ -1,5 +1,5 @@
-//! What the fuzzers do with their bytes. `tests/fuzz.rs` of the library and of the program drive the same functions over
-//! the same corpus with random damage, for a few seconds and without libFuzzer.
+//! What the fuzzers do with their bytes. `tests/fuzz.rs` of the library and of the program drive the same functions
+//! over the same corpus with random damage, for a few seconds and without libFuzzer.
 
 #![allow(clippy::unwrap_used, reason = "a panic is what a fuzzer looks for")]
 

@@ -67,9 +67,10 @@ def gated(folder: pathlib.Path) -> pathlib.Path:
     import sys
 
     sys.path.insert(0, str(ROOT / "scripts"))
-    import gated_phantom  # type: ignore[import-not-found]
     import nibabel
     import numpy as np
+
+    from lib import gated_phantom  # type: ignore[import-not-found]
 
     voxels, affine = gated_phantom.beat(str(folder / "rest"))
     image = nibabel.Nifti1Image(voxels.astype(np.int16), affine)

@@ -1,6 +1,7 @@
 """Ends one call of the package at many moments, and prints how much processor time it took until it ended.
 
-python ended_calls.py CALL FOLDER MOMENTS prints a JSON list of seconds. FOLDER holds what `test_ended_calls.py` puts there.
+python ended_calls.py CALL FOLDER MOMENTS prints a JSON list of seconds. FOLDER holds what `test_ended_calls.py` puts
+there.
 
 Moments and delays are processor time of this process: another program that has the processor meanwhile changes neither.
 """
@@ -98,7 +99,8 @@ def calls(folder: pathlib.Path) -> dict[str, Callable[[], Callable[[], object]]]
 
 
 def ended(call: Callable[[], object], after: float) -> float | None:
-    """The seconds until `call` ended once the signal was sent, `after` seconds of processor time after its beginning."""
+    """The seconds until `call` ended once the signal was sent, `after` seconds of processor time after its
+    beginning."""
     begin, sent, armed = time.process_time(), [0.0], True
 
     def end(number: int, frame: object) -> None:

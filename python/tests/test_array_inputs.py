@@ -12,7 +12,8 @@ import ventriform as vf
 
 
 class Tensor:
-    """As `monai.data.MetaTensor`: a tensor of PyTorch with `affine` and `meta`, which NumPy takes from the processor's memory alone."""
+    """As `monai.data.MetaTensor`: a tensor of PyTorch with `affine` and `meta`, which NumPy takes from the processor's
+    memory alone."""
 
     def __init__(self, array: Any, affine: Any = None, **meta: Any) -> None:
         self.own = np.asarray(array)
@@ -59,7 +60,8 @@ def coordinates(volume: vf.Volume, frame: str) -> dict[str, Any]:
 
 
 def of_itk(volume: vf.Volume) -> Named:
-    """As `itk.xarray_from_image` makes it: axes z, y, x; the rows and columns of the direction from the last axis on."""
+    """As `itk.xarray_from_image` makes it: axes z, y, x; the rows and columns of the direction from the last axis
+    on."""
     affine = volume.in_frame("LPS").affine
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     direction = affine[:3, :3] / spacing

@@ -14,8 +14,8 @@ import ventriform as vf
 
 
 def arrays(thing: Any, path: str = "", depth: int = 0) -> Iterator[tuple[str, Callable[[Any], Any]]]:
-    """Every array that public attributes and methods without arguments give, and of the package's objects among them again:
-    where it is, and how to get it from `thing`."""
+    """Every array that public attributes and methods without arguments give, and of the package's objects among them
+    again: where it is, and how to get it from `thing`."""
     for name in dir(thing):
         if name.startswith("_") or name.startswith(("to_", "save", "mask_image", "plot", "from_")):
             continue

@@ -53,7 +53,8 @@ before = resident(), tracemalloc.get_traced_memory()[0]
 for _ in range(fits):
     work()
 gc.collect()
-print(json.dumps({"resident": resident() - before[0], "traced": tracemalloc.get_traced_memory()[0] - before[1], "at": before[0]}))
+traced = tracemalloc.get_traced_memory()[0] - before[1]
+print(json.dumps({"resident": resident() - before[0], "traced": traced, "at": before[0]}))
 """
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import pathlib
 import pydoc
 import re
 import subprocess
@@ -66,7 +65,7 @@ def test_a_mistake_is_seen_by_the_checker(number: int, errors: dict[str, list[st
 
 
 def test_committed_files_are_those_that_the_tables_give() -> None:
-    made = subprocess.run([sys.executable, ROOT / "scripts/python_types.py", "check"], capture_output=True, text=True)
+    made = subprocess.run([sys.executable, ROOT / "scripts/release/python_types.py", "check"], capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
 
 

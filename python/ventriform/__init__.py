@@ -6,12 +6,12 @@
 >>> fit.mask, fit.confidence, fit.polar
 
 Functions: `read`, `generate`, `segment`, `beat`, `compare`, `build_normals`, `measure`, `calibrate`, `evaluate`,
-`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in the
-patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`. `Coordinates` state
-theirs. Files are LPS, as the command writes them.
+`phantom`. Their parameters are those of the commands of the same names (`normals build`). Positions are millimetres in
+the patient frame of the scan, in and out: RAS, as nibabel has it, unless it was read with `frame="LPS"`. `Coordinates`
+state theirs. Files are LPS, as the command writes them.
 
-Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is a
-client of the service (extra `client`).
+Modules: `ventriform.plot` draws (extra `plot`), `ventriform.reports` has the classes of reports, `ventriform.client` is
+a client of the service (extra `client`).
 """
 
 from __future__ import annotations

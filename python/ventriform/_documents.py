@@ -40,7 +40,8 @@ def is_place(parameter: str) -> bool:
 
 
 class Document:
-    """A JSON document whose fields are attributes. Points and directions among them are `Coordinates`, which have a frame."""
+    """A JSON document whose fields are attributes. Points and directions among them are `Coordinates`, which have a
+    frame."""
 
     _built: ClassVar[dict[str, str]] = {}
     _source: dict[str, Any]

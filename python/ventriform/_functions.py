@@ -10,8 +10,21 @@ from . import _checks, _inputs, _native, _objects
 from ._errors import InputError, file_error
 from ._frames import Frame, checked
 from ._results import (
-    Beat, Calibration, Comparison, Evaluation, Fit, Measured, Model, NormalLimits, Phantom, Profile, Surface, Volume,
-    frame_of, teller, unwrap,
+    Beat,
+    Calibration,
+    Comparison,
+    Evaluation,
+    Fit,
+    Measured,
+    Model,
+    NormalLimits,
+    Phantom,
+    Profile,
+    Surface,
+    Volume,
+    frame_of,
+    teller,
+    unwrap,
 )
 from ._tables import to_lps, with_table
 
@@ -36,13 +49,13 @@ def read(source: Any, *, frame: str = "RAS", threads: int | None = None) -> Volu
     Parameters
     ----------
     source : path, sequence of paths, bytes, open file, or image
-        NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a file that is open
-        in binary mode, from where it is to its end; a `Volume`; a pair (array, affine); an image of nibabel, SimpleITK,
-        MONAI or xarray; a dataset of pydicom, or those of a series. Files named by paths are read again when they are used,
-        so they must stay where and as they are: one with other bytes is refused.
+        NIfTI or DICOM: a file, the files of a series, a folder or a zip archive; the bytes of a file; a file that is
+        open in binary mode, from where it is to its end; a `Volume`; a pair (array, affine); an image of nibabel,
+        SimpleITK, MONAI or xarray; a dataset of pydicom, or those of a series. Files named by paths are read again when
+        they are used, so they must stay where and as they are: one with other bytes is refused.
     frame : {'RAS', 'LPS'}
-        The patient frame of the volume's affine, of points and directions that are given for it, and of its results. A pair's
-        affine is in it.
+        The patient frame of the volume's affine, of points and directions that are given for it, and of its results. A
+        pair's affine is in it.
     threads : int, optional
         Threads to work on; by default as many as there are processors.
     """
@@ -112,7 +125,8 @@ def segment(
     scan : Volume, path, bytes or image
         As `read` takes it.
     model : 'auto', Model, path, or a sequence of these
-        What to fit: the built-in hearts, models, or files of closed meshes. The fit with the greatest confidence is kept.
+        What to fit: the built-in hearts, models, or files of closed meshes. The fit with the greatest confidence is
+        kept.
     reader : Profile or path, optional
         How a reader draws the wall (`calibrate`): the wall is drawn as that reader would.
     expert : Volume, path, bytes or image, optional
@@ -124,8 +138,8 @@ def segment(
     parts : sequence of {'endocardium', 'epicardium', 'base'}
         Parts of the wall that become files of their own.
     deidentify : bool
-        Leave patient, study and series out of report.html, and the patient's identity out of DICOM objects (PS3.15, basic
-        profile).
+        Leave patient, study and series out of report.html, and the patient's identity out of DICOM objects (PS3.15,
+        basic profile).
     progress : callable or tqdm, optional
         Told stage and completed fraction of the whole. An exception in it ends the work.
     threads : int, optional
@@ -260,8 +274,8 @@ def measure(
     ----------
     a, b : Fit, Wall, Model, Volume, path, bytes or image
         The mask to judge, and the reference: a volume of 0 and another value, a label map, a DICOM Segmentation,
-        probabilities of which those above .5 count, or a closed surface: a `Wall`, a `Model` or the file of a mesh. A `Fit`
-        is its mask.
+        probabilities of which those above .5 count, or a closed surface: a `Wall`, a `Model` or the file of a mesh. A
+        `Fit` is its mask.
     label : str or int, optional
         Structure to compare, of each that holds several: number of a label or segment, or name of a segment.
     label_a, label_b : str or int, optional
@@ -310,10 +324,10 @@ def calibrate(
     Parameters
     ----------
     cohort : path, dict of str to (scan, mask), or iterable of (scan, mask)
-        A folder with a folder for each case, which holds spect.nii.gz (or .nii, .dcm) and the reader's mask. Or the cases
-        themselves: scans as `read` takes them, masks as `measure` does. Without names they are case1, case2 and so on. Files
-        give the profile, byte for byte, that a folder of them gives in that order; the profile names a file by its hash,
-        and an array by that of its values and place.
+        A folder with a folder for each case, which holds spect.nii.gz (or .nii, .dcm) and the reader's mask. Or the
+        cases themselves: scans as `read` takes them, masks as `measure` does. Without names they are case1, case2 and
+        so on. Files give the profile, byte for byte, that a folder of them gives in that order; the profile names a
+        file by its hash, and an array by that of its values and place.
     mask : str
         Name of the masks' files in a folder, without .nii.gz.
     name : str
@@ -593,7 +607,8 @@ def _cases(cohort: Any) -> Any:
         try:
             scan, mask = (_inputs.native(one, unwrap) for one in (pair[0], _mask(pair[1])))
         except InputError as error:
-            raise error._about("cohort", f"{name}: ")
+            error._about("cohort", f"{name}: ")
+            raise
         cases.append((name, scan, mask))
     return cases
 

@@ -1,4 +1,4 @@
-"""Signatures of `_functions`. Written by scripts/python_types.py: change that, or the library's tables."""
+"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library's tables."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence

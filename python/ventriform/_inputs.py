@@ -93,13 +93,14 @@ def _on_host(array: Any) -> Any:
 
 
 def _ask_about_first_axis(shape: tuple[int, ...]) -> None:
-    """Refuses four axes of which the first may be that of channels or gates: read as voxels they would be another volume."""
+    """Refuses four axes of which the first may be that of channels or gates: read as voxels they would be another
+    volume."""
     first, *others, _ = shape
     if first <= FEWEST_VOXELS or first <= MOST_CHANNELS and 2 * first < min(others):
         raise InputError(
             "array",
-            f"The array has the shape {shape}, and its first axis may be one of channels or gates; (i, j, k, gate) is taken.",
-            "Give array[0] for the only channel, or numpy.moveaxis(array, 0, -1) for gates. If it is an axis of voxels, exchange it "
+            f"The array has the shape {shape}, and its first axis may be one of channels or gates; (i, j, k, gate) " f"is taken.",
+            "Give array[0] for the only channel, or numpy.moveaxis(array, 0, -1) for gates. If it is an axis of " "voxels, exchange it "
             "with another, in the affine too.",
             "axis-order",
         )
@@ -165,7 +166,8 @@ def content(file: Any) -> bytes:
 
 
 def whole_path(path: Any) -> str:
-    """The path from the root, which names the same file after a change of the working folder, and in another process."""
+    """The path from the root, which names the same file after a change of the working folder, and in another
+    process."""
     given = os.fsdecode(path)
     return given if os.path.isabs(given) else os.path.join(os.getcwd(), given)
 
@@ -197,7 +199,8 @@ def open_each(field: str, paths: Iterable[Any]) -> None:
 class Stamp:
     """What a file was when it was read.
 
-    Size, times and number of the file tell at once that it is the same; where they differ, the hash of its bytes decides.
+    Size, times and number of the file tell at once that it is the same; where they differ, the hash of its bytes
+    decides.
     """
 
     __slots__ = ("_seen", "digest", "path")
@@ -377,14 +380,16 @@ def of_simpleitk(image: Any) -> _native.NativeVolume:
 
 
 def unplaced(array: NDArray[np.float32], sizes_mm: Sequence[float]) -> _native.NativeVolume:
-    """Voxels whose place in the patient no header states, as a NIfTI file that states none: they are read with its warning."""
+    """Voxels whose place in the patient no header states, as a NIfTI file that states none: they are read with its
+    warning."""
     return _native.NativeVolume.from_bytes([("the image", nifti_bytes(array, sizes_mm, None))])
 
 
 def nifti_bytes(array: NDArray[np.float32], sizes_mm: Sequence[float], ras: Sequence[Sequence[float]] | None) -> bytes:
-    """A NIfTI-1 file of 32-bit floats (i, j, k) or (i, j, k, gate); `ras` is the affine to RAS mm, if the file states one."""
+    """A NIfTI-1 file of 32-bit floats (i, j, k) or (i, j, k, gate); `ras` is the affine to RAS mm, if the file states
+    one."""
     if max(array.shape) > MOST_NIFTI_VOXELS:
-        reason = f"The array has the shape {array.shape}, and a NIfTI-1 file holds at most {MOST_NIFTI_VOXELS} voxels along an axis."
+        reason = f"The array has the shape {array.shape}, and a NIfTI-1 file holds at most {MOST_NIFTI_VOXELS} " f"voxels along an axis."
         fix = "Give ventriform.Volume(array, affine)." if ras is None else "Write it as a file of another format, and give its path."
         raise InputError("array", reason, fix)
     header = bytearray(352)
@@ -437,8 +442,8 @@ Source = Any
 
 
 def native(source: Source, unwrap: Callable[[Any], Native | None], frame: Frame = "RAS") -> Native:
-    """The volume that `source` is, unread where it is files. `unwrap` knows the package's own volumes; `frame` is that of an
-    affine beside an array."""
+    """The volume that `source` is, unread where it is files. `unwrap` knows the package's own volumes; `frame` is that
+    of an affine beside an array."""
     own = unwrap(source)
     if own is not None:
         return own
@@ -474,7 +479,7 @@ def native(source: Source, unwrap: Callable[[Any], Native | None], frame: Frame 
     raise InputError(
         "source",
         f"A value of type {type(source).__name__} is no volume.",
-        "Give a path, paths, bytes, an open file, a ventriform.Volume, (array, affine), an image of nibabel, SimpleITK, MONAI or "
+        "Give a path, paths, bytes, an open file, a ventriform.Volume, (array, affine), an image of nibabel, " "SimpleITK, MONAI or "
         "xarray, or datasets of pydicom.",
     )
 

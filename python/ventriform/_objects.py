@@ -37,13 +37,13 @@ ROWS: list[Row] = [
     *STATED,
     _text(
         "deidentify_secret",
-        "Secret from which `deidentify` derives new UIDs: with the same secret, objects of one study stay together. Default: "
+        "Secret from which `deidentify` derives new UIDs: with the same secret, objects of one study stay together. " "Default: "
         "VENTRIFORM_DEIDENTIFY_SECRET of the environment, or a random one",
         "a long sentence",
     ),
     {
         "name": "made_at", "kind": "time", "default": "", "example": "2026-11-23T13:45:00Z",
-        "summary": "Date and time of the DICOM objects: with the same time, the same input gives the same bytes. Default: now",
+        "summary": "Date and time of the DICOM objects: with the same time, the same input gives the same bytes. " "Default: now",
     },
 ]
 """Like the rows of the library's tables."""

@@ -74,9 +74,9 @@ class Volume:
     Parameters
     ----------
     array : array_like, (i, j, k) or (i, j, k, gate)
-        Voxel values; NaN, or the mask of a `numpy.ma.MaskedArray`, where one is missing. They are kept as 32-bit floats in
-        Fortran order: such an array is copied once, any other is converted first. The last axis of a 4-D array of 6 to 32
-        volumes are the gates of a heart beat.
+        Voxel values; NaN, or the mask of a `numpy.ma.MaskedArray`, where one is missing. They are kept as 32-bit floats
+        in Fortran order: such an array is copied once, any other is converted first. The last axis of a 4-D array of 6
+        to 32 volumes are the gates of a heart beat.
     affine : array_like, (4, 4)
         From voxel indices to millimetres in the patient. Its numbers are rounded to 32 bits, as NIfTI files hold them.
     frame : {'RAS', 'LPS'}
@@ -153,7 +153,8 @@ class Volume:
         return self.data()
 
     def data(self, frame: int | None = None) -> NDArray[np.float32]:
-        """The voxels of one volume of several, counted from 0; without `frame` those of the only one, or of the sum of the gates."""
+        """The voxels of one volume of several, counted from 0; without `frame` those of the only one, or of the sum of
+        the gates."""
         if frame is not None:
             frame = _checks.whole("frame", frame, 0, self.frames - 1)
         native = self._current()
@@ -245,8 +246,8 @@ def _unplaced_again(array: Any, sizes_mm: Sequence[float], frame: Frame) -> Volu
 class Surface:
     """A triangle surface.
 
-    Arrays are copies, made each time that one is asked for. Vertices that are assigned are this object's own: what it was
-    made of stays as it was.
+    Arrays are copies, made each time that one is asked for. Vertices that are assigned are this object's own: what it
+    was made of stays as it was.
 
     Attributes
     ----------
@@ -470,7 +471,8 @@ class Files(Mapping[str, bytes]):
         return json.loads(self._files[name])
 
     def save(self, path: _Path) -> None:
-        """Writes all files into a folder, which is made if it is missing; or one of them, if `path` ends in its name."""
+        """Writes all files into a folder, which is made if it is missing; or one of them, if `path` ends in its
+        name."""
         name = os.path.basename(_checks.path("path", path))
         if name in self._files and not os.path.isdir(path):
             _write(path, self._files[name])
@@ -478,7 +480,7 @@ class Files(Mapping[str, bytes]):
         ending = next((end for end in FILE_ENDINGS if name.lower().endswith(end)), None)
         if ending is not None and not os.path.isdir(path):
             alike = [own for own in self._files if own.lower().endswith(ending)] or list(self._files)
-            fix = f"Give the path of a folder, or one that ends in {' or '.join(alike)}; `files[name]` are the bytes of each."
+            fix = f"Give the path of a folder, or one that ends in {' or '.join(alike)}; `files[name]` are the bytes " f"of each."
             raise InputError("path", f"`{name}` is none of the {len(self._files)} files of the result.", fix)
         os.makedirs(path, exist_ok=True)
         for own, content in self._files.items():
@@ -515,8 +517,8 @@ class Result:
     files: Files
 
     def save(self, path: _Path) -> None:
-        """Writes the files that the command would write into a folder; or one of them, if `path` ends in its name, such as
-        mask.nii.gz."""
+        """Writes the files that the command would write into a folder; or one of them, if `path` ends in its name, such
+        as mask.nii.gz."""
         self.files.save(path)
 
 
@@ -551,8 +553,8 @@ class Fit(Result):
 
     @property
     def walls(self) -> dict[str, Wall]:
-        """`apparent`: the wall as the blurred image shows it; `anatomical`: without what blur, beating and breathing add.
-        Other organs have the one that is shown."""
+        """`apparent`: the wall as the blurred image shows it; `anatomical`: without what blur, beating and breathing
+        add. Other organs have the one that is shown."""
         walls = {self._made["shown"]: self.surface}
         if "other" in self._made:
             lps, faces = self._made["other_mesh"]
@@ -582,8 +584,8 @@ class Fit(Result):
 
     @property
     def confidence(self) -> float:
-        """The chance that a reader who draws the visible edge agrees (Jaccard index 0.75 or more), calibrated on simulated
-        scans, 0 to 1."""
+        """The chance that a reader who draws the visible edge agrees (Jaccard index 0.75 or more), calibrated on
+        simulated scans, 0 to 1."""
         return self._report.fit.confidence
 
     @property
@@ -774,7 +776,8 @@ class Comparison(Result):
 
     @property
     def report(self) -> reports.ComparisonReport:
-        """The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories, flags."""
+        """The figures of `comparison.json`: TID, reversible and fixed share of the wall, segments, territories,
+        flags."""
         from .reports import ComparisonReport
 
         return ComparisonReport.from_json(self.files["comparison.json"], frame=self.frame)
@@ -803,7 +806,7 @@ class Comparison(Result):
 
     def __repr__(self) -> str:
         report = self._report
-        return f"Comparison(TID {report.tid:.2f}, reversible {report.reversible_percent:.0f} %, fixed {report.fixed_percent:.0f} %)"
+        return f"Comparison(TID {report.tid:.2f}, reversible {report.reversible_percent:.0f} %, fixed " f"{report.fixed_percent:.0f} %)"
 
     def polar(self, scan: str) -> _Floats:
         """The polar map of `stress`, `rest` or their `difference`, (32, 60); NaN where there is none."""
@@ -995,8 +998,8 @@ class Evaluation:
     Attributes
     ----------
     folder : str
-        Where the files are: evaluation.html, evaluation.json, table1.csv, figure3.csv, fits.csv, models/ and fits/. Of an
-        evaluation without `out` it is removed with this object.
+        Where the files are: evaluation.html, evaluation.json, table1.csv, figure3.csv, fits.csv, models/ and fits/. Of
+        an evaluation without `out` it is removed with this object.
     problems : list of (str, str)
         Cases or models that could not be used, and why.
     """

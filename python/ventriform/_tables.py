@@ -123,8 +123,8 @@ def checked(command: str, parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def to_lps(command: str, parameters: dict[str, Any], frame_for: Callable[[str], Frame]) -> dict[str, Any]:
-    """Parameters with points and directions in LPS. Plain numbers are in the frame that `frame_for` a parameter's name gives;
-    `Coordinates` have their own."""
+    """Parameters with points and directions in LPS. Plain numbers are in the frame that `frame_for` a parameter's name
+    gives; `Coordinates` have their own."""
     made = dict(parameters)
     for row in rows(command):
         name = row["name"]
@@ -163,7 +163,8 @@ def _described(row: Row) -> str:
 
 
 def with_table(*commands: str) -> Callable[[Function], Function]:
-    """Gives a function with `**parameters` the signature and the docstring of its tables, and checks what it is given."""
+    """Gives a function with `**parameters` the signature and the docstring of its tables, and checks what it is
+    given."""
 
     def decorate(function: Function) -> Function:
         own = inspect.signature(function)

@@ -165,9 +165,9 @@ class Client:
         Parameters
         ----------
         scan : path, sequence of paths, bytes, open file, Volume or image
-            What `ventriform.read` takes. One file is sent as it is. The files of a series, a pair or a folder are sent as one
-            zip archive: of a folder those that `read` would look at. An array or an image is sent as a NIfTI file of 32-bit
-            floats.
+            What `ventriform.read` takes. One file is sent as it is. The files of a series, a pair or a folder are sent
+            as one zip archive: of a folder those that `read` would look at. An array or an image is sent as a NIfTI
+            file of 32-bit floats.
         name : str, optional
             The file's name at the service, where there is another than its own.
 

@@ -1,7 +1,7 @@
 """The reports as classes, one for each document of the service's OpenAPI description.
 
-Written by scripts/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres, volumes
-millilitres, angles degrees, as the names' endings say. Positions are LPS.
+Written by scripts/release/python_types.py from openapi/ventriform.json: change that, not this. Lengths are millimetres,
+volumes millilitres, angles degrees, as the names' endings say. Positions are LPS.
 """
 
 from __future__ import annotations

@@ -26,9 +26,11 @@ use ventriform::progress::{CancelToken, Monitor, Plan};
   ventriform beat gate1.nii.gz gate2.nii.gz ... gate8.nii.gz -o out --rr-ms 850
 Writes beat.json (EDV, ESV, EF, curve, motion, thickening and phase of each segment, flags), report.html, curve.svg,
 phase.svg, gates.csv,
-segments.csv, polar maps (polar.svg and polar.json: uptake of all gates; polar_ed, polar_es, polar_motion, polar_thickening,
+segments.csv, polar maps (polar.svg and polar.json: uptake of all gates; polar_ed, polar_es, polar_motion, \
+polar_thickening,
 polar_phase), mesh.glb (the beat as an animation), mesh_ed.glb and mesh_es.glb (end diastole and end systole),
-mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes and triangles) and labels_gate01.nii.gz, ...
+mesh_gate01.glb, ... (or the formats given by --format; all have the same nodes and triangles) and \
+labels_gate01.nii.gz, ...
 (wall 1, cavity 2); with --dicom also mask_ed.dcm, mask_es.dcm and measurements.dcm.
 Gates and segments are counted from 1.")]
 pub struct BeatArgs {

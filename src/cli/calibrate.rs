@@ -154,8 +154,8 @@ fn choice(made: &Calibration) -> String {
         "with one mask learnt on none: no distances, the usual level"
     };
     format!(
-        "  mean E_J, {learnt_on}: by distances {edge:.3}, by a level {level:.3}; without a profile {without:.3}. A level is \
-         chosen where it is better by more than {LEVEL_MARGIN_E_J}\n"
+        "  mean E_J, {learnt_on}: by distances {edge:.3}, by a level {level:.3}; without a profile {without:.3}. A \
+         level is chosen where it is better by more than {LEVEL_MARGIN_E_J}\n"
     )
 }
 

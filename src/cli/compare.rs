@@ -24,10 +24,14 @@ use ventriform::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
 #[command(after_help = "Examples:
   ventriform compare --stress stress.dcm --rest rest.dcm -o out
   ventriform compare --stress stress.nii.gz --rest rest.nii.gz -o out --normals normals.json --sex F
-Both scans are fitted by the same model. Where both are gated, a beat is fitted to each, and EF, motion and thickening are compared too.
-Writes comparison.json (TID, reversible and fixed share of the wall, segments, territories, flags), segments.csv and polar maps
-(polar_stress, polar_rest, polar_difference; with normal limits also polar_z_stress, polar_score_stress, ...), and of each scan the
-fitted wall (mesh_stress.glb, mesh_rest.glb, ...) and the image about the heart (region_stress.nii.gz, region_rest.nii.gz); slices.png
+Both scans are fitted by the same model. Where both are gated, a beat is fitted to each, and EF, motion and thickening \
+are compared too.
+Writes comparison.json (TID, reversible and fixed share of the wall, segments, territories, flags), segments.csv and \
+polar maps
+(polar_stress, polar_rest, polar_difference; with normal limits also polar_z_stress, polar_score_stress, ...), and of \
+each scan the
+fitted wall (mesh_stress.glb, mesh_rest.glb, ...) and the image about the heart (region_stress.nii.gz, \
+region_rest.nii.gz); slices.png
 (stress above rest), report.html and, with --dicom, measurements.dcm, page.dcm (the report as
 one picture), polar_stress.dcm, polar_rest.dcm and polar_difference.dcm.
 One scan given twice and scans of two patients are refused.")]
@@ -80,8 +84,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let whose = args.dicom.whose_of_either(&stress, &limits)?;
     let choice = &parameters.choice;
     if normals.is_none() && (choice.stress_protocol.is_some() || choice.rest_protocol.is_some()) {
-        let without = "--stress-protocol and --rest-protocol choose groups of normal limits; give --normals FILE too, or \
-                       leave them out";
+        let without = "--stress-protocol and --rest-protocol choose groups of normal limits; give --normals FILE too, \
+                       or leave them out";
         return Err(UnusableArgument::new(without.to_owned()).into());
     }
     let (auto, models) = chosen_models(&args.model, &MeshStatement::default(), &limits)?;

@@ -1,7 +1,7 @@
 //! The arguments of commands beside the service that work on its data, and the settings that they resolve to.
 //!
-//! Every command resolves settings as `serve` does: a flag, else an environment variable, else the file of `--config`, else
-//! the default. A command has the flags of the settings that it needs.
+//! Every command resolves settings as `serve` does: a flag, else an environment variable, else the file of `--config`,
+//! else the default. A command has the flags of the settings that it needs.
 
 use super::serve::variable;
 use anyhow::{Result, anyhow};
@@ -112,8 +112,8 @@ impl Resolved {
         match &self.settings.database.0 {
             None => Ok(()),
             Some(url) => Err(anyhow!(
-                "the records of the service are in {url} ({}), and this command works on those in a data folder: {instead}. \
-                 For a folder whose records are in its file, give --database sqlite",
+                "the records of the service are in {url} ({}), and this command works on those in a data folder: \
+                 {instead}. For a folder whose records are in its file, give --database sqlite",
                 self.origins.of("database").of("database")
             )),
         }
@@ -136,8 +136,8 @@ impl Resolved {
         };
         anyhow!(
             "{error}. That comes from the {}; give what the service has, such as --data-dir /var/lib/ventriform, \
-             or the file of its settings by --config. Before its first start, make an empty folder for it (mkdir): then \
-             `keys create` makes the store",
+             or the file of its settings by --config. Before its first start, make an empty folder for it (mkdir): \
+             then `keys create` makes the store",
             self.origins.of(of).of(of)
         )
     }

@@ -118,8 +118,8 @@ pub fn back_up(args: &BackupArgs) -> Result<()> {
     service.require_file("the tools of PostgreSQL copy it, such as pg_dump")?;
     if let Some(bucket) = s3_location(&service.settings) {
         bail!(
-            "the files of the service are in {bucket}, and this command copies those in a data folder: the tools of S3 copy \
-             a bucket. For a folder with its files, give --blobs folder"
+            "the files of the service are in {bucket}, and this command copies those in a data folder: the tools of S3 \
+             copy a bucket. For a folder with its files, give --blobs folder"
         );
     }
     let done = ventriform_store::backup(&service.settings.data_dir, &args.target);

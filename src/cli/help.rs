@@ -1,7 +1,8 @@
 //! What the command line says of itself: `-h` on one screen, `--help` in full; and refusals and failures in words.
 //!
-//! The short help has the arguments that stand under no heading, and those of [`USUAL_SETTINGS`], each with the beginning of its
-//! text; the number of the others under each heading; and the first examples. Lists of commands have the beginnings of theirs.
+//! The short help has the arguments that stand under no heading, and those of [`USUAL_SETTINGS`], each with the
+//! beginning of its text; the number of the others under each heading; and the first examples. Lists of commands have
+//! the beginnings of theirs.
 
 use clap::{Arg, Command};
 use std::error::Error;

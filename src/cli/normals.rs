@@ -30,8 +30,10 @@ enum NormalsAction {
 #[command(after_help = "Example:
   ventriform normals build cohort -o normals.json
   ventriform segment scan.nii.gz --model auto -o out --normals normals.json --sex F --protocol rest
-The folder holds cohort.csv with the columns case, file, sex (M or F), protocol, tracer, attenuation_corrected (yes or no),
-healthy (yes or no) and, if a scan at stress has one at rest, rest_case. A group of sex, protocol, tracer and correction needs 12
+The folder holds cohort.csv with the columns case, file, sex (M or F), protocol, tracer, attenuation_corrected (yes or \
+no),
+healthy (yes or no) and, if a scan at stress has one at rest, rest_case. A group of sex, protocol, tracer and \
+correction needs 12
 cases; 30 or more give steady limits. Files of gates also give limits of EDV, ESV, EF, motion, thickening and phase.")]
 struct BuildArgs {
     /// Folder with cohort.csv and the scans
@@ -66,8 +68,8 @@ impl NormalLimitArgs {
             if parameters.scan == ScanKind::default() {
                 return Ok(None);
             }
-            let without = "--sex, --protocol, --tracer and --attenuation-corrected choose a group of normal limits; give \
-                           --normals FILE too, or leave them out";
+            let without = "--sex, --protocol, --tracer and --attenuation-corrected choose a group of normal limits; \
+                           give --normals FILE too, or leave them out";
             return Err(UnusableArgument::new(without.to_owned()).into());
         };
         let context = || format!("{}", path.display());
@@ -125,8 +127,8 @@ fn build(args: &BuildArgs) -> Result<()> {
 fn summary(group: &NormalGroup) -> String {
     let left_out = &group.leave_one_out;
     format!(
-        "{group}; each judged by the limits of the others: {:.1} % of the wall below them and a deficit score of {:.2} % in the mean, \
-         95 of 100 people below {:.2} %",
+        "{group}; each judged by the limits of the others: {:.1} % of the wall below them and a deficit score of {:.2} \
+         % in the mean, 95 of 100 people below {:.2} %",
         left_out.mean_extent_percent, left_out.mean_deficit_percent, left_out.deficit_percent_of_95
     )
 }
@@ -134,8 +136,8 @@ fn summary(group: &NormalGroup) -> String {
 /// A scan beside its limits, in a line.
 pub(super) fn normals_line(perfusion: &Perfusion) -> String {
     format!(
-        "against the normal limits of {} {}people: deficit score {:.1} % (TPD-like: not comparable with QPS's), {:.1} % of the wall \
-         below the limit, summed score {}",
+        "against the normal limits of {} {}people: deficit score {:.1} % (TPD-like: not comparable with QPS's), {:.1} \
+         % of the wall below the limit, summed score {}",
         perfusion.group.cases,
         if perfusion.group.simulated {
             "simulated "

@@ -18,7 +18,8 @@ use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_pe
   ventriform phantom -o infarct --defect 3:1 --defect 9:1 --right-ventricle 1.2
 writes phantom/spect.nii.gz, phantom/lv_truth.nii.gz and phantom/params.json
   ventriform phantom -o healthy --normal --seed 5
-writes 30 healthy hearts (--cases) and healthy/cohort.csv, from which `ventriform normals build` makes limits for tests. They are
+writes 30 healthy hearts (--cases) and healthy/cohort.csv, from which `ventriform normals build` makes limits for \
+tests. They are
 simulated, not patients: such limits say so, and are not for patients.")]
 pub struct PhantomArgs {
     /// Folder to write to (created if missing)

@@ -29,9 +29,11 @@ use ventriform::volume::{ReadLimits, VolumeFile};
   ventriform segment scan.dcm --model a.json --model b.json -o out --expert mask.nii.gz
   ventriform segment scan.nii.gz --model heart.stl --expert drawn.vtp --mesh-frame ras -o out
   ventriform segment scan.nii.gz --model auto -o out --seed-point 60,70,55 --format ply
-Writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd (wall 1, cavity 2), mesh.glb, mesh.stl, mesh.json (or the formats given by --format), report.json,
+Writes mask.nii.gz, labels.nii.gz and labels.seg.nrrd (wall 1, cavity 2), mesh.glb, mesh.stl, mesh.json (or the \
+formats given by --format), report.json,
 report.html, slices.png, region.nii.gz (the scan about the organ, which the report shows) and, for the
-left ventricle, polar.json, polar.svg, polar.png, and mask and mesh of the anatomical wall: mask_anatomical.nii.gz, mesh_anatomical.glb, ... (with --edge anatomical:
+left ventricle, polar.json, polar.svg, polar.png, and mask and mesh of the anatomical wall: mask_anatomical.nii.gz, \
+mesh_anatomical.glb, ... (with --edge anatomical:
 mask_apparent.nii.gz, mesh_apparent.glb, ...); with --dicom also mask.dcm, contours.dcm, mesh.dcm,
 surface.dcm, measurements.dcm, polar.dcm and page.dcm (the report as one picture)")]
 pub struct SegmentArgs {

@@ -259,8 +259,8 @@ pub(super) fn variable(name: &str) -> Option<String> {
 fn bind(listen: SocketAddr) -> Result<TcpListener> {
     TcpListener::bind(listen).with_context(|| {
         format!(
-            "cannot listen on {listen} (--listen); give another address of this machine, such as 127.0.0.1:8081, or port 0 for \
-             any free port"
+            "cannot listen on {listen} (--listen); give another address of this machine, such as 127.0.0.1:8081, or \
+             port 0 for any free port"
         )
     })
 }

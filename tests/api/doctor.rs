@@ -119,8 +119,8 @@ async fn readable_rows_of_a_damaged_database_are_kept_and_broken_items_set_aside
     serves(data.path(), &paths).await;
 }
 
-/// What a repair takes away and what it brings back has a row of the trail each; a backup, which leaves out what is damaged, adds
-/// none to its own.
+/// What a repair takes away and what it brings back has a row of the trail each; a backup, which leaves out what is
+/// damaged, adds none to its own.
 #[tokio::test]
 async fn what_a_repair_changes_is_in_the_trail_and_what_a_backup_leaves_out_is_not() {
     let data = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 //!
 //! `tests/faults/shim.c` injects the faults. By default a sample of all writes fails, one in each
 //! round; `VENTRIFORM_TEST_FAULTS=all` lets every one of them fail, in turn
-//! (`scripts/check_faults.sh`).
+//! (`scripts/check/faults.sh`).
 
 #![cfg(target_os = "linux")]
 

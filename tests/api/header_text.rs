@@ -1,8 +1,8 @@
 //! Text of headers and of callers: who does not see whose scan a volume is sees none of it, by no way, of no kind of
 //! product, and nobody does once the identity is erased.
 //!
-//! A mark in every attribute of the dictionary that holds text, in every text of a NIfTI header and a mesh, and in every free
-//! text of a caller; then every GET of the OpenAPI document.
+//! A mark in every attribute of the dictionary that holds text, in every text of a NIfTI header and a mesh, and in
+//! every free text of a caller; then every GET of the OpenAPI document.
 
 use crate::comparisons::person;
 use crate::dicom::{JANE, Patient, nm_of};
@@ -37,8 +37,8 @@ const NEEDED: [Tag; 8] = [
     Tag(0x0020, 0x000e),
 ];
 
-/// What `read` sees of a scan (docs/security.md): manufacturer, model, software, reconstruction, and what UIDs, Image Type and
-/// the tracer are in.
+/// What `read` sees of a scan (docs/security.md): manufacturer, model, software, reconstruction, and what UIDs, Image
+/// Type and the tracer are in.
 const SHOWN: [&str; 6] = [
     "QZXVKJ00080070",
     "QZXVKJ00081090",

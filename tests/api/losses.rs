@@ -1,5 +1,5 @@
-//! What a damaged, lost or older database takes with it: whatever page is lost, the service stays closed, nobody gets what
-//! others had, holds hold, and what is lost is named, in the answer of the repair and by the check of the trail.
+//! What a damaged, lost or older database takes with it: whatever page is lost, the service stays closed, nobody gets
+//! what others had, holds hold, and what is lost is named, in the answer of the repair and by the check of the trail.
 
 use crate::helpers::{TestApp, fake_engine, key, text};
 use crate::postgres::{reached, server};
@@ -213,8 +213,8 @@ async fn whatever_page_is_lost_the_service_stays_closed_and_nothing_is_lost_in_s
     }
 }
 
-/// Every table that has fewer rows than before is named, in the answer and in the trail; the trail is in order only if all of
-/// its rows are there.
+/// Every table that has fewer rows than before is named, in the answer and in the trail; the trail is in order only if
+/// all of its rows are there.
 async fn check_losses(
     case: &str,
     rows: &SqlStore,

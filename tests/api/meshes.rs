@@ -1,5 +1,5 @@
-//! Meshes, archives and odd volumes over HTTP, with the real computation: templates and experts from every format, files
-//! beside a series, single slices.
+//! Meshes, archives and odd volumes over HTTP, with the real computation: templates and experts from every format,
+//! files beside a series, single slices.
 
 use crate::dicom::{JANE, element, file, nm};
 use crate::helpers::{Service, heart, mesh_json, problem, scan, text};

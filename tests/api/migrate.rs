@@ -112,8 +112,8 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     content
 }
 
-/// Admits callers without credentials again: files that were moved by other tools may be a restored copy, from before the
-/// first key.
+/// Admits callers without credentials again: files that were moved by other tools may be a restored copy, from before
+/// the first key.
 async fn opened(data: &Path, database: Option<&PostgresSettings>) {
     let rows = open_database(data, database).await.unwrap();
     let event = AuditEvent::new(1, Activity::AccessOpened, Tenant::default(), "me".into());

@@ -64,7 +64,8 @@ fn every_parameter_of_a_job_is_documented_twice() {
     }
 }
 
-/// A generated client tells the parameters of one kind of job from those of another by `kind`, and fills in no others' defaults.
+/// A generated client tells the parameters of one kind of job from those of another by `kind`, and fills in no others'
+/// defaults.
 #[test]
 fn a_request_for_a_job_is_told_by_its_kind() {
     let document: Value = serde_json::from_str(&document_json()).unwrap();
@@ -166,7 +167,7 @@ fn every_operation_has_an_id_of_its_own_and_examples() {
                 let json = ["application/json", "application/problem+json"];
                 assert!(
                     !json.contains(&media_type.as_str()) || shared || !example.is_null(),
-                    "{what} {status}: record its examples: scripts/check_contract.py --record"
+                    "{what} {status}: record its examples: scripts/check/contract.py --record"
                 );
             }
         }

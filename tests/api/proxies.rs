@@ -1,5 +1,5 @@
-//! The service behind a proxy, and what clients and proxies send in many ways. scripts/check_proxy.sh tries the same with
-//! nginx.
+//! The service behind a proxy, and what clients and proxies send in many ways. scripts/check/proxy.sh tries the same
+//! with nginx.
 
 use crate::helpers::{Service, TestApp, closed, key, problem, text, volume};
 use crate::tls::{Authority, file};

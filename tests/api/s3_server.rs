@@ -1,7 +1,7 @@
 //! An S3 store in the test's process (s3s-fs), and a proxy before it that fails as networks do.
 //!
 //! With `VENTRIFORM_TEST_S3`, the tests use the store at that address instead, which must have the
-//! bucket `hearts` (scripts/check_s3.sh).
+//! bucket `hearts` (scripts/check/s3.sh).
 
 use axum::Router;
 use axum::body::{Body, Bytes};

@@ -1,5 +1,5 @@
-//! Erasing all volumes of a patient, a study, a series or an accession: `DELETE /v1/volumes`. What selects which volumes, on both
-//! engines, is in `contract.rs`.
+//! Erasing all volumes of a patient, a study, a series or an accession: `DELETE /v1/volumes`. What selects which
+//! volumes, on both engines, is in `contract.rs`.
 
 use crate::helpers::{TestApp, closed, key, problem, text};
 use reqwest::StatusCode;

@@ -1,8 +1,8 @@
 //! Where a clock is read and where an age is counted: exact lists, so that no new one is forgotten.
 //!
-//! Ages count by a trusted clock only (`records/clock.rs` of the service): a method that erases, gives up or forgets what
-//! is old takes a `Cutoff` or a `TrustedNow`, which only a trusted clock makes. The compiler watches that; here is who
-//! does so, who reads a clock that is not trusted and why, and which statements compare stamps.
+//! Ages count by a trusted clock only (`records/clock.rs` of the service): a method that erases, gives up or forgets
+//! what is old takes a `Cutoff` or a `TrustedNow`, which only a trusted clock makes. The compiler watches that; here is
+//! who does so, who reads a clock that is not trusted and why, and which statements compare stamps.
 
 use crate::imports::rust_files;
 use std::collections::BTreeSet;

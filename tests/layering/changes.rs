@@ -1,8 +1,8 @@
-//! A change that is made for somebody, and its row of the audit trail, are one transaction: every method of the store that
-//! writes either appends a row in its transaction, or is listed here with the reason why it needs none.
+//! A change that is made for somebody, and its row of the audit trail, are one transaction: every method of the store
+//! that writes either appends a row in its transaction, or is listed here with the reason why it needs none.
 //!
-//! `changes_and_their_rows_are_one` (tests/api/contract.rs) shows on both engines that those with a row undo the change if
-//! the row cannot be written. Nobody but the recorder appends rows that belong to no change.
+//! `changes_and_their_rows_are_one` (tests/api/contract.rs) shows on both engines that those with a row undo the change
+//! if the row cannot be written. Nobody but the recorder appends rows that belong to no change.
 
 use crate::imports::rust_files;
 use std::collections::{BTreeMap, BTreeSet};
@@ -117,8 +117,8 @@ const WRITES: [&str; 5] = [
     ".write_beside(&self",
 ];
 
-/// Who appends rows by themselves: the recorder, for what is read or refused; a repair, to a draft that nobody uses yet;
-/// a command, for the end of a trail that was followed.
+/// Who appends rows by themselves: the recorder, for what is read or refused; a repair, to a draft that nobody uses
+/// yet; a command, for the end of a trail that was followed.
 const APPENDERS: [&str; 3] = [
     "crates/service/src/access/audit/recorder.rs",
     "crates/store/src/doctor.rs",

@@ -44,8 +44,8 @@ pub fn true_wall(case: &Path) -> Result<Option<TriMesh>> {
     ))
 }
 
-/// Every `stride`th ray through the wall `apparent` that meets the `truth`: the numbers that describe it in the image `scan`, and
-/// the distances by which the true inner and outer surface lie farther out, mm.
+/// Every `stride`th ray through the wall `apparent` that meets the `truth`: the numbers that describe it in the image
+/// `scan`, and the distances by which the true inner and outer surface lie farther out, mm.
 ///
 /// # Errors
 /// If a direction has no wall.

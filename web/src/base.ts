@@ -1,5 +1,5 @@
-// The path under which the service is shown: "/", or "/heart/" behind a proxy. It is where this program came from: the service
-// does not always know.
+// The path under which the service is shown: "/", or "/heart/" behind a proxy. It is where this program came from: the
+// service does not always know.
 
 const BASE = new URL(import.meta.url).pathname.replace(/(assets|src)\/[^/]*$/, "");
 

@@ -18,7 +18,10 @@ interface Wanted {
   object?: boolean;
 }
 
-/** Paths of the DICOM objects of a result, made when they are asked for. Of a scan that is not DICOM nobody knows whose they would be. */
+/**
+ * Paths of the DICOM objects of a result, made when they are asked for. Of a scan that is not DICOM nobody knows whose
+ * they would be.
+ */
 export function objectsOf(volume: Volume, result: Result): string[] {
   return volume.dicom ? result.links.dicom ?? [] : [];
 }

@@ -1,5 +1,5 @@
-// The documentation of the API, read from the service's own document: every operation with its parameters, bodies, answers and a
-// command; operations that only read can be sent from here.
+// The documentation of the API, read from the service's own document: every operation with its parameters, bodies,
+// answers and a command; operations that only read can be sent from here.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { at } from "./base";

@@ -25,7 +25,8 @@ export function LimitsView() {
       setState(`Adding ${file.name} …`);
       try {
         const name = file.name.replace(/\.json$/i, "").slice(0, 100);
-        // As it was written: read and written again by a browser, numbers are spelt otherwise, and the file's hash is another.
+        // As it was written: read and written again by a browser, numbers are spelt otherwise, and the file's hash is
+        // another.
         const answer = await call(`/v1/normals?${new URLSearchParams({ name })}`, { method: "POST", headers: { "content-type": "application/json" }, body: await textOf(file) });
         const added = (await answer.json()) as Normals;
         setState(`Added: ${added.name}.`);

@@ -1,4 +1,5 @@
-// Which scans belong to one study, which two of them are rest and stress, and which a person has picked for a comparison.
+// Which scans belong to one study, which two of them are rest and stress, and which a person has picked for a
+// comparison.
 
 import type { Volume } from "./api";
 import { Watched } from "./state";

@@ -1,5 +1,5 @@
-// The script of self-contained reports: slices, wall and polar map are drawn and linked by the page's own code. A report is whole
-// without it; what it draws stands where a picture would.
+// The script of self-contained reports: slices, wall and polar map are drawn and linked by the page's own code. A
+// report is whole without it; what it draws stands where a picture would.
 
 import { type ComponentChildren, render } from "preact";
 import "./report.css";
@@ -79,7 +79,10 @@ function put(place: string, view: ComponentChildren): void {
   host.closest("section")?.classList.add("touched");
 }
 
-/** The rows of the segments: a press of the number takes the cursor there, and the row of the cursor's segment is marked. */
+/**
+ * The rows of the segments: a press of the number takes the cursor there, and the row of the cursor's segment is
+ * marked.
+ */
 function linkSegments(scene: Scene, frame: WallFrame, map: PolarMap): void {
   const rows = new Map([...document.querySelectorAll<HTMLTableRowElement>("tr[data-segment]")].map(row => [Number(row.dataset["segment"]), row]));
   for (const [number, row] of rows) {

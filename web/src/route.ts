@@ -1,6 +1,6 @@
 // The address of the view: #/ is the list, #/evaluation the results of an evaluation, #/limits the normal limits,
-// #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is shown beside, #/comparison/ID the comparison of rest
-// and stress with that id, or the job that makes it.
+// #/scan/VOLUME/RESULT/OTHER a scan, what was made of it and what it is shown beside, #/comparison/ID the comparison of
+// rest and stress with that id, or the job that makes it.
 
 import { Watched } from "./state";
 

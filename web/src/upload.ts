@@ -26,7 +26,10 @@ export interface Upload {
   existed?: boolean;
 }
 
-/** Whether a file's name becomes the label `name` of its volume. Exports name files after patients, so not unless a person asks for it. */
+/**
+ * Whether a file's name becomes the label `name` of its volume. Exports name files after patients, so not unless a
+ * person asks for it.
+ */
 export const keepNames = new Watched<boolean>(localStorage.getItem("ventriform.names") === "yes");
 keepNames.watch(() => localStorage.setItem("ventriform.names", keepNames.value ? "yes" : "no"));
 
@@ -43,7 +46,10 @@ export function onStored(act: (volume: Volume) => void, together: (volumes: Volu
 /** The name of a NIfTI file of one gate: what is before and after its number. */
 const GATE_NAME = /^(.*(?:gate|bin|phase|frame|slot)[ _-]*)\d+(.*\.nii(?:\.gz)?)$/i;
 
-/** Files that make up one scan: a header with its image, the files of one DICOM series (a slice or a gate each), and NIfTI files named as the gates of one study. */
+/**
+ * Files that make up one scan: a header with its image, the files of one DICOM series (a slice or a gate each), and
+ * NIfTI files named as the gates of one study.
+ */
 export async function grouped(files: File[]): Promise<Group[]> {
   const groups = new Map<string, Group>();
   const add = (id: string, name: string, file: File) => {
@@ -89,7 +95,10 @@ function folderOf(file: File): string {
   return pathOf(file).split("/").slice(0, -1).join("/");
 }
 
-/** The series of a DICOM file, and its frames; null for other files. A file of many frames is a scan by itself, unless it has as many others beside it as a beat has gates. */
+/**
+ * The series of a DICOM file, and its frames; null for other files. A file of many frames is a scan by itself, unless
+ * it has as many others beside it as a beat has gates.
+ */
 async function seriesOf(file: File): Promise<{ uid: string; frames: number } | null> {
   if (/\.(nii|gz|zip)$/i.test(file.name) || file.size < 200) return null;
   const head = new Uint8Array(await file.slice(0, 16_384).arrayBuffer());

@@ -2,7 +2,10 @@
 
 import type { Job, Kind, Result, Volume } from "./api";
 
-/** Names of the files that this tab has sent, by the ids of their volumes. They are often patients' names, and are stored nowhere. */
+/**
+ * Names of the files that this tab has sent, by the ids of their volumes. They are often patients' names, and are
+ * stored nowhere.
+ */
 const sentAs = new Map<string, string>();
 export function rememberFileName(volume: Volume, name: string): void {
   sentAs.set(volume.id, name);
@@ -37,7 +40,10 @@ export function titleOf(volume: Volume): string {
   return /^[\d.]{20,}$/.test(name) ? `UID ${name}` : name;
 }
 
-/** Patient and study of a scan, as DICOM or the caller states them, identifiers with what they identify; `written` shortens them. */
+/**
+ * Patient and study of a scan, as DICOM or the caller states them, identifiers with what they identify; `written`
+ * shortens them.
+ */
 export function study({ dicom }: Volume, written: (text: string) => string = text => text): string {
   if (!dicom) return "";
   const patient = dicom["patient_name"]?.replaceAll("^", " ").trim();

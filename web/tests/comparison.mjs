@@ -59,8 +59,8 @@ const isDrawn = canvas => canvas.evaluate(element => {
 });
 
 /**
- * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the uptake
- * in the colours of both.
+ * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the
+ * uptake in the colours of both.
  */
 const likeness = (page, path) => page.evaluate(async path => {
   const picture = await createImageBitmap(await (await fetch(path)).blob());
@@ -113,7 +113,7 @@ async function cutOff(page) {
 const number = (value, digits, unit = "") => value.toFixed(digits) + (unit && `\u2009${unit}`);
 
 export async function comparisons(tools) {
-  const { browser, service, tab, check, look, printed, choose, SCREENSHOTS } = tools;
+  const { browser, service, tab, check, look, printed, choose } = tools;
   let files;
   const data = () => (files ??= made(tools));
   const read = async (address, path) => (await fetch(address + path)).json();
@@ -253,7 +253,8 @@ export async function comparisons(tools) {
     const { beat, segments } = await reportOf(own.address, await page.evaluate(() => location.hash.split("/").pop()));
     const points = Math.round(beat.ef_change_points);
     const shown = await page.textContent(".compared-headlines");
-    assert.ok(shown.includes(`EF, change${points > 0 ? "+" : ""}${points}points: ${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`), shown);
+    const both = `${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`;
+    assert.ok(shown.includes(`EF, change${points > 0 ? "+" : ""}${points}points: ${both}`), shown);
     assert.ok((await page.textContent(".particulars")).includes(`End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}${number(beat.rest_edv_ml, 0, "ml")}`));
     await page.locator(".particulars summary", { hasText: "Segments" }).click();
     const moved = Math.abs(segments[6].motion_change_mm).toFixed(1);

@@ -1,6 +1,6 @@
-// DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO), or a
-// PET series of one file for each slice. The same scan as header and image, as gates of a beat, and small volumes for a long
-// list.
+// DICOM files (explicit little endian) of an axis-aligned 16-bit NIfTI-1 scan: one NM file of many frames (RECON TOMO),
+// or a PET series of one file for each slice. The same scan as header and image, as gates of a beat, and small volumes
+// for a long list.
 
 import { gunzipSync, gzipSync } from "node:zlib";
 
@@ -158,7 +158,10 @@ export function pair(nifti) {
 /** How much shorter every length about the heart is at end systole, and when that is, in turns of the cycle. */
 const [SHRINKAGE, SYSTOLE] = [0.1, 0.375];
 
-/** The gates of a beat as `scripts/gated_phantom.py` makes them: the scan drawn together about the heart and let go again. */
+/**
+ * The gates of a beat as `scripts/lib/gated_phantom.py` makes them: the scan drawn together about the heart and let go
+ * again.
+ */
 function beat(nifti, truth, gates) {
   const file = gunzipSync(nifti);
   const [nx, ny, nz] = [42, 44, 46].map(at => file.readInt16LE(at));

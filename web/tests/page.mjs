@@ -1,4 +1,5 @@
-// The page in a browser, as a person uses it. Run by scripts/check_page.sh, which sets PROGRAM, SCREENSHOTS and CHROMIUM.
+// The page in a browser, as a person uses it. Run by scripts/check/page.sh, which sets PROGRAM, SCREENSHOTS and
+// CHROMIUM.
 //
 // Every view is looked at by axe-core; anything that the console reports, that the policy forbids, or that leaves this
 // machine fails the check.
@@ -106,7 +107,8 @@ async function look(page, name) {
     return result.value;
   };
   await run(AXE);
-  const text = await run("axe.run().then(r => JSON.stringify(r.violations.map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))");
+  const text = await run("axe.run().then(r => JSON.stringify(r.violations" +
+      ".map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))");
   assert.deepEqual(JSON.parse(text), [], name);
   await session.detach();
 }
@@ -149,7 +151,10 @@ async function printed(page, name) {
   return readFileSync(path, "latin1").split(/\/Type\s*\/Page\b/).length - 1;
 }
 
-/** A way to the service that breaks, or holds on, once so many bytes were sent on one connection; it is whole again after `mend`. */
+/**
+ * A way to the service that breaks, or holds on, once so many bytes were sent on one connection; it is whole again
+ * after `mend`.
+ */
 async function fragile(address, bytes, { holds = false } = {}) {
   let whole = false;
   const server = net.createServer(from => {
@@ -228,7 +233,7 @@ async function main() {
 
   await check("packed files hold what the plain ones do", async () => {
     const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
-    const names = [...(await read("/", "identity")).toString().matchAll(/"[.\/]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
+    const names = [...(await read("/", "identity")).toString().matchAll(/"[./]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
     const program = (await read(names.find(name => name.endsWith(".js")), "identity")).toString();
     for (const [, chunk] of program.matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g)) names.push(`/assets/${chunk}`);
     assert.ok(names.some(name => name.includes("viewer")) && names.some(name => name.includes("docs")), names.join());
@@ -244,7 +249,8 @@ async function main() {
     await page.waitForSelector(".welcome");
     const sizes = await page.evaluate(() => performance.getEntriesByType("resource").concat(performance.getEntriesByType("navigation")).map(entry => [entry.name, entry.encodedBodySize]));
     const whole = sizes.filter(([name]) => !name.includes("/v1/")).reduce((sum, [, size]) => sum + size, 0);
-    console.log(`  first view: ${whole} bytes, ${await page.evaluate(() => Math.round(performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? 0))} ms to the first paint`);
+    const painted = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? 0);
+    console.log(`  first view: ${whole} bytes, ${Math.round(painted)} ms to the first paint`);
     assert.ok(whole > 5_000 && whole < 400_000, `${whole} bytes`);
     assert.ok(!sizes.some(([name]) => name.includes("viewer")), "the viewer is loaded when it is needed");
     await look(page, "empty-1280");
@@ -658,7 +664,8 @@ async function main() {
       assert.notEqual(await picture(), wide);
 
       const figures = await page.textContent(".figures");
-      assert.match(figures, new RegExp(`Ejection fraction90 %: ${report.ef_interval_percent.map(end => end.toFixed(0)).join(" to ")}${report.ef_percent.toFixed(0)}`));
+      const interval = report.ef_interval_percent.map(end => end.toFixed(0)).join(" to ");
+      assert.match(figures, new RegExp(`Ejection fraction90 %: ${interval}${report.ef_percent.toFixed(0)}`));
       assert.match(figures, /End-diastolic volume90 %[^]*End-systolic volume90 %[^]*Stroke volume[^]*Bandwidth/);
       if (gates === 16) assert.match(figures, /Peak filling rate[\d.]+/);
       assert.equal(await page.locator(".maps canvas[role=img]").count(), 5);
@@ -769,7 +776,8 @@ async function main() {
       socket.on("data", chunk => (text += chunk));
       socket.on("error", fail);
       socket.on("close", () => done(text));
-      socket.write(`POST /v1/volumes HTTP/1.1\r\nhost: ${new URL(small.address).host}\r\ncontent-length: 3000000000\r\nconnection: close\r\n\r\n`);
+      const { host } = new URL(small.address);
+      socket.write(`POST /v1/volumes HTTP/1.1\r\nhost: ${host}\r\ncontent-length: 3000000000\r\nconnection: close\r\n\r\n`);
     });
     assert.match(answer, /^HTTP\/1.1 413 [^]*The body is larger than 1 ?MiB, the limit of this service/);
     assert.deepEqual(faults, []);
@@ -1067,7 +1075,8 @@ async function main() {
         await page.waitForFunction(() => /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent));
       }
       times.sort((a, b) => a - b);
-      console.log(`  ${size}^3: new contours ${times[2].toFixed(0)} ms after the press (median of 5; ${times[0].toFixed(0)} to ${times[4].toFixed(0)})`);
+      const [least, , median, , most] = times.map(time => time.toFixed(0));
+      console.log(`  ${size}^3: new contours ${median} ms after the press (median of 5; ${least} to ${most})`);
       // Three slices, the row of slices and two maps a few times, however often the job tells of its progress.
       console.log(`  pictures painted for each: ${painted.join(", ")}`);
       assert.ok(Math.max(...painted) <= 180);

@@ -89,7 +89,8 @@ export async function samePolarMap(page) {
   });
   const { tiles, hatches, hatched, lines, covered, drawn, stray } = found;
   const quantile = share => tiles[Math.floor(share * tiles.length)];
-  console.log(`  polar map: colours apart by ${quantile(0.5)} (half of the ${tiles.length} places), ${quantile(0.9)} (nine tenths); ${covered} of ${lines} parts of the contour, ${stray} of ${drawn} pixels beside it`);
+  console.log(`  polar map: colours apart by ${quantile(0.5)} (half of the ${tiles.length} places), ${quantile(0.9)} (nine tenths); ` +
+    `${covered} of ${lines} parts of the contour, ${stray} of ${drawn} pixels beside it`);
   // A tenth lies under lines and numbers.
   assert.ok(tiles.length + hatches === 1920 && quantile(0.5) <= 2 && quantile(0.9) <= 6, "the colours are those of the picture");
   console.log(`  valve plane: ${hatched} of ${hatches} places hatched`);

@@ -174,7 +174,8 @@ fn commands(url: &str) -> String {
         "ventriform {version}: surface models of the left ventricle from cardiac SPECT
 
 A model of 150 points, as GLB:
-  curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' -H 'Accept: model/gltf-binary' '{url}/v1/models?points=150' -o lv.glb
+  curl -fsS --data-binary @spect.nii.gz -H 'Prefer: wait=60' -H 'Accept: model/gltf-binary' \
+  '{url}/v1/models?points=150' -o lv.glb
 The same in the background; the answer names the job:
   curl -fsS --data-binary @spect.nii.gz '{url}/v1/models?points=150'
 The wall of the ventricle as mask.nii.gz, found with the best model of the library:

@@ -98,3 +98,8 @@ pub use server::{Running, ServeError, start};
 pub fn document_json() -> String {
     format!("{:#}\n", router::document())
 }
+
+/// The examples of README.md, compiled as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

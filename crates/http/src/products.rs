@@ -1,5 +1,5 @@
-//! The common routes of models, segmentations, beats, comparisons, limits and templates beside being [`Collection`]s: a mesh
-//! in several formats, files that can be downloaded, and perhaps a report.
+//! The common routes of models, segmentations, beats, comparisons, limits and templates beside being [`Collection`]s: a
+//! mesh in several formats, files that can be downloaded, and perhaps a report.
 //!
 //! [`routes`] serves them under `/v1/{plural}/{id}/mesh`, `.../report` and `.../{file}`.
 

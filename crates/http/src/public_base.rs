@@ -6,8 +6,8 @@
 //! (RFC 7239). Of a list, as many values count from its right as there are trusted proxies
 //! ([`trusted_hops`]): the leftmost of them, which the outermost trusted proxy has written. What stands before it could
 //! have been made up by the client. If `X-Forwarded-*` and `Forwarded` disagree, neither is used. The prefixes
-//! that count are joined in their order. Values that cannot be part of an address are not used. Without a prefix from a proxy, the
-//! setting `base_path` is the path.
+//! that count are joined in their order. Values that cannot be part of an address are not used. Without a prefix from a
+//! proxy, the setting `base_path` is the path.
 //!
 //! Requests may come with `base_path` or without, so a proxy may strip it or not.
 //!
@@ -276,7 +276,8 @@ mod tests {
         // The element of a stranger does not count before that of the trusted proxy.
         let forwarded = [(
             "forwarded",
-            "for=198.51.100.1;host=evil.example, for=203.0.113.7;proto=https;host=\"heart.example\", for=10.2.2.2;proto=http",
+            "for=198.51.100.1;host=evil.example, for=203.0.113.7;proto=https;host=\"heart.example\", \
+             for=10.2.2.2;proto=http",
         )];
         assert_eq!(seen("10.1.2.3", &forwarded), "https://heart.example/own");
     }

@@ -1,8 +1,8 @@
 //! `DELETE /v1/volumes`: all volumes of a patient, a study, a series or an accession, and what was made of them.
 //!
-//! Without a filter nothing is erased. `dry_run` shows what would go and what stands in the way; an erasure may name that
-//! plan, and is refused if another would be carried out. All goes in one transaction with one receipt, or nothing goes.
-//! Neither receipt nor audit trail holds a value of the filter.
+//! Without a filter nothing is erased. `dry_run` shows what would go and what stands in the way; an erasure may name
+//! that plan, and is refused if another would be carried out. All goes in one transaction with one receipt, or nothing
+//! goes. Neither receipt nor audit trail holds a value of the filter.
 
 use super::app::App;
 use super::caller::Caller;
@@ -153,8 +153,8 @@ impl ScanErasureQuery {
                 "It is not said which volumes to erase. Nothing was erased.",
             )
             .fix(
-                "Give `patient`, `study`, `series` or `accession`, first with `dry_run=true`; or DELETE /v1/volumes/ID for \
-                 one volume.",
+                "Give `patient`, `study`, `series` or `accession`, first with `dry_run=true`; or DELETE /v1/volumes/ID \
+                 for one volume.",
             ));
         }
         Ok(selection)
@@ -258,7 +258,8 @@ fn kept(plan: &ScanErasurePlan) -> Problem {
             ),
         )
         .fix(format!(
-            "DELETE {}/hold, and so of the others, when the holds have ended; or choose a study or series without a hold.",
+            "DELETE {}/hold, and so of the others, when the holds have ended; or choose a study or series without a \
+             hold.",
             path_of(first)
         ));
     }

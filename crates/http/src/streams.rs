@@ -1,5 +1,5 @@
-//! The limits on streams of events, which last as long as the job they follow: in all, and of one client of a tenant or one
-//! anonymous client.
+//! The limits on streams of events, which last as long as the job they follow: in all, and of one client of a tenant or
+//! one anonymous client.
 
 use super::problem::{Answer, Problem};
 use axum::http::{StatusCode, header};

@@ -2,7 +2,8 @@
 //! changed by a JSON merge patch (RFC 7396), and searched by.
 //!
 //! In a query string or a form: `external_id=A1` and `labels=study:42`, the latter repeated. In
-//! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`. Shown to callers who see whose scan a volume is ([`shown`]).
+//! JSON: `"external_id": "A1"` and `"labels": {"study": "42"}`. Shown to callers who see whose scan a volume is
+//! ([`shown`]).
 
 use super::app::App;
 use super::caller::Caller;

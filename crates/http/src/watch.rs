@@ -2,8 +2,8 @@
 //!
 //! A request is admitted once. Its answer may go on for hours: a stream of events, a download over a slow line, a wait
 //! for a job. [`CredentialWatch`] asks every [`LOOK_EVERY`] whether the credentials still open the service, so that
-//! such an answer ends soon after a key was revoked, or a key or token has expired. It is broken off, and its connection
-//! closed, so that no client takes it for whole.
+//! such an answer ends soon after a key was revoked, or a key or token has expired. It is broken off, and its
+//! connection closed, so that no client takes it for whole.
 //!
 //! Uploads are not ended: what a request has begun with valid credentials it may finish.
 

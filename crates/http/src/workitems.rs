@@ -602,7 +602,8 @@ fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
     DataSetJson::of(object).map_err(|error| {
         Problem::bad_request("malformed-dicom-json", format!("{error}."))
             .at(&error.tag)
-            .fix("Send DICOM JSON (PS3.18 annex F), such as [{\"00741000\": {\"vr\": \"CS\", \"Value\": [\"SCHEDULED\"]}}].")
+            .fix("Send DICOM JSON (PS3.18 annex F), such as [{\"00741000\": {\"vr\": \"CS\", \"Value\": \
+                [\"SCHEDULED\"]}}].")
     })
 }
 

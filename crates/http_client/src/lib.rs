@@ -1,7 +1,7 @@
 //! The HTTP client of the service: the traits of [`ventriform_service::http_client`] on `reqwest`.
 //!
-//! In: [`ClientOptions`]. Out: clients that connect as these say, over HTTP/1.1 and TLS by rustls. The process's provider
-//! of cryptography has to be installed before the first client is made.
+//! In: [`ClientOptions`]. Out: clients that connect as these say, over HTTP/1.1 and TLS by rustls. The process's
+//! provider of cryptography has to be installed before the first client is made.
 
 mod client;
 mod error;
@@ -53,6 +53,11 @@ impl ClientFactory for ReqwestFactory {
         Ok(Arc::new(ReqwestClient(client)))
     }
 }
+
+/// The examples of README.md, compiled as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 #[cfg(test)]
 mod tests;

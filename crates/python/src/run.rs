@@ -2,8 +2,8 @@
 //!
 //! In: work that takes a [`Monitor`]. Out: its result, or an exception.
 //!
-//! 1. The work runs on a thread of its own, in a pool of threads that belongs to this process: a process that was forked
-//!    has none of its parent's threads and makes its own.
+//! 1. The work runs on a thread of its own, in a pool of threads that belongs to this process: a process that was
+//!    forked has none of its parent's threads and makes its own.
 //! 2. The calling thread lets go of the interpreter and looks every [`LOOK_EVERY`] for signals (Ctrl-C) and for
 //!    progress, which it tells the caller's function.
 //! 3. A signal, or an exception of that function, cancels the work. Its exception is raised when the work has ended,

@@ -1,8 +1,8 @@
 //! Erasing what is no item: received objects, work items.
 //!
 //! As an item's ([`crate::items`]): the rows go in one transaction that also writes the row of the audit trail and the
-//! receipt; then the files; then what the database's files still hold of the rows is overwritten. All of it runs in a task of
-//! its own, which goes on if the caller goes away.
+//! receipt; then the files; then what the database's files still hold of the rows is overwritten. All of it runs in a
+//! task of its own, which goes on if the caller goes away.
 
 use crate::access::Agent;
 use crate::error::ServiceError;
@@ -10,8 +10,8 @@ use crate::records::{Erased, ErasureReason, Receipt, StoreError, Tenant};
 use crate::service::Service;
 
 impl Service {
-    /// Erases the objects of a group that are not part of a volume, and what is known of those that are. `None` if the tenant
-    /// has no such group.
+    /// Erases the objects of a group that are not part of a volume, and what is known of those that are. `None` if the
+    /// tenant has no such group.
     ///
     /// # Errors
     /// If the storage fails.

@@ -142,8 +142,8 @@ impl Service {
     /// are counted here.
     ///
     /// # Errors
-    /// `queue-full`; `storage-quota` if its texts have no room; `idempotency-key-reused` if the key stands for another order; `invalid-field` if something
-    /// that it needs does not exist.
+    /// `queue-full`; `storage-quota` if its texts have no room; `idempotency-key-reused` if the key stands for another
+    /// order; `invalid-field` if something that it needs does not exist.
     pub async fn file_job(
         &self,
         work: &dyn Work,

@@ -1,7 +1,7 @@
 //! Templates, readers' profiles and normal limits, added by a tenant.
 //!
-//! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets the
-//! same limits; here they are refused before the body is read, and read under the budget of decoding.
+//! Their number, names and bytes are checked where they are added ([`crate::items`]), so that the command line meets
+//! the same limits; here they are refused before the body is read, and read under the budget of decoding.
 
 use crate::access::{Agent, Quota};
 use crate::decoding::LITTLE_MEMORY;
@@ -16,8 +16,8 @@ use ventriform::progress::Monitor;
 
 /// Memory for a byte of a mesh: numbers as text, parsed, and as files of several formats.
 const MEMORY_PER_BYTE: u64 = 16;
-/// Memory for a byte of normal limits: what is parsed, its copy, and the text of it that is hashed. The costliest text is a list of people
-/// without names: 14 bytes of it take 370.
+/// Memory for a byte of normal limits: what is parsed, its copy, and the text of it that is hashed. The costliest text
+/// is a list of people without names: 14 bytes of it take 370.
 const LIMITS_MEMORY_PER_BYTE: u64 = 26;
 
 /// A product with its owner's record, and whether it is new.
@@ -140,7 +140,8 @@ impl Service {
         Ok(by.change(add).await?)
     }
 
-    /// Refuses another template, reader or set of normal limits where the tenant has as many as it may have, before it is sent.
+    /// Refuses another template, reader or set of normal limits where the tenant has as many as it may have, before it
+    /// is sent.
     ///
     /// # Errors
     /// `library-full`.

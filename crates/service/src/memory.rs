@@ -1,16 +1,18 @@
 //! The memory that requests hold, shared out between tenants, and between the clients of each.
 //!
-//! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`MEMORY_WAIT`], or the error `busy`.
+//! In: how many bytes a request is about to hold. Out: leave to do so, now or within [`MEMORY_WAIT`], or the error
+//! `busy`.
 //!
 //! Whatever a client can make the service keep for it is charged here before it is taken: the part of a body
 //! that is gathered, what is made of it, the rows of a page, the answer until it is read. What is decoded has a
 //! budget of its own ([`super::decoding`]).
 //!
-//! **Shares.** Of the budget (setting `request_memory`), a tenant gets no more than twice what it leaves free, and of that
-//! a client (an address) no more than it leaves to the tenant's other clients. So one tenant alone has at most two thirds of
-//! the budget and one client of it a third, and there is always something left for a tenant that holds little, and for a client of
-//! it, whatever their addresses. An anonymous caller gets no more than it leaves free: one alone has at most half. (The rule is that of dynamic
-//! thresholds for shared buffers: A. K. Choudhury and E. L. Hahne, IEEE/ACM Transactions on Networking 6, 1998.)
+//! **Shares.** Of the budget (setting `request_memory`), a tenant gets no more than twice what it leaves free, and of
+//! that a client (an address) no more than it leaves to the tenant's other clients. So one tenant alone has at most two
+//! thirds of the budget and one client of it a third, and there is always something left for a tenant that holds
+//! little, and for a client of it, whatever their addresses. An anonymous caller gets no more than it leaves free: one
+//! alone has at most half. (The rule is that of dynamic thresholds for shared buffers: A. K. Choudhury and E. L. Hahne,
+//! IEEE/ACM Transactions on Networking 6, 1998.)
 //!
 //! A request charges by [`charge`], which notes what it holds in a [`Ledger`] of the request. When the handler
 //! has ended, the ledger goes with the body of the answer, and ends with it. Single rows are read by [`read_row`]; what
@@ -28,8 +30,8 @@ use tokio::time::{Instant, timeout_at};
 /// Longest time for which a request waits for memory.
 const MEMORY_WAIT: Duration = Duration::from_secs(2);
 
-/// Memory for a stored byte of a row: the row, its JSON parsed (a job of 1000 cases takes nine times as much as its text), and the
-/// JSON of the answer.
+/// Memory for a stored byte of a row: the row, its JSON parsed (a job of 1000 cases takes nine times as much as its
+/// text), and the JSON of the answer.
 pub const MEMORY_PER_ROW_BYTE: u64 = 12;
 
 /// Stored bytes of a single row that are not charged.
@@ -178,8 +180,8 @@ impl MemoryBudget {
         self.0.used.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes `bytes` for a holder if it leaves `share` times as much to the others of its group as it then has, and its group enough
-    /// to other groups.
+    /// Takes `bytes` for a holder if it leaves `share` times as much to the others of its group as it then has, and its
+    /// group enough to other groups.
     fn take(&self, holder: &Requester, bytes: u64, share: u64) -> bool {
         if bytes == 0 {
             return true;
@@ -381,8 +383,8 @@ pub async fn charge(bytes: u64) -> Result<(), ServiceError> {
     }
 }
 
-/// A row whose size a client chose, for which the current request is charged before it is read if it is large: `read` is
-/// given the most bytes that the row may have.
+/// A row whose size a client chose, for which the current request is charged before it is read if it is large: `read`
+/// is given the most bytes that the row may have.
 ///
 /// # Errors
 /// Those of `read`, and `busy` as of [`charge`].
@@ -411,8 +413,8 @@ async fn charge_row(bytes: u64) -> Result<(), ServiceError> {
     }
 }
 
-/// Gives back what the current request was charged for rows that it holds no more, but what `copies` of them take, which it
-/// holds until its answer has been read.
+/// Gives back what the current request was charged for rows that it holds no more, but what `copies` of them take,
+/// which it holds until its answer has been read.
 pub async fn end_rows(copies: u64) {
     if let Ok(ledger) = REQUEST_LEDGER.try_with(Ledger::clone) {
         let mut charges = ledger.charges.lock().await;

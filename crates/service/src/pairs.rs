@@ -3,18 +3,18 @@
 //! In: a stored volume of a study, and the rule that asks for a comparison. Out: both volumes, stress first, or `None`
 //! while the other scan of the study has not come.
 //!
-//! 1. A scan is at stress or at rest as the rule's parts of the Series Description say; where they say neither, as its header
-//!    says. The rule goes first, as the description of a whole study may name one of the two for both. Where they
-//!    contradict each other, the comparison is flagged.
-//! 2. Where neither does, the injections of the study decide ([`roles_of`]): those of rest and stress are two, so that scans of one
-//!    injection are what any of them is told to be, and those of the other one the other. If none of the study is told, the rule may
-//!    say which one is made first with the lower dose, as in protocols of one day. More than two injections, or those that
-//!    contradict what is told, decide nothing.
-//! 3. Candidates are the tenant's other volumes of the study that are the other of the two. One with another attenuation
-//!    correction is none. Those with as many volumes (gates) go first, then the newest.
+//! 1. A scan is at stress or at rest as the rule's parts of the Series Description say; where they say neither, as its
+//!    header says. The rule goes first, as the description of a whole study may name one of the two for both. Where
+//!    they contradict each other, the comparison is flagged.
+//! 2. Where neither does, the injections of the study decide ([`roles_of`]): those of rest and stress are two, so that
+//!    scans of one injection are what any of them is told to be, and those of the other one the other. If none of the
+//!    study is told, the rule may say which one is made first with the lower dose, as in protocols of one day. More
+//!    than two injections, or those that contradict what is told, decide nothing.
+//! 3. Candidates are the tenant's other volumes of the study that are the other of the two. One with another
+//!    attenuation correction is none. Those with as many volumes (gates) go first, then the newest.
 //!
-//! Guaranteed: whichever scan comes first, and also if both come at once, one comparison is filed: either finds the other,
-//! as volumes are stored before jobs are filed, and the key of the order names both.
+//! Guaranteed: whichever scan comes first, and also if both come at once, one comparison is filed: either finds the
+//! other, as volumes are stored before jobs are filed, and the key of the order names both.
 
 use crate::intake::Rule;
 use crate::records::{
@@ -79,7 +79,8 @@ fn attenuation_corrected(scan: &ScanIdentity) -> Option<bool> {
 
 /// Starts of an injection that series of one scan state differ by less, seconds.
 const ONE_INJECTION_SECONDS: f64 = 120.0;
-/// Quotient of the doses of a protocol of one day, the later to the earlier, from which they tell which is which: usual is three.
+/// Quotient of the doses of a protocol of one day, the later to the earlier, from which they tell which is which: usual
+/// is three.
 const LEAST_DOSE_QUOTIENT: f64 = 1.5;
 
 /// An injection of a tracer.
@@ -141,7 +142,8 @@ fn other_than(role: WhichScan) -> WhichScan {
     }
 }
 
-/// Whether each scan of a study is at stress or at rest, by what it says ([`role_of`]) and, where that is nothing, by its injection.
+/// Whether each scan of a study is at stress or at rest, by what it says ([`role_of`]) and, where that is nothing, by
+/// its injection.
 fn roles_of(scans: &[&ScanIdentity], rule: &Rule) -> Vec<Option<WhichScan>> {
     let told: Vec<Option<WhichScan>> = scans.iter().map(|scan| role_of(scan, rule)).collect();
     let injections: Vec<Option<Injection>> = scans.iter().map(|scan| Injection::of(scan)).collect();

@@ -1,9 +1,9 @@
 //! Places for work of one kind, shared out in turn.
 //!
 //! In: whoever asks for a place, a client of a tenant or an anonymous one ([`Requester`]). Out: a [`Place`], when it is
-//! its turn. Free places go round between tenants (and anonymous clients), those of a tenant between its clients, and each
-//! client's requests are served in their order ([`Rounds`]). So whoever asks for little waits for about one piece of
-//! work of each other tenant, however many requests, from however many addresses, others have waiting.
+//! its turn. Free places go round between tenants (and anonymous clients), those of a tenant between its clients, and
+//! each client's requests are served in their order ([`Rounds`]). So whoever asks for little waits for about one piece
+//! of work of each other tenant, however many requests, from however many addresses, others have waiting.
 //!
 //! [`crate::decoding`] shares out memory in the same order, the store its connections to the database.
 

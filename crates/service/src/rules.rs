@@ -86,8 +86,9 @@ fn of_pair(error: PairError) -> MakeError {
         PairError::NoRole => {
             let failure = Failure::new(Fault::Content, "rest-or-stress", error.to_string());
             MakeError::Never(failure.fix(
-                "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or `first`, the scan that is made \
-                 first on the same day with the lower dose; or compare the volumes by POST /v1/comparisons.",
+                "Give in the rule `stress` and `rest`, parts of the Series Description that tell them, or `first`, the \
+                 scan that is made first on the same day with the lower dose; or compare the volumes by POST \
+                 /v1/comparisons.",
             ))
         }
     }

@@ -2,7 +2,8 @@
 //!
 //! In: files as streams of bytes. Out: a stored volume, pinned until the caller has done with it.
 //!
-//! 1. [`VolumeUpload::write`] streams each file to the disk and hashes it on the way; nothing but a few pieces is held in memory.
+//! 1. [`VolumeUpload::write`] streams each file to the disk and hashes it on the way; nothing but a few pieces is held
+//!    in memory.
 //! 2. [`Service::store_volume`] tells the volume by its content, reads it if it is new, and adds it.
 //!
 //! Guaranteed: what arrives counts against the tenant's quota as it comes. Not guaranteed: that a refused upload has

@@ -1,8 +1,8 @@
 //! A copy of a data folder, while the service runs or not.
 //!
 //! 1. `VACUUM INTO` takes a snapshot of the database in one read transaction.
-//! 2. The files of each row of the snapshot (received objects first) are copied and hashed on the way. Files never change
-//!    once published, so those that an earlier backup into the same folder has copied are kept.
+//! 2. The files of each row of the snapshot (received objects first) are copied and hashed on the way. Files never
+//!    change once published, so those that an earlier backup into the same folder has copied are kept.
 //! 3. A row whose item was erased meanwhile is removed from the snapshot.
 //! 4. The snapshot replaces the target's database; items that it does not name are deleted.
 //!

@@ -52,8 +52,8 @@ pub async fn open_beside(
     open_database(folder, database).await
 }
 
-/// Refuses a folder that is no data folder of a service: a missing one, one that holds other things, and unless it may be
-/// made into one, an empty one.
+/// Refuses a folder that is no data folder of a service: a missing one, one that holds other things, and unless it may
+/// be made into one, an empty one.
 ///
 /// # Errors
 /// [`OpenError::NoStore`]; others if the folder cannot be read.

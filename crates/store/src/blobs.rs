@@ -46,7 +46,8 @@ const DAY_FORMAT: StaticFormatDescription = format_description!("[year]-[month]-
 /// Content that [`BlobStore::check`] writes: more than the free rest of a block.
 pub(super) const PROBE_BYTES: &[u8] = &[b'v'; 8192];
 
-/// Uploads and received objects that are forced to disk at the same time, in turn: the disk is slow, and the threads for it are few.
+/// Uploads and received objects that are forced to disk at the same time, in turn: the disk is slow, and the threads
+/// for it are few.
 const SYNCS_AT_ONCE: usize = 32;
 
 /// Files below one folder.
@@ -548,8 +549,8 @@ pub(super) fn quarantine_shelf(folder: &Path, now: Timestamp) -> io::Result<Path
 /// The file beside a damaged item's files that says who had it.
 pub(super) const HOLDERS_FILE: &str = "holders.json";
 
-/// The folder in the quarantine for items of which nobody knows whose they are. It is not emptied by age: one of them may be
-/// on legal hold.
+/// The folder in the quarantine for items of which nobody knows whose they are. It is not emptied by age: one of them
+/// may be on legal hold.
 pub(super) const UNOWNED_SHELF: &str = "unowned";
 
 /// Moves the folder of an item into the quarantine of the day. Returns whether there was one.

@@ -62,8 +62,8 @@ impl Stamp {
         }
     }
 
-    /// Whether the open file with this stamp still holds the same: nothing of it has changed, or it was erased. That changes
-    /// the time of its inode alone, and whoever has it open reads on.
+    /// Whether the open file with this stamp still holds the same: nothing of it has changed, or it was erased. That
+    /// changes the time of its inode alone, and whoever has it open reads on.
     fn still_holds(&self, now: &Metadata) -> bool {
         let mut found = Self::of(now);
         if is_erased(now) {
@@ -192,8 +192,8 @@ impl Reading {
         reading.next()
     }
 
-    /// The next chunk. With the last one, checks that the file was not changed meanwhile. A file that was erased meanwhile
-    /// is read to its end: the answer has begun, and is whole.
+    /// The next chunk. With the last one, checks that the file was not changed meanwhile. A file that was erased
+    /// meanwhile is read to its end: the answer has begun, and is whole.
     fn next(mut self) -> Result<(Bytes, Self), BlobError> {
         let mut chunk = vec![0; self.left.min(SENT_CHUNK) as usize];
         self.file.read_exact(&mut chunk)?;
@@ -240,8 +240,8 @@ mod tests {
         second.is_ok_and(|(second, _)| [first, second].concat() == content)
     }
 
-    /// An answer that has begun when the item is erased is whole: the file is read on, as it is open. One that was altered
-    /// is not passed on.
+    /// An answer that has begun when the item is erased is whole: the file is read on, as it is open. One that was
+    /// altered is not passed on.
     #[test]
     fn a_file_that_is_erased_while_it_is_read_is_whole_and_one_that_is_altered_is_refused() {
         let alter = |path: &Path| {

@@ -104,8 +104,8 @@ impl Writing {
         }
     }
 
-    /// Overwrites what was deleted since the last time, as far as that is this program's business: PostgreSQL does so by
-    /// itself in time. `false` if a reader was in the way.
+    /// Overwrites what was deleted since the last time, as far as that is this program's business: PostgreSQL does so
+    /// by itself in time. `false` if a reader was in the way.
     pub async fn overwrite_deleted(&self) -> StoreResult<bool> {
         match self {
             Writing::Sqlite(writer) => writer.overwrite_erased().await,
@@ -166,8 +166,8 @@ impl Query {
 /// The prefix of the names of runs.
 const RUN_PREFIX: &str = "run_";
 
-/// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`], and the traits
-/// of `access`, `hooks`, `archive`, `intake` and `worklist`.
+/// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`],
+/// and the traits of `access`, `hooks`, `archive`, `intake` and `worklist`.
 pub struct SqlStore {
     pub(super) writer: Writing,
     pub(super) readers: Readers,

@@ -18,8 +18,8 @@
 //!
 //! If the files are in a bucket, steps 2 to 5 are done there ([`super::s3`]).
 //!
-//! Repair deletes no content that was ever published and not replaced. An item whose ownership was lost goes back to the
-//! tenants whom other rows or an index name, else to the heir that the caller names, else into a part of the
+//! Repair deletes no content that was ever published and not replaced. An item whose ownership was lost goes back to
+//! the tenants whom other rows or an index name, else to the heir that the caller names, else into a part of the
 //! quarantine that is not emptied by age. A volume that is given back is on legal hold until that is lifted: nobody
 //! knows whether it was. Each of these is a row of the audit trail. Jobs, keys and receipts live in the database only.
 
@@ -271,8 +271,8 @@ impl<'a> Doctor<'a> {
         SqlStore::open(&self.folder.join(name), settings.write_wait, gauge).await
     }
 
-    /// Makes a new database, with the rows of the old one that can be read. The old one stays in its place until the new
-    /// one is finished.
+    /// Makes a new database, with the rows of the old one that can be read. The old one stays in its place until the
+    /// new one is finished.
     async fn new_database(
         &mut self,
         old: Option<PathBuf>,
@@ -452,8 +452,8 @@ impl<'a> Doctor<'a> {
         };
         if let Some(end) = &settled.restored {
             let detail = format!(
-                "The database is a restored copy, which ends with row {} of the audit trail. What was revoked or erased since is \
-                 as it was before: `ventriform audit missed --from NEWER` says what.",
+                "The database is a restored copy, which ends with row {} of the audit trail. What was revoked or \
+                 erased since is as it was before: `ventriform audit missed --from NEWER` says what.",
                 end.sequence
             );
             self.found
@@ -544,7 +544,8 @@ impl<'a> Doctor<'a> {
         let keys = rows.keys(None, page).await?;
         if keys.items.is_empty() && rows.is_closed().await? {
             let detail = format!(
-                "The service asks for credentials, and there is no key. Unless it has an issuer of tokens, {HOW_TO_OPEN}."
+                "The service asks for credentials, and there is no key. Unless it has an issuer of tokens, \
+                 {HOW_TO_OPEN}."
             );
             self.found.remark("keys-missing", "api_keys", detail, None);
         }

@@ -16,14 +16,17 @@ pub(super) const NO_ROW: &str = "It has files but no row.";
 pub(super) const NO_HOLDER: &str =
     "No tenant has it: the record of who does is lost, and with it whether it is on legal hold.";
 /// The repair of an item without a holder, if an heir is named.
-pub(super) const GIVEN_TO_HEIR: &str = "it was given to the tenant that --tenant names; a volume is on legal hold until that is lifted";
+pub(super) const GIVEN_TO_HEIR: &str = "it was given to the tenant that --tenant names; a volume is on legal hold \
+    until that is lifted";
 /// The same if none is named.
-pub(super) const UNOWNED_SET_ASIDE: &str = "it was moved into the quarantine, where it stays: `--repair --tenant NAME` gives it to that tenant";
+pub(super) const UNOWNED_SET_ASIDE: &str = "it was moved into the quarantine, where it stays: `--repair --tenant NAME` \
+    gives it to that tenant";
 
 /// The repair of a damaged item.
 const DAMAGED_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine";
 /// The same for one on legal hold.
-const HELD_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine, where they stay: it is on legal hold";
+const HELD_SET_ASIDE: &str = "its row was removed and its files moved into the quarantine, where they stay: it is on \
+    legal hold";
 
 /// Something that is not as it should be.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -4,17 +4,18 @@
 //! In: the marks and the end of the audit trail in the database, and the notes beside it. Out: whether callers without
 //! credentials are refused, and the newest row of the trail that is known.
 //!
-//! - The service is **closed** if the database or any note says so: a note outlives a damaged or restored database, and the
-//!   marks outlive a damaged table of keys.
+//! - The service is **closed** if the database or any note says so: a note outlives a damaged or restored database, and
+//!   the marks outlive a damaged table of keys.
 //! - It is **open** if a note says so that belongs to this database and lies where it was written, or if nothing was
 //!   ever noted, as before the first start.
-//! - Else it is **in doubt**, and closed: the database was noted once, but its note is missing, damaged, a copy, or that of
-//!   another database. A copy of a whole folder is told by the number of the note's inode, that of a bucket by its name.
+//! - Else it is **in doubt**, and closed: the database was noted once, but its note is missing, damaged, a copy, or
+//!   that of another database. A copy of a whole folder is told by the number of the note's inode, that of a bucket by
+//!   its name.
 //! - A note that names a row of the trail which the database lacks stays known in the database, and
 //!   [`ventriform_service::access::verify`] says so.
 //!
-//! Notes are written when the service opens, when access changes, every [`NOTE_EVERY`] if the trail has grown, and at the
-//! end. Not guaranteed: a snapshot of a whole disk from before the first key looks like that time.
+//! Notes are written when the service opens, when access changes, every [`NOTE_EVERY`] if the trail has grown, and at
+//! the end. Not guaranteed: a snapshot of a whole disk from before the first key looks like that time.
 
 use crate::database::SqlStore;
 use crate::note::{Beside, Found, NOTE_FILE, Note};
@@ -65,8 +66,8 @@ impl Settled {
             tracing::warn!(
                 sequence = end.sequence,
                 hash = end.hash,
-                "the database is a restored copy, which ends with this row of the audit trail: keys that were revoked and \
-                 items that were erased since are as they were before. `ventriform audit missed --from NEWER` says \
+                "the database is a restored copy, which ends with this row of the audit trail: keys that were revoked \
+                 and items that were erased since are as they were before. `ventriform audit missed --from NEWER` says \
                  which, and with --apply does the same here"
             );
         }
@@ -74,18 +75,18 @@ impl Settled {
             tracing::warn!(
                 sequence = head.sequence,
                 hash = head.hash,
-                "the database lacks rows of the audit trail up to this one: it was damaged, or it is an older copy, in which \
-                 what was revoked or erased since is as it was before. `ventriform audit missed --from NEWER` says what, \
-                 and does it"
+                "the database lacks rows of the audit trail up to this one: it was damaged, or it is an older copy, in \
+                 which what was revoked or erased since is as it was before. `ventriform audit missed --from NEWER` \
+                 says what, and does it"
             );
         }
     }
 }
 
 impl SqlStore {
-    /// Compares the database with the notes about it at `beside`, closes the service if any says so or if it is in doubt,
-    /// and writes marks and notes anew. From now on notes are kept there. `lost` if a repair made the database anew, or
-    /// lost what tells whether there was a key.
+    /// Compares the database with the notes about it at `beside`, closes the service if any says so or if it is in
+    /// doubt, and writes marks and notes anew. From now on notes are kept there. `lost` if a repair made the database
+    /// anew, or lost what tells whether there was a key.
     ///
     /// # Errors
     /// If the database or a place fails.
@@ -179,7 +180,8 @@ impl SqlStore {
         });
         let why = why.unwrap_or("it is missing");
         let doubt = format!(
-            "it is not known whether it ever had a key: the note `{NOTE_FILE}` beside the database does not tell, as {why}"
+            "it is not known whether it ever had a key: the note `{NOTE_FILE}` beside the database does not tell, as \
+             {why}"
         );
         Ok((Access::Closed, Some(Doubt(doubt))))
     }
@@ -245,7 +247,8 @@ impl SqlStore {
         Ok((self.trail_end().await?, self.marks().await?.access))
     }
 
-    /// The newest rows of the trail that the notes name, and the one that the database itself keeps, each with its place.
+    /// The newest rows of the trail that the notes name, and the one that the database itself keeps, each with its
+    /// place.
     pub(crate) async fn kept_heads(&self) -> StoreResult<Vec<(String, Anchor)>> {
         let marks = self.marks().await?;
         let mut heads = Vec::new();

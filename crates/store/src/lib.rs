@@ -745,6 +745,11 @@ impl Drop for FolderLock {
     }
 }
 
+/// The examples of README.md, compiled as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 #[cfg(test)]
 mod tests {
     use super::*;

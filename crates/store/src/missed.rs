@@ -1,17 +1,18 @@
 //! What a newer trail says and an older copy of the store does not know: keys revoked, items and identities erased, and
 //! legal holds set since the copy was made.
 //!
-//! In: the store, which no service uses, and the newer one: a data folder, whose database may be damaged, or a database of
-//! PostgreSQL. The engines need not be the same, and nothing is written to the newer one. Out: a list; and if asked for, the
-//! same done to the store.
+//! In: the store, which no service uses, and the newer one: a data folder, whose database may be damaged, or a database
+//! of PostgreSQL. The engines need not be the same, and nothing is written to the newer one. Out: a list; and if asked
+//! for, the same done to the store.
 //!
-//! 1. Both are compared row by row, not by time: a revocation, a receipt or a hold of the newer store that this one lacks.
+//! 1. Both are compared row by row, not by time: a revocation, a receipt or a hold of the newer store that this one
+//!    lacks.
 //! 2. The rows of the newer trail that this one lacks are taken over as they are, if they follow its rows; the chain of
 //!    hashes shows it. Else, if rows were written here meanwhile, an event names the end of the newer trail.
 //! 3. Keys are revoked, holds set, and then items erased, each with its row of the trail and a receipt.
 //!
-//! Not done: a hold that was lifted later stays, since what is in doubt holds. What a job that has not ended needs, or what
-//! is on hold here, is named and stays.
+//! Not done: a hold that was lifted later stays, since what is in doubt holds. What a job that has not ended needs, or
+//! what is on hold here, is named and stays.
 
 use crate::Store;
 use crate::database::{Readers, SqlStore};
@@ -110,8 +111,8 @@ pub enum MissedError {
     },
     /// The newer trail does not know the newest row here.
     #[error(
-        "row {sequence} of the audit trail here, with the hash {hash}, is not in the trail of {store}: it is not a newer \
-         copy of this store"
+        "row {sequence} of the audit trail here, with the hash {hash}, is not in the trail of {store}: it is not a \
+         newer copy of this store"
     )]
     OtherTrail {
         /// The newer store's database.
@@ -354,8 +355,8 @@ async fn common_end(rows: &SqlStore, newer: &mut Newer<'_>) -> Result<Anchor, Mi
     Ok(common.unwrap_or(end))
 }
 
-/// Those of the later rows that can be taken over: they follow the common end without a break, and the row here that comes
-/// next follows them.
+/// Those of the later rows that can be taken over: they follow the common end without a break, and the row here that
+/// comes next follows them.
 async fn following(
     rows: &SqlStore,
     common: &Anchor,

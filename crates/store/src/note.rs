@@ -1,4 +1,5 @@
-//! The notes about a database beside it: what they say, and where they lie. What follows from them is in [`super::kept`].
+//! The notes about a database beside it: what they say, and where they lie. What follows from them is in
+//! [`super::kept`].
 
 use crate::blobs;
 use async_trait::async_trait;

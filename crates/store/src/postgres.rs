@@ -51,17 +51,20 @@ const RUN_SETTING: &str = "ventriform.run";
 const SHARED_SESSION: &str =
     "a pooler between this program and PostgreSQL lets several connections share one session";
 /// Advice.
-const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of PostgreSQL itself";
+const USE_SESSIONS: &str = "Set `pool_mode = session` for this database in PgBouncer, or give the address of \
+    PostgreSQL itself";
 /// Advice about a user or a password that is not accepted.
-const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf (by auth_file, if a \
-     pooler says so)";
-/// Transactions of this process that write or wait at the server for the lock: while one commits, the next one is there.
+const WRONG_PASSWORD: &str = "Correct user and password in the URL (or PGPASSWORD), or let the user in by pg_hba.conf \
+     (by auth_file, if a pooler says so)";
+/// Transactions of this process that write or wait at the server for the lock: while one commits, the next one is
+/// there.
 const WRITE_CONNECTIONS: usize = 2;
 /// Oldest version of the server that is tested.
 const OLDEST_SERVER_VERSION: i32 = 150_000;
 
 /// The key of the lock for writing, in any schema of its own.
-pub(super) const BEGIN_WRITING: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || current_schema(), 0))";
+pub(super) const BEGIN_WRITING: &str = "BEGIN; SELECT pg_advisory_xact_lock(hashtextextended('ventriform writes ' || \
+    current_schema(), 0))";
 
 /// How the driver reaches the database at `url`.
 ///
@@ -184,8 +187,8 @@ pub(super) async fn connect_unlimited(
     Ok(connection)
 }
 
-/// Connects to a database that another program may have made, for reading: its tables stay as they are. Statements may take
-/// any time.
+/// Connects to a database that another program may have made, for reading: its tables stay as they are. Statements may
+/// take any time.
 pub(super) async fn open_as_it_is(
     settings: &PostgresSettings,
 ) -> Result<Shared<PgPool>, PostgresError> {

@@ -1,8 +1,9 @@
 //! Space on the disk of the data folder that is kept for erasures.
 //!
 //! An erasure writes to the database before it frees anything, so on a full disk nothing could be erased. A file of
-//! [`RESERVE_BYTES`] holds the space: when an erasure finds the disk full, the file is deleted and the erasure tried again.
-//! The upkeep writes it anew once there is room. Not guaranteed: that no other program takes the space in between.
+//! [`RESERVE_BYTES`] holds the space: when an erasure finds the disk full, the file is deleted and the erasure tried
+//! again. The upkeep writes it anew once there is room. Not guaranteed: that no other program takes the space in
+//! between.
 
 use std::fs::{self, File};
 use std::io::{self, Write};

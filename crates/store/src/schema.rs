@@ -1,9 +1,9 @@
-//! The tables of SQLite and PostgreSQL as migrations: SQL files in `migrations/` and `migrations_postgres/`, embedded in the
-//! program. A file is named `VERSION_DESCRIPTION.sql`; what has landed is never changed, since a database keeps the sum of each
-//! file that it was made by.
+//! The tables of SQLite and PostgreSQL as migrations: SQL files in `migrations/` and `migrations_postgres/`, embedded
+//! in the program. A file is named `VERSION_DESCRIPTION.sql`; what has landed is never changed, since a database keeps
+//! the sum of each file that it was made by.
 //!
-//! `sqlx::migrate!` would do the same. Its macro crate compiles both drivers, TLS and tokio a second time for the compiler's
-//! own use.
+//! `sqlx::migrate!` would do the same. Its macro crate compiles both drivers, TLS and tokio a second time for the
+//! compiler's own use.
 
 use include_dir::{Dir, include_dir};
 use sqlx::SqlSafeStr;

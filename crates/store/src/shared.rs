@@ -18,7 +18,8 @@ pub(super) struct Shared<P> {
 }
 
 impl<P> Shared<P> {
-    /// Connections of which at most `places` are used at the same time, and for one of which nobody waits longer than `wait`.
+    /// Connections of which at most `places` are used at the same time, and for one of which nobody waits longer than
+    /// `wait`.
     pub fn new(pool: P, health: Arc<Health>, places: usize, wait: Duration) -> Self {
         Self {
             pool,

@@ -89,7 +89,8 @@ impl SqlStore {
         Ok(salvaged)
     }
 
-    /// Removes rows that name an ownership which nobody has, with a row of the trail for each table. Returns how many of each.
+    /// Removes rows that name an ownership which nobody has, with a row of the trail for each table. Returns how many
+    /// of each.
     pub(super) async fn drop_orphans(
         &self,
         now: Timestamp,
@@ -191,8 +192,8 @@ async fn salvage(to: &mut SqliteConnection, old: &Path) -> Result<Salvage, sqlx:
         });
     }
     let readable = names(to, "old").await;
-    // No transaction: after a statement that met the damage, SQLite lets none write that its transaction has begun. The new
-    // database takes its place as a whole, and is forced to disk before.
+    // No transaction: after a statement that met the damage, SQLite lets none write that its transaction has begun. The
+    // new database takes its place as a whole, and is forced to disk before.
     run(to, "PRAGMA synchronous = OFF").await?;
     let triggers: Vec<(String, String)> =
         sqlx::query_as("SELECT name, sql FROM main.sqlite_schema WHERE type = 'trigger'")
@@ -287,8 +288,8 @@ async fn salvage_table(to: &mut SqliteConnection, table: String) -> Result<Salva
     })
 }
 
-/// Number of rows that a table of the old database had, by its indexes and the numbers given to rows; `None` if none of them can
-/// be read.
+/// Number of rows that a table of the old database had, by its indexes and the numbers given to rows; `None` if none of
+/// them can be read.
 async fn rows_before(of: &mut SqliteConnection, table: &str, last: Option<i64>) -> Option<u64> {
     let indexes =
         "SELECT name FROM pragma_index_list(?1, 'old') WHERE partial = 0 AND origin != 'pk'";

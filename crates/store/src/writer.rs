@@ -1,8 +1,8 @@
 //! The one connection that writes, and how a failed write ends.
 //!
-//! SQLite allows one writer at a time, so writers wait for one connection in turn, tenant by tenant and client by client
-//! ([`ventriform_service::places`]), instead of polling for the database's lock. Every write goes through [`Writer::begin`] and
-//! [`WriteTransaction::commit`]:
+//! SQLite allows one writer at a time, so writers wait for one connection in turn, tenant by tenant and client by
+//! client ([`ventriform_service::places`]), instead of polling for the database's lock. Every write goes through
+//! [`Writer::begin`] and [`WriteTransaction::commit`]:
 //!
 //! 1. wait for the connection, and for other processes that hold the database's lock, for at most
 //!    the set time in all;
@@ -57,7 +57,8 @@ pub(super) struct Writer {
     /// commit; without a commit, to the beginning of the next write, which waits for the lock of the
     /// one before: until then the changes of that one may still reach the disk.
     version: AtomicU64,
-    /// Whether the log may still hold rows that were deleted. So it may after a start: the process before may have been killed.
+    /// Whether the log may still hold rows that were deleted. So it may after a start: the process before may have been
+    /// killed.
     pub erased: AtomicBool,
 }
 
@@ -152,8 +153,8 @@ impl Writer {
         self.connected_by(Instant::now() + self.wait).await
     }
 
-    /// A new connection. Opening one reads the database, which nobody can while another connection, such as that of a failed
-    /// write, is being closed: that is waited for until the `deadline`.
+    /// A new connection. Opening one reads the database, which nobody can while another connection, such as that of a
+    /// failed write, is being closed: that is waited for until the `deadline`.
     async fn connected_by(&self, deadline: Instant) -> StoreResult<SqliteConnection> {
         loop {
             let error = match self.options.connect().await {
@@ -167,9 +168,9 @@ impl Writer {
         }
     }
 
-    /// Overwrites the rows that were deleted since the last time: their pages in the database are overwritten as they are
-    /// freed, and those in the log by moving it into the database. `false` if a reader was in the way; then the next call
-    /// tries again.
+    /// Overwrites the rows that were deleted since the last time: their pages in the database are overwritten as they
+    /// are freed, and those in the log by moving it into the database. `false` if a reader was in the way; then the
+    /// next call tries again.
     pub async fn overwrite_erased(&self) -> StoreResult<bool> {
         if !self.erased.swap(false, Ordering::Relaxed) {
             return Ok(true);

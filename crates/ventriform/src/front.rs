@@ -1,8 +1,8 @@
 //! The library in a call each: no limits, files or monitors to set up.
 //!
-//! In: a path, or voxels in memory. Out: a [`Scan`], and of that a model, a segmentation, or the agreement of two masks.
-//! Every function calls the one of its module with [`ReadLimits::default`] and a silent monitor. Programs that show
-//! progress, cancel, or take files from strangers call those: [`pipeline::generate`],
+//! In: a path, or voxels in memory. Out: a [`Scan`], and of that a model, a segmentation, or the agreement of two
+//! masks. Every function calls the one of its module with [`ReadLimits::default`] and a silent monitor. Programs that
+//! show progress, cancel, or take files from strangers call those: [`pipeline::generate`],
 //! [`segmentation::from_files`], [`read_mask`].
 
 use crate::grid::Volume;

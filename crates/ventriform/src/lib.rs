@@ -158,3 +158,8 @@ pub use pipeline::Model;
 pub use progress::Monitor;
 pub use segmentation::{NamedTemplate, Segmentation, SegmentationParameters, SegmentedVolume};
 pub use volume::{PhantomParameters, ReadLimits, VolumeFile, phantom};
+
+/// The examples of README.md, compiled as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
 //! DICOM objects of results: whose they are, and when they were made.
 //!
-//! In: the files of a scan, and what the caller states of patient and study ([`ObjectChoice`]). Out: an [`ObjectOrder`],
-//! which gives the scan that the objects of a result belong to, and the person whom a report names.
+//! In: the files of a scan, and what the caller states of patient and study ([`ObjectChoice`]). Out: an
+//! [`ObjectOrder`], which gives the scan that the objects of a result belong to, and the person whom a report names.
 //!
 //! 1. The identity is what the files state, completed by the caller. Both must not contradict each other.
 //! 2. Without an identity, or with one that cannot be read, there is no order.

@@ -301,8 +301,8 @@ impl<'a> Monitor<'a> {
     }
 }
 
-/// The progress of equal parts of a whole that are worked on at the same time: of each stage the whole has completed the mean
-/// of what its parts have.
+/// The progress of equal parts of a whole that are worked on at the same time: of each stage the whole has completed
+/// the mean of what its parts have.
 pub struct ConcurrentParts<'a> {
     whole: &'a Monitor<'a>,
     /// The completed fraction of every stage of [`Stage::ALL`], for each part.

@@ -1,5 +1,5 @@
 //! A short run of the fuzz targets of the library (`fuzz/`) without libFuzzer: the same functions over the same
-//! corpus, damaged at random with a fixed seed. `scripts/fuzz.sh` runs the real fuzzers.
+//! corpus, damaged at random with a fixed seed. `scripts/check/fuzz.sh` runs the real fuzzers.
 
 #![allow(
     clippy::unwrap_used,

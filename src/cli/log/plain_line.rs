@@ -1,11 +1,11 @@
 //! A line of the log as text without colours.
 //!
-//! In: an event of `tracing` and the spans around it. Out: the line that `tracing_subscriber` writes: time, level, spans
-//! with their fields, target, fields.
+//! In: an event of `tracing` and the spans around it. Out: the line that `tracing_subscriber` writes: time, level,
+//! spans with their fields, target, fields.
 //!
 //! The formatter of `tracing_subscriber` takes every word through the machinery of `Debug` and makes the date anew for
-//! every line, which took a tenth of the instructions of a small request. Here, texts of printable ASCII are copied, and
-//! a thread makes a date once a second.
+//! every line, which took a tenth of the instructions of a small request. Here, texts of printable ASCII are copied,
+//! and a thread makes a date once a second.
 //!
 //! Guaranteed: the same text, but for the time itself. Not guaranteed: years before 1970 (the time is then 1970).
 

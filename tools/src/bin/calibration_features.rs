@@ -1,4 +1,4 @@
-//! Writes the table of features from which `scripts/calibrate.py` estimates the constants of
+//! Writes the table of features from which `scripts/measure/calibrate.py` estimates the constants of
 //! `crates/ventriform/src/judge/calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin calibration_features -- FOLDER... > features.csv` segments

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Every PAIR is a folder with stress/spect.nii.gz, rest/spect.nii.gz and pair.json, as the simulator of pairs writes
-//! them. Prints a row for each pair, ready for scripts/calibrate_comparison.py: the ratio of the cavities of the
-//! anatomical wall and of the wall as it looks, that of the muscle, the deviation of the difference over the wall,
+//! them. Prints a row for each pair, ready for scripts/measure/calibrate_comparison.py: the ratio of the cavities of
+//! the anatomical wall and of the wall as it looks, that of the muscle, the deviation of the difference over the wall,
 //! the reversible share, the territory that has most of it, and flags.
 
 use anyhow::{Context, Result, anyhow};

@@ -1,12 +1,13 @@
-//! Scores by which exchanged axes are told (`judge/exchanged_axes.rs`), of scans as they are, cut out, and with two axes exchanged.
+//! Scores by which exchanged axes are told (`judge/exchanged_axes.rs`), of scans as they are, cut out, and with two
+//! axes exchanged.
 //!
 //! ```sh
 //! cargo run --release --package ventriform-tools --bin exchanged_axes -- SEED FOLDER...
 //! ```
 //!
-//! Every FOLDER holds spect.nii.gz and lv_truth.nii.gz. Prints a row for each scan: as it is, with sides and length exchanged in
-//! RAS+ order, with depth and length exchanged in LPS+ order, and three cut-outs with random margins about the heart. An
-//! exchange changes the order of the array and keeps its affine.
+//! Every FOLDER holds spect.nii.gz and lv_truth.nii.gz. Prints a row for each scan: as it is, with sides and length
+//! exchanged in RAS+ order, with depth and length exchanged in LPS+ order, and three cut-outs with random margins about
+//! the heart. An exchange changes the order of the array and keeps its affine.
 
 use anyhow::{Context, Result};
 use rand::RngExt;

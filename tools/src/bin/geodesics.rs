@@ -1,5 +1,5 @@
 //! Computes exact geodesic distances, for comparison with other programs by
-//! `scripts/check_geodesics.py`.
+//! `scripts/check/geodesics.py`.
 //!
 //! Reads `{"vertices": [[x, y, z], ...], "triangles": [[a, b, c], ...], "points": [[triangle, u, v, w],
 //! ...]}` from standard input (u, v, w are barycentric coordinates) and prints the matrix of distances

@@ -179,7 +179,8 @@ fn summary(rows: &[Row]) {
     let extents = of(true, |row| row.extent);
     let greatest = of(true, |row| row.score).into_iter().fold(0.0, f64::max);
     println!(
-        "{} healthy, {} with defects; healthy wall beyond the limit {:.2} % in the mean, {:.2} % at most; greatest healthy score {greatest:.3}",
+        "{} healthy, {} with defects; healthy wall beyond the limit {:.2} % in the mean, {:.2} % at most; greatest \
+         healthy score {greatest:.3}",
         extents.len(),
         rows.len() - extents.len(),
         mean(&extents),
@@ -190,7 +191,8 @@ fn summary(rows: &[Row]) {
         .filter(|row| row.lowest_is_dark.is_some())
         .collect();
     println!(
-        "{} single basal defects: {} with a score above every healthy heart's, {} whose segment is the lowest of the basal ones",
+        "{} single basal defects: {} with a score above every healthy heart's, {} whose segment is the lowest of the \
+         basal ones",
         basal.len(),
         basal.iter().filter(|row| row.score > greatest).count(),
         basal

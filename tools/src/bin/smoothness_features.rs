@@ -1,11 +1,12 @@
-//! Writes the table of features from which `scripts/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
+//! Writes the table of features from which `scripts/measure/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
 //! `crates/ventriform/src/deform/calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz` of every case in
-//! the folders, as it is and blurred by further Gaussian filters, and compares the apparent walls with `lv_surface.ply`. Refused
-//! scans and those without a heart are left out. TABLE has a row for each fit: the filter that was added (full width at half
-//! maximum, mm), the smoothness of the image, mm, the cavity's size, ml, and the means over all rays that meet the true wall:
-//! of the numbers that describe them, and of the distances by which the true surfaces lie farther out, mm.
+//! `cargo run --release -p ventriform-tools --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz`
+//! of every case in the folders, as it is and blurred by further Gaussian filters, and compares the apparent walls with
+//! `lv_surface.ply`. Refused scans and those without a heart are left out. TABLE has a row for each fit: the filter
+//! that was added (full width at half maximum, mm), the smoothness of the image, mm, the cavity's size, ml, and the
+//! means over all rays that meet the true wall: of the numbers that describe them, and of the distances by which the
+//! true surfaces lie farther out, mm.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Times single steps on a volume in memory, for `scripts/compare_peers.sh`.
+//! Times single steps on a volume in memory, for `scripts/measure/compare_peers.sh`.
 //!
 //! Reads one command per line from standard input and prints one line of JSON for each, with `wall_ms`
 //! and the results:

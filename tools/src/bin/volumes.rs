@@ -1,9 +1,10 @@
-//! Writes the table of volumes from which `scripts/calibrate_intervals.py` estimates the constants of
+//! Writes the table of volumes from which `scripts/measure/calibrate_intervals.py` estimates the constants of
 //! `crates/ventriform/src/judge/volume_calibration.rs`.
 //!
-//! `cargo run --release -p ventriform-tools --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every case in the
-//! folders. TABLE has a row for each heart that is not refused: the folder's name, the case's, the volumes of the anatomical wall and of its
-//! cavity, found and true (`params.json`, "result"), ml, the share of the wall that is dark, the resolution, mm, and the confidence.
+//! `cargo run --release -p ventriform-tools --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every
+//! case in the folders. TABLE has a row for each heart that is not refused: the folder's name, the case's, the volumes
+//! of the anatomical wall and of its cavity, found and true (`params.json`, "result"), ml, the share of the wall that
+//! is dark, the resolution, mm, and the confidence.
 
 use std::path::Path;
 

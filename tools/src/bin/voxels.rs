@@ -1,4 +1,4 @@
-//! The voxels that are read of files, for `scripts/check_codecs.py`.
+//! The voxels that are read of files, for `scripts/check/dicom_codecs.py`.
 //!
 //!     cargo run -p ventriform-tools --bin voxels -- FILE...
 //!

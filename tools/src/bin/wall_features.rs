@@ -1,4 +1,4 @@
-//! Writes the tables of features from which `scripts/calibrate_walls.py` estimates the constants of
+//! Writes the tables of features from which `scripts/measure/calibrate_walls.py` estimates the constants of
 //! `crates/ventriform/src/deform/calibration.rs` and `crates/ventriform/src/judge/uncertainty_calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of
@@ -8,8 +8,8 @@
 //!
 //! - `rims.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it, and of
 //!   the true rim, mm from the cup's centre towards the apex;
-//! - `signal_ends.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it and of
-//!   the true rim, and the distances basal of the former at which the signal ends, at half of the heart's and of the
+//! - `signal_ends.csv`, a row for each case: the length of the heart, the heights of the rim as the sensors left it and
+//!   of the true rim, and the distances basal of the former at which the signal ends, at half of the heart's and of the
 //!   direction's own, mm;
 //! - `rays.csv`, a row for every [`RAY_STRIDE`]th ray through the apparent wall that meets the true one: the numbers
 //!   that describe it, as far as they are not functions of others, and the distances by which the true surfaces lie

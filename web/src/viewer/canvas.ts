@@ -10,8 +10,8 @@ function fit(element: HTMLCanvasElement): void {
 }
 
 /**
- * A canvas that is drawn after its component or its size has changed and when `watch` calls, at most once a frame. It is
- * watched anew when `source` is another one.
+ * A canvas that is drawn after its component or its size has changed and when `watch` calls, at most once a frame. It
+ * is watched anew when `source` is another one.
  */
 export function useCanvas(draw: (element: HTMLCanvasElement) => void, watch: (act: () => void) => () => void, source: unknown) {
   const canvas = useRef<HTMLCanvasElement>(null);

@@ -1,4 +1,5 @@
-// What the views of a comparison share: colours, the chosen slice, the cursor on both walls, from where the walls are seen.
+// What the views of a comparison share: colours, the chosen slice, the cursor on both walls, from where the walls are
+// seen.
 
 import { Watched } from "../state";
 import { LUTS, type Lut, UPTAKE, WALL_LUT, kept } from "./colours";

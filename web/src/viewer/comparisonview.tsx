@@ -1,5 +1,5 @@
-// Rest and stress of one patient, as readers know it: slices above each other, polar maps beside each other, both walls, and
-// what they say in figures.
+// Rest and stress of one patient, as readers know it: slices above each other, polar maps beside each other, both
+// walls, and what they say in figures.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { type Job, type Parameters, type Result, type Volume, get, sentences, words } from "../api";

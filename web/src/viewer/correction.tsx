@@ -90,7 +90,8 @@ export function Correction({ scene, volume, shown }: Props) {
       if (reader) next["reader"] = reader;
       else delete next["reader"];
       if (edit.changed.has("roll") && scene.heart.value) {
-        // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that it had.
+        // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that
+        // it had.
         const { axis: way, anterior } = frameOf(scene.heart.value);
         next["segments_from"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => Math.round(value * 1e4) / 1e4);
       }
@@ -106,9 +107,9 @@ export function Correction({ scene, volume, shown }: Props) {
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
       <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall: turning only renames segments. {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.</p>
-      <Triple name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
+      <TripleField name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
       <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
-      <Triple name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
+      <TripleField name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
       <label class="field">
         Base, mm from the centre
         <NumberInput step={1} text={dot(sub(edit.center, edit.base), axis).toFixed(0)} aria-invalid={problem?.field === "base" || undefined} onNumber={baseTo} />
@@ -138,7 +139,7 @@ export function Correction({ scene, volume, shown }: Props) {
   );
 }
 
-interface TripleProps {
+interface TripleFieldProps {
   name: string;
   value: Vec;
   digits: number;
@@ -146,7 +147,7 @@ interface TripleProps {
   onValue: (value: Vec) => void;
 }
 
-function Triple({ name, value, digits, wrong, onValue }: TripleProps) {
+function TripleField({ name, value, digits, wrong, onValue }: TripleFieldProps) {
   return (
     <fieldset class={wrong ? "field triple wrong" : "field triple"}>
       <legend>{name}</legend>
@@ -171,7 +172,9 @@ interface NumberInputProps {
   "aria-invalid"?: true | undefined;
 }
 
-/** A number that counts when the field is left. What is typed until then is kept, however often the view is drawn again. */
+/**
+ * A number that counts when the field is left. What is typed until then is kept, however often the view is drawn again.
+ */
 function NumberInput({ text, onNumber, ...rest }: NumberInputProps) {
   const [typed, setTyped] = useState<string | null>(null);
   return (

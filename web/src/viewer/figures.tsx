@@ -109,7 +109,9 @@ const EVIDENCE: [string, (evidence: Evidence) => string][] = [
   ["Chance that the patient moved", evidence => share(evidence.chance_of_motion)],
 ];
 
-/** Whether the fit is good, in words; every reason to doubt it; and the figures behind both, which are `open` on paper. */
+/**
+ * Whether the fit is good, in words; every reason to doubt it; and the figures behind both, which are `open` on paper.
+ */
 export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean }) {
   const flags = shown.report?.flags ?? shown.beat?.report.flags ?? [];
   const confidence = shown.report?.fit.confidence ?? shown.beat?.report.confidence;

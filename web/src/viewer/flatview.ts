@@ -1,5 +1,5 @@
-// Meshes in three dimensions on a plain canvas, for browsers without WebGL, for paper and for the self-contained report:
-// triangles are drawn from the farthest to the nearest.
+// Meshes in three dimensions on a plain canvas, for browsers without WebGL, for paper and for the self-contained
+// report: triangles are drawn from the farthest to the nearest.
 
 import { type Camera, type MeshPainter, heightOf, light, rightOf, usualCamera } from "./camera";
 import type { Mesh } from "./mesh";

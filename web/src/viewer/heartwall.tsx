@@ -1,5 +1,5 @@
-// The wall of a compared heart in three dimensions with the letters that readers know: its sides, and the territories of the
-// arteries. Both hearts are seen from the same side of the heart, wherever they lie in the scanner.
+// The wall of a compared heart in three dimensions with the letters that readers know: its sides, and the territories
+// of the arteries. Both hearts are seen from the same side of the heart, wherever they lie in the scanner.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { type Camera, type MeshPainter, boundsOf, project, turn, usualCamera } from "./camera";

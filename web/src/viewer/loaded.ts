@@ -48,7 +48,10 @@ function expertOf(id: string, parameters: Result["parameters"]): Promise<Voxels>
   return kept(`/v1/volumes/${id}/voxels.nii.gz?${query}`);
 }
 
-/** The voxels of a stored volume, whatever its files are; of frames that are no gates, and of which none is chosen, the first. */
+/**
+ * The voxels of a stored volume, whatever its files are; of frames that are no gates, and of which none is chosen, the
+ * first.
+ */
 export function voxelsOf(volume: Pick<Volume, "id" | "frames">, frame: number | null): Promise<Voxels> {
   const path = `/v1/volumes/${volume.id}/voxels.nii.gz`;
   if (frame !== null) return kept(`${path}?frame=${frame}`);

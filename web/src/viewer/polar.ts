@@ -50,7 +50,9 @@ export function figureMap(map: PolarFigure): DrawnMap {
   return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null, cyclic, digits: map.figure === "z" ? 1 : 0 };
 }
 
-/** An uptake as it is shown: the reference is a mean of the brightest wall, so that some places lie a little above it. */
+/**
+ * An uptake as it is shown: the reference is a mean of the brightest wall, so that some places lie a little above it.
+ */
 export function shown(percent: number | null | undefined): number | null {
   return percent == null ? null : Math.min(100, percent);
 }
@@ -420,7 +422,9 @@ function cursorOn(map: Laid, [rows, columns]: [number, number], at: (radius: num
   return at(Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))), columns / map.columns);
 }
 
-/** The place of a number of this height, moved where the cursor's ring would cover it: to the side with the most room. */
+/**
+ * The place of a number of this height, moved where the cursor's ring would cover it: to the side with the most room.
+ */
 function besideRing(place: [number, number], [x, y]: [number, number], others: [number, number][], height: number): [number, number] {
   const [aside, above] = [CURSOR_RADIUS + 4 + height, CURSOR_RADIUS + 2 + height / 2];
   if (Math.abs(place[0] - x) >= aside || Math.abs(place[1] - y) >= above) return place;

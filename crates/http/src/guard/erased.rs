@@ -1,7 +1,7 @@
 //! Reads beside an erasure.
 //!
-//! Rows are erased before files, so a request that has found the row may not find the files, wherever it looks for them. Its
-//! answer then says that the item is gone, as it would have a moment later.
+//! Rows are erased before files, so a request that has found the row may not find the files, wherever it looks for
+//! them. Its answer then says that the item is gone, as it would have a moment later.
 
 use crate::app::App;
 use crate::problem::Problem;
@@ -12,8 +12,8 @@ use axum::response::{IntoResponse, Response};
 use serde_json::Value;
 use ventriform_service::records::{Resource, StoreResult, Tenant};
 
-/// The answer of a request on the item `id`, or why the service could not answer: 410 if the item was erased meanwhile, 409
-/// if a volume was that it is made of.
+/// The answer of a request on the item `id`, or why the service could not answer: 410 if the item was erased meanwhile,
+/// 409 if a volume was that it is made of.
 pub async fn settled(app: &App, tenant: &Tenant, id: Option<&str>, response: Response) -> Response {
     if response.status() != StatusCode::INTERNAL_SERVER_ERROR {
         return response;

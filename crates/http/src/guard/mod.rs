@@ -4,18 +4,20 @@
 //!    another site cannot change anything on a service that asks nobody who they are.
 //!    Headers that a request has at most once are refused if it has two ([`SINGLE_HEADERS`]): one part of the way
 //!    may have looked at the first, another at the last.
-//! 2. The `Authorization` header tells the caller, see [`ventriform_service::access::Gate`]; without a valid one the answer is
+//! 2. The `Authorization` header tells the caller, see [`ventriform_service::access::Gate`]; without a valid one the
+//!    answer is
 //!    401. [`is_open_path`] names the paths that everybody may read.
-//! 3. The caller's requests are counted, also as those of the keys that have made its key: 429 beyond the quota. Every answer carries `RateLimit` and
-//!    `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
+//! 3. The caller's requests are counted, also as those of the keys that have made its key: 429 beyond the quota. Every
+//!    answer carries `RateLimit` and `RateLimit-Policy` (draft-ietf-httpapi-ratelimit-headers-10).
 //! 4. The scope must include what method and path need: 403 if not.
-//! 5. From here on, its memory is charged to its tenant and client ([`super::memory`]). Handlers that add something reserve it
-//!    under the tenant's quotas ([`super::quota`]).
+//! 5. From here on, its memory is charged to its tenant and client ([`super::memory`]). Handlers that add something
+//!    reserve it under the tenant's quotas ([`super::quota`]).
 //! 6. What changes something is recorded where that is done, by the caller's agent ([`Caller::by`]); after the handler,
-//!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event is on
-//!    disk.
+//!    [`trail`] records the rest: what was read and refused. An act that changed something is answered when its event
+//!    is on disk.
 //!
-//! 7. An answer that lasts ends when the credentials of its request do ([`CredentialWatch`]), and so does a wait for a job.
+//! 7. An answer that lasts ends when the credentials of its request do ([`CredentialWatch`]), and so does a wait for a
+//!    job.
 //!
 //! `Authorization` decides alone; a caller's address or a forwarded header never does.
 

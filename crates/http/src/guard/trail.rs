@@ -1,9 +1,10 @@
 //! From requests to rows of the audit trail.
 //!
-//! Changes are recorded where they are made ([`Agent::change`]), so that a request which is dropped or refused afterwards
-//! leaves its rows; what a handler changes otherwise is recorded here, after its answer is known. Recorded are: acts that changed something, reads of contents and of lists under `/v1`, refused
-//! credentials, and requests beyond a caller's scope. Not recorded are reads of jobs, which clients
-//! repeat while they wait, and requests that were refused for another reason or found nothing.
+//! Changes are recorded where they are made ([`Agent::change`]), so that a request which is dropped or refused
+//! afterwards leaves its rows; what a handler changes otherwise is recorded here, after its answer is known. Recorded
+//! are: acts that changed something, reads of contents and of lists under `/v1`, refused credentials, and requests
+//! beyond a caller's scope. Not recorded are reads of jobs, which clients repeat while they wait, and requests that
+//! were refused for another reason or found nothing.
 //!
 //! A row names an item by its id and never a path, a query or a name from a file.
 

@@ -75,7 +75,8 @@ problems! {
         400: "A query parameter is unknown, is given twice, or cannot be read",
         403: "The caller's scope does not allow it",
         404: "No volume matches",
-        409: "An unfinished job, a request or a legal hold keeps something, or something else would go than the plan names",
+        409: "An unfinished job, a request or a legal hold keeps something, or something else would go than the plan \
+            names",
         422: "There is no filter, a value of it is empty or too long, or one receipt cannot hold what would go",
         500: "The service met an error of its own",
     }

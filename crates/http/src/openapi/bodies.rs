@@ -701,7 +701,9 @@ macro_rules! forms {
 forms! {
     /// A form whose files are a volume.
     UploadForm {
-        "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series (a slice or a gate in each file), or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the form",
+        "file": "The volume; several files make up one: a .hdr/.img pair, a DICOM series (a slice or a gate in each \
+            file), or 6 to 32 NIfTI files of one gate each, in the order of the numbers in their names or else of the \
+            form",
     }
     /// A form with both scans of a patient.
     ComparisonForm {

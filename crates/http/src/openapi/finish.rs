@@ -3,15 +3,15 @@
 //!
 //! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
 //!    64 bits.
-//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave the
-//!    fields in one object, as generators of clients want them.
+//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave
+//!    the fields in one object, as generators of clients want them.
 //! 3. A path `.../{file}` becomes one path per file, so that each file has one media type and one
 //!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
 //!    names of a form: the meshes and labels of the gates of a beat.
 //! 4. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
 //! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
-//!    `scripts/check_contract.py`, and a command line for curl.
+//!    `scripts/check/contract.py`, and a command line for curl.
 //! 6. Every operation takes `X-Request-Id`.
 
 use super::answers::media_type_of;

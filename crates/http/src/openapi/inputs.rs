@@ -138,7 +138,8 @@ macro_rules! headers {
 
 headers! {
     /// The header of a request on a claimed work item.
-    TransactionHeader: ("Transaction-UID", "The Transaction UID under which the item is claimed; it may also be in the body",
+    TransactionHeader: ("Transaction-UID", "The Transaction UID under which the item is claimed; it may also be in the \
+        body",
         text());
     /// The header of an erasure.
     ErasureHeader: ("Prefer", "`return=representation` asks for the receipt in the answer", text());
@@ -150,7 +151,8 @@ headers! {
         ("Range", "`bytes=FIRST-LAST`: a part of the file", text()),
         ("If-Range", "Apply `Range` only if this validator is current, else send the whole file", text());
     /// The header of a request for a job that may be repeated.
-    IdempotencyHeader: ("Idempotency-Key", "A random text. Repeating a request under the same key returns the first job",
+    IdempotencyHeader: ("Idempotency-Key", "A random text. Repeating a request under the same key returns the first \
+        job",
         text().min_length(Some(1)).max_length(Some(255)).pattern(Some("^[!#-~]+$")));
     /// The header with the secret of a job's webhook.
     WebhookSecretHeader: ("Webhook-Secret", "What signs the deliveries: `whsec_` and base64", text());

@@ -63,11 +63,13 @@ use utoipa::openapi::{RefOr, Required};
         (name = "segmentations", description = "Models fitted to volumes, and one request from volume to segmentation"),
         (name = "beats", description = "Gated studies as one model in motion, and one request from study to beat"),
         (name = "comparisons", description = "Rest and stress of one patient"),
-        (name = "normals", description = "Normal limits: the uptake of healthy people, which segmentations, beats and comparisons are scored by"),
+        (name = "normals", description = "Normal limits: the uptake of healthy people, which segmentations, beats and \
+            comparisons are scored by"),
         (name = "templates", description = "The library of models that `auto` chooses from"),
         (name = "readers", description = "How readers draw the wall: profiles that segmentations can be drawn by"),
         (name = "webhooks", description = "Telling other programs about jobs"),
-        (name = "workitems", description = "Unified Procedure Steps (DICOM UPS-RS): work that is scheduled, claimed, done"),
+        (name = "workitems", description = "Unified Procedure Steps (DICOM UPS-RS): work that is scheduled, claimed, \
+            done"),
         (name = "access", description = "Keys and the audit trail, for the scope `admin`"),
         (name = "dicomweb", description = "Images from other systems: STOW-RS, and what became of them"),
         (name = "erasures", description = "Receipts of what was erased"),

@@ -29,8 +29,8 @@ pub trait AccessStore: Send + Sync + 'static {
     /// Notes that callers without credentials are refused from now on.
     async fn close_access(&self) -> StoreResult<()>;
 
-    /// Admits callers without credentials again, and adds the event that says so. Does nothing and returns `false` while
-    /// there is a key that has not ended.
+    /// Admits callers without credentials again, and adds the event that says so. Does nothing and returns `false`
+    /// while there is a key that has not ended.
     async fn open_access(&self, now: Timestamp, event: &AuditEvent) -> StoreResult<bool>;
 
     /// Revokes a key, and adds the event that says so unless it was revoked already. Returns

@@ -1,7 +1,7 @@
 //! The values that are read of an archive's JSON answer.
 //!
-//! In: the bytes, and the path of the value that is looked for. Out: that value. Everything else is parsed and dropped, so that
-//! memory is bounded by what is kept: a tree of JSON values has up to 50 times as many bytes as its text.
+//! In: the bytes, and the path of the value that is looked for. Out: that value. Everything else is parsed and dropped,
+//! so that memory is bounded by what is kept: a tree of JSON values has up to 50 times as many bytes as its text.
 
 use serde::de::{DeserializeSeed, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Deserializer;

@@ -177,8 +177,8 @@ pub trait ArchiveStore: Send + Sync + 'static {
     /// Counts an attempt to deliver before it is made, so that one with which the process ends counts too.
     async fn send_begun(&self, id: &str, now: Timestamp) -> StoreResult<()>;
 
-    /// Writes down how an attempt to deliver ended, which has been counted. If it was the last one, the row of the audit trail
-    /// is part of that: the result was read, or that was refused.
+    /// Writes down how an attempt to deliver ended, which has been counted. If it was the last one, the row of the
+    /// audit trail is part of that: the result was read, or that was refused.
     async fn settle_send(
         &self,
         send: &DueSend,

@@ -26,13 +26,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Most bytes of a search's answer for each object that a series may have. PS3.18 (10.6.3.3) has some 40 attributes in an
-/// answer about an instance, those of its study and its series included, of 60 to 100 bytes each as JSON.
+/// Most bytes of a search's answer for each object that a series may have. PS3.18 (10.6.3.3) has some 40 attributes in
+/// an answer about an instance, those of its study and its series included, of 60 to 100 bytes each as JSON.
 const FOUND_BYTES: usize = 4 << 10;
 /// Most bytes of a search's answer beside those.
 const SEARCH_BYTES: usize = 64 << 10;
-/// Most bytes of the answer about one stored object: a few hundred for what PS3.18 (annex I) has, and room for the attributes that
-/// the archive has changed, or for a page of text.
+/// Most bytes of the answer about one stored object: a few hundred for what PS3.18 (annex I) has, and room for the
+/// attributes that the archive has changed, or for a page of text.
 const STORED_BYTES: usize = 256 << 10;
 
 /// Longest time to connect.
@@ -211,8 +211,8 @@ impl DicomWeb {
         &self.base
     }
 
-    /// The SOP Instance UIDs of a series, as the archive lists them; `None` if it does not say, or lists more than a series
-    /// may have.
+    /// The SOP Instance UIDs of a series, as the archive lists them; `None` if it does not say, or lists more than a
+    /// series may have.
     ///
     /// # Errors
     /// If the archive does not answer, or its answer is longer than any that can be used.
@@ -369,7 +369,8 @@ fn authorization(credentials: &Credentials) -> Option<Result<HeaderValue, Invali
     }))
 }
 
-/// The SOP Instance UIDs in an answer to QIDO-RS; `None` if it is no list of objects that have one, or of more than `most`.
+/// The SOP Instance UIDs in an answer to QIDO-RS; `None` if it is no list of objects that have one, or of more than
+/// `most`.
 fn uids(answer: &[u8], most: usize) -> Option<Vec<String>> {
     let uid = [
         Step::Member(SOP_INSTANCE_UID),

@@ -745,7 +745,8 @@ fn read_file(path: &Path) -> Result<FileContent, ConfigError> {
     };
     let text = std::fs::read_to_string(path).map_err(|error| {
         unreadable(format!(
-            "the file of settings cannot be read ({error}): give the path of a TOML file by --config or VENTRIFORM_CONFIG"
+            "the file of settings cannot be read ({error}): give the path of a TOML file by --config or \
+             VENTRIFORM_CONFIG"
         ))
     })?;
     let table: toml::Table = text

@@ -247,8 +247,8 @@ pub struct InFolder;
 
 impl Keyword for InFolder {
     const KEYWORD_TEXT: &'static str = "sqlite";
-    const PERMITTED_TEXTS: &'static str = "a URL such as postgres://user@host:5432/name; characters such as @ : / in a user or password \
-         are written as %40 %3A %2F";
+    const PERMITTED_TEXTS: &'static str = "a URL such as postgres://user@host:5432/name; characters such as @ : / in a \
+         user or password are written as %40 %3A %2F";
 }
 
 /// The URL of a database on a server, or `sqlite`: a file in the data folder.

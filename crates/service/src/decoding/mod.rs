@@ -4,21 +4,22 @@
 //! cost is bounded and shared out:
 //!
 //! 1. Admission. Each piece of work states the memory that it needs at most. It is admitted when
-//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted tenant by tenant in turn (or anonymous
-//!    client), that of a tenant client by client ([`crate::places`]). A client holds at most half of the budget, a tenant three
-//!    quarters; work that needs more than half of it holds half, one piece at a time in turn. So one's queue does not delay
-//!    another's work, whatever their addresses. What needs more than a quarter of the memory that the process may have, and
-//!    more than the budget, is refused. The queue is bounded (setting `decoding_queue`); beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
+//!    that much of the budget is free (setting `decoding_memory`). What waits is admitted tenant by tenant in turn (or
+//!    anonymous client), that of a tenant client by client ([`crate::places`]). A client holds at most half of the
+//!    budget, a tenant three quarters; work that needs more than half of it holds half, one piece at a time in turn. So
+//!    one's queue does not delay another's work, whatever their addresses. What needs more than a quarter of the memory
+//!    that the process may have, and more than the budget, is refused. The queue is bounded (setting `decoding_queue`);
+//!    beyond that the answer is `busy`, except for a requester that has less than its equal share of the queue.
 //! 2. Turns. As many pieces of work as the machine has cores compute at the same time, on blocking
-//!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of tenants and clients that have
-//!    computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
+//!    threads. Each gives up its turn after [`TURN_SLICE`] if other work goes before it, that of tenants and clients
+//!    that have computed less ([`Turns`]), and queues again: short work does not wait until long work ends, nor that of
 //!    one client for that of another. Work that has not reported for [`STALL_TIME`], and work whose client hung up,
 //!    loses its turn without being asked; it goes on beside the others until it reports, as one of at
 //!    most [`OVERRUNS_PER_CORE`] per core.
 //! 3. Time. Work computes for at most `decoding_time`, and one second more for every `decoding_rate`
 //!    bytes of its file; it is then ended with `decoding-time`. For how long a thread waits for a processor
-//!    does not count ([`ThreadClock`]). While other work has waited for [`ADMISSION_PATIENCE`] for memory, work that has
-//!    used a [`COSTLY_SHARE`] of its time is ended with `busy`.
+//!    does not count ([`ThreadClock`]). While other work has waited for [`ADMISSION_PATIENCE`] for memory, work that
+//!    has used a [`COSTLY_SHARE`] of its time is ended with `busy`.
 //!
 //! Memory and turn belong to the computation and not to the request that waits for it: the memory is
 //! free when the computation has ended. If the client hangs up, the computation is cancelled and
@@ -110,8 +111,8 @@ impl Decoding {
     /// Dropping the future cancels the work. Its memory gives it no time: a small file may need much.
     ///
     /// # Errors
-    /// `too-large` if the work needs more memory than the process can spare, `busy` if too much waits, `decoding-time` if the
-    /// work takes too long, `internal` if it panics.
+    /// `too-large` if the work needs more memory than the process can spare, `busy` if too much waits, `decoding-time`
+    /// if the work takes too long, `internal` if it panics.
     pub async fn run<T: Send + 'static>(
         &self,
         memory: u64,
@@ -563,7 +564,8 @@ impl AdmissionQueue {
     }
 }
 
-/// Most memory that one piece of work may need: the budget, or a quarter of what the process may have where that is more.
+/// Most memory that one piece of work may need: the budget, or a quarter of what the process may have where that is
+/// more.
 fn largest_work(budget: u64, process: Option<u64>) -> u64 {
     process.map_or(u64::MAX, |bytes| budget.max(bytes / 4))
 }
@@ -576,7 +578,8 @@ fn too_large(memory: u64, most: u64) -> ServiceError {
         mebibytes(most)
     );
     Failure::new(Fault::Content, "too-large", detail)
-        .fix("Download the upload itself (`content`), or ask the operator for more memory or a larger `decoding_memory`.")
+        .fix("Download the upload itself (`content`), or ask the operator for more memory or a larger \
+            `decoding_memory`.")
         .into()
 }
 

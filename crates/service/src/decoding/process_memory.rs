@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-/// Where Linux tells the memory limit of the group of processes that this one belongs to, as a container sees it: cgroups of
-/// version 2 and 1. Without a limit they hold `max`, or more than any machine has.
+/// Where Linux tells the memory limit of the group of processes that this one belongs to, as a container sees it:
+/// cgroups of version 2 and 1. Without a limit they hold `max`, or more than any machine has.
 const GROUP_LIMITS: [&str; 2] = [
     "/sys/fs/cgroup/memory.max",
     "/sys/fs/cgroup/memory/memory.limit_in_bytes",
 ];
 
-/// Bytes of memory that the process may have: the least of its own limits, that of its container and that of the machine, as
-/// far as the system tells them.
+/// Bytes of memory that the process may have: the least of its own limits, that of its container and that of the
+/// machine, as far as the system tells them.
 pub fn process_memory() -> Option<u64> {
     let read = |path: &str| std::fs::read_to_string(Path::new(path)).ok();
     let groups = GROUP_LIMITS

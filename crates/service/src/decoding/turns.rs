@@ -1,9 +1,9 @@
 //! Turns of requesters at a few places.
 //!
-//! Whoever computes has a place. A free place goes to the waiting work of the tenant (or anonymous client) that has computed
-//! least lately; of one tenant, to its client that has; of one client, to what waits longest. So work of who asks for
-//! little waits for no more than the next free place, whatever others have begun. What was computed counts half after
-//! [`HALF_LIFE`], so that nobody waits for ever.
+//! Whoever computes has a place. A free place goes to the waiting work of the tenant (or anonymous client) that has
+//! computed least lately; of one tenant, to its client that has; of one client, to what waits longest. So work of who
+//! asks for little waits for no more than the next free place, whatever others have begun. What was computed counts
+//! half after [`HALF_LIFE`], so that nobody waits for ever.
 
 use crate::memory::{Group, Requester};
 use std::cmp::Ordering;

@@ -1,13 +1,13 @@
 //! Whose turn it is: fairness among tenants and among destinations.
 //!
-//! What one tenant has for one destination (scheme, host and port; or an archive) is a [`Lane`]. The places are a limit on
-//! what is on the way in all, and each destination has a limit of its own. A tenant takes all places of a limit while
-//! nobody else wants one, and half of them while another tenant has something due. Who has nothing on the way gets one
-//! place also where others have taken all, up to twice the limit in all: what they have on the way may take as long as
-//! its receivers like.
+//! What one tenant has for one destination (scheme, host and port; or an archive) is a [`Lane`]. The places are a limit
+//! on what is on the way in all, and each destination has a limit of its own. A tenant takes all places of a limit
+//! while nobody else wants one, and half of them while another tenant has something due. Who has nothing on the way
+//! gets one place also where others have taken all, up to twice the limit in all: what they have on the way may take as
+//! long as its receivers like.
 //!
-//! A lane whose last attempt failed has one place, after a pause that grows. All failing lanes together have half of the
-//! places, shared in the same way, so that receivers that hang leave the other half to those that answer.
+//! A lane whose last attempt failed has one place, after a pause that grows. All failing lanes together have half of
+//! the places, shared in the same way, so that receivers that hang leave the other half to those that answer.
 
 use super::RetrySchedule;
 use crate::records::{Tenant, Timestamp, milliseconds};
@@ -187,8 +187,8 @@ impl Lanes {
     }
 }
 
-/// How many more of the places of a limit one may take who has `own` of the `taken` ones. `contended` says whether others
-/// want one now.
+/// How many more of the places of a limit one may take who has `own` of the `taken` ones. `contended` says whether
+/// others want one now.
 fn share(limit: usize, taken: usize, own: usize, contended: bool) -> usize {
     let most = if contended { limit.div_ceil(2) } else { limit };
     let rest = limit.saturating_sub(taken).min(most.saturating_sub(own));

@@ -5,8 +5,8 @@ use crate::records::{Resource, rfc3339};
 use serde_json::{Map, Value, json};
 
 /// The body of a delivery, the same in every attempt: `type`, `timestamp`, and `data` with the
-/// job's id, kind, state and paths, which begin with `base_path`. It holds no figures and no texts of errors: whoever may see
-/// them reads them from the API.
+/// job's id, kind, state and paths, which begin with `base_path`. It holds no figures and no texts of errors: whoever
+/// may see them reads them from the API.
 pub fn message_body(delivery: &DueDelivery, base_path: &str) -> String {
     let path =
         |id: &str| Resource::of(id).map(|kind| format!("{base_path}/v1/{}/{id}", kind.plural()));

@@ -167,8 +167,8 @@ pub trait DeliveryStore: Send + Sync + 'static {
     /// Counts an attempt before it is made, so that one with which the process ends counts too.
     async fn begun(&self, id: &str, now: Timestamp) -> StoreResult<()>;
 
-    /// Writes down how an attempt ended, which has been counted. After [`AttemptOutcome::Gone`] the endpoint is not told
-    /// any more, and what it has not been told is given up.
+    /// Writes down how an attempt ended, which has been counted. After [`AttemptOutcome::Gone`] the endpoint is not
+    /// told any more, and what it has not been told is given up.
     async fn settle(&self, id: &str, settled: Settlement, now: Timestamp) -> StoreResult<()>;
 
     /// Makes those due that a clock which was ahead has put off; see [`Errands::recall`](super::Errands::recall).

@@ -6,8 +6,8 @@
 //! 1. [`Listener`] accepts connections; each becomes an association, if the caller is one of the
 //!    operator's [`Sender`]s. [`Wire`](wire) reads PDUs within limits; the contexts are negotiated to the
 //!    SOP classes and transfer syntaxes that [`ventriform::volume`] reads.
-//! 2. [`Receiver`] takes one object: its bytes go to the disk as they come, its header is checked ([`HeaderTurns`]), and
-//!    its row is committed ([`IntakeStore`]). Only then the sender is told that it is stored.
+//! 2. [`Receiver`] takes one object: its bytes go to the disk as they come, its header is checked ([`HeaderTurns`]),
+//!    and its row is committed ([`IntakeStore`]). Only then the sender is told that it is stored.
 //! 3. [`Gatherer`] waits until a group of objects is complete: at once for an object that is a volume of
 //!    its own; for a series of slices, when the association is released and nothing more has come
 //!    for a while. Then it makes the volume and files the job of the first [`Rule`] that matches, by

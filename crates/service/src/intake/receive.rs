@@ -2,8 +2,8 @@
 //!
 //! 1. The bytes are written to a file as they come ([`Incoming::write`]).
 //! 2. The header is read and the content hashed, within the bounds of a [`HeaderTurns`].
-//! 3. The file is forced to the disk; then its row is committed; then that of the audit trail. From here on it goes on if
-//!    the caller goes away.
+//! 3. The file is forced to the disk; then its row is committed; then that of the audit trail. From here on it goes on
+//!    if the caller goes away.
 
 use super::observer::IntakeObserver;
 use super::record::{
@@ -267,8 +267,9 @@ impl Receiver {
         })
     }
 
-    /// Stores an object whose bytes have all been written, for `by`. When this returns, it is on disk, and so is the row of the
-    /// audit trail which says that the session brings objects of this group. Returns its group, and its header.
+    /// Stores an object whose bytes have all been written, for `by`. When this returns, it is on disk, and so is the
+    /// row of the audit trail which says that the session brings objects of this group. Returns its group, and its
+    /// header.
     ///
     /// # Errors
     /// Why it was not stored; nothing is left of it, unless the audit trail could not be written.
@@ -376,7 +377,8 @@ impl Keeping {
         origin: Origin,
     ) -> Result<String, ReceiveError> {
         let group = self.store(incoming, examined, origin).await?;
-        // The row of the first object of a group was written with it; further ones of the session are counted each second.
+        // The row of the first object of a group was written with it; further ones of the session are counted each
+        // second.
         if self.recorded.contains(&group) {
             self.by.note(Activity::Create, group.clone()).await;
         } else {

@@ -250,8 +250,8 @@ pub trait IntakeStore: Send + Sync + 'static {
         page: ListRequest,
     ) -> StoreResult<ListPage<IntakeGroup>>;
 
-    /// Erases a tenant's group. Returns the files of its objects, which are yet to be deleted, and the receipt, which was
-    /// written in the same transaction with the row of the audit trail; `None` if it has none with that id.
+    /// Erases a tenant's group. Returns the files of its objects, which are yet to be deleted, and the receipt, which
+    /// was written in the same transaction with the row of the audit trail; `None` if it has none with that id.
     async fn remove(
         &self,
         tenant: &Tenant,

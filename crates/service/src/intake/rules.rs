@@ -24,14 +24,15 @@ pub struct Rule {
     pub study_description: Option<String>,
     /// The kind of job: `model`, `segmentation`, `beat`, or `comparison` of a scan at stress with its scan at rest.
     pub kind: String,
-    /// For comparisons: a part of the Series Description of scans at stress, where headers do not tell them from those at rest.
+    /// For comparisons: a part of the Series Description of scans at stress, where headers do not tell them from those
+    /// at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<String>,
     /// For comparisons: a part of the Series Description of scans at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<String>,
-    /// For comparisons: the scan that comes first, with the lower dose, where both are made on one day and neither headers nor
-    /// descriptions tell them apart.
+    /// For comparisons: the scan that comes first, with the lower dose, where both are made on one day and neither
+    /// headers nor descriptions tell them apart.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first: Option<WhichScan>,
     /// The job's parameters.

@@ -166,8 +166,8 @@ impl Items {
         Ok(erased)
     }
 
-    /// Notes that files and records of items may disagree from now on, and returns their files. Unless they are erased and
-    /// settled, the upkeep looks at them.
+    /// Notes that files and records of items may disagree from now on, and returns their files. Unless they are erased
+    /// and settled, the upkeep looks at them.
     pub(super) async fn doom(&self, ids: &[String]) -> Result<Doomed, StoreError> {
         let mut doomed = Doomed::new();
         for id in ids {

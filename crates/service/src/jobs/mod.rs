@@ -23,8 +23,8 @@
 //! cannot start such a process (`Works::isolation` is `None`) counts the deaths of the whole
 //! service instead, and cannot tell the two apart.
 //!
-//! **Time.** [`ServiceClock`](crate::records::ServiceClock) does not follow a step of the system's clock until it has lasted, and
-//! no lease of the living run depends on any clock.
+//! **Time.** [`ServiceClock`](crate::records::ServiceClock) does not follow a step of the system's clock until it has
+//! lasted, and no lease of the living run depends on any clock.
 //!
 //! Guaranteed:
 //! - a job is on disk before [`Queue::file`] returns;

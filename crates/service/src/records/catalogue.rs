@@ -139,7 +139,8 @@ pub trait Catalogue: Custody + Scans + ScanErasures {
         page: ListRequest,
     ) -> StoreResult<ListPage<Owned<Product>>>;
 
-    /// Replaces the tags of an item or a job. `false` if there is none with that id, or its tags are not `before` any more.
+    /// Replaces the tags of an item or a job. `false` if there is none with that id, or its tags are not `before` any
+    /// more.
     async fn change_tags(
         &self,
         tenant: &Tenant,

@@ -29,12 +29,13 @@ pub enum Bounded<T> {
     Missing,
 }
 
-/// Stored bytes after which a page ends: ten jobs of a thousand cases, five volumes of two thousand files, or a hundred rows of
-/// 20 KiB. Only a page of one row may have more.
+/// Stored bytes after which a page ends: ten jobs of a thousand cases, five volumes of two thousand files, or a hundred
+/// rows of 20 KiB. Only a page of one row may have more.
 pub const PAGE_BYTES: u64 = 2 << 20;
 
 impl ListRequest {
-    /// The plan of a page whose rows have these sequence numbers and stored bytes, that of the next page's first row included.
+    /// The plan of a page whose rows have these sequence numbers and stored bytes, that of the next page's first row
+    /// included.
     pub fn planned(self, rows: impl IntoIterator<Item = (i64, u64)>) -> PagePlan {
         let (mut count, mut bytes, mut page) = (0, 0_u64, self);
         for (sequence, size) in rows {

@@ -1,8 +1,8 @@
 //! Erasing all volumes of a patient, a study, a series or an accession at once.
 //!
-//! A [`ScanErasureOrder`] names scans by what their headers or their tenant say. Its [`ScanErasurePlan`] says what would go
-//! and what stands in the way, and changes nothing. The erasure is one transaction with one receipt: all goes that the plan
-//! of that moment has, or nothing.
+//! A [`ScanErasureOrder`] names scans by what their headers or their tenant say. Its [`ScanErasurePlan`] says what
+//! would go and what stands in the way, and changes nothing. The erasure is one transaction with one receipt: all goes
+//! that the plan of that moment has, or nothing.
 
 use super::{ErasedItem, ErasureAgent, Receipt, StoreResult, Tenant, Timestamp, content_id};
 use async_trait::async_trait;

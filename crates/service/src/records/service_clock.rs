@@ -5,13 +5,13 @@
 //! of stamps ([`Clock::now`]), whether ages count by it ([`Clock::is_trusted`]), and the latest time that it may be
 //! ([`Clock::latest`]).
 //!
-//! 1. **Steady.** Corrections of up to [`CLOCK_STEP_MS`] are followed at once. After a step of the wall clock, time goes
-//!    on as the monotonic clock says until the step has lasted for [`SETTLING_TIME`]; meanwhile no ages count. Then a
-//!    step of up to [`EXPECTED_GAP`] is followed; a longer one is in doubt.
-//! 2. **In doubt** is also a start more than [`EXPECTED_GAP`] after the last trusted time, or before it: the service has
-//!    not run for so long, or the clock is wrong, and nobody can tell. No ages count. Time is the later of the wall
-//!    clock and of the trusted time with what the monotonic clock has counted since: what is stamped in doubt never looks
-//!    older than it is.
+//! 1. **Steady.** Corrections of up to [`CLOCK_STEP_MS`] are followed at once. After a step of the wall clock, time
+//!    goes on as the monotonic clock says until the step has lasted for [`SETTLING_TIME`]; meanwhile no ages count.
+//!    Then a step of up to [`EXPECTED_GAP`] is followed; a longer one is in doubt.
+//! 2. **In doubt** is also a start more than [`EXPECTED_GAP`] after the last trusted time, or before it: the service
+//!    has not run for so long, or the clock is wrong, and nobody can tell. No ages count. Time is the later of the wall
+//!    clock and of the trusted time with what the monotonic clock has counted since: what is stamped in doubt never
+//!    looks older than it is.
 //! 3. **Trusted again** is a wall clock that comes back to where it was expected; or one that has gone on without a
 //!    step for [`DOUBT_LASTS`], in which somebody could set it.
 //!

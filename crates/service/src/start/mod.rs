@@ -1,7 +1,7 @@
 //! Starting a service on its stores, and ending it.
 //!
-//! 1. [`open`] makes the [`Service`] from settings, engine, stores and the factory of HTTP clients, returns the jobs of a process that died to the
-//!    queue, and checks the rules of the settings. Nothing runs yet.
+//! 1. [`open`] makes the [`Service`] from settings, engine, stores and the factory of HTTP clients, returns the jobs of
+//!    a process that died to the queue, and checks the rules of the settings. Nothing runs yet.
 //! 2. [`RunningService::start`] starts workers and background tasks.
 //! 3. [`RunningService::stop`] ends them in order; unfinished jobs go back to the queue.
 

@@ -89,7 +89,8 @@ pub fn why_unready(checks: &[Check]) -> Option<&'static str> {
         .find_map(|check| check.fault)
 }
 
-/// Checks each dependency. `trail` is when a row could be appended to the audit trail last; it is returned as it is now.
+/// Checks each dependency. `trail` is when a row could be appended to the audit trail last; it is returned as it is
+/// now.
 async fn check_all(on: Dependencies<'_>, trail: Option<Instant>) -> (Vec<Check>, Option<Instant>) {
     let queue = on.queue;
     let trail = trail.filter(|at| at.elapsed() < TRAIL_EVERY);
@@ -171,8 +172,8 @@ async fn limited<T>(
     }
 }
 
-const CLOCK_IN_DOUBT: &str = "The time of day is in doubt: nothing is erased or given up by age until the clock has gone on for an hour, or is \
-     where it was expected.";
+const CLOCK_IN_DOUBT: &str = "The time of day is in doubt: nothing is erased or given up by age until the clock has \
+     gone on for an hour, or is where it was expected.";
 
 const UNKNOWN_FAULT: &str = "The database does not do what it is told.";
 

@@ -1,5 +1,5 @@
-//! Why jobs and requests of the works end: the domain's errors, as [`ventriform::advice`] explains them, and what only a
-//! service meets.
+//! Why jobs and requests of the works end: the domain's errors, as [`ventriform::advice`] explains them, and what only
+//! a service meets.
 
 use super::page::PageError;
 use crate::jobs::WorkError;

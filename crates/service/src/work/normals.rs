@@ -1,5 +1,5 @@
-//! Jobs of kind `normals`: [`ventriform::evaluate::normals::of_scans`] over stored volumes. The parameter `cases` is the
-//! cohort's table; each of its rows names a volume. The job's own volume is that of the first row.
+//! Jobs of kind `normals`: [`ventriform::evaluate::normals::of_scans`] over stored volumes. The parameter `cases` is
+//! the cohort's table; each of its rows names a volume. The job's own volume is that of the first row.
 
 use super::failures::volume_missing;
 use super::limits;
@@ -120,8 +120,8 @@ fn wrong(field: &str, detail: impl Into<String>) -> Failure {
     Failure::new(Fault::Request, "invalid-field", detail)
         .at(field)
         .fix(
-            "Give a list of rows such as {\"case\": \"n01\", \"volume\": \"vol_...\", \"sex\": \"F\", \"protocol\": \"rest\", \
-             \"tracer\": \"Tc-99m tetrofosmin\", \"attenuation_corrected\": false, \"healthy\": true}.",
+            "Give a list of rows such as {\"case\": \"n01\", \"volume\": \"vol_...\", \"sex\": \"F\", \"protocol\": \
+             \"rest\", \"tracer\": \"Tc-99m tetrofosmin\", \"attenuation_corrected\": false, \"healthy\": true}.",
         )
 }
 

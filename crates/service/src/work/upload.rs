@@ -83,8 +83,8 @@ pub trait UploadReader: Send + Sync + 'static {
         monitor: &Monitor<'_>,
     ) -> Result<Vec<u8>, Failure>;
 
-    /// Reads and validates a mesh that is to serve as a template of `organ`; `stated` is what the caller says of its unit
-    /// and frame. Returns its main figures and every download.
+    /// Reads and validates a mesh that is to serve as a template of `organ`; `stated` is what the caller says of its
+    /// unit and frame. Returns its main figures and every download.
     ///
     /// # Errors
     /// Why the mesh cannot be fitted.

@@ -156,8 +156,8 @@ async fn note_folder(
     Ok(items)
 }
 
-/// Compares the database with the note at the new place of the files, which is a copy at best: what was closed stays so, and
-/// what is in doubt is closed.
+/// Compares the database with the note at the new place of the files, which is a copy at best: what was closed stays
+/// so, and what is in doubt is closed.
 async fn beside(
     rows: &SqlStore,
     server: Option<&PostgresSettings>,

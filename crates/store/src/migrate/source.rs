@@ -116,7 +116,8 @@ impl Source {
     }
 }
 
-/// Marks the snapshot as the folder and its note say, so that the target stays closed or in doubt, and makes the note for it.
+/// Marks the snapshot as the folder and its note say, so that the target stays closed or in doubt, and makes the note
+/// for it.
 async fn note_of(folder: &Path, rows: &SqlStore) -> StoreResult<Option<Note>> {
     let judged = rows.judge(&Beside::folder(folder), false).await?;
     if rows.marks().await?.store.is_none() {

@@ -32,8 +32,8 @@ pub(super) async fn stored_bytes(of: &mut Transaction<'_>, tenant: &Tenant) -> S
     Ok(rows::unsigned(row.try_get(0)?))
 }
 
-/// Whether there is a key that was made after the operator opened the service at `$1`, or had not ended then. A program of an
-/// older version makes keys without closing the service.
+/// Whether there is a key that was made after the operator opened the service at `$1`, or had not ended then. A program
+/// of an older version makes keys without closing the service.
 const KEYS_SINCE_OPENED: &str = "SELECT EXISTS (SELECT 1 FROM api_keys
     WHERE created_at > $1 OR (revoked_at IS NULL AND (expires_at IS NULL OR expires_at > $1)))";
 
@@ -486,8 +486,8 @@ fn no_row() -> Anchor {
     }
 }
 
-/// The row that the next one follows. If the newest rows are lost, their numbers are not given again: the next row follows
-/// the newest one that was ever written, with its hash if another place has kept that.
+/// The row that the next one follows. If the newest rows are lost, their numbers are not given again: the next row
+/// follows the newest one that was ever written, with its hash if another place has kept that.
 async fn end_of_trail(of: &mut Transaction<'_>) -> StoreResult<Anchor> {
     let ends = query(
         "SELECT sequence, hash, 0 AS rank FROM (

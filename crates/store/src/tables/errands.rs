@@ -114,8 +114,8 @@ impl SqlStore {
         Ok(())
     }
 
-    /// Makes the waiting errands due whose pause was set by a clock that was ahead: they were tried last, or began, later
-    /// than `now`. Returns how many these are.
+    /// Makes the waiting errands due whose pause was set by a clock that was ahead: they were tried last, or began,
+    /// later than `now`. Returns how many these are.
     pub(super) async fn recall(&self, errands: Errands, now: Timestamp) -> StoreResult<u64> {
         let table = errands.table();
         let put_off = "state = 'pending' AND next_attempt_at > $1

@@ -767,7 +767,8 @@ mod tests {
         let places = plan(&store, QUEUE_POSITIONS).await;
         for step in [
             "SEARCH turns USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn>? AND turn<?)",
-            "SEARCH own USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence>? AND sequence<?)",
+            "SEARCH own USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence>? AND \
+             sequence<?)",
             "SEARCH earlier USING COVERING INDEX jobs_ready (state=? AND priority=? AND turn=? AND sequence<?)",
             "SEARCH higher USING COVERING INDEX jobs_ready (state=? AND priority<?)",
         ] {

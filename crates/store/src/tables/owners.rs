@@ -1,8 +1,8 @@
 //! Who has an item, when a repair finds that rows about it are lost.
 //!
-//! A repair gives an item to nobody who is not known to have had it: to those whom other rows name, else to the heir that the
-//! operator names, else to nobody. Whether a volume of theirs was on legal hold is not known any more, so it is: such a hold
-//! is lifted as any other, by name.
+//! A repair gives an item to nobody who is not known to have had it: to those whom other rows name, else to the heir
+//! that the operator names, else to nobody. Whether a volume of theirs was on legal hold is not known any more, so it
+//! is: such a hold is lifted as any other, by name.
 
 use super::access::append;
 use super::catalogue::{OTHER_VOLUMES, insert_content};
@@ -77,8 +77,8 @@ impl SqlStore {
         })
     }
 
-    /// Removes the row of an item, and every ownership of it, with a row of the trail for each tenant at that time. With `None`
-    /// there is no such row: in a copy, whose trail stays that of the original. Does not record an erasure.
+    /// Removes the row of an item, and every ownership of it, with a row of the trail for each tenant at that time.
+    /// With `None` there is no such row: in a copy, whose trail stays that of the original. Does not record an erasure.
     pub(crate) async fn forget(&self, id: &str, now: Option<Timestamp>) -> StoreResult<()> {
         let mut transaction = self.writer.begin().await?;
         let mut removed = 0;
@@ -108,9 +108,9 @@ impl SqlStore {
         transaction.commit().await
     }
 
-    /// Makes the row of an item anew, with a row of the trail. It belongs to those who had it when it was set aside; unless
-    /// somebody has the item, `heir` does from now on, with a legal hold in doubt. Does nothing and returns `false` if nobody
-    /// has it and there is no heir.
+    /// Makes the row of an item anew, with a row of the trail. It belongs to those who had it when it was set aside;
+    /// unless somebody has the item, `heir` does from now on, with a legal hold in doubt. Does nothing and returns
+    /// `false` if nobody has it and there is no heir.
     pub(crate) async fn restore(
         &self,
         record: &ItemRecord,

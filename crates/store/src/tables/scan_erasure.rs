@@ -2,8 +2,8 @@
 //!
 //! 1. Find the tenant's volumes for which all given values hold; with `cascade` also what was made of them.
 //! 2. Note what stands in the way: legal holds and jobs that have not ended.
-//! 3. If nothing does, delete all as a single erasure does ([`super::erasure`]), append a row to the audit trail for each
-//!    volume, and store one receipt, which names the last of these rows.
+//! 3. If nothing does, delete all as a single erasure does ([`super::erasure`]), append a row to the audit trail for
+//!    each volume, and store one receipt, which names the last of these rows.
 //!
 //! Receipt and trail hold no value of the order: they stay when the patient is gone.
 

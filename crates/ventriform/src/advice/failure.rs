@@ -19,7 +19,8 @@ pub struct Failure {
     /// Advice, as a sentence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<String>,
-    /// The cause with the texts of the file that it is about, for whoever sent the file, in the answer to that. Never stored.
+    /// The cause with the texts of the file that it is about, for whoever sent the file, in the answer to that. Never
+    /// stored.
     #[serde(skip)]
     pub to_sender: Option<Box<str>>,
 }
@@ -83,8 +84,8 @@ impl Failure {
         }
     }
 
-    /// The failure without the sentence, if a version that stored what files say in words can have written it: what quotes a
-    /// file, and all that is not known to quote none. Code, field and advice stay.
+    /// The failure without the sentence, if a version that stored what files say in words can have written it: what
+    /// quotes a file, and all that is not known to quote none. Code, field and advice stay.
     #[must_use]
     pub fn of_earlier_version(mut self) -> Self {
         let quotes = match self.fault {

@@ -388,8 +388,8 @@ fn beat_advice(error: &BeatError) -> ((Fault, &'static str), &'static str) {
     match error {
         BeatError::GateCount { .. } => (
             (Fault::Content, "gate-count"),
-            "Send the gated series as it was reconstructed, usually with 8 or 16 gates; one volume of the whole beat is \
-             for a segmentation.",
+            "Send the gated series as it was reconstructed, usually with 8 or 16 gates; one volume of the whole beat \
+             is for a segmentation.",
         ),
         BeatError::OtherGrid { .. } => (
             (Fault::Content, "gates-differ"),
@@ -450,8 +450,8 @@ impl Explain for GivenMaskError {
             GivenMaskError::Elsewhere { .. } | GivenMaskError::TooFarApart { .. } => (
                 (Fault::Content, "mask-elsewhere"),
                 None,
-                "Give a mask of the same scan whose header places it correctly in the patient; of a mesh, state its frame \
-                 by `mesh_frame` (lps or ras)."
+                "Give a mask of the same scan whose header places it correctly in the patient; of a mesh, state its \
+                 frame by `mesh_frame` (lps or ras)."
                     .into(),
             ),
             GivenMaskError::Cancelled(_) => (CANCELLED_FAILURE, None, START_AGAIN.into()),
@@ -701,14 +701,16 @@ fn volume_advice(error: &VolumeError) -> String {
         VolumeError::NoFile | VolumeError::Empty { .. } => {
             "Give a file that contains the volume.".into()
         }
-        VolumeError::Unsupported { fix, .. } | VolumeError::NotVolume { fix, .. } | VolumeError::NotSlices { fix, .. } => (*fix).into(),
+        VolumeError::Unsupported { fix, .. }
+        | VolumeError::NotVolume { fix, .. }
+        | VolumeError::NotSlices { fix, .. } => (*fix).into(),
         VolumeError::Mesh { error, .. } => mesh_file_advice(error),
         VolumeError::SingleSlice { .. } => {
             "Send all slices: every file of the series, or a volume with at least two voxels along each axis.".into()
         }
         VolumeError::NotOneSeries { .. } => {
-            "Send all files of one scan, each once, as several files or as one zip; where they are of one scan and their headers contradict \
-             each other, export it again from the system that made it."
+            "Send all files of one scan, each once, as several files or as one zip; where they are of one scan and \
+             their headers contradict each other, export it again from the system that made it."
                 .into()
         }
         VolumeError::Unrecognised { .. } => {
@@ -732,15 +734,16 @@ fn volume_advice(error: &VolumeError) -> String {
             let choose = format!("Set `frame` to a number from 0 (the first) to {last} (the last).");
             match error {
                 VolumeError::FrameNeeded { .. } if GATE_COUNTS.contains(frames) => format!(
-                    "{choose} If they are the gates of one heart beat, say so: in the names of files of one gate each (gate1.nii, gate2.nii, \
-                     ...), or by the time of a gate in the header (pixdim[4] and xyzt_units of NIfTI); or give their sum. A beat takes them \
-                     with `gated`."
+                    "{choose} If they are the gates of one heart beat, say so: in the names of files of one gate each \
+                     (gate1.nii, gate2.nii, ...), or by the time of a gate in the header (pixdim[4] and xyzt_units of \
+                     NIfTI); or give their sum. A beat takes them with `gated`."
                 ),
                 _ => choose,
             }
         }
         VolumeError::OtherGate { .. } => {
-            "Give the gates as they were reconstructed together: of one study, as many voxels, at the same place.".into()
+            "Give the gates as they were reconstructed together: of one study, as many voxels, at the same \
+             place.".into()
         }
         VolumeError::NotGated { .. } => {
             "Give the gated series (6 to 32 volumes of one heart beat in one file, or one file for each gate).".into()
@@ -749,7 +752,8 @@ fn volume_advice(error: &VolumeError) -> String {
             "Give the .hdr and the .img together, or a single .nii.".into()
         }
         VolumeError::NotOneVolume { .. } => {
-            "Give one file, a .hdr with its .img, the DICOM files of one series (a slice or a gate each), or 6 to 32 NIfTI files of one gate each."
+            "Give one file, a .hdr with its .img, the DICOM files of one series (a slice or a gate each), or 6 to 32 \
+             NIfTI files of one gate each."
                 .into()
         }
         VolumeError::Overflow { .. } => "Scale the values to below 3.4e38.".into(),
@@ -770,8 +774,8 @@ fn too_large_advice(what: &str, limit: u64) -> String {
             "Give the folder of the scan itself, not one far above it; `--folder-limit` allows more levels.".into()
         }
         _ if what.starts_with("files") || what.contains("directory") => format!(
-            "Give the files of one scan alone: at most {limit} {what}; `--file-limit`, or the operator's setting `file_limit`, \
-             allows more."
+            "Give the files of one scan alone: at most {limit} {what}; `--file-limit`, or the operator's setting \
+             `file_limit`, allows more."
         ),
         _ if what.contains("bytes") => format!(
             "Give one scan without other files, or a smaller one: at most {limit} {what}. The operator's setting \

@@ -1,15 +1,15 @@
 //! Activity beside the wall that changes over the beat: gut that moves, or what falls into single gates.
 //!
-//! In: the gates, scaled to equal counts, and the fitted wall. Out: the place outside of the wall where the counts change most
-//! with the beat ([`ActivityBeside`]), if there is one as bright as the wall. The fit takes activity beside the wall for the same in all
-//! gates; what changes is taken for motion of the wall.
+//! In: the gates, scaled to equal counts, and the fitted wall. Out: the place outside of the wall where the counts
+//! change most with the beat ([`ActivityBeside`]), if there is one as bright as the wall. The fit takes activity beside
+//! the wall for the same in all gates; what changes is taken for motion of the wall.
 //!
 //! 1. Each gate is blurred, so that noise of single voxels does not count.
-//! 2. Samples lie [`DISTANCES_MM`] outside of the wall, on its rays, at the same places in all gates: those of the outer surface in the
-//!    mean of the beat. A wall that moves changes them by up to .14 of its own uptake,
-//!    at less than .8 of it (thirty simulated studies, `docs/log/beat.md`).
-//! 3. Of the samples that reach [`LEAST_SHARE`] of the wall's uptake in a gate, that with the greatest amplitude of the first harmonic is
-//!    taken, if this is at least [`LEAST_CHANGE`].
+//! 2. Samples lie [`DISTANCES_MM`] outside of the wall, on its rays, at the same places in all gates: those of the
+//!    outer surface in the mean of the beat. A wall that moves changes them by up to .14 of its own uptake, at less
+//!    than .8 of it (thirty simulated studies, `docs/log/beat.md`).
+//! 3. Of the samples that reach [`LEAST_SHARE`] of the wall's uptake in a gate, that with the greatest amplitude of the
+//!    first harmonic is taken, if this is at least [`LEAST_CHANGE`].
 //!
 //! Not guaranteed: that activity which moves along the wall, or never gets as bright, is found.
 
@@ -24,7 +24,8 @@ use crate::polar::PolarMap;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Distances of the samples from the outer surface, mm: beyond the reach of the wall's own motion and blur, near enough to disturb it.
+/// Distances of the samples from the outer surface, mm: beyond the reach of the wall's own motion and blur, near enough
+/// to disturb it.
 const DISTANCES_MM: [f64; 5] = [8.0, 10.0, 12.0, 14.0, 16.0];
 /// Gaussian blur of a gate before it is sampled, sigma in mm.
 const BLUR_MM: f64 = 6.0;

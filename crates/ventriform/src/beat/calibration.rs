@@ -1,4 +1,4 @@
-//! Constants of the intervals about the figures of a beat. Written by `scripts/calibrate_intervals.py`: do not edit.
+//! Constants of the intervals about the figures of a beat. Written by `scripts/measure/calibrate_intervals.py`: do not edit.
 //!
 //! In: figures of fits to simulated gated studies, and the true ones. Out: mean and deviation of the error.
 

@@ -1,7 +1,7 @@
 //! Counts of the wall through the beat: a second opinion on thickening, beside that of the model.
 //!
-//! In: the gates, scaled to equal counts, and the fitted wall. Out: for every ray of the wall the largest count on the way
-//! through it, as a periodic function of time. A wall thinner than the image's resolution looks the brighter the
+//! In: the gates, scaled to equal counts, and the fitted wall. Out: for every ray of the wall the largest count on the
+//! way through it, as a periodic function of time. A wall thinner than the image's resolution looks the brighter the
 //! thicker it is (Galt, Garcia, Robbins, IEEE Transactions on Medical Imaging 9, 1990), so the change of the counts is
 //! that of the thickness, as far as the image's filter lets it through: on simulated studies about half of it.
 //!

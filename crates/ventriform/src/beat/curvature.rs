@@ -96,8 +96,8 @@ impl Curvature {
         })
     }
 
-    /// Variance of the motion's first harmonic at each node, mm², in a minimum of `objective` where the image has noise of
-    /// density 1: its sum over `n` voxels has the variance `n`.
+    /// Variance of the motion's first harmonic at each node, mm², in a minimum of `objective` where the image has noise
+    /// of density 1: its sum over `n` voxels has the variance `n`.
     pub fn motion_variances(&self, objective: &Objective) -> Vec<f64> {
         let layout = &objective.layout;
         let unknowns = harmonic_unknowns(layout, 0);

@@ -99,8 +99,8 @@ pub enum BeatFlag {
     },
     /// The wall did not get the mass that the caller gave.
     #[error(
-        "the wall was to have {given_g:.0} g and has {found_g:.0} g: for so much or so little muscle it would have to be \
-         thicker or thinner than walls are; make sure that the mass is that of this heart's left ventricle"
+        "the wall was to have {given_g:.0} g and has {found_g:.0} g: for so much or so little muscle it would have to \
+         be thicker or thinner than walls are; make sure that the mass is that of this heart's left ventricle"
     )]
     MassNotMet {
         /// As given, g.
@@ -110,8 +110,8 @@ pub enum BeatFlag {
     },
     /// A gate has more counts than the others.
     #[error(
-        "gates have more counts than the others, as after a fault of sorting: {}; each was scaled to the usual counts of a \
-         gate",
+        "gates have more counts than the others, as after a fault of sorting: {}; each was scaled to the usual counts \
+         of a gate",
         losses_text(gains)
     )]
     CountGain {
@@ -120,8 +120,8 @@ pub enum BeatFlag {
     },
     /// Activity beside the wall changes over the beat.
     #[error(
-        "beside segment {}, {:.0} mm outside of the wall, is activity of up to {:.0} % of the wall's uptake that changes over the beat \
-         by {:.0} % of it: gut that moves may be taken for motion of the wall",
+        "beside segment {}, {:.0} mm outside of the wall, is activity of up to {:.0} % of the wall's uptake that \
+         changes over the beat by {:.0} % of it: gut that moves may be taken for motion of the wall",
         .0.segment,
         .0.distance_mm,
         100.0 * .0.greatest,
@@ -255,7 +255,8 @@ fn phase_text(moving_share: f64, noise_degrees: f64) -> String {
     });
     let noisy = (noise_degrees > PHASE_NOISE_DEGREES).then(|| {
         format!(
-            "the noise of the gates alone scatters the phases by {noise_degrees:.0} degrees: the wall moves too little for so few counts"
+            "the noise of the gates alone scatters the phases by {noise_degrees:.0} degrees: the wall moves too little \
+             for so few counts"
         )
     });
     let texts: Vec<String> = still.into_iter().chain(noisy).collect();

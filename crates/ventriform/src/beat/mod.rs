@@ -11,8 +11,8 @@
 //! 4. [`counts`] gives a second opinion on thickening, from the gates' brightness.
 //! 5. [`intervals`] says how far the figures may be off, and [`flags`] where they mean little.
 //!
-//! Guaranteed: the volume of the muscle changes by less than 3 per cent over the beat; gates that begin elsewhere in the
-//! cycle give the same figures, moved; without a beat there is no ejection fraction.
+//! Guaranteed: the volume of the muscle changes by less than 3 per cent over the beat; gates that begin elsewhere in
+//! the cycle give the same figures, moved; without a beat there is no ejection fraction.
 //!
 //! Not guaranteed: the thickness of the wall, which the image does not tell. Its mean is assumed, or comes from a known
 //! volume of muscle; a millimetre moves the ejection fraction by about 1.5 points. Where the wall is dark, its motion

@@ -1,17 +1,18 @@
 //! The scatter of a wall's phases by the noise of the gates alone.
 //!
-//! In: the function that the fit minimised, its unknowns at the minimum and its curvature there. Out: degrees. The steps:
+//! In: the function that the fit minimised, its unknowns at the minimum and its curvature there. Out: degrees. The
+//! steps:
 //!
-//! 1. The noise's density: the mean square of what the fit leaves of a gate, added up over blocks of [`BLOCK_VOXELS`], by the
-//!    block's voxels. A block is wider than the filters of reconstructions, so neighbours that noise moves together count
-//!    together.
-//! 2. Each node's first harmonic of motion has the deviation that noise of this density gives to the minimum: the curvature
-//!    turns changes of the image into changes of the unknowns ([`Curvature::motion_variances`]).
+//! 1. The noise's density: the mean square of what the fit leaves of a gate, added up over blocks of [`BLOCK_VOXELS`],
+//!    by the block's voxels. A block is wider than the filters of reconstructions, so neighbours that noise moves
+//!    together count together.
+//! 2. Each node's first harmonic of motion has the deviation that noise of this density gives to the minimum: the
+//!    curvature turns changes of the image into changes of the unknowns ([`Curvature::motion_variances`]).
 //! 3. A phase is off by the angle whose tangent is that deviation over the harmonic's amplitude. The mean square over
 //!    the wall, weighted as in [`super::phase`].
 //!
-//! Not guaranteed: noise that all gates share, and what is wrong with the model. docs/log/beat.md compares the result with
-//! the errors of phases in simulated hearts.
+//! Not guaranteed: noise that all gates share, and what is wrong with the model. docs/log/beat.md compares the result
+//! with the errors of phases in simulated hearts.
 
 use super::curvature::Curvature;
 use super::objective::Objective;

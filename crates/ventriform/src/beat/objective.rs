@@ -1,4 +1,5 @@
-//! The distance of a beating wall from the gates and from prior knowledge of walls: the function that the fit minimises.
+//! The distance of a beating wall from the gates and from prior knowledge of walls: the function that the fit
+//! minimises.
 //!
 //! Image: the mean over voxels and gates of the squared difference of the blurred activity and the gate, within
 //! reach of the wall, in units of the wall's own uptake. Priors: neighbouring nodes differ little (second

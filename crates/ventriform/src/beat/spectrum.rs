@@ -4,8 +4,9 @@
 //!
 //! 1. The energy of orders of the gates' Fourier series, over all voxels. Noise has the same in each.
 //! 2. Orders above those that a fit may have are noise: their mean is that of one order.
-//! 3. Gates are noisy where the first order, which holds most of a beat, has less than [`ENERGY_OVER_NOISE`] times the noise.
-//!    They have two harmonics, since a third follows the noise; others three, and four from [`GATES_OF_FOUR`] gates on.
+//! 3. Gates are noisy where the first order, which holds most of a beat, has less than [`ENERGY_OVER_NOISE`] times the
+//!    noise. They have two harmonics, since a third follows the noise; others three, and four from [`GATES_OF_FOUR`]
+//!    gates on.
 //!
 //! docs/log/beat.md compares two and three harmonics.
 

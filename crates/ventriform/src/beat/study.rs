@@ -31,8 +31,8 @@ pub struct GatedStudy {
 }
 
 impl GatedStudy {
-    /// The study of these gates, of which those in `lost`, counted from 0, tell nothing of the beat: neither the sum nor the curve has
-    /// them.
+    /// The study of these gates, of which those in `lost`, counted from 0, tell nothing of the beat: neither the sum
+    /// nor the curve has them.
     ///
     /// # Errors
     /// [`BeatError`]: fewer gates than 6 or more than 32, gates on different grids, a gate without counts.
@@ -59,8 +59,8 @@ impl GatedStudy {
         if let Some(empty) = counts.iter().position(|counts| *counts <= 0.0) {
             return Err(BeatError::EmptyGate { gate: empty + 1 });
         }
-        // The upper half of the gates lost nothing: the mean would be drawn down by those that did. Its median is not drawn up
-        // by a gate that has too many.
+        // The upper half of the gates lost nothing: the mean would be drawn down by those that did. Its median is not
+        // drawn up by a gate that has too many.
         let mut sorted = counts.clone();
         sorted.sort_by(f64::total_cmp);
         let upper = &sorted[sorted.len() / 2..];

@@ -1,4 +1,4 @@
-//! Constants of comparisons. Written by `scripts/calibrate_comparison.py`: do not edit.
+//! Constants of comparisons. Written by `scripts/measure/calibrate_comparison.py`: do not edit.
 //!
 //! In: comparisons of simulated pairs of scans, and what truly changed. Out: how much unchanged hearts differ.
 

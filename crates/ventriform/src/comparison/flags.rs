@@ -161,15 +161,18 @@ impl fmt::Display for ComparisonFlag {
             Self::NotComparable(reason) => write!(f, "the scans are not comparable: {reason}"),
             Self::TidUncertain { reversible_percent } => write!(
                 f,
-                "{reversible_percent:.0} % of the wall is reversible: a wall that lacks uptake looks thinner, so the ratio of the cavities is too large by an unknown part"
+                "{reversible_percent:.0} % of the wall is reversible: a wall that lacks uptake looks thinner, so the \
+                 ratio of the cavities is too large by an unknown part"
             ),
             Self::OriginNotStated { scan: None } => write!(
                 f,
-                "neither file names a patient, tracer or attenuation correction: make sure that those of both scans are the same"
+                "neither file names a patient, tracer or attenuation correction: make sure that those of both scans \
+                 are the same"
             ),
             Self::OriginNotStated { scan: Some(scan) } => write!(
                 f,
-                "the {scan} scan's file names no patient, tracer or attenuation correction: make sure that they are those of the other scan"
+                "the {scan} scan's file names no patient, tracer or attenuation correction: make sure that they are \
+                 those of the other scan"
             ),
             Self::RoleNotStated { scan } => write!(
                 f,
@@ -182,15 +185,18 @@ impl fmt::Display for ComparisonFlag {
             } => write!(f, "{field} differs: {stress} at stress, {rest} at rest"),
             Self::ScaleUncertain { percent } => write!(
                 f,
-                "only {percent:.0} % of the wall is unchanged, and stress was scaled by that part: all differences share its error"
+                "only {percent:.0} % of the wall is unchanged, and stress was scaled by that part: all differences \
+                 share its error"
             ),
             Self::Turned { degrees } => write!(
                 f,
-                "the stress map was turned by {degrees:.0} degrees about the long axis, where both maps agree significantly better"
+                "the stress map was turned by {degrees:.0} degrees about the long axis, where both maps agree \
+                 significantly better"
             ),
             Self::NotStated { scan, field, other } => write!(
                 f,
-                "the {scan} scan's header does not state the {field}, and that of the other scan says: {other}; make sure that they are alike"
+                "the {scan} scan's header does not state the {field}, and that of the other scan says: {other}; make \
+                 sure that they are alike"
             ),
             Self::OfLimits {
                 scan: None, reason, ..

@@ -13,8 +13,8 @@
 //! 3. Every node moves along its ray by the distance interpolated between the two surfaces, which
 //!    keeps the order of points along a ray, so that the surfaces cannot cross.
 //!
-//! The coefficients are a least-squares fit to simulated hearts whose walls are known; `scripts/calibrate_walls.py`
-//! estimates them again. Two other
+//! The coefficients are a least-squares fit to simulated hearts whose walls are known;
+//! `scripts/measure/calibrate_walls.py` estimates them again. Two other
 //! ways were tried on the same hearts and came out behind. A fixed shift of both surfaces makes
 //! small hearts too thin. A forward model (the wall rendered, blurred and compared with the image)
 //! cannot tell the width of the point response from the wall's thickness: its least residual lies
@@ -22,8 +22,8 @@
 //!
 //! Not guaranteed: a single heart's wall. Beating and breathing blur the wall as much as the camera
 //! does and cannot be measured in an image that is not gated; the mean thickness of a heart scatters
-//! by about 0.9 mm about the true one. No figure of the image that was tried tells the rest (14 of them on 65 hearts, each
-//! left out): hollowness, uptake, thickness, strength of the edges and the like.
+//! by about 0.9 mm about the true one. No figure of the image that was tried tells the rest (14 of them on 65 hearts,
+//! each left out): hollowness, uptake, thickness, strength of the edges and the like.
 
 use super::blur_correction;
 use super::calibration::{

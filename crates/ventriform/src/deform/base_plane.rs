@@ -15,11 +15,11 @@
 //! 5. Nodes within [`STRETCHED_LENGTH_MM`](super::rim_frame::STRETCHED_LENGTH_MM) of the rim move along the axis, those
 //!    at the rim by the whole, so that the wall is stretched or compressed there.
 //!
-//! Shape and functions are least-squares fits to simulated hearts whose rims are known; `scripts/calibrate_walls.py`
-//! estimates them again. On hearts that were left out, the rms error of the rim's height falls from 3.8 mm as sensed to 3.3
-//! by shape and 2.9 with the ends of the signal (docs/log/walls.md). Not guaranteed: an infarct over half of the base
-//! moves the shape itself; a wall that is short where its base is dark stays too long. A model whose orientation is unknown
-//! keeps its rim.
+//! Shape and functions are least-squares fits to simulated hearts whose rims are known;
+//! `scripts/measure/calibrate_walls.py` estimates them again. On hearts that were left out, the rms error of the rim's
+//! height falls from 3.8 mm as sensed to 3.3 by shape and 2.9 with the ends of the signal (docs/log/walls.md). Not
+//! guaranteed: an infarct over half of the base moves the shape itself; a wall that is short where its base is dark
+//! stays too long. A model whose orientation is unknown keeps its rim.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -60,8 +60,8 @@ pub fn settled(
     self_intersections(&moved).is_empty().then_some(moved)
 }
 
-/// What tells where the rim of `mesh` is, whose wall is `wall`, in the image `field` about it. `None` without a rim or a
-/// signal in every direction.
+/// What tells where the rim of `mesh` is, whose wall is `wall`, in the image `field` about it. `None` without a rim or
+/// a signal in every direction.
 pub fn rim_evidence(
     mesh: &TriMesh,
     cup: &Cup,

@@ -1,7 +1,7 @@
-//! Constants of the models of rim and wall. Written by `scripts/calibrate_walls.py`: do not edit.
+//! Constants of the models of rim and wall. Written by `scripts/measure/calibrate_walls.py`: do not edit.
 //!
-//! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction, and
-//! the distances from the apparent to the anatomical wall.
+//! In: rims and walls of fits to simulated hearts, and the true ones. Out: the shape of the rim with its correction,
+//! and the distances from the apparent to the anatomical wall.
 
 use super::ray_terms::{RayTerms, SizeShift, SmoothnessShift};
 use super::rim_model::{

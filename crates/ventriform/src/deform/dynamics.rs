@@ -11,9 +11,9 @@
 //! (M/dt² + g M/dt + K + J^T W J) x' = (M/dt² + g M/dt) x + M v/dt + targets
 //! ```
 //!
-//! Sensors are read before every step. Their reach falls step by step, and while it does a third of them is read; when it has
-//! reached its least value, readings are averaged, sensors that hardly move keep the edge that they saw, and after 12 readings the
-//! mean is fixed. The implicit step
+//! Sensors are read before every step. Their reach falls step by step, and while it does a third of them is read; when
+//! it has reached its least value, readings are averaged, sensors that hardly move keep the edge that they saw, and
+//! after 12 readings the mean is fixed. The implicit step
 //! is stable for any dt, so the motion ends at rest, where it stalls, or at the limit of steps
 //! ([`StopReason`]).
 
@@ -203,8 +203,8 @@ impl SensorMean {
         self.count >= SETTLED_READINGS
     }
 
-    /// Adds readings of sensors of this density. Those that are not `settled`, and those of another density than before,
-    /// are the mean by themselves.
+    /// Adds readings of sensors of this density. Those that are not `settled`, and those of another density than
+    /// before, are the mean by themselves.
     fn add(&mut self, mut readings: Vec<SensorReading>, density: Density, settled: bool) {
         let is_alike = !self.last.is_empty() && density == self.density;
         self.count = if settled && is_alike {

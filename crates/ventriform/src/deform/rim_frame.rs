@@ -1,7 +1,8 @@
 //! Directions about a ventricle's long axis, and its rim in each of them.
 //!
-//! In: the axis of a fitted cup and the direction in which the patient's head lies. Out: the height at which a mesh begins
-//! in each direction ([`RimFrame::heights`]), and the mesh with its rim moved along the axis ([`RimFrame::stretched`]).
+//! In: the axis of a fitted cup and the direction in which the patient's head lies. Out: the height at which a mesh
+//! begins in each direction ([`RimFrame::heights`]), and the mesh with its rim moved along the axis
+//! ([`RimFrame::stretched`]).
 
 use std::f64::consts::TAU;
 

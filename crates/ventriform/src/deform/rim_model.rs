@@ -1,5 +1,5 @@
-//! The calibrated model of a ventricle's rim: the shape that rims have, how much of a distance from it is taken back, and
-//! what the ends of the signal change.
+//! The calibrated model of a ventricle's rim: the shape that rims have, how much of a distance from it is taken back,
+//! and what the ends of the signal change.
 //!
 //! In: angles about the long axis, and a distance of the rim from its shape. Out: heights and the distance by which
 //! the rim moves. The constants are in [`calibration`](super::calibration).
@@ -15,8 +15,8 @@ pub const RIM_TERMS: usize = 2 * RIM_HARMONICS;
 /// Coefficients of a distance in every direction: its mean, and those of [`RIM_TERMS`].
 const WAVES: usize = RIM_TERMS + 1;
 
-/// Ends of the signal, at half of the heart's, from which on a wall counts as dark at its base, and up to which it counts
-/// as partly so, mm basal of the rim.
+/// Ends of the signal, at half of the heart's, from which on a wall counts as dark at its base, and up to which it
+/// counts as partly so, mm basal of the rim.
 const DARK_ENDS_MM: [f64; 2] = [-9.0, -3.0];
 
 /// Coefficients of one harmonic of the rim's height towards the apex, shares of the heart's length.
@@ -140,8 +140,8 @@ pub struct RimRegression {
 }
 
 impl RimRegression {
-    /// Distances towards the base by which the rim moves in every direction, mm. Where the wall is dark at its base, the
-    /// rim does not lie apical of where its shape puts it.
+    /// Distances towards the base by which the rim moves in every direction, mm. Where the wall is dark at its base,
+    /// the rim does not lie apical of where its shape puts it.
     pub fn shifts(&self, evidence: &RimEvidence) -> Vec<f64> {
         let [shortest, longest] = self.length_range_mm;
         let length = evidence.length_mm.clamp(shortest, longest);
@@ -270,8 +270,8 @@ mod tests {
         assert!((at(500.0) - 12.0).abs() < 1e-9);
     }
 
-    /// Ends of a third of the directions lie 12 mm apical: the rim moves by what the others tell, and there not towards the
-    /// apex. Where signal goes on, it moves towards the base.
+    /// Ends of a third of the directions lie 12 mm apical: the rim moves by what the others tell, and there not towards
+    /// the apex. Where signal goes on, it moves towards the base.
     #[test]
     fn a_dark_base_is_not_cut_off() {
         let dark = |direction: usize| direction < RIM_DIRECTIONS / 3;
@@ -314,8 +314,8 @@ mod tests {
         assert!((1.5..3.0).contains(&(apart / level(0.0))), "{apart}");
     }
 
-    /// A signal that goes on by 4 mm moves the rim by less than that, and towards the base; so does a rim that is shorter
-    /// than its shape.
+    /// A signal that goes on by 4 mm moves the rim by less than that, and towards the base; so does a rim that is
+    /// shorter than its shape.
     #[test]
     fn the_rim_follows_signal_and_shape() {
         let level = |by_shape: f64, end: f64| {

@@ -5,9 +5,9 @@
 //!
 //! The signal of a direction at a height is the greatest value across the wall, from [`BORDER_MM`] inside of its inner
 //! surface to as far outside of its outer one, both as they are in the basal part of the wall. Two ends are measured,
-//! because each fails elsewhere: half of the whole heart's signal tells a septum that has run out from one that is seen,
-//! half way from the direction's own signal to what lies basal of it is not deceived by a direction that is faint as a
-//! whole or lies before a bright neighbour.
+//! because each fails elsewhere: half of the whole heart's signal tells a septum that has run out from one that is
+//! seen, half way from the direction's own signal to what lies basal of it is not deceived by a direction that is faint
+//! as a whole or lies before a bright neighbour.
 
 use super::rim_frame::{RIM_DIRECTIONS, RimFrame};
 use crate::grid::field::Field;

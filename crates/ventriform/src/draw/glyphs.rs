@@ -1,7 +1,8 @@
-//! Characters as pixels, for pictures that no viewer's font is at hand for: Noto Sans Mono in four sizes and two weights.
+//! Characters as pixels, for pictures that no viewer's font is at hand for: Noto Sans Mono in four sizes and two
+//! weights.
 //!
-//! Drawn are the printable characters of ASCII, Latin-1 and Latin Extended-A, and what [`drawn_as`] draws by one of them.
-//! Any other character, a control character too, is drawn as [`UNKNOWN_CHARACTER`]: no character is left out.
+//! Drawn are the printable characters of ASCII, Latin-1 and Latin Extended-A, and what [`drawn_as`] draws by one of
+//! them. Any other character, a control character too, is drawn as [`UNKNOWN_CHARACTER`]: no character is left out.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
@@ -82,8 +83,8 @@ impl Font {
     }
 }
 
-/// The character that `character` is drawn as: dashes, quotation marks and spaces as those of ASCII, what the font lacks
-/// as [`UNKNOWN_CHARACTER`], any other as itself.
+/// The character that `character` is drawn as: dashes, quotation marks and spaces as those of ASCII, what the font
+/// lacks as [`UNKNOWN_CHARACTER`], any other as itself.
 pub fn drawn_as(character: char) -> char {
     match character {
         '\u{2010}'..='\u{2015}' | '\u{2212}' => '-',

@@ -7,8 +7,8 @@ use libdeflater::{CompressionLvl, Compressor};
 /// Numbers of PNG's row filters: the bytes themselves, and their differences from the row above.
 const NO_FILTER: u8 = 0;
 const UP_FILTER: u8 = 2;
-/// The usual compromise of zlib, of 1 to 12. Drawings of reports become a sixth to two fifths smaller than with a filter chosen
-/// for each row, slices of scans stay as large, in a quarter of the instructions.
+/// The usual compromise of zlib, of 1 to 12. Drawings of reports become a sixth to two fifths smaller than with a
+/// filter chosen for each row, slices of scans stay as large, in a quarter of the instructions.
 const COMPRESSION_LEVEL: i32 = 6;
 
 /// Pixels of one (grey), three (RGB) or four (RGBA) bytes, row by row from the top left.

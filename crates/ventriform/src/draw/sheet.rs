@@ -1,7 +1,7 @@
 //! A page as one picture, for viewers that show nothing but pictures.
 //!
-//! In: blocks (headings, sentences, figures, tables, pictures), one below the other or in columns. Out: [`Sheet::image`], black
-//! on white, [`SHEET_WIDTH_PX`] wide and as high as its blocks.
+//! In: blocks (headings, sentences, figures, tables, pictures), one below the other or in columns. Out:
+//! [`Sheet::image`], black on white, [`SHEET_WIDTH_PX`] wide and as high as its blocks.
 //!
 //! Every text stays within the width of its block: sentences are wrapped, words that are longer than a line are broken,
 //! and what exceeds the lines or the column that it may have ends in [`ELLIPSIS`]. No block overlaps another. If a
@@ -131,7 +131,8 @@ impl Sheet {
         top += pen.wrapped([MARGIN_PX, top], &self.footer, footer, CONTENT_WIDTH_PX, 2);
         if !pen.all_drawn {
             let note = format!(
-                "{UNKNOWN_CHARACTER} stands for a character that this picture cannot draw; the header of its file has the text."
+                "{UNKNOWN_CHARACTER} stands for a character that this picture cannot draw; the header of its file has \
+                 the text."
             );
             top += pen.wrapped([MARGIN_PX, top], &note, footer, CONTENT_WIDTH_PX, 2);
         }
@@ -457,8 +458,8 @@ impl ColumnWidths {
         self.gaps() + self.least.iter().sum::<usize>()
     }
 
-    /// Widths that are within `all` characters with the gaps. The widest columns are narrowed where there is no room for
-    /// all cells, and what room there is goes to titles.
+    /// Widths that are within `all` characters with the gaps. The widest columns are narrowed where there is no room
+    /// for all cells, and what room there is goes to titles.
     fn within(&self, all: usize) -> Vec<usize> {
         let mut widths = self.least.clone();
         let mut room = all.saturating_sub(self.least_all());
@@ -527,7 +528,8 @@ mod tests {
     use super::super::table::TableColumn;
     use super::*;
 
-    const LONG: &str = "A sentence that does not fit into one line of a narrow column, and Donaudampfschifffahrtsgesellschaftskapitän";
+    const LONG: &str = "A sentence that does not fit into one line of a narrow column, and \
+        Donaudampfschifffahrtsgesellschaftskapitän";
 
     /// A sheet on which every text is `text`, repeated.
     fn sheet(text: &str) -> Sheet {

@@ -258,8 +258,8 @@ impl VectorShape {
     }
 }
 
-/// The places about a character's pixel that its rim covers too: columns and rows away, and how many times as much, up to
-/// all. A character's edge is smooth: beside a pixel that it covers by half, its rim covers the next one whole.
+/// The places about a character's pixel that its rim covers too: columns and rows away, and how many times as much, up
+/// to all. A character's edge is smooth: beside a pixel that it covers by half, its rim covers the next one whole.
 const RIM: &[([i64; 2], f64)] = &[
     ([0, 0], 2.0),
     ([-1, 0], 2.0),
@@ -357,8 +357,8 @@ fn text_start([x, y]: Point, anchor: Anchor, text: &str, font: Font) -> [i64; 2]
     [left.round() as i64, top.round() as i64]
 }
 
-/// Mixes `colour` into the pixels that `text` covers, and those at `places` beside them. What lies outside of the picture
-/// is left out.
+/// Mixes `colour` into the pixels that `text` covers, and those at `places` beside them. What lies outside of the
+/// picture is left out.
 fn paint_text(
     image: &mut Image<3>,
     [left, top]: [i64; 2],

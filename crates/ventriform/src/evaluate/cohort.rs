@@ -1,9 +1,9 @@
 //! A cohort's folder: who is in it, and in which files.
 //!
 //! Each case has a folder of its own with `spect.nii.gz` (or `.nii`, `.dcm`) and, where they are
-//! known, the gold standards of [`Gold`], as volumes or as meshes (`.stl`, `.ply` ...). `manifest.json`, a list of `{"case", "role"}` (or an
-//! object with such a list under `cases`), says which cases are templates: those with the role
-//! `template`. Without a manifest, cases whose names begin with `t` are templates. A missing
+//! known, the gold standards of [`Gold`], as volumes or as meshes (`.stl`, `.ply` ...). `manifest.json`, a list of
+//! `{"case", "role"}` (or an object with such a list under `cases`), says which cases are templates: those with the
+//! role `template`. Without a manifest, cases whose names begin with `t` are templates. A missing
 //! file does not end the run: it is noted in [`Cohort::problems`].
 
 use super::rows::Gold;

@@ -1,8 +1,8 @@
 //! GLB of a surface in motion: one morph target for each mesh of a cycle, and an animation that closes.
 //!
 //! In: meshes with the same triangles, at equal steps of a cycle, and the cycle's length. Out: a GLB file as
-//! [`Format::Glb`](super::Format::Glb) has it, of one of the meshes, with the others as displacements of its positions and
-//! normals.
+//! [`Format::Glb`](super::Format::Glb) has it, of one of the meshes, with the others as displacements of its positions
+//! and normals.
 //!
 //! 1. The mesh at rest is written as [`gltf::document`] does, with parts, colours and metadata.
 //! 2. Each mesh becomes a morph target of the name "gate 1", "gate 2", ...; all parts share its accessors.

@@ -21,7 +21,9 @@
 //! JSON files, millimetres.
 //!
 //! GLB and glTF files show a figure of each vertex ([`VertexField`]) as vertex colours, VTP and VTK files hold it as an
-//! array of its name, PLY files as a property of its name in lower case beside `red`, `green` and `blue`, and JSON files as the entry of `fields` with that name: the uptake of a fitted wall, the distance of a model to the surface it was made of.
+//! array of its name, PLY files as a property of its name in lower case beside `red`, `green` and `blue`, and JSON
+//! files as the entry of `fields` with that name: the uptake of a fitted wall, the distance of a model to the surface
+//! it was made of.
 //!
 //! Where the parts of a ventricle's wall are known ([`Metadata::parts`]), each triangle says which it is of: 1
 //! endocardium, 2 epicardium, 3 base. That is the cell array `Part` of VTP and VTK files, the face property `part` of

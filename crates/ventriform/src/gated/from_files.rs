@@ -120,7 +120,8 @@ pub fn from_files(
     })
 }
 
-/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat if the gates are one.
+/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat if the gates are
+/// one.
 pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure> {
     let whole = HeartFigure::whole;
     let mut figures = heart_figures(segmentation);

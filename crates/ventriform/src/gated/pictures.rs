@@ -94,7 +94,8 @@ pub(super) fn phase(report: &BeatReport) -> String {
         @for degrees in [0, 90, 180, 270, 360] {
             text x=(tenth(x(f64::from(degrees)))) y=(PLOT_AREA_PX[3] + 16.0) text-anchor="middle" { (degrees) }
         }
-        text x=(f64::midpoint(PLOT_AREA_PX[0], PLOT_AREA_PX[2])) y=(SIZE_PX[1] - 10.0) text-anchor="middle" { "degrees of the cycle" }
+        text x=(f64::midpoint(PLOT_AREA_PX[0], PLOT_AREA_PX[2])) y=(SIZE_PX[1] - 10.0) text-anchor="middle" { "degrees \
+            of the cycle" }
         text x="14" y=(PLOT_AREA_PX[1] - 4.0) { "% of the wall" }
     };
     picture(&title, &content)

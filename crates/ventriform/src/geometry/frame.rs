@@ -9,8 +9,8 @@
 use super::Vec3;
 use nalgebra::{Matrix3, Matrix4};
 
-/// Sizes that a voxel of a scan can have, mm: from scanners of mice to thick slices. Work and memory of a blur grow with
-/// the number of voxels in a millimetre.
+/// Sizes that a voxel of a scan can have, mm: from scanners of mice to thick slices. Work and memory of a blur grow
+/// with the number of voxels in a millimetre.
 pub const VOXEL_MM: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
 /// The affine map from voxel indices to LPS millimetres; always finite and invertible.

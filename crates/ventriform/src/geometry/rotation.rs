@@ -3,8 +3,8 @@
 use super::Vec3;
 use nalgebra::{Matrix3, Rotation3};
 
-/// The least determinant, relative to the cube of the Frobenius norm, of matrices that Newton's iteration decomposes: their
-/// rotation is as exact as that of the SVD.
+/// The least determinant, relative to the cube of the Frobenius norm, of matrices that Newton's iteration decomposes:
+/// their rotation is as exact as that of the SVD.
 const LEAST_DETERMINANT: f64 = 1e-7;
 /// Most rounds of Newton's iteration; matrices above [`LEAST_DETERMINANT`] take four to nine.
 const MAX_NEWTON_ROUNDS: usize = 20;
@@ -18,8 +18,8 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Matrix3<f64> {
     polar_rotation(m).unwrap_or_else(|| nearest_rotation_by_svd(m))
 }
 
-/// The rotation of the polar decomposition of `m` by Newton's iteration X ← (s X + X^-T / s) / 2 with scale s (Higham 1986), a
-/// tenth of the work of an SVD; `None` where `m` is a reflection or nearly singular.
+/// The rotation of the polar decomposition of `m` by Newton's iteration X ← (s X + X^-T / s) / 2 with scale s (Higham
+/// 1986), a tenth of the work of an SVD; `None` where `m` is a reflection or nearly singular.
 fn polar_rotation(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let mut x = *m;
     for round in 0..MAX_NEWTON_ROUNDS {

@@ -167,8 +167,8 @@ fn contour_distances(
     })
 }
 
-/// The `q`-quantile of numbers from 0 on, as [`quantile`] of them in order. There may be as many as a volume has voxels:
-/// sorting them would take seconds without a look at the cancel token.
+/// The `q`-quantile of numbers from 0 on, as [`quantile`] of them in order. There may be as many as a volume has
+/// voxels: sorting them would take seconds without a look at the cancel token.
 fn quantile_of_distances(values: &[f64], q: f64, monitor: &Monitor) -> Result<f64, Cancelled> {
     let place = q * (values.len() - 1) as f64;
     let below = place.floor() as usize;

@@ -147,8 +147,8 @@ fn blur_line(
 mod tests {
     use super::*;
 
-    /// A kernel longer than the axis, folded at its end, against the whole one value by value; and one that would not fit
-    /// into memory.
+    /// A kernel longer than the axis, folded at its end, against the whole one value by value; and one that would not
+    /// fit into memory.
     #[test]
     fn kernels_beyond_the_axis_are_folded() {
         let row: Vec<f32> = (0..7).map(|n| (n as f32 * 1.3).sin()).collect();

@@ -1,21 +1,22 @@
 //! The smoothness of an image: the length over which its values change.
 //!
-//! In: samples on a grid. Out: a length, mm ([`smoothness_mm`]): the root mean square of the first derivatives over that of the
-//! second ones. It grows with whatever blurred the image, the camera and the filters of the reconstruction alike. Differences of
-//! neighbouring samples stand for derivatives.
+//! In: samples on a grid. Out: a length, mm ([`smoothness_mm`]): the root mean square of the first derivatives over
+//! that of the second ones. It grows with whatever blurred the image, the camera and the filters of the reconstruction
+//! alike. Differences of neighbouring samples stand for derivatives.
 //!
-//! A wave of length λ has the smoothness λ / 2π, whatever its height and phase. An image of many waves has the mean of its
-//! waves, weighted towards the short ones, so noise should be blurred away before.
+//! A wave of length λ has the smoothness λ / 2π, whatever its height and phase. An image of many waves has the mean of
+//! its waves, weighted towards the short ones, so noise should be blurred away before.
 //!
 //! Guaranteed: the result does not depend on the values' unit or origin.
 //!
-//! Not guaranteed: that equal cameras and filters give equal lengths; organs of other shapes and more noise give others.
+//! Not guaranteed: that equal cameras and filters give equal lengths; organs of other shapes and more noise give
+//! others.
 
 /// Least number of second differences along an axis.
 const MIN_DIFFERENCES: usize = 200;
 
-/// The smoothness of `values`, mm. They have the `shape`, the first axis fastest; neighbours lie `spacing_mm` apart. `None` if there
-/// are too few samples along every axis, or no change of slope.
+/// The smoothness of `values`, mm. They have the `shape`, the first axis fastest; neighbours lie `spacing_mm` apart.
+/// `None` if there are too few samples along every axis, or no change of slope.
 pub fn smoothness_mm(values: &[f32], shape: [usize; 3], spacing_mm: [f64; 3]) -> Option<f64> {
     let mut first = 0.0;
     let mut second = 0.0;
@@ -82,8 +83,8 @@ mod tests {
         }
     }
 
-    /// A Gaussian of deviation s has mean squares 3 / 4 s² and 9 / 4 s⁴ of its slopes and bends along the axes, over a common
-    /// factor, so its smoothness is s times √(2 / 3).
+    /// A Gaussian of deviation s has mean squares 3 / 4 s² and 9 / 4 s⁴ of its slopes and bends along the axes, over a
+    /// common factor, so its smoothness is s times √(2 / 3).
     #[test]
     fn that_of_a_blurred_point_grows_with_the_blur_and_a_unit_changes_nothing() {
         for deviation_mm in [6.0, 9.0, 12.0] {

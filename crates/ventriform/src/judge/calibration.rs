@@ -1,4 +1,4 @@
-//! Constants of the logistic models. Written by `scripts/calibrate.py`: do not edit.
+//! Constants of the logistic models. Written by `scripts/measure/calibrate.py`: do not edit.
 //!
 //! In: figures of fits to simulated hearts. Out: for each model of `confidence.rs` the intercept, and
 //! of each term the mean and the standard deviation over the calibration set and the weight.

@@ -7,13 +7,14 @@
 //! - [`of_motion`]: that the patient moved during the scan;
 //! - [`of_heart`]: that what was fitted is a left ventricle.
 //!
-//! 1. All are [logistic models](super::logistic) whose constants `scripts/calibrate.py` estimates from fits to simulated
-//!    hearts ([`calibration`]). Hearts that are hard to fit are over-represented, so the chances are cautious.
+//! 1. All are [logistic models](super::logistic) whose constants `scripts/measure/calibrate.py` estimates from fits to
+//!    simulated hearts ([`calibration`]). Hearts that are hard to fit are over-represented, so the chances are
+//!    cautious.
 //! 2. Of several fits the mean logarithm of the odds scatters less than that of one.
 //! 3. Where it is known how the patient lay, the projections of the image ([`Views::gain`]) join the chances.
 //!
-//! Guaranteed: a chance rises or falls with each figure alone but the size of the cavity: fits of very small and very large
-//! hearts are worse than others. Not guaranteed: that a displaced heart is noticed. A
+//! Guaranteed: a chance rises or falls with each figure alone but the size of the cavity: fits of very small and very
+//! large hearts are worse than others. Not guaranteed: that a displaced heart is noticed. A
 //! displacement in the last views only leaves an image of one heart in one position, which may not be its position in
 //! another image. docs/log/confidence.md has the sets, the areas under the curve, and what else was tried.
 

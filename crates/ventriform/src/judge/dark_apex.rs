@@ -1,9 +1,10 @@
-//! Whether the apex of a fitted wall is dark, all round or in part: the model may end short of it, or has its shape there from
-//! the wall about it.
+//! Whether the apex of a fitted wall is dark, all round or in part: the model may end short of it, or has its shape
+//! there from the wall about it.
 //!
-//! In: the fitted wall and its rays, the volume. Out: the uptake of the apical third against the wall's brightest quarter,
-//! where every sector of it is dark, or one is darker. [`crate::locate`] looks for an apex without uptake before the fit; a wall
-//! that closes at the border of an infarct, on the blur of the muscle that is left, shows its own apex half bright.
+//! In: the fitted wall and its rays, the volume. Out: the uptake of the apical third against the wall's brightest
+//! quarter, where every sector of it is dark, or one is darker. [`crate::locate`] looks for an apex without uptake
+//! before the fit; a wall that closes at the border of an infarct, on the blur of the muscle that is left, shows its
+//! own apex half bright.
 
 use std::ops::Range;
 
@@ -19,12 +20,12 @@ use crate::model::wall::{RAY_COLUMNS, RAY_ROWS, VentricleWall};
 const APICAL_ROWS: Range<usize> = 0..RAY_ROWS / 3;
 /// Columns of a sector: a sixth of a turn about the axis.
 const SECTOR_COLUMNS: usize = RAY_COLUMNS / 6;
-/// Share of the brightest wall that no sector of an apex exceeds that is dark all round. Apices that are thin, not infarcted,
-/// keep three quarters and more in most sectors.
+/// Share of the brightest wall that no sector of an apex exceeds that is dark all round. Apices that are thin, not
+/// infarcted, keep three quarters and more in most sectors.
 const DARK_SECTOR_SHARE: f64 = 0.7;
-/// Share of the brightest wall below which a sector is dark by itself, at whatever angle it begins. Of simulated hearts, those with
-/// one apical segment or two without uptake have a sector of 0.56 and less (12; simulator's seed 11031 and kind "apex" of seed 5001),
-/// healthy ones none below 0.73 (6).
+/// Share of the brightest wall below which a sector is dark by itself, at whatever angle it begins. Of simulated
+/// hearts, those with one apical segment or two without uptake have a sector of 0.56 and less (12; simulator's seed
+/// 11031 and kind "apex" of seed 5001), healthy ones none below 0.73 (6).
 const DARK_PART_SHARE: f64 = 0.6;
 /// Step along a ray, mm.
 const STEP_MM: f64 = 1.0;

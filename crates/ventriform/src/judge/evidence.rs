@@ -70,7 +70,8 @@ pub(super) struct Edges {
 
 impl Evidence {
     /// The figures of a fit whose apparent wall, before its rim was moved, is `wall`, in a heart that is hollow by
-    /// `hollowness`, in this blurred `image` and its projections, the `views`; `None` for models whose wall no ray meets.
+    /// `hollowness`, in this blurred `image` and its projections, the `views`; `None` for models whose wall no ray
+    /// meets.
     pub(super) fn of(
         wall: &VentricleWall,
         edges: &Edges,

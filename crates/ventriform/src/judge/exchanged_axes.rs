@@ -1,20 +1,22 @@
-//! Whether two axes of the image were exchanged, as in an array in z, y, x order that was given the affine of its image.
+//! Whether two axes of the image were exchanged, as in an array in z, y, x order that was given the affine of its
+//! image.
 //!
-//! Such a heart is mirrored, and may still point to the left, to the front and down. But its surroundings do not: the camera
-//! cuts the body off above and below, while it ends in air at the sides, and what is hot beside a heart, liver and gut, lies below
-//! it and to its right. In: the volume, the heart's centre, the wall's uptake, in a frame whose axes are nearly the patient's. Out:
-//! for each pair of axes of which one runs along the body, by how much both speak against an exchange: a *score*, above
-//! zero for images as they are, the same below zero for those with these two axes exchanged.
+//! Such a heart is mirrored, and may still point to the left, to the front and down. But its surroundings do not: the
+//! camera cuts the body off above and below, while it ends in air at the sides, and what is hot beside a heart, liver
+//! and gut, lies below it and to its right. In: the volume, the heart's centre, the wall's uptake, in a frame whose
+//! axes are nearly the patient's. Out: for each pair of axes of which one runs along the body, by how much both speak
+//! against an exchange: a *score*, above zero for images as they are, the same below zero for those with these two axes
+//! exchanged.
 //!
-//! 1. Ends: the mean area of the body's outermost slices along an axis, of those that hold [`END_SHARE`] of it, against its
-//!    largest slice. The logarithm of that along the body over that along the other axis.
+//! 1. Ends: the mean area of the body's outermost slices along an axis, of those that hold [`END_SHARE`] of it, against
+//!    its largest slice. The logarithm of that along the body over that along the other axis.
 //! 2. Side: of the bright activity around the heart, the share on the side of liver and gut less that on the
 //!    other side of the plane on which an exchange leaves everything in its place.
 //! 3. The score is their sum ([`AxisPair::flag_score`]).
 //!
-//! A cut-out about the heart has no ends, and a scan without activity beside the heart no sides; with neither, nothing is told. Not
-//! told: an exchange of both axes across the body, which turns the apex to the right or back, or mirrors a heart that
-//! points as far to the left as to the front.
+//! A cut-out about the heart has no ends, and a scan without activity beside the heart no sides; with neither, nothing
+//! is told. Not told: an exchange of both axes across the body, which turns the apex to the right or back, or mirrors a
+//! heart that points as far to the left as to the front.
 
 use crate::geometry::Vec3;
 use crate::grid::Volume;
@@ -47,9 +49,10 @@ impl AxisPair {
     /// Both.
     pub const ALL: [Self; 2] = [Self::SidesAndLength, Self::DepthAndLength];
 
-    /// The score below which these axes count as exchanged. `scripts/calibrate_axes.py` estimates it, .1 below the lowest of
-    /// 280 images that are right or cut out about the heart (.01, -.18). Held out, it tells 69 of 69 exchanged ones and none of
-    /// 276 right ones, for either pair; the highest score of an exchanged one of the estimate is -.32, -.34.
+    /// The score below which these axes count as exchanged. `scripts/measure/calibrate_axes.py` estimates it, .1 below
+    /// the lowest of 280 images that are right or cut out about the heart (.01, -.18). Held out, it tells 69 of 69
+    /// exchanged ones and none of 276 right ones, for either pair; the highest score of an exchanged one of the
+    /// estimate is -.32, -.34.
     pub fn flag_score(self) -> f64 {
         match self {
             AxisPair::SidesAndLength => -0.15,
@@ -65,8 +68,8 @@ impl AxisPair {
         }
     }
 
-    /// How far `from`, a place relative to the heart, lies on the side of liver and gut: below, and to the right or the back.
-    /// An exchange changes its sign.
+    /// How far `from`, a place relative to the heart, lies on the side of liver and gut: below, and to the right or the
+    /// back. An exchange changes its sign.
     fn side(self, from: &Vec3) -> f64 {
         match self {
             AxisPair::SidesAndLength => -from.x - from.z,
@@ -91,8 +94,8 @@ impl Score {
     }
 }
 
-/// The scores of both pairs of axes for a heart at `centre` (LPS mm) with this uptake of its wall in `volume`; `None` where the grid is
-/// oblique, or no body is seen.
+/// The scores of both pairs of axes for a heart at `centre` (LPS mm) with this uptake of its wall in `volume`; `None`
+/// where the grid is oblique, or no body is seen.
 pub fn scores(volume: &Volume, centre: &Vec3, uptake: f64) -> Option<[Score; 2]> {
     let of_patient = patient_axes(volume)?;
     if !(uptake > 0.0) {
@@ -220,7 +223,8 @@ fn sides(volume: &Volume, centre: &Vec3, uptake: f64) -> [f64; 2] {
     balance.map(|sum| sum / weights)
 }
 
-/// The pair of axes that counts as exchanged: of those whose score is below [`AxisPair::flag_score`], that with the lowest.
+/// The pair of axes that counts as exchanged: of those whose score is below [`AxisPair::flag_score`], that with the
+/// lowest.
 pub(super) fn exchanged(volume: &Volume, centre: &Vec3, uptake: f64) -> Option<(AxisPair, Score)> {
     let scores = scores(volume, centre, uptake)?;
     let both = AxisPair::ALL.into_iter().zip(scores);

@@ -1,18 +1,18 @@
 //! Whether the image ends in the wall: at the border of the volume, or at voxels that hold nothing.
 //!
-//! A scan is blurred, so that no value falls to nothing within one voxel. Where it does beside the wall, the image was cut: by
-//! the array, by missing values, or by a constant that stands for them. In: the fitted wall, the volume. Out: the area of
-//! such steps near the wall, cm².
+//! A scan is blurred, so that no value falls to nothing within one voxel. Where it does beside the wall, the image was
+//! cut: by the array, by missing values, or by a constant that stands for them. In: the fitted wall, the volume. Out:
+//! the area of such steps near the wall, cm².
 //!
 //! 1. Voxels that hold nothing: beyond the array, NaN, or in a connected region of one value ([`LEAST_EQUAL_VOXELS`]).
-//! 2. A step is the face between such a voxel and another one that is brighter by more than [`STEP_SHARE`] of the wall's
-//!    uptake, within [`REACH_MM`] of the wall.
-//! 3. An image that was cut and interpolated afterwards, as by a turn of its slices, rises over two voxels: the second one is
-//!    brighter by that much, and the third one hardly brighter than the second ([`LEVEL_SHARE`]). The foot of a blurred wall
-//!    grows steeper there.
+//! 2. A step is the face between such a voxel and another one that is brighter by more than [`STEP_SHARE`] of the
+//!    wall's uptake, within [`REACH_MM`] of the wall.
+//! 3. An image that was cut and interpolated afterwards, as by a turn of its slices, rises over two voxels: the second
+//!    one is brighter by that much, and the third one hardly brighter than the second ([`LEVEL_SHARE`]). The foot of a
+//!    blurred wall grows steeper there.
 //!
-//! Backgrounds of zeros far from the wall make no steps: their neighbours differ little. Plateaus of clipped values make
-//! none: their neighbours are darker.
+//! Backgrounds of zeros far from the wall make no steps: their neighbours differ little. Plateaus of clipped values
+//! make none: their neighbours are darker.
 
 use crate::geometry::Vec3;
 use crate::geometry::bvh::{Aabb, Bvh};
@@ -24,9 +24,10 @@ use crate::model::wall::VentricleWall;
 const LEAST_EQUAL_VOXELS: usize = 50;
 /// Step of an image that was cut, as a share of the wall's uptake.
 const STEP_SHARE: f64 = 0.4;
-/// Most that an image that was interpolated after it was cut rises from the second voxel to the third, as a share of its mean
-/// rise from voxel to voxel before. With 0.25 to 0.5, 40 cuts of 8 simulated hearts (seed 5001), resliced obliquely, have 7 cm² of steps
-/// and more; of 172 whole scans (seeds 5001 and 8801) the largest has 1.2 cm² with 0.35, 2.7 with 0.5 and 5 with 0.7.
+/// Most that an image that was interpolated after it was cut rises from the second voxel to the third, as a share of
+/// its mean rise from voxel to voxel before. With 0.25 to 0.5, 40 cuts of 8 simulated hearts (seed 5001), resliced
+/// obliquely, have 7 cm² of steps and more; of 172 whole scans (seeds 5001 and 8801) the largest has 1.2 cm² with 0.35,
+/// 2.7 with 0.5 and 5 with 0.7.
 const LEVEL_SHARE: f64 = 0.35;
 /// Difference of values that count as one, as a share of the wall's uptake: interpolation rounds a constant.
 const EQUAL_SHARE: f64 = 1e-4;
@@ -42,8 +43,8 @@ struct Ramp {
 }
 
 impl Ramp {
-    /// Whether the image ends here by `least_step` or more: within one voxel, or, where it was interpolated after it was cut,
-    /// within two. Blurred walls rise farther beyond the second voxel.
+    /// Whether the image ends here by `least_step` or more: within one voxel, or, where it was interpolated after it
+    /// was cut, within two. Blurred walls rise farther beyond the second voxel.
     fn is_step(&self, least_step: f64) -> bool {
         let after_two = |[second, third]: [f64; 2]| {
             let rise = second - self.beyond;
@@ -182,8 +183,8 @@ impl Part {
         })
     }
 
-    /// The second and the third voxel inward of the voxel `index`, the first one, against the `way` along `axis`; `None` beyond
-    /// the part or without values.
+    /// The second and the third voxel inward of the voxel `index`, the first one, against the `way` along `axis`;
+    /// `None` beyond the part or without values.
     fn inward(&self, index: usize, axis: usize, way: f64) -> Option<[f64; 2]> {
         let [nx, ny, _] = self.shape;
         let own = [index % nx, index / nx % ny, index / (nx * ny)][axis];
@@ -200,7 +201,8 @@ impl Part {
         Some([value(1)?, value(2)?])
     }
 
-    /// Whether each voxel holds nothing: no value, or that of a connected region of values that differ by `same` at most.
+    /// Whether each voxel holds nothing: no value, or that of a connected region of values that differ by `same` at
+    /// most.
     fn empty(&self, same: f32) -> Vec<bool> {
         let mut empty: Vec<bool> = self.values.iter().map(|value| value.is_nan()).collect();
         let mut seen = empty.clone();

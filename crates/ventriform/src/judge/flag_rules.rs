@@ -22,16 +22,17 @@ const POSITION_FLAG_CONFIDENCE: f64 = 0.6;
 /// apparent wall, 94 by the anatomical one) it costs flags on 4 and 9 more than a limit of 0.5 would. Fits below 0.65
 /// without any other flag reach 0.58 there, and reached 0.62 on a set judged before.
 const FIT_FLAG_PROBABILITY: f64 = 0.7;
-/// Chance of motion from which on it is flagged where it is known that the camera turned: 17 of 18 simulated scans with a
-/// displacement of 6 to 26 mm reach it, and 1 of 81 without (calibrating seeds). By the shape of the wall alone: 21 of
-/// 24, and 9 of 150.
+/// Chance of motion from which on it is flagged where it is known that the camera turned: 17 of 18 simulated scans with
+/// a displacement of 6 to 26 mm reach it, and 1 of 81 without (calibrating seeds). By the shape of the wall alone: 21
+/// of 24, and 9 of 150.
 const MOTION_FLAG_PROBABILITY: f64 = 0.25;
 /// The same where it is not known how the camera turned: cameras that see all angles at once have no views before and
 /// after a motion, and two real scans of such cameras have a chance of 0.29 and more.
 const MOTION_FLAG_PROBABILITY_OF_UNKNOWN_ORBIT: f64 = 0.5;
 
-/// The flags of `model`, fitted to `volume`, judged by `evidence`, and by it a good fit with this `chance`, with a camera
-/// that turned by `orbit`. The number of values, volumes, thickness, length and strain are judged for a ventricle only.
+/// The flags of `model`, fitted to `volume`, judged by `evidence`, and by it a good fit with this `chance`, with a
+/// camera that turned by `orbit`. The number of values, volumes, thickness, length and strain are judged for a
+/// ventricle only.
 pub(super) fn flags(
     model: &FittedModel,
     (evidence, chance): (Option<&Evidence>, f64),
@@ -96,8 +97,9 @@ pub(super) fn with_chance(mut flags: Vec<Flag>, chance: f64, evidence: &Evidence
     flags
 }
 
-/// The chance of a good fit that got these `flags`: it is calibrated on images of uptake that lie in the patient as they
-/// say, and at most 0.5 in a map of labels, in an image whose values are no counts, and in one that looks mirrored.
+/// The chance of a good fit that got these `flags`: it is calibrated on images of uptake that lie in the patient as
+/// they say, and at most 0.5 in a map of labels, in an image whose values are no counts, and in one that looks
+/// mirrored.
 pub(super) fn limited(chance: f64, flags: &[Flag]) -> f64 {
     let outside_of_calibration = |flag: &Flag| {
         matches!(
@@ -178,9 +180,9 @@ fn of_motion_to_rest(model: &FittedModel) -> Vec<Flag> {
     flags
 }
 
-/// Area of a cut image beside the wall from which on it is flagged, cm². Cuts 8 mm deep into the wall of 19 simulated hearts
-/// from two sides have 16 and more, none of the whole scans any; one (filtered backprojection, whose negative values are
-/// 0) has 5 for steps of a quarter of the uptake.
+/// Area of a cut image beside the wall from which on it is flagged, cm². Cuts 8 mm deep into the wall of 19 simulated
+/// hearts from two sides have 16 and more, none of the whole scans any; one (filtered backprojection, whose negative
+/// values are 0) has 5 for steps of a quarter of the uptake.
 const CUT_FLAG_AREA_CM2: f64 = 4.0;
 
 /// The flag of an image that ends in the wall.
@@ -190,24 +192,24 @@ fn cut(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     (area_cm2 >= CUT_FLAG_AREA_CM2).then_some(Flag::FieldOfView { area_cm2 })
 }
 
-/// Part of the long axis's direction to the patient's right, or to the back, from which on a heart is flagged. Axes point 5
-/// degrees or more to the left and to the front in simulated hearts and in all real scans that were looked at; a
-/// fitted axis is off by some degrees.
+/// Part of the long axis's direction to the patient's right, or to the back, from which on a heart is flagged. Axes
+/// point 5 degrees or more to the left and to the front in simulated hearts and in all real scans that were looked at;
+/// a fitted axis is off by some degrees.
 const MIRRORED_SINE: f64 = 0.1;
 /// The same upward: horizontal hearts lie nearly level.
 const UPWARD_SINE: f64 = 0.2;
 /// Greatest angle of the patient's superior direction to the frame's at which the frame's x tells left from right.
 const UPRIGHT_COSINE: f64 = 0.7;
 
-/// Part of the long axis's direction to the patient's left up to which the apex leaves left and right open, so that the liver's
-/// side is asked: 14 degrees. Usual hearts point 27 degrees and more to the left.
+/// Part of the long axis's direction to the patient's left up to which the apex leaves left and right open, so that the
+/// liver's side is asked: 14 degrees. Usual hearts point 27 degrees and more to the left.
 const OPEN_SIDE_SINE: f64 = 0.25;
-/// Share of the bright activity below the heart by which the left outweighs the right from which on a heart is flagged. In 65
-/// simulated scans (seed 8801) the right outweighs the left by 0.02 and more, in four real ones by 0.46 and more.
+/// Share of the bright activity below the heart by which the left outweighs the right from which on a heart is flagged.
+/// In 65 simulated scans (seed 8801) the right outweighs the left by 0.02 and more, in four real ones by 0.46 and more.
 const LIVER_FLAG_SHARE: f64 = 0.25;
 
-/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, of surroundings that
-/// show two exchanged axes, or of a liver on the left below an apex that hardly points to a side.
+/// The flag of an apex that points to the right, to the back or up in a frame that claims a patient, of surroundings
+/// that show two exchanged axes, or of a liver on the left below an apex that hardly points to a side.
 fn mirrored(model: &FittedModel, volume: &Volume) -> Option<Flag> {
     let (cup, orientation) = (model.cup.as_ref()?, model.patient_orientation.as_ref()?);
     let claims =

@@ -16,8 +16,8 @@ pub enum Flag {
     },
     /// The chance of a good fit is below 0.7.
     #[error(
-        "the chance that a reader who draws the visible edge agrees with this mask (Jaccard index 0.75 or more; calibrated on \
-         simulated scans) is {:.0} %: \
+        "the chance that a reader who draws the visible edge agrees with this mask (Jaccard index 0.75 or more; \
+         calibrated on simulated scans) is {:.0} %: \
          edges along {:.0} % of the surface, {residual:.1} mm off in the mean, strain {:.0} %, the \
          wall's thickness scatters by {thickness_spread:.1} mm, its distance from the axis by {:.0} %, \
          hollow by {hollowness:.2}",
@@ -70,9 +70,9 @@ pub enum Flag {
     },
     /// The values of the wall were cut off above.
     #[error(
-        "{:.0} % of the wall's voxels have its greatest value, {}: values were cut off there (saturated at a greatest number, clipped by a \
-         window or a percentile). The wall looks thicker and its defects shallower than they are: send the scan as it was \
-         reconstructed",
+        "{:.0} % of the wall's voxels have its greatest value, {}: values were cut off there (saturated at a greatest \
+         number, clipped by a window or a percentile). The wall looks thicker and its defects shallower than they are: \
+         send the scan as it was reconstructed",
         100.0 * .0.share, .0.value
     )]
     Saturated(Saturation),
@@ -81,15 +81,17 @@ pub enum Flag {
     Background(Background),
     /// Single voxels of the wall outshine it.
     #[error(
-        "{} voxel(s) of the wall outshine all about them; the brightest, {:?} (i, j, k from 0), holds {}, those about it {} at most: \
-         damaged values, by which per cent of uptake are wrong. Replace them by those of their neighbours",
+        "{} voxel(s) of the wall outshine all about them; the brightest, {:?} (i, j, k from 0), holds {}, those about \
+         it {} at most: damaged values, by which per cent of uptake are wrong. Replace them by those of their \
+         neighbours",
         .0.count, .0.index, .0.value, .0.beside
     )]
     HotVoxels(HotVoxels),
     /// The apical wall, or a part of it, is too dark to be seen.
     #[error("{}", dark_apex_text(*uptake, *part))]
     DarkApex {
-        /// Uptake of what is dark of the apical wall, relative to the basal wall ([`DarkPart::Whole`]) or to the brightest.
+        /// Uptake of what is dark of the apical wall, relative to the basal wall ([`DarkPart::Whole`]) or to the
+        /// brightest.
         uptake: f64,
         /// What is dark.
         part: DarkPart,
@@ -124,9 +126,9 @@ pub enum Flag {
     },
     /// Bright activity as the liver's lies on the left, below an apex that hardly points to a side.
     #[error(
-        "{:.0} % of the bright activity below the heart lies to the left of the body's middle, and the apex points to neither side: \
-         left and right may be exchanged in the file (compare with another view: the liver lies on the right). The sides of the \
-         polar map are those of the file",
+        "{:.0} % of the bright activity below the heart lies to the left of the body's middle, and the apex points to \
+         neither side: left and right may be exchanged in the file (compare with another view: the liver lies on the \
+         right). The sides of the polar map are those of the file",
         100.0 * share
     )]
     LiverOnTheLeft {
@@ -143,9 +145,9 @@ pub enum Flag {
     },
     /// The image ends in the wall.
     #[error(
-        "the image ends in the wall: over {area_cm2:.0} cm² beside it, values stop at the volume's border, or at voxels that hold \
-         nothing (missing, or one constant). Volumes and the polar map are wrong there by an unknown part: send the whole field \
-         of view"
+        "the image ends in the wall: over {area_cm2:.0} cm² beside it, values stop at the volume's border, or at \
+         voxels that hold nothing (missing, or one constant). Volumes and the polar map are wrong there by an unknown \
+         part: send the whole field of view"
     )]
     FieldOfView {
         /// Area of the cut near the wall, cm².
@@ -195,12 +197,12 @@ fn dark_apex_text(uptake: f64, part: DarkPart) -> String {
     let percent = 100.0 * uptake;
     match part {
         DarkPart::Whole => format!(
-            "the apical wall takes up {percent:.0} % as much as the basal one: the length of the model is that of a mean \
-             heart of this breadth"
+            "the apical wall takes up {percent:.0} % as much as the basal one: the length of the model is that of a \
+             mean heart of this breadth"
         ),
         DarkPart::AllRound => format!(
-            "the apical wall takes up {percent:.0} % as much as the brightest, all round: the model may end short of the \
-             apex, its cavity and wall be too small"
+            "the apical wall takes up {percent:.0} % as much as the brightest, all round: the model may end short of \
+             the apex, its cavity and wall be too small"
         ),
         DarkPart::Sector { degrees } => format!(
             "over {degrees:.0} degrees of its circumference the apical wall takes up {percent:.0} % as much as the \
@@ -218,15 +220,15 @@ fn background_text(found: &Background) -> String {
     let percent = 100.0 * of_uptake;
     if *value < 0.0 {
         format!(
-            "the background is negative: it lies at {value}, {percent:.0} % of the wall's uptake, and {:.0} % of all voxels are below 0: \
-             values were scaled or shifted, or padded below 0. Per cent of uptake are wrong: send counts, which begin at 0 (subtract \
-             the background's value, or set padding to 0)",
+            "the background is negative: it lies at {value}, {percent:.0} % of the wall's uptake, and {:.0} % of all \
+             voxels are below 0: values were scaled or shifted, or padded below 0. Per cent of uptake are wrong: send \
+             counts, which begin at 0 (subtract the background's value, or set padding to 0)",
             100.0 * negative
         )
     } else {
         format!(
-            "no part of the volume is dark: hardly a voxel is below {value}, {percent:.0} % of the wall's uptake. A constant was added, or \
-             an intercept left out: per cent of uptake are wrong. Send counts, which begin at 0"
+            "no part of the volume is dark: hardly a voxel is below {value}, {percent:.0} % of the wall's uptake. A \
+             constant was added, or an intercept left out: per cent of uptake are wrong. Send counts, which begin at 0"
         )
     }
 }
@@ -253,9 +255,9 @@ fn exchanged_text(pair: AxisPair, score: &Score) -> String {
         String::new()
     };
     format!(
-        "{axes} are probably exchanged, which mirrors the heart (an array in {order} order with the affine of its image): the body is cut \
-         off {ends} more than above and below (logarithm of the ends' areas {:.2}, usually above 0){liver}. Transpose the array. \
-         The sides of the polar map are those of the file",
+        "{axes} are probably exchanged, which mirrors the heart (an array in {order} order with the affine of its \
+         image): the body is cut off {ends} more than above and below (logarithm of the ends' areas {:.2}, usually \
+         above 0){liver}. Transpose the array. The sides of the polar map are those of the file",
         score.ends
     )
 }
@@ -297,9 +299,9 @@ fn mirrored_text(towards: ApexDirection, degrees: f64) -> String {
              (compare with another view: the spine lies behind). The sides of the polar map are those of the file"
         ),
         ApexDirection::Superior => format!(
-            "the apex points {degrees:.0} degrees up: up and down may be exchanged in the file (compare with another view: \
-             the liver lies below the heart). The sides of the polar map are those of the file: a defect named anterior may \
-             be inferior"
+            "the apex points {degrees:.0} degrees up: up and down may be exchanged in the file (compare with another \
+             view: the liver lies below the heart). The sides of the polar map are those of the file: a defect named \
+             anterior may be inferior"
         ),
     }
 }

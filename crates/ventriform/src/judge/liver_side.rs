@@ -1,7 +1,8 @@
 //! The side of the body on which bright activity lies below the heart: the liver's.
 //!
-//! In: the volume, the fitted cup and the wall's uptake, in a frame whose x runs to the patient's left and z up. Out: how much
-//! more of that activity lies to the right of the body's middle than to the left. Gut and spleen on the left are smaller.
+//! In: the volume, the fitted cup and the wall's uptake, in a frame whose x runs to the patient's left and z up. Out:
+//! how much more of that activity lies to the right of the body's middle than to the left. Gut and spleen on the left
+//! are smaller.
 
 use crate::geometry::Vec3;
 use crate::grid::Volume;
@@ -22,8 +23,8 @@ const BEYOND_SIDE_SHARE: f64 = 0.02;
 /// Step from voxel to voxel, along each axis.
 const STRIDE: usize = 2;
 
-/// The share of the bright activity below the heart that lies to the patient's right of the body's middle, less that on the
-/// left: -1..=1; `None` where there is too little of it.
+/// The share of the bright activity below the heart that lies to the patient's right of the body's middle, less that on
+/// the left: -1..=1; `None` where there is too little of it.
 pub(super) fn liver_side(volume: &Volume, cup: &Cup, uptake: f64) -> Option<f64> {
     let [nx, ny, nz] = volume.shape;
     let reach = 0.5 * cup.length + HEART_MARGIN_MM;
@@ -67,7 +68,8 @@ mod tests {
     use super::*;
     use crate::geometry::frame::VoxelToPatient;
 
-    /// The side of a bright ball at `x` mm to the left, `down` mm below the heart's centre, in a body that is not bright.
+    /// The side of a bright ball at `x` mm to the left, `down` mm below the heart's centre, in a body that is not
+    /// bright.
     fn side(x: f64, down: f64, radius: f64) -> Option<f64> {
         let frame = VoxelToPatient::centred([64; 3], [5.0; 3], Vec3::zeros()).unwrap();
         let centre = Vec3::new(40.0, -20.0, 30.0);

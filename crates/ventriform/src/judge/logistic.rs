@@ -6,7 +6,7 @@ const MAX_DEVIATIONS: f64 = 4.0;
 /// One term of a weighted sum.
 #[derive(Debug)]
 pub struct Term {
-    /// The figure, as `scripts/calibrate.py` names it.
+    /// The figure, as `scripts/measure/calibrate.py` names it.
     pub name: &'static str,
     /// Mean of the figure over the calibration set; 0 for a figure that enters as it is.
     pub mean: f64,

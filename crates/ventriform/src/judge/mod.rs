@@ -6,8 +6,8 @@
 //! 1. [`evidence`]: figures of the wall as the sensors left it, before its base plane was put;
 //!    [`motion`]: whether the projections of the image show the wall in two positions.
 //! 2. [`confidence`]: the chances of a good fit, of motion and of a heart, by calibrated logistic models.
-//! 3. [`flags`]: the warnings, by [`flag_rules`], among them [`values`] (no counts) and [`exchanged_axes`]; [`uncertainty`] and [`volume_intervals`]: how far each node and the
-//!    volumes may be off.
+//! 3. [`flags`]: the warnings, by [`flag_rules`], among them [`values`] (no counts) and [`exchanged_axes`];
+//!    [`uncertainty`] and [`volume_intervals`]: how far each node and the volumes may be off.
 //! 4. [`septum`]: whether the fit is to be made again without the septum's sensors; [`refusal`]: whether it is a
 //!    heart at all.
 //! 5. [`consensus`]: of several models' fits to one volume, the judgement of the chosen one by all of them.
@@ -57,9 +57,9 @@ use motion::Views;
 /// The chance that a fitted model is right, its reasons, and warnings.
 #[derive(Debug, Clone)]
 pub struct Judgement {
-    /// Of a ventricle, the chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of 0.75
-    /// or more, calibrated on simulated scans ([`confidence::of_agreement`]). Of other organs, half the share of the surface that
-    /// sees an edge, at most 0.5.
+    /// Of a ventricle, the chance that a reader who draws the visible edge agrees with the mask by a Jaccard index of
+    /// 0.75 or more, calibrated on simulated scans ([`confidence::of_agreement`]). Of other organs, half the share of
+    /// the surface that sees an edge, at most 0.5.
     pub confidence: f64,
     /// Confidence of the model's position, 0 (a guess) to 1 ([`confidence::of_position`]).
     pub position_confidence: f64,

@@ -11,8 +11,8 @@ use crate::deform::FittedModel;
 use crate::locate::{Hints, LocateError, NotAHeart};
 
 /// Where [`confidence::of_heart`] does not decide, a fitted model is no heart if less than this share of its
-/// area sees an edge, and the edges are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most 1.15,
-/// also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
+/// area sees an edge, and the edges are farther away than this (weighted rms, mm). Hearts have at least 0.63 or at most
+/// 1.15, also with 100 % defects over seven segments; noise has at most 0.51 and at least 1.6.
 const NO_WALL_EDGE_LIMITS: (f64, f64) = (0.57, 1.3);
 
 /// Likewise, if the search's confidence and the chance of a good fit are below one

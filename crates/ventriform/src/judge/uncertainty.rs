@@ -8,9 +8,10 @@
 //! the fits of the other built-in hearts, the logarithm of the odds of a good fit, and the way from
 //! apex to rim. The coefficients are a quantile regression: 68 % of the nodes are to lie nearer to the wall
 //! (the apparent one to an expert's mask, the anatomical one to the true wall). They come from 23250 nodes
-//! (`scripts/calibrate_walls.py` estimates them again) of 155 simulated hearts of the seeds that [`confidence`] is calibrated on. There 70 %
-//! lie within one standard deviation and 93 and 91 % within two (each heart left out with a fifth of
-//! all), about as many where the result is small as where it is great. docs/log/walls.md has the figures of held-out hearts.
+//! (`scripts/measure/calibrate_walls.py` estimates them again) of 155 simulated hearts of the seeds that [`confidence`]
+//! is calibrated on. There 70 % lie within one standard deviation and 93 and 91 % within two (each heart left out with
+//! a fifth of all), about as many where the result is small as where it is great. docs/log/walls.md has the figures of
+//! held-out hearts.
 //!
 //! Not guaranteed: a heart in the wrong place. Its nodes are as near to each other's fits as those of a right one.
 

@@ -1,4 +1,4 @@
-//! Constants of the uncertainty of nodes. Written by `scripts/calibrate_walls.py`: do not edit.
+//! Constants of the uncertainty of nodes. Written by `scripts/measure/calibrate_walls.py`: do not edit.
 //!
 //! In: nodes of fits to simulated hearts, and their distances from the walls. Out: the logarithm of the distance within
 //! which 68 % of the nodes lie, mm.

@@ -1,16 +1,18 @@
 //! Whether the values of a volume are those of a scan: counts, or what is proportional to them.
 //!
 //! Uptake in per cent needs a scale that begins at nothing and ends nowhere. A converter, an export for a screen or the
-//! preparation for training may cut values off, shift them, or scale them about their mean; single damaged voxels may outshine
-//! the rest. In: the fitted wall, the volume. Out: the figures of what is wrong.
+//! preparation for training may cut values off, shift them, or scale them about their mean; single damaged voxels may
+//! outshine the rest. In: the fitted wall, the volume. Out: the figures of what is wrong.
 //!
-//! 1. Saturation ([`Saturation`]): many voxels of the wall have its greatest value, and far fewer a value just below. A blurred
-//!    image has one or two there.
-//! 2. Background ([`Background`]): the volume's lowest value is below zero and held by many voxels, or half of the voxels lie below
-//!    zero; or hardly any voxel is near zero. Noise of filtered backprojection lies about zero, and no two of its voxels are alike.
+//! 1. Saturation ([`Saturation`]): many voxels of the wall have its greatest value, and far fewer a value just below. A
+//!    blurred image has one or two there.
+//! 2. Background ([`Background`]): the volume's lowest value is below zero and held by many voxels, or half of the
+//!    voxels lie below zero; or hardly any voxel is near zero. Noise of filtered backprojection lies about zero, and no
+//!    two of its voxels are alike.
 //! 3. Hot voxels ([`HotVoxels`]): single voxels of the wall are far brighter than those about them.
 //!
-//! Each figure is relative to the wall, so that cut organs beside it, padding at zero and the border's artefacts say nothing.
+//! Each figure is relative to the wall, so that cut organs beside it, padding at zero and the border's artefacts say
+//! nothing.
 
 use crate::grid::Volume;
 use crate::model::wall::VentricleWall;
@@ -18,13 +20,13 @@ use std::collections::BTreeSet;
 
 /// Relative difference of values that count as the greatest one.
 const EQUAL_SHARE: f32 = 1e-3;
-/// Share of the wall's voxels with its greatest value from which on it is cut off. In 31 simulated scans at most two voxels of
-/// a thousand have it, in the real ones one or two voxels.
+/// Share of the wall's voxels with its greatest value from which on it is cut off. In 31 simulated scans at most two
+/// voxels of a thousand have it, in the real ones one or two voxels.
 const SATURATED_SHARE: f64 = 0.02;
 /// Least number of such voxels.
 const LEAST_SATURATED: usize = 6;
-/// How many times more there are of them than just below it. Of whole numbers of few counts each is held by many voxels, the
-/// greatest by fewest.
+/// How many times more there are of them than just below it. Of whole numbers of few counts each is held by many
+/// voxels, the greatest by fewest.
 const SATURATED_TIMES: usize = 2;
 /// The range just below the greatest value, as a share of it; at least the step to the next value.
 const BELOW_SHARE: f32 = 0.01;
@@ -230,7 +232,8 @@ mod tests {
     use crate::geometry::Vec3;
     use crate::geometry::frame::VoxelToPatient;
 
-    /// A blurred shell of uptake 100 with a dark side in a body of 10, with noise, in air; and the numbers of its wall's voxels.
+    /// A blurred shell of uptake 100 with a dark side in a body of 10, with noise, in air; and the numbers of its
+    /// wall's voxels.
     fn scan() -> (Volume, Vec<usize>) {
         let shape = [40; 3];
         let frame = VoxelToPatient::centred(shape, [5.0; 3], Vec3::zeros()).unwrap();

@@ -1,4 +1,4 @@
-//! Constants of the intervals about the volumes of a fit. Written by `scripts/calibrate_intervals.py`: do not edit.
+//! Constants of the intervals about the volumes of a fit. Written by `scripts/measure/calibrate_intervals.py`: do not edit.
 //!
 //! In: volumes of fits to simulated hearts, and the true ones. Out: mean and deviation of the error.
 

@@ -1,9 +1,9 @@
 //! The intervals of the volumes of the anatomical wall and of its cavity.
 //!
-//! In: both volumes and the share of the wall that is dark. Out: intervals that hold the true volumes in nine of ten hearts,
-//! as those of a beat do ([`crate::numeric::error_terms`]): wider where the wall is dark and, of the cavity, where it is small.
-//! The constants ([`super::volume_calibration`]) are estimated from simulated hearts of all kinds, lost fits among them.
-//! docs/log/walls.md has the figures of held-out hearts.
+//! In: both volumes and the share of the wall that is dark. Out: intervals that hold the true volumes in nine of ten
+//! hearts, as those of a beat do ([`crate::numeric::error_terms`]): wider where the wall is dark and, of the cavity,
+//! where it is small. The constants ([`super::volume_calibration`]) are estimated from simulated hearts of all kinds,
+//! lost fits among them. docs/log/walls.md has the figures of held-out hearts.
 //!
 //! Not guaranteed: other ways of drawing where the ventricle ends at its base. The simulator's true cavity ends at the
 //! plane of the rim.
@@ -20,8 +20,8 @@ pub struct VolumeIntervals {
 }
 
 impl VolumeIntervals {
-    /// About the volumes that were found, ml, where `dark_share` of the wall takes up less than half as much as its bright part
-    /// does.
+    /// About the volumes that were found, ml, where `dark_share` of the wall takes up less than half as much as its
+    /// bright part does.
     pub fn about(wall_ml: f64, cavity_ml: f64, dark_share: f64) -> Self {
         let dark_share = dark_share.clamp(0.0, 1.0);
         Self {

@@ -13,7 +13,8 @@ pub enum LocateError {
     #[error("the volume shows nothing: it holds no positive values that differ")]
     Blank,
     /// No place looks like a ventricle.
-    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), {reason}{}", .size.as_ref().map(|size| size.to_string()).unwrap_or_default())]
+    #[error("no heart found: the best candidate, at {centre:.0?} mm (LPS), \
+        {reason}{}", .size.as_ref().map(|size| size.to_string()).unwrap_or_default())]
     NoHeart {
         /// Best candidate's centre, LPS mm.
         centre: [f64; 3],

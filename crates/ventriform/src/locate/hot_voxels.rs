@@ -1,8 +1,9 @@
 //! Single voxels that outshine a volume, as damaged values do.
 //!
-//! The search for the heart measures brightness by the volume's greatest value. In a blurred image that is the peak of something as
-//! wide as the blur. In: a volume. Out: [`Outshone`] where a few voxels are many times brighter than as many millilitres as the
-//! smallest source takes up. The border's artefacts of real scans, hot gut and bladders are not.
+//! The search for the heart measures brightness by the volume's greatest value. In a blurred image that is the peak of
+//! something as wide as the blur. In: a volume. Out: [`Outshone`] where a few voxels are many times brighter than as
+//! many millilitres as the smallest source takes up. The border's artefacts of real scans, hot gut and bladders are
+//! not.
 
 use crate::grid::volume::Volume;
 
@@ -16,8 +17,8 @@ const LEAST_APART: usize = 12;
 /// A few voxels outshine all others.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
-    "{count} voxel(s) outshine all others: that at {index:?} (i, j, k from 0) holds {value}, {:.0} times as much as the rest, which reaches \
-     {rest}: damaged values, of no scan",
+    "{count} voxel(s) outshine all others: that at {index:?} (i, j, k from 0) holds {value}, {:.0} times as much as \
+     the rest, which reaches {rest}: damaged values, of no scan",
     value / rest
 )]
 pub struct Outshone {

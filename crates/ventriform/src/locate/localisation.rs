@@ -32,8 +32,8 @@ pub struct Localisation {
     /// Uptake of the apical wall against the basal one, if the apical wall does not show (less than
     /// 0.42): place and length then come from the base.
     pub dark_apex: Option<f64>,
-    /// The best correlation at a place more than 25 mm away, if there was a candidate; none was looked for where rays and cup
-    /// agree on the heart.
+    /// The best correlation at a place more than 25 mm away, if there was a candidate; none was looked for where rays
+    /// and cup agree on the heart.
     pub runner_up: Option<f64>,
     /// Whether an infarct left only a part of the wall to tell the place.
     pub infarcted: bool,
@@ -55,7 +55,8 @@ impl Cups {
     /// Searches the whole of `volume`.
     ///
     /// # Errors
-    /// [`LocateError::Blank`], [`LocateError::NoCandidate`], [`LocateError::HintOutside`] or [`LocateError::Cancelled`].
+    /// [`LocateError::Blank`], [`LocateError::NoCandidate`], [`LocateError::HintOutside`] or
+    /// [`LocateError::Cancelled`].
     pub fn everywhere(
         volume: &Volume,
         hints: &Hints,
@@ -196,8 +197,8 @@ pub fn of_model(volume: &Volume, monitor: &Monitor) -> Result<Localisation, Loca
     Ok(cups.localisation(cups.best(|_| true)?))
 }
 
-/// As [`of_model`] for a model whose cavity lies about `middle` (LPS mm): the search starts there alone. Where the cup that
-/// it finds is not [clear](super::CLEAR_CORRELATION), the whole picture is searched.
+/// As [`of_model`] for a model whose cavity lies about `middle` (LPS mm): the search starts there alone. Where the cup
+/// that it finds is not [clear](super::CLEAR_CORRELATION), the whole picture is searched.
 ///
 /// # Errors
 /// [`LocateError`].

@@ -75,8 +75,8 @@ pub enum MeshFileError {
     },
     /// Edges whose triangles do not lie on opposite sides.
     #[error(
-        "the triangles have no common orientation: at {edges} edges they traverse the edge in the same direction, at the \
-         first from {from} to {to}"
+        "the triangles have no common orientation: at {edges} edges they traverse the edge in the same direction, at \
+         the first from {from} to {to}"
     )]
     Orientation {
         /// Their number.

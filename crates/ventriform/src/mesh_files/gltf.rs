@@ -1,8 +1,8 @@
 //! glTF 2.0: GLB, and JSON with its buffers embedded.
 //!
-//! The triangles (also strips and fans) of every mesh that the scene shows, at the place where its nodes put it. Positions in
-//! files of our own are taken as they are stored, LPS millimetres; of others they are those of the world, which has Y up
-//! and metres. Not read: buffers in other files, sparse accessors, required extensions.
+//! The triangles (also strips and fans) of every mesh that the scene shows, at the place where its nodes put it.
+//! Positions in files of our own are taken as they are stored, LPS millimetres; of others they are those of the world,
+//! which has Y up and metres. Not read: buffers in other files, sparse accessors, required extensions.
 
 use super::MeshFormat;
 use super::error::MeshFileError;

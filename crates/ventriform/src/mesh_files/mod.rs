@@ -10,20 +10,21 @@
 //!    are split into triangles from their first corner, strips into their triangles. Lines and single points are no
 //!    surface and are left out.
 //! 3. `weld`: STL names no shared vertices, and others often repeat them. Points with exactly equal coordinates
-//!    become one vertex, of STL always, of the others where the surface is not closed as it stands. If edges are still open,
-//!    points within 2^-20 of the greatest coordinate (a ten-thousandth of a millimetre at 100 mm) become one.
+//!    become one vertex, of STL always, of the others where the surface is not closed as it stands. If edges are still
+//!    open, points within 2^-20 of the greatest coordinate (a ten-thousandth of a millimetre at 100 mm) become one.
 //!    Triangles that lose their area by that, and vertices without triangle, are left out.
 //! 4. `closed`: every edge must have as many triangles on one side as on the other.
-//! 5. Unit and frame: what the file says, or the caller. Files of our own and of 3D Slicer say `SPACE=LPS` or `SPACE=RAS`,
-//!    ours `UNIT=mm` also. Without that: millimetres, LPS; of glTF metres, Y up, as its specification says. The size
-//!    of a mesh whose unit nobody states must be that of an organ.
+//! 5. Unit and frame: what the file says, or the caller. Files of our own and of 3D Slicer say `SPACE=LPS` or
+//!    `SPACE=RAS`, ours `UNIT=mm` also. Without that: millimetres, LPS; of glTF metres, Y up, as its specification
+//!    says. The size of a mesh whose unit nobody states must be that of an organ.
 //! 6. A surface whose triangles face inward is turned.
 //!
 //! Guaranteed: never a panic. No memory is taken by a count in a file before the bytes for it are there: at most
-//! about eight times the size of the file, arrays of packed VTP files counted unpacked. The same bytes give the same mesh.
+//! about eight times the size of the file, arrays of packed VTP files counted unpacked. The same bytes give the same
+//! mesh.
 //!
-//! Not guaranteed: that the surface does not intersect itself, or touches itself nowhere: an edge may have four triangles.
-//! [`topology::check`](crate::mesh::topology::check) tells a manifold.
+//! Not guaranteed: that the surface does not intersect itself, or touches itself nowhere: an edge may have four
+//! triangles. [`topology::check`](crate::mesh::topology::check) tells a manifold.
 
 mod closed;
 mod cursor;
@@ -268,9 +269,13 @@ fn finish(
         *p = lps * scale;
     }
     if frame.is_none() {
-        notes.push(if world { "The file does not say which way the patient lies; the axes of glTF were assumed: x to the left, \
-                     y to superior, z to anterior."
-                .into() } else { "The file does not say in which frame its coordinates are; LPS was assumed.".into() });
+        notes.push(if world {
+            "The file does not say which way the patient lies; the axes of glTF were assumed: x to \
+                     the left, y to superior, z to anterior."
+                .into()
+        } else {
+            "The file does not say in which frame its coordinates are; LPS was assumed.".into()
+        });
     }
     if unit.is_none() {
         let assumed = if world {

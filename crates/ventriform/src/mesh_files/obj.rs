@@ -31,8 +31,8 @@ const SKIPPED_STATEMENTS: [&[u8]; 17] = [
     b"d_interp",
 ];
 
-/// Whether a file that begins with `start` is an OBJ file: its lines are statements of OBJ, and a vertex or a comment that
-/// names the frame or the format is among them.
+/// Whether a file that begins with `start` is an OBJ file: its lines are statements of OBJ, and a vertex or a comment
+/// that names the frame or the format is among them.
 pub(super) fn is_obj(start: &[u8]) -> bool {
     let mut known = false;
     // The last line may be cut off.

@@ -1,7 +1,7 @@
 //! PLY 1.0: elements with properties, as text or in binary of either byte order.
 //!
-//! Of the element `vertex` x, y and z are read, of `face` the list `vertex_indices` (or `vertex_index`); all else is passed
-//! over. Triangle strips (`tristrips`) are refused.
+//! Of the element `vertex` x, y and z are read, of `face` the list `vertex_indices` (or `vertex_index`); all else is
+//! passed over. Triangle strips (`tristrips`) are refused.
 
 use super::MeshFormat;
 use super::cursor::{Cursor, words};

@@ -1,7 +1,8 @@
 //! Whether a mesh is as large as an organ.
 //!
-//! A ventricle is 60 to 130 mm long, that of an infant 25 mm, a liver 250 mm. The unit of a mesh whose greatest extent lies
-//! outside [`MIN_EXTENT_MM`] to [`MAX_EXTENT_MM`] must be stated, so that metres or centimetres are never read as millimetres.
+//! A ventricle is 60 to 130 mm long, that of an infant 25 mm, a liver 250 mm. The unit of a mesh whose greatest extent
+//! lies outside [`MIN_EXTENT_MM`] to [`MAX_EXTENT_MM`] must be stated, so that metres or centimetres are never read as
+//! millimetres.
 
 use super::statement::MeshUnit;
 use crate::geometry::bvh::Aabb;
@@ -14,7 +15,8 @@ const MAX_EXTENT_MM: f64 = 500.0;
 
 /// An extent that is not that of an organ.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the mesh is {extent} {} across, which is no organ: one is {MIN_EXTENT_MM} to {MAX_EXTENT_MM} mm across{}", unit.as_str(), self.guess())]
+#[error("the mesh is {extent} {} across, which is no organ: one is {MIN_EXTENT_MM} to {MAX_EXTENT_MM} mm \
+    across{}", unit.as_str(), self.guess())]
 pub struct UnlikelySize {
     /// Greatest extent along an axis, in `unit`.
     pub extent: f64,

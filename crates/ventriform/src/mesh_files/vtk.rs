@@ -251,8 +251,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Passes over texts: lines, or in binary a length in 1, 2, 4 or 8 bytes (told by the upper two bits of the first) and
-    /// the bytes.
+    /// Passes over texts: lines, or in binary a length in 1, 2, 4 or 8 bytes (told by the upper two bits of the first)
+    /// and the bytes.
     fn texts(&mut self, entries: u64) -> Result<(), MeshFileError> {
         for _ in 0..self.cursor.require(entries, 1, "texts")? {
             if !self.binary {

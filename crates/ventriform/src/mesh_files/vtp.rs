@@ -1,5 +1,5 @@
-//! VTK XML PolyData: text, base64 within the tags, or appended as base64 or raw bytes; plain or packed by zlib; both byte
-//! orders; 32- and 64-bit headers; several pieces.
+//! VTK XML PolyData: text, base64 within the tags, or appended as base64 or raw bytes; plain or packed by zlib; both
+//! byte orders; 32- and 64-bit headers; several pieces.
 //!
 //! After "VTK XML Formats". The field data `SPACE` and `UNIT` say frame and unit.
 
@@ -306,8 +306,8 @@ impl File<'_> {
         Ok(bytes[..end.unwrap_or(bytes.len())].to_vec())
     }
 
-    /// The bytes of an array that is not text: after a header that states their number, or with packed arrays the numbers of
-    /// blocks and bytes.
+    /// The bytes of an array that is not text: after a header that states their number, or with packed arrays the
+    /// numbers of blocks and bytes.
     fn bytes(&mut self, content: Content<'_>) -> Result<Vec<u8>, MeshFileError> {
         let (source, raw) = match content {
             Content::Text(text) | Content::Base64(text) => (text, false),

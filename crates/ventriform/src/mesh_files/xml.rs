@@ -1,7 +1,7 @@
 //! The tags of a VTP file, one after the other.
 //!
-//! VTK's files may hold raw bytes after their last tag, which is not XML; parsers of XML refuse such files. Entities and
-//! document types, which nothing here needs, are refused.
+//! VTK's files may hold raw bytes after their last tag, which is not XML; parsers of XML refuse such files. Entities
+//! and document types, which nothing here needs, are refused.
 
 use super::MeshFormat;
 use super::error::MeshFileError;

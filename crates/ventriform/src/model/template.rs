@@ -137,9 +137,9 @@ fn check(mesh: &TriMesh) -> Result<(), TemplateError> {
     Ok(())
 }
 
-/// The cup of `mesh`, a ventricle's wall, as [`Template::new`] finds it but for the search's last steps: within 2 mm and
-/// 3 degrees for the built-in hearts. The search starts at the middle of the mesh alone, which takes a fifth off the time
-/// of a model from file to file.
+/// The cup of `mesh`, a ventricle's wall, as [`Template::new`] finds it but for the search's last steps: within 2 mm
+/// and 3 degrees for the built-in hearts. The search starts at the middle of the mesh alone, which takes a fifth off
+/// the time of a model from file to file.
 ///
 /// # Errors
 /// [`TemplateError`], as [`Template::new`].

@@ -92,7 +92,8 @@ pub fn group_of(
     let excluded = odd.iter().map(|(person, judged)| ExcludedCase {
         case: person.case.case.clone(),
         reason: format!(
-            "{:.1} % of the wall lies beyond the limits of the others; at most {MOST_EXTENT_PERCENT:.0} % is taken for normal",
+            "{:.1} % of the wall lies beyond the limits of the others; at most {MOST_EXTENT_PERCENT:.0} % is taken for \
+             normal",
             judged.extent_percent
         ),
     });

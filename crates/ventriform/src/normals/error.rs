@@ -73,7 +73,8 @@ pub enum NormalsError {
     Unoriented,
     /// Too little of the wall has both muscle and limits.
     #[error(
-        "only {percent:.0} % of the wall can be compared with the normal limits: the base is masked, or the wall has no uptake"
+        "only {percent:.0} % of the wall can be compared with the normal limits: the base is masked, or the wall has \
+         no uptake"
     )]
     TooLittleWall {
         /// Share of the wall.

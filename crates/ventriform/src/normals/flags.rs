@@ -85,15 +85,18 @@ impl fmt::Display for NormalsFlag {
             ),
             Self::OtherVersion { built } => write!(
                 f,
-                "the normal limits were built by version {built} of this program: build them again, or make sure that its fits are those of this version"
+                "the normal limits were built by version {built} of this program: build them again, or make sure that \
+                 its fits are those of this version"
             ),
             Self::MaskedBase { percent } => write!(
                 f,
-                "{percent:.0} % of the basal segments' wall has no limits or lies beyond the muscle's end: their scores stand on the rest"
+                "{percent:.0} % of the basal segments' wall has no limits or lies beyond the muscle's end: their \
+                 scores stand on the rest"
             ),
             Self::FewMatched { percent } => write!(
                 f,
-                "only {percent:.0} % of the wall looks normal, and the scan was scaled by that part: all deficits share its error"
+                "only {percent:.0} % of the wall looks normal, and the scan was scaled by that part: all deficits \
+                 share its error"
             ),
         }
     }

@@ -1,9 +1,10 @@
-//! The patterns in which healthy hearts differ from their mean as a whole: attenuation, the apex's own uptake, the position in the chest.
+//! The patterns in which healthy hearts differ from their mean as a whole: attenuation, the apex's own uptake, the
+//! position in the chest.
 //!
-//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`PATTERN_TERMS`] smooth functions of the place, with
-//! coefficients that vary from person to person. Their covariance among the healthy is part of the limits. It is the
-//! prior of a scan's own coefficients, so that what healthy people vary in is taken off before a place is called low,
-//! while a defect, which no healthy person has, hardly is.
+//! The ratio of a healthy scan to the normal mean is 1 plus a sum of [`PATTERN_TERMS`] smooth functions of the place,
+//! with coefficients that vary from person to person. Their covariance among the healthy is part of the limits. It is
+//! the prior of a scan's own coefficients, so that what healthy people vary in is taken off before a place is called
+//! low, while a defect, which no healthy person has, hardly is.
 
 use crate::polar::{RAY_COLUMNS, RAY_ROWS};
 use nalgebra::{SMatrix, SVector};

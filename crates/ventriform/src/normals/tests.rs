@@ -429,8 +429,8 @@ fn a_file_is_read_as_it_was_written_and_not_if_it_was_edited() {
     }
 }
 
-/// Lists are read up to the length that they may have, and parameters have nothing in them: what they are parsed to could
-/// have 50 times the bytes of the text.
+/// Lists are read up to the length that they may have, and parameters have nothing in them: what they are parsed to
+/// could have 50 times the bytes of the text.
 #[test]
 fn what_is_longer_than_any_limits_is_refused_before_it_is_all_read() {
     let text = file().to_json();

@@ -134,8 +134,8 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
             example: "stress",
         },
         default: "",
-        summary: "The protocol of the scan at stress, as the normal limits name it. Default: the only one with the word \
-                  stress in its name",
+        summary: "The protocol of the scan at stress, as the normal limits name it. Default: the only one with the \
+                  word stress in its name",
         read: |d, v| {
             d.stress_protocol = Some(scan_name(v.text())?);
             Ok(())
@@ -182,55 +182,57 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
         "stress_center",
         stress_correction.center,
         stated_point,
-        "A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart \
-         is searched for"
+        "A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
+         Default: the heart is searched for"
     ),
     in_scan!(
         "stress_axis",
         stress_correction.axis,
         direction,
-        "Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 degrees of it"
+        "Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 \
+         degrees of it"
     ),
     in_scan!(
         "stress_base",
         stress_correction.base,
         stated_point,
-        "A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put there. Default: \
-         where image and anatomy put it"
+        "A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put \
+         there. Default: where image and anatomy put it"
     ),
     in_scan!(
         "stress_segments_from",
         stress_correction.segments_from,
         direction,
-        "Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. Default: the \
-         anterior wall"
+        "Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. \
+         Default: the anterior wall"
     ),
     in_scan!(
         "rest_center",
         rest_correction.center,
         stated_point,
-        "A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. Default: the heart \
-         is searched for"
+        "A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
+         Default: the heart is searched for"
     ),
     in_scan!(
         "rest_axis",
         rest_correction.axis,
         direction,
-        "Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 degrees of it"
+        "Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 \
+         degrees of it"
     ),
     in_scan!(
         "rest_base",
         rest_correction.base,
         stated_point,
-        "A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put there. Default: \
-         where image and anatomy put it"
+        "A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put \
+         there. Default: where image and anatomy put it"
     ),
     in_scan!(
         "rest_segments_from",
         rest_correction.segments_from,
         direction,
-        "Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. Default: the \
-         anterior wall"
+        "Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. \
+         Default: the anterior wall"
     ),
 ];
 

@@ -224,7 +224,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "tracer",
         tracer,
         "Tc-99m tetrofosmin",
-        "The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the only one that they have"
+        "The scan's tracer, as the normal limits name it. Default: the one that a DICOM header's text names, or the \
+         only one that they have"
     ),
     ParameterSpec {
         name: "attenuation_corrected",
@@ -459,9 +460,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "orbit",
         deform.orbit,
         "auto",
-        "How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that motion of the \
-         patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan Arc (0018,1143); PET: none); \
-         where it does not, motion is flagged only from a chance of one half on",
+        "How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that \
+         motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan \
+         Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on",
         "auto" => Orbit::Auto,
         "none" => Orbit::None,
         "180" => Orbit::Half,

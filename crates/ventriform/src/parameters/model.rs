@@ -75,7 +75,8 @@ impl ModelParameters {
             });
         }
         // The paper's method takes the surface as it is, spreads the points evenly, leaves them on it and
-        // flips by its raw form. Denoising, varying density, fit, further starts and the guard belong to the refined method.
+        // flips by its raw form. Denoising, varying density, fit, further starts and the guard belong to the refined
+        // method.
         let optimise = &mut draft.optimise;
         let mut usual_starts = usual_starts(draft.retile.points);
         if draft.retile.method == Method::Paper {

@@ -1,7 +1,7 @@
 //! Other figures of a wall than its uptake, laid flat as a polar map is.
 //!
-//! In: a figure of every ray and of every segment, and the [`PolarMap`] of the same wall, which knows segments and sides.
-//! Out: a [`FigureMap`], drawn by [`figure_svg`](super::figure_svg), written as a
+//! In: a figure of every ray and of every segment, and the [`PolarMap`] of the same wall, which knows segments and
+//! sides. Out: a [`FigureMap`], drawn by [`figure_svg`](super::figure_svg), written as a
 //! [`FigureDocument`](super::FigureDocument). The colours have the same range for every patient.
 
 use super::PolarMap;
@@ -98,10 +98,12 @@ impl WallFigure {
                 "Phase of the wall's greatest thickness, degrees of the cycle; grey: no wall, or none that moves"
             }
             Self::Difference => {
-                "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; grey: no wall in one of them; hatched: valve plane at rest"
+                "Uptake at rest less that at stress, per cent of the rest scan's reference; orange: less at stress; \
+                 grey: no wall in one of them; hatched: valve plane at rest"
             }
             Self::Z => {
-                "Uptake against normal limits, standard deviations from the normal mean; grey: nothing to compare; hatched: valve plane"
+                "Uptake against normal limits, standard deviations from the normal mean; grey: nothing to compare; \
+                 hatched: valve plane"
             }
             Self::Score => {
                 "Score of the uptake against normal limits, 0 to 4; grey: nothing to compare; hatched: valve plane"

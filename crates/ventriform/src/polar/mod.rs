@@ -23,8 +23,10 @@
 //! Association draws them; with [`Projection::Area`] every level has the share of the map that it has of
 //! the wall.
 //!
-//! Where the muscle ends at the base is read in every direction from the image and the rim of the anatomical wall (`polar/base.rs`). Places beyond it, and the last
-//! [`PolarParameters::rim_margin`] millimetres before it, of which blur takes much, are [`PlaceState::ValvePlane`]: drawn hatched, and in no figure.
+//! Where the muscle ends at the base is read in every direction from the image and the rim of the anatomical wall
+//! (`polar/base.rs`). Places beyond it, and the last
+//! [`PolarParameters::rim_margin`] millimetres before it, of which blur takes much, are [`PlaceState::ValvePlane`]:
+//! drawn hatched, and in no figure.
 //!
 //! [`FigureMap`] lays other figures of the same wall flat, such as its motion over a beat.
 //!

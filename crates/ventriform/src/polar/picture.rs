@@ -156,7 +156,8 @@ fn drawing(map: &PolarMap) -> Drawing {
     });
     Drawing {
         title: format!(
-            "Polar map, per cent of {}; extent below {:.0} %: {:.1} % of the wall; grey: no wall; hatched: valve plane{}",
+            "Polar map, per cent of {}; extent below {:.0} %: {:.1} % of the wall; grey: no wall; hatched: valve \
+             plane{}",
             counts(map.reference),
             100.0 * map.threshold,
             map.extent_percent,

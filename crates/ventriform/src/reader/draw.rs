@@ -1,7 +1,7 @@
 //! A fitted wall as a reader would draw it.
 //!
-//! By a level of the image, the surface gets smaller triangles, and every node moves along its normal ([`super::level`]);
-//! where the surface would intersect itself, the nodes about go less far. By distances:
+//! By a level of the image, the surface gets smaller triangles, and every node moves along its normal
+//! ([`super::level`]); where the surface would intersect itself, the nodes about go less far. By distances:
 //!
 //! 1. Every node moves along its ray from the long axis ([`VentricleWall`]), by the distance of the inner
 //!    surface, of the outer one, or between the two in proportion to its depth in the wall. Where the
@@ -23,7 +23,8 @@ use crate::mesh::{FaceId, TriMesh};
 use crate::model::wall::VentricleWall;
 use crate::progress::{Cancelled, Monitor};
 
-/// Rounds in which displacements about triangles that intersect are made shorter, and the share of them that stays in each.
+/// Rounds in which displacements about triangles that intersect are made shorter, and the share of them that stays in
+/// each.
 const MAX_SHORTENING_ROUNDS: usize = 20;
 const SHORTENED: f64 = 0.7;
 
@@ -38,8 +39,8 @@ pub struct DrawnFit {
     pub midpoints: Midpoints,
 }
 
-/// `model` with the shown wall moved by `drawing`. `image` is read for a level. Organs other than ventricles stay as they
-/// are.
+/// `model` with the shown wall moved by `drawing`. `image` is read for a level. Organs other than ventricles stay as
+/// they are.
 ///
 /// # Errors
 /// [`Cancelled`].

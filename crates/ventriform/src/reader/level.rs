@@ -1,17 +1,18 @@
 //! A fitted wall as a reader draws it who follows a level of the image, a share of the wall's own uptake.
 //!
-//! In: a fitted wall, its image, a level. Out: the wall's surface in smaller triangles, and for every node the distance along its
-//! normal at which the image falls to the level.
+//! In: a fitted wall, its image, a level. Out: the wall's surface in smaller triangles, and for every node the distance
+//! along its normal at which the image falls to the level.
 //!
-//! 1. The surface is subdivided until its edges are some [`EDGE_MM`] long: the edges of a model are three or four voxels long,
-//!    and a level follows the image more closely.
-//! 2. Every triangle is read at several places. Along the normal of each, from the middle of the wall outward (of the inner
-//!    surface: towards the cavity), the image is followed from the brightest point inside the wall to where it falls to the
-//!    level, at most [`BAND_MM`] beyond the fitted surface.
+//! 1. The surface is subdivided until its edges are some [`EDGE_MM`] long: the edges of a model are three or four
+//!    voxels long, and a level follows the image more closely.
+//! 2. Every triangle is read at several places. Along the normal of each, from the middle of the wall outward (of the
+//!    inner surface: towards the cavity), the image is followed from the brightest point inside the wall to where it
+//!    falls to the level, at most [`BAND_MM`] beyond the fitted surface.
 //! 3. Where it does not fall so far, as beside the liver, the wall ends at the least value on the way.
-//! 4. Where the wall itself has less than [`INFARCT_SHARE_OF_LEVEL`] of the level, it keeps its fitted edge: an infarct is wall.
-//!    Where it has more, but nowhere the level, it has its least thickness.
-//! 5. A node moves by the mean over the places about it, weighted by area and nearness, so that mask and mesh stay one thing.
+//! 4. Where the wall itself has less than [`INFARCT_SHARE_OF_LEVEL`] of the level, it keeps its fitted edge: an infarct
+//!    is wall. Where it has more, but nowhere the level, it has its least thickness.
+//! 5. A node moves by the mean over the places about it, weighted by area and nearness, so that mask and mesh stay one
+//!    thing.
 //!
 //! Guaranteed: no node moves farther than [`BAND_MM`], nor past the middle of the wall.
 
@@ -34,8 +35,8 @@ pub const BAND_MM: f64 = 8.0;
 /// Median length of the edges up to which a surface is subdivided, mm, and the most times.
 const EDGE_MM: f64 = 5.0;
 const MAX_SUBDIVISIONS: usize = 3;
-/// Uptake of an infarct, as a share of the level: so that infarcts stay wall, more than the 0.6 that agrees best with simulated
-/// readers who draw a level (docs/log/evaluation.md).
+/// Uptake of an infarct, as a share of the level: so that infarcts stay wall, more than the 0.6 that agrees best with
+/// simulated readers who draw a level (docs/log/evaluation.md).
 const INFARCT_SHARE_OF_LEVEL: f64 = 0.8;
 /// Step along a line, mm.
 const STEP_MM: f64 = 0.5;

@@ -58,7 +58,8 @@ pub fn measure(
     ))
 }
 
-/// The level at which the wall of `fit`, drawn on `image`, agrees best with the mask `drawn` on the grid at `frame` (E_J).
+/// The level at which the wall of `fit`, drawn on `image`, agrees best with the mask `drawn` on the grid at `frame`
+/// (E_J).
 ///
 /// # Errors
 /// [`Cancelled`].

@@ -17,8 +17,8 @@ use crate::mesh::TriMesh;
 use crate::volume::Provenance;
 
 /// How to read the polar maps.
-const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's wall; motion in \
-    mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle.";
+const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's \
+    wall; motion in mm, thickening in per cent, from end diastole to end systole; phase in degrees of the cycle.";
 
 /// A beat's report with its pictures, all of them SVG.
 #[derive(Debug, Clone, Copy)]

@@ -15,13 +15,14 @@ use crate::draw::text::{data_uri, number, signed};
 use crate::volume::Provenance;
 
 /// How to read the polar maps.
-pub(super) const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same scan's wall; \
-    differences in points, stress scaled to rest where nothing changed; z in standard deviations from the normal \
-    mean; scores from 0 (normal) to 4 (none).";
+pub(super) const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the \
+    same scan's wall; differences in points, stress scaled to rest where nothing changed; z in standard deviations \
+    from the normal mean; scores from 0 (normal) to 4 (none).";
 
 /// How to read the slices.
-pub(super) const SLICES_HINT: &str = "Stress above rest at the same levels, each by the greatest uptake of its own wall. Short axis from apex to base, \
-    vertical long axis from septum to lateral wall, horizontal long axis from inferior to anterior wall.";
+pub(super) const SLICES_HINT: &str = "Stress above rest at the same levels, each by the greatest uptake of its own \
+    wall. Short axis from apex to base, vertical long axis from septum to lateral wall, horizontal long axis from \
+    inferior to anterior wall.";
 
 /// The title of a comparison's page.
 pub(super) const TITLE: &str = "Left ventricle: rest and stress";
@@ -87,7 +88,8 @@ pub fn comparison_page(page: &ComparisonPage) -> String {
     .html()
 }
 
-/// One line on what both scans are. Of scans that are not `named`, the description is left out: it may say whose they are.
+/// One line on what both scans are. Of scans that are not `named`, the description is left out: it may say whose they
+/// are.
 pub(super) fn origin(report: &ComparisonReport, named: bool) -> String {
     let described = |name: &str, scan: &ComparedScan| {
         let parts = [
@@ -310,8 +312,8 @@ pub(super) fn segment_table(report: &ComparisonReport) -> Table {
     }
 }
 
-/// The known facts of both scans, side by side. Of scans that are not `named`, the description is left out: it may say whose
-/// they are.
+/// The known facts of both scans, side by side. Of scans that are not `named`, the description is left out: it may say
+/// whose they are.
 pub(super) fn scan_table(report: &ComparisonReport, named: bool) -> Table {
     let text = |text: &Option<String>| text.clone().unwrap_or_else(|| "not stated".to_owned());
     let both = [&report.stress, &report.rest];

@@ -1,5 +1,5 @@
-//! The page of a comparison as one picture: whose scans they are, flags, slices beside the figures, polar maps side by side,
-//! territories and segments.
+//! The page of a comparison as one picture: whose scans they are, flags, slices beside the figures, polar maps side by
+//! side, territories and segments.
 
 use super::comparison_page::{
     self, MAPS_HINT, SLICES_HINT, TITLE, headline_figures, missing_figures, scan_table,

@@ -5,9 +5,9 @@
 //! valences), smoothness (dihedral angles) and closeness (two-sided distances, volume, area).
 //! [`ModelReport::new`] joins these figures to the facts of the stages. [`model_page()`] makes a
 //! self-contained page of that report, coloured by [`Closeness`]; [`segmentation_page()`] one of a
-//! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of a
-//! [`ComparisonReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for viewers that show
-//! nothing else: a [`DrawnPage`].
+//! segmentation's [`SegmentationReport`], [`beat_page()`] one of a beat's [`BeatReport`], [`comparison_page()`] one of
+//! a [`ComparisonReport`]. [`segmentation_sheet()`] and [`comparison_sheet()`] make a picture of such a page, for
+//! viewers that show nothing else: a [`DrawnPage`].
 //!
 //! Each document is defined here once: the structs are what is written, what is read of a stored file, and,
 //! with the feature `schema`, what the OpenAPI document describes.

@@ -408,9 +408,9 @@ pub(super) fn polar_hint(report: &SegmentationReport) -> String {
         }
     };
     format!(
-        "Polar map of the 17 segments of the American Heart Association: apex in the centre, {sides}. In per cent of the \
-         hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold; grey is outside of \
-         the wall.",
+        "Polar map of the 17 segments of the American Heart Association: apex in the centre, {sides}. In per cent of \
+         the hottest quarter of this scan's own wall. {} The cyan line encloses the wall below the threshold; grey is \
+         outside of the wall.",
         limits_hint(report.perfusion.as_ref())
     )
 }

@@ -1,5 +1,5 @@
-//! The page of a segmentation as one picture: whose scan it is, flags, slices with contours, the polar map beside the figures,
-//! the segments, and what stands beside normal limits.
+//! The page of a segmentation as one picture: whose scan it is, flags, slices with contours, the polar map beside the
+//! figures, the segments, and what stands beside normal limits.
 
 use super::page_parts::{flags_headline, limits_figures, limits_line, score_table};
 use super::sections::Program;

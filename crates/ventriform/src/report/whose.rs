@@ -79,8 +79,8 @@ pub(super) fn section(scan: Option<&Provenance>) -> Markup {
     }
 }
 
-/// Patient and studies of `scans`, each with its name, a sentence each, for a picture: without UIDs. One study of all scans
-/// is named once. Nothing where nothing is known.
+/// Patient and studies of `scans`, each with its name, a sentence each, for a picture: without UIDs. One study of all
+/// scans is named once. Nothing where nothing is known.
 pub(super) fn sentences(scans: &[(&str, &Provenance)]) -> Vec<String> {
     let Some((_, first)) = scans.first() else {
         return Vec::new();

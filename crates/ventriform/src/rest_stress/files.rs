@@ -30,8 +30,8 @@ impl ComparedHearts {
 
     /// `comparison.json`, `segments.csv`; polar maps as pictures and numbers: `polar_stress` and `polar_rest`, each by
     /// its own reference, `polar_difference`, and with normal limits z and scores of both; of each scan the wall in
-    /// `formats` (`mesh_stress`, `mesh_rest`) and the image about the heart (`region_stress`, `region_rest`); slices of stress above
-    /// those of rest (`slices.png`).
+    /// `formats` (`mesh_stress`, `mesh_rest`) and the image about the heart (`region_stress`, `region_rest`); slices of
+    /// stress above those of rest (`slices.png`).
     ///
     /// # Errors
     /// [`SegmentationFilesError`].

@@ -1,11 +1,11 @@
 //! Slices of both scans as readers know them: stress above rest at the same levels.
 //!
-//! In: two fitted hearts with their images. Out: one picture, six rows of cells of equal scale: short-axis slices from apex
-//! to base (septum left, anterior on top), vertical long-axis slices from septum to lateral wall (apex right, anterior on
-//! top), and horizontal long-axis slices from inferior to anterior wall (apex on top, septum left). Of each three kinds the
-//! row of stress stands above that of rest. A level is a share of that heart's own long axis, or a distance from it; the
-//! stress scan is turned as its polar map is. Colours are those of polar maps, in per cent of the reference of that
-//! scan's own wall.
+//! In: two fitted hearts with their images. Out: one picture, six rows of cells of equal scale: short-axis slices from
+//! apex to base (septum left, anterior on top), vertical long-axis slices from septum to lateral wall (apex right,
+//! anterior on top), and horizontal long-axis slices from inferior to anterior wall (apex on top, septum left). Of each
+//! three kinds the row of stress stands above that of rest. A level is a share of that heart's own long axis, or a
+//! distance from it; the stress scan is turned as its polar map is. Colours are those of polar maps, in per cent of the
+//! reference of that scan's own wall.
 
 use super::hearts::{ComparedHeart, ComparedHearts};
 use crate::comparison::WhichScan;

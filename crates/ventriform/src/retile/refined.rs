@@ -290,7 +290,8 @@ impl<'a> RefinedRun<'a> {
         Ok(cells)
     }
 
-    /// The numbers of cells to relax one after the other, the last one first: N, and where that is large quarters of it.
+    /// The numbers of cells to relax one after the other, the last one first: N, and where that is large quarters of
+    /// it.
     fn coarse_to_fine(&self) -> Vec<usize> {
         let mut numbers = vec![self.points];
         let mut points = self.points;

@@ -1,22 +1,22 @@
 //! Seeds of many cells from relaxed cells of a quarter of their number.
 //!
 //! In: the samples, relaxed [`Cells`], and the number of seeds. Out: seeds at the sites, and between the sites of
-//! neighbouring cells. Of regular cells, which have six neighbours, that makes four times as many that are as regular: what
-//! took relaxation many rounds on random seeds is done where rounds are cheap.
+//! neighbouring cells. Of regular cells, which have six neighbours, that makes four times as many that are as regular:
+//! what took relaxation many rounds on random seeds is done where rounds are cheap.
 
 use super::cells::Cells;
 use super::surface_samples::WeightedSamples;
 
-/// Two neighbouring cells: their numbers, the lower one first, and the samples on their border by the distance from the middle
-/// between the two sites, nearest first.
+/// Two neighbouring cells: their numbers, the lower one first, and the samples on their border by the distance from the
+/// middle between the two sites, nearest first.
 struct Neighbours {
     sites: [u32; 2],
     border: Vec<u32>,
 }
 
 /// Distinct samples: first those nearest to the sites of `cells`, then those between neighbouring sites, the farthest
-/// neighbours first, as many as `wanted` says for each component of the surface; at most as many as there are neighbours.
-/// `components` has that of each sample, `spacing` the wanted relative distance of sites there.
+/// neighbours first, as many as `wanted` says for each component of the surface; at most as many as there are
+/// neighbours. `components` has that of each sample, `spacing` the wanted relative distance of sites there.
 pub(super) fn seeds(
     cells: &Cells,
     samples: &WeightedSamples,

@@ -29,8 +29,8 @@ pub(super) struct WeightedSamples {
 }
 
 impl WeightedSamples {
-    /// Samples of the surface with at least `wanted` vertices: from [`PARTLY_SPLIT_FROM_SAMPLES`] on no more than that but
-    /// for edges of one length, below as many as splitting every edge makes.
+    /// Samples of the surface with at least `wanted` vertices: from [`PARTLY_SPLIT_FROM_SAMPLES`] on no more than that
+    /// but for edges of one length, below as many as splitting every edge makes.
     pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
         let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
         while samples.len() < wanted {

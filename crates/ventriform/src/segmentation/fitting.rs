@@ -239,8 +239,8 @@ pub fn try_all(
     }
 }
 
-/// The fit of each template to the organ in `volume`, in the order of the templates, as many at once as there are threads.
-/// Each is the same as alone.
+/// The fit of each template to the organ in `volume`, in the order of the templates, as many at once as there are
+/// threads. Each is the same as alone.
 ///
 /// # Errors
 /// Where the organ is not found.

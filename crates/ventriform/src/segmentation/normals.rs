@@ -23,8 +23,8 @@ pub fn heart_figures(segmentation: &Segmentation) -> Vec<HeartFigure> {
     ]
 }
 
-/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex, protocol, tracer and correction are
-/// those of the scan's header, if the parameters do not state them.
+/// The segmentation of a scan, and `figures` of the same heart, beside `limits`. Sex, protocol, tracer and correction
+/// are those of the scan's header, if the parameters do not state them.
 ///
 /// # Errors
 /// [`SegmentationError::Normals`]: there is no polar map, the header states the other sex, or the limits do not suit

@@ -103,7 +103,8 @@ fn find_ventricle(
     facts.ventricle_score = Some(cavity.score);
     if cavity.score < UNCERTAIN_SCORE {
         facts.warnings.push(format!(
-            "the left ventricle was recognised with little certainty (score {:.2} of 1): look whether the region is right, or give a box or a seed",
+            "the left ventricle was recognised with little certainty (score {:.2} of 1): look whether the region is \
+             right, or give a box or a seed",
             cavity.score
         ));
     }
@@ -135,7 +136,8 @@ fn find_ventricle(
     }
     if region.loose_voxels > region.labels.count() / 20 {
         facts.warnings.push(format!(
-            "{} voxels of the wall are not connected to the rest at the iso-value and were left out (a defect splits the wall); a lower iso-value may join them",
+            "{} voxels of the wall are not connected to the rest at the iso-value and were left out (a defect splits \
+             the wall); a lower iso-value may join them",
             region.loose_voxels
         ));
     }

@@ -16,8 +16,9 @@
 //! Guaranteed: the mesh is a closed, oriented 2-manifold; with [`TopologyMode::Genus0`] it is a
 //! sphere; without step 7 vertices lie at the linear crossings of the iso-value except where voxels
 //! were cut or filled (there in the middle of the edge) and within 0.05 voxel of an edge's ends, and
-//! step 7 moves none by more than three times the noise there or half a voxel; the same bytes on any number of threads. Not guaranteed: that a doubtful ventricle is the right one;
-//! `facts.ventricle_score` and the warnings say how sure the search is.
+//! step 7 moves none by more than three times the noise there or half a voxel; the same bytes on any number of threads.
+//! Not guaranteed: that a doubtful ventricle is the right one; `facts.ventricle_score` and the warnings say how sure
+//! the search is.
 
 pub mod denoise;
 mod error;
@@ -332,7 +333,8 @@ fn warn_of_topology(facts: &mut SurfaceFacts, largest: usize) {
     );
     facts.warnings.push(if share > LARGE_CHANGE {
         format!(
-            "{what}: this is a large change. The object may truly have handles or cavities; topology: keep retains them, another iso-value may avoid them"
+            "{what}: this is a large change. The object may truly have handles or cavities; topology: keep retains \
+             them, another iso-value may avoid them"
         )
     } else {
         what
@@ -355,7 +357,8 @@ fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
         return;
     }
     facts.warnings.push(
-        "the region touches the volume's border and was closed there; part of the object may lie outside the volume".into(),
+        "the region touches the volume's border and was closed there; part of the object may lie outside the \
+         volume".into(),
     );
     let share = match object.mask {
         None => share_of_border(object),
@@ -363,7 +366,8 @@ fn look_at_border(object: &Object, facts: &mut SurfaceFacts) {
     };
     if share > SURROUNDINGS_BORDER_SHARE {
         facts.warnings.push(format!(
-            "the region takes {:.0} % of the volume's border: an object darker than its surroundings is taken by `iso` = below:{}",
+            "the region takes {:.0} % of the volume's border: an object darker than its surroundings is taken by `iso` \
+             = below:{}",
             100.0 * share,
             object.iso
         ));

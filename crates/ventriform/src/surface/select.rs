@@ -72,7 +72,8 @@ pub(super) fn select<'a>(
                 VolumeKind::Mask
             } else {
                 facts.warnings.push(format!(
-                    "the volume is a label map with {}; the largest, {label}, was taken: name another one by isolate: label",
+                    "the volume is a label map with {}; the largest, {label}, was taken: name another one by isolate: \
+                     label",
                     describe_labels(&all)
                 ));
                 VolumeKind::Labels

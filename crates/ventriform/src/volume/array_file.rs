@@ -4,8 +4,8 @@
 //! whatever takes files takes arrays too. Of several, as many as a study has gates are gates; others are volumes of
 //! which the caller names one.
 //!
-//! Guaranteed: voxels are those of the arrays, bit for bit. The numbers of the frame are rounded to single precision, as
-//! those of DICOM are, so that a scan gives the same results in every container.
+//! Guaranteed: voxels are those of the arrays, bit for bit. The numbers of the frame are rounded to single precision,
+//! as those of DICOM are, so that a scan gives the same results in every container.
 
 use super::VolumeError;
 use super::facts::AffineSource;

@@ -1,21 +1,22 @@
 //! Whether volumes, in their order, show a heart that beats.
 //!
-//! In: 6 to 32 volumes, coarsely. Out: how their greatest change at one place goes through them ([`Course`]). Method, Gaussians being
-//! given by their standard deviation:
+//! In: 6 to 32 volumes, coarsely. Out: how their greatest change at one place goes through them ([`Course`]). Method,
+//! Gaussians being given by their standard deviation:
 //!
-//! 1. At every place the mean within [`NARROW_MM`] less that within [`WIDE_MM`], over the square root of the latter: what the
-//!    place has more than its surroundings. In a cavity it rises as the walls close in, and it falls where they were. Places darker than
-//!    [`BRIGHT_SHARE`] of the brightest do not count.
-//! 2. The place where this differs most between the volumes, with all within [`REACH_MM`]: the choice knows nothing of the order.
-//! 3. The changes there, over the cycle: the share that comes and goes once (the first harmonic), once or twice, and the largest step of
-//!    the main course (the first principal component) as a share of its range.
+//! 1. At every place the mean within [`NARROW_MM`] less that within [`WIDE_MM`], over the square root of the latter:
+//!    what the place has more than its surroundings. In a cavity it rises as the walls close in, and it falls where
+//!    they were. Places darker than [`BRIGHT_SHARE`] of the brightest do not count.
+//! 2. The place where this differs most between the volumes, with all within [`REACH_MM`]: the choice knows nothing of
+//!    the order.
+//! 3. The changes there, over the cycle: the share that comes and goes once (the first harmonic), once or twice, and
+//!    the largest step of the main course (the first principal component) as a share of its range.
 //!
-//! A beat comes and goes once, mostly, in steps. People come in no order. A ladder of filters has a step from its end to its
-//! beginning that is as large as its range, and so have scans at rest after scans under stress.
+//! A beat comes and goes once, mostly, in steps. People come in no order. A ladder of filters has a step from its end
+//! to its beginning that is as large as its range, and so have scans at rest after scans under stress.
 //!
-//! Guaranteed: volumes in another order that is the same cycle, forwards or backwards, have the same course. Not guaranteed: that
-//! volumes in a chance order are refused; by chance one of 30 to 100 orders passes. The bounds are those of `scripts/gate_look.py`, figures
-//! are in `docs/log/beat.md`.
+//! Guaranteed: volumes in another order that is the same cycle, forwards or backwards, have the same course. Not
+//! guaranteed: that volumes in a chance order are refused; by chance one of 30 to 100 orders passes. The bounds are
+//! those of `scripts/measure/gate_look.py`, figures are in `docs/log/beat.md`.
 
 use crate::grid::blur::{Kernel, blur};
 use crate::progress::{Cancelled, Monitor};
@@ -30,7 +31,8 @@ const CUT: f64 = 3.0;
 const BRIGHT_SHARE: f64 = 0.25;
 /// Distance from the place that changes most, mm.
 const REACH_MM: f64 = 20.0;
-/// Least change where it is greatest, as a share of the brightness: the root of its mean square. Less is that of rounding.
+/// Least change where it is greatest, as a share of the brightness: the root of its mean square. Less is that of
+/// rounding.
 const LEAST_CHANGE: f64 = 1e-3;
 /// Steps of the power iteration for the main course.
 const ITERATIONS: usize = 200;
@@ -82,8 +84,9 @@ impl Course {
         let percent = |share: f64| 100.0 * share;
         let [once, twice] = self.least();
         format!(
-            "where they differ most, {:.0} % of the change comes and goes once in their order and {:.0} % once or twice (in a beat {:.0} and \
-             {:.0} % or more), with a step of {:.0} % of the whole way (in a beat at most {:.0} %)",
+            "where they differ most, {:.0} % of the change comes and goes once in their order and {:.0} % once or \
+             twice (in a beat {:.0} and {:.0} % or more), with a step of {:.0} % of the whole way (in a beat at most \
+             {:.0} %)",
             percent(self.once),
             percent(self.twice),
             percent(once),

@@ -163,7 +163,8 @@ pub enum VolumeError {
         held: String,
     },
     /// The value of a voxel exceeds the range of 32-bit floats.
-    #[error("{file}: voxel ({}, {}, {}) is {value}, beyond the range of 32-bit floats", .voxel[0], .voxel[1], .voxel[2])]
+    #[error("{file}: voxel ({}, {}, {}) is {value}, beyond the range of 32-bit \
+        floats", .voxel[0], .voxel[1], .voxel[2])]
     Overflow {
         /// The file's name.
         file: String,
@@ -198,7 +199,8 @@ pub enum VolumeError {
         error: MeshFileError,
     },
     /// A volume of one slice, of which no model can be made.
-    #[error("the volume has {} x {} x {} voxels: it is a single slice, of which no model can be made", .shape[0], .shape[1], .shape[2])]
+    #[error("the volume has {} x {} x {} voxels: it is a single slice, of which no model can be \
+        made", .shape[0], .shape[1], .shape[2])]
     SingleSlice {
         /// Voxels along i, j, k.
         shape: [usize; 3],
@@ -256,8 +258,8 @@ impl VolumeError {
         }
     }
 
-    /// The error without what the file says in words: values that are texts, names of series, first bytes. Numbers, UIDs of
-    /// known form and the standard's own terms stay. For records that outlive the file, or that others read.
+    /// The error without what the file says in words: values that are texts, names of series, first bytes. Numbers,
+    /// UIDs of known form and the standard's own terms stay. For records that outlive the file, or that others read.
     #[must_use]
     pub fn without_header_text(&self) -> Self {
         let mut error = self.clone();
@@ -307,8 +309,8 @@ impl VolumeError {
     }
 }
 
-/// The name of the attribute that files contradict each other on, without the values, which follow it in quotes; `None` if
-/// nothing is quoted.
+/// The name of the attribute that files contradict each other on, without the values, which follow it in quotes; `None`
+/// if nothing is quoted.
 fn without_values(reason: &str) -> Option<String> {
     let (told, _) = reason.split_once('"')?;
     let told = told.trim_end();
@@ -428,14 +430,15 @@ mod tests {
             VolumeError::NotOneSeries {
                 count: 2,
                 reason: format!(
-                    "Patient's Name (0010,0010) is \"{MARK}\" in a.dcm, and \"{MARK} series: \" in 3 files, such as b.dcm"
+                    "Patient's Name (0010,0010) is \"{MARK}\" in a.dcm, and \"{MARK} series: \" in 3 files, such as \
+                     b.dcm"
                 ),
             },
             VolumeError::NotOneSeries {
                 count: 2,
                 reason: format!(
-                    "they say that they are gates, but not of one scan: Study ID (0020,0010) is \"{MARK}\" in a.dcm, and \"\" \
-                     in b.dcm; they differ in Tracer too"
+                    "they say that they are gates, but not of one scan: Study ID (0020,0010) is \"{MARK}\" in a.dcm, \
+                     and \"\" in b.dcm; they differ in Tracer too"
                 ),
             },
             VolumeError::OtherGate {

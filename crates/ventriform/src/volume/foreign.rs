@@ -43,12 +43,12 @@ use Sign::{Bytes, Line, Test, Word};
 const ANALYZE: &str = "Convert it to NIfTI: Analyze files do not state which side is left.";
 const ITK: &str = "Convert it to NIfTI (.nii.gz), for example with SimpleITK: \
     SimpleITK.WriteImage(SimpleITK.ReadImage(\"the file\"), \"scan.nii.gz\"), or with 3D Slicer.";
-const INTERFILE: &str = "Convert it to NIfTI (.nii.gz), for example with XMedCon: medcon -f the.h33 -c nifti, or export \
-    the scan as DICOM.";
-const FREESURFER: &str = "Convert it to NIfTI (.nii.gz), for example with FreeSurfer: mri_convert the.mgz scan.nii.gz, or \
-    with nibabel: nibabel.save(nibabel.Nifti1Image.from_image(nibabel.load(\"the.mgz\")), \"scan.nii.gz\").";
-const PHILIPS: &str = "Convert it to NIfTI (.nii.gz), for example with dcm2niix: dcm2niix -z y the.par, with the .rec file \
-    beside it.";
+const INTERFILE: &str = "Convert it to NIfTI (.nii.gz), for example with XMedCon: medcon -f the.h33 -c nifti, or \
+    export the scan as DICOM.";
+const FREESURFER: &str = "Convert it to NIfTI (.nii.gz), for example with FreeSurfer: mri_convert the.mgz scan.nii.gz, \
+    or with nibabel: nibabel.save(nibabel.Nifti1Image.from_image(nibabel.load(\"the.mgz\")), \"scan.nii.gz\").";
+const PHILIPS: &str = "Convert it to NIfTI (.nii.gz), for example with dcm2niix: dcm2niix -z y the.par, with the .rec \
+    file beside it.";
 const MINC: &str =
     "Convert it to NIfTI (.nii.gz), for example with the MINC tools: mnc2nii the.mnc scan.nii.";
 const AFNI: &str =
@@ -58,12 +58,13 @@ const NUMPY: &str = "Convert it to NIfTI (.nii.gz) with the size and place of it
 const MATLAB: &str = "Convert it to NIfTI (.nii.gz) with the size and place of its voxels, for example in MATLAB: \
     niftiwrite(volume, \"scan\", info), or export the scan as DICOM.";
 const CONVERT: &str = "Convert it to NIfTI (.nii.gz).";
-const PICTURE: &str = "Send the scan itself, as DICOM or NIfTI (.nii.gz): a picture does not state where its pixels lie in \
-    the patient. Convert it to NIfTI (.nii.gz) only with the size and place of its voxels.";
+const PICTURE: &str = "Send the scan itself, as DICOM or NIfTI (.nii.gz): a picture does not state where its pixels \
+    lie in the patient. Convert it to NIfTI (.nii.gz) only with the size and place of its voxels.";
 const UNPACK: &str = "Unpack it, and send the files in it or a zip archive of them.";
 const LFS: &str = "Fetch the file itself (git lfs pull), and send that.";
 const ANNEX: &str = "Fetch the file itself (git annex get, or datalad get), and send that.";
-const PAGE: &str = "Download the file again: the server answered with a page, such as a login or an error, in its place.";
+const PAGE: &str = "Download the file again: the server answered with a page, such as a login or an error, in its \
+    place.";
 const DOCUMENT: &str = "Send the scan itself, as DICOM or NIfTI (.nii.gz).";
 
 /// Every format that is named, with its signs; the first of which one is found counts.

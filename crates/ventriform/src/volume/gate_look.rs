@@ -1,21 +1,22 @@
 //! Whether volumes that are taken for gates look like gates of one heart beat, and which of them are none.
 //!
-//! In: a file of several volumes, and what calls them gates ([`CalledBy`]). Out: the volumes that are left out, and, unless the
-//! header or the caller calls them gates, why they are none. Steps, on means over blocks of about [`BLOCK_MM`], each volume scaled to equal
-//! counts:
+//! In: a file of several volumes, and what calls them gates ([`CalledBy`]). Out: the volumes that are left out, and,
+//! unless the header or the caller calls them gates, why they are none. Steps, on means over blocks of about
+//! [`BLOCK_MM`], each volume scaled to equal counts:
 //!
-//! 1. A volume that is the sum or the mean of the others, or has far more counts than a gate, is no gate. One that repeats another
-//!    voxel by voxel tells nothing of its own.
+//! 1. A volume that is the sum or the mean of the others, or has far more counts than a gate, is no gate. One that
+//!    repeats another voxel by voxel tells nothing of its own.
 //! 2. Each of the others must show the heart where the rest do (the correlation with their mean), have counts like
-//!    them, and not fall into groups: distances between the groups that are beyond all distances within them. A heart that beats passes
-//!    through all shapes between its extremes; scans at rest and under stress, or with and without attenuation correction, do not.
-//! 3. What nothing but its number calls gates is summed only if it shows a heart that beats ([`beat_evidence`](super::beat_evidence)), or
-//!    if all volumes are equal, whose sum is any of them.
+//!    them, and not fall into groups: distances between the groups that are beyond all distances within them. A heart
+//!    that beats passes through all shapes between its extremes; scans at rest and under stress, or with and without
+//!    attenuation correction, do not.
+//! 3. What nothing but its number calls gates is summed only if it shows a heart that beats
+//!    ([`beat_evidence`](super::beat_evidence)), or if all volumes are equal, whose sum is any of them.
 //!
-//! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes are moments of
-//! one beat; a fit tells ([`crate::beat`]).
+//! Guaranteed: volumes that their header calls gates are never refused here. Not guaranteed: that volumes are moments
+//! of one beat; a fit tells ([`crate::beat`]).
 //!
-//! The bounds are those of `scripts/gate_look.py`, which measures simulated beats, hearts of several people and
+//! The bounds are those of `scripts/measure/gate_look.py`, which measures simulated beats, hearts of several people and
 //! reconstructions of scans.
 
 use super::beat_evidence::{Blocks, Course};
@@ -43,7 +44,8 @@ const COUNT_LOSS_SHARE: f64 = 0.3;
 const LOSING_SHARE: f64 = 0.25;
 /// Share of the volumes that may repeat others.
 const REPEATING_SHARE: f64 = 0.25;
-/// Squared distance from the mean of the others, as a share of the usual one of a gate, below which a volume is their mean.
+/// Squared distance from the mean of the others, as a share of the usual one of a gate, below which a volume is their
+/// mean.
 const MEAN_DISTANCE: f64 = 0.005;
 /// The same for the first or the last volume, where only without it their number is usual.
 const MEAN_DISTANCE_AT_END: f64 = 0.25;
@@ -53,7 +55,8 @@ const LEAST_CORRELATION: f64 = 0.85;
 const GROUPS_APART: f64 = 2.0;
 /// Least squared distance of noisy volumes, as a share of the usual step.
 const NOISE_STEP: f64 = 0.03;
-/// Squared distance, as a share of the squared contrast of the image, up to which groups are of equal images: 2 % of it.
+/// Squared distance, as a share of the squared contrast of the image, up to which groups are of equal images: 2 % of
+/// it.
 const ALIKE_DISTANCE: f64 = 3e-4;
 /// The same up to which images are equal but for their scale and the rounding of their values: 1 %.
 const EQUAL_DISTANCE: f64 = 1e-4;
@@ -340,7 +343,8 @@ impl Images {
         Ok(look)
     }
 
-    /// Why volumes that nothing calls gates are none, although nothing speaks against it: they show no heart that beats.
+    /// Why volumes that nothing calls gates are none, although nothing speaks against it: they show no heart that
+    /// beats.
     fn no_beat(&self, look: &GateLook, monitor: &Monitor) -> Result<Option<String>, Cancelled> {
         let kept = self.kept(look);
         let Some(fine) = &self.fine else {
@@ -490,7 +494,8 @@ impl Images {
         let losing = kept.iter().filter(loses).count();
         if losing as f64 > LOSING_SHARE * kept.len() as f64 {
             return Some(format!(
-                "nothing in the file calls them gates, and {losing} of them have less than {:.0} % of the counts of the others",
+                "nothing in the file calls them gates, and {losing} of them have less than {:.0} % of the counts of \
+                 the others",
                 100.0 * (1.0 - COUNT_LOSS_SHARE)
             ));
         }
@@ -501,8 +506,9 @@ impl Images {
         let worst = alike.min_by(|a, b| a.1.total_cmp(&b.1));
         if let Some((frame, r)) = worst.filter(|(_, r)| !(*r >= LEAST_CORRELATION)) {
             return Some(format!(
-                "nothing in the file calls them gates, and volume {frame} shows another heart, or one at another place, than the others \
-                 (its correlation with them is {r:.2}, and that of gates {LEAST_CORRELATION} or more)"
+                "nothing in the file calls them gates, and volume {frame} shows another heart, or one at another \
+                 place, than the others (its correlation with them is {r:.2}, and that of gates {LEAST_CORRELATION} or \
+                 more)"
             ));
         }
         let distances = self.distances(&kept);
@@ -513,8 +519,8 @@ impl Images {
             };
             let groups: Vec<String> = groups.iter().map(list).collect();
             return Some(format!(
-                "nothing in the file calls them gates, and they fall into groups (volumes {}), as scans at rest and under stress do, \
-                 which differ more than moments of one beat",
+                "nothing in the file calls them gates, and they fall into groups (volumes {}), as scans at rest and \
+                 under stress do, which differ more than moments of one beat",
                 groups.join("; ")
             ));
         }
@@ -587,7 +593,8 @@ fn groups(distances: &[Vec<f64>]) -> Option<Vec<Vec<usize>>> {
             let leaves = (0..count).filter(|n| group[*n] == *name && next(n) != *name);
             leaves.count()
         };
-        // A motion to and fro passes each shape twice, so that its volumes make pairs: more than two groups must be one stretch each.
+        // A motion to and fro passes each shape twice, so that its volumes make pairs: more than two groups must be one
+        // stretch each.
         let stretches = cuts == 1 || names.iter().all(|name| ends(name) == 1);
         let within = all.iter().flat_map(|group| {
             let pairs = group
@@ -624,7 +631,8 @@ fn spanning_tree(distances: &[Vec<f64>]) -> Vec<(f64, usize, usize)> {
     links
 }
 
-/// Whether volumes differ by more than motion: the two that differ least, and are not equal, by a fair part of the usual step.
+/// Whether volumes differ by more than motion: the two that differ least, and are not equal, by a fair part of the
+/// usual step.
 fn is_noisy(distances: &[Vec<f64>]) -> bool {
     let count = distances.len();
     let apart = distances.iter().flatten().filter(|d| **d > 0.0);

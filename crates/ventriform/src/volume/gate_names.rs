@@ -1,8 +1,8 @@
 //! What the names of files say of the volumes in them.
 //!
-//! In: the names of files of one volume each. Out: that they are gates, that they are something else, or nothing. Only words count that
-//! stand beside a number or a name by which the files differ: `gate_3.nii`, `sub-07.nii.gz`. A word for people or reconstructions goes
-//! before a word for gates.
+//! In: the names of files of one volume each. Out: that they are gates, that they are something else, or nothing. Only
+//! words count that stand beside a number or a name by which the files differ: `gate_3.nii`, `sub-07.nii.gz`. A word
+//! for people or reconstructions goes before a word for gates.
 
 /// Words for a gate, whose number tells which.
 const GATES: [&str; 14] = [
@@ -105,7 +105,8 @@ pub fn said_by_names(names: &[&str]) -> NamesSay {
     }
 }
 
-/// The parts of a name between other characters than letters and digits, each as letters and digits in turn, in lower case.
+/// The parts of a name between other characters than letters and digits, each as letters and digits in turn, in lower
+/// case.
 fn parts(name: &str) -> Vec<Vec<String>> {
     let lower = name.to_lowercase();
     let mut parts: Vec<&str> = lower.split(|c: char| !c.is_alphanumeric()).collect();

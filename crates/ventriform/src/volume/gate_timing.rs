@@ -73,15 +73,16 @@ impl GateTiming {
         let stated = self.stated_rr(gates);
         let impossible = stated.filter(|ms| !RR_MS.contains(ms)).map(|ms| {
             format!(
-                "The header's R-R interval of {ms:.0} ms is none of a heart ({least:.0} to {most:.0} ms) and was left out."
+                "The header's R-R interval of {ms:.0} ms is none of a heart ({least:.0} to {most:.0} ms) and was left \
+                 out."
             )
         });
         let both = self.rr_ms.zip(self.rr_of_frames(gates));
         let apart = both.filter(|(rr, frames)| (frames / rr - 1.0).abs() > GATES_APART_SHARE);
         let apart = apart.map(|(rr, frames)| {
             format!(
-                "{gates} gates of the header's Frame Time last {frames:.0} ms, and its R-R interval is {rr:.0} ms: the gates may \
-                 not cover the beat, on which EF and phases depend."
+                "{gates} gates of the header's Frame Time last {frames:.0} ms, and its R-R interval is {rr:.0} ms: the \
+                 gates may not cover the beat, on which EF and phases depend."
             )
         });
         impossible.into_iter().chain(apart).collect()
@@ -98,7 +99,8 @@ impl GateTiming {
 mod tests {
     use super::*;
 
-    /// R-R interval and frame time of a header, for eight gates: the interval that is taken, and the number of warnings.
+    /// R-R interval and frame time of a header, for eight gates: the interval that is taken, and the number of
+    /// warnings.
     #[test]
     fn intervals_of_no_heart_are_left_out_and_contradictions_told() {
         for (rr_ms, frame_time_ms, taken, warnings) in [

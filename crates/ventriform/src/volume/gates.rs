@@ -33,8 +33,8 @@ pub struct GatedReading {
     pub stated_grid: Option<StatedGrid>,
 }
 
-/// The first gate, counted from 1, that is of another scan than those before it, and how that shows. `said` has what the file of each
-/// gate says, where each is a file of its own.
+/// The first gate, counted from 1, that is of another scan than those before it, and how that shows. `said` has what
+/// the file of each gate says, where each is a file of its own.
 fn other_scan(said: &[ScanStatement]) -> Option<(usize, String)> {
     let said: Vec<&ScanStatement> = said.iter().collect();
     (2..=said.len()).find_map(|gates| {
@@ -52,8 +52,8 @@ impl GatedReading {
         self.scans.first()
     }
 
-    /// The gates that were read one by one from the volumes `frames` of which those in `lost` tell nothing, what their file says of the beats of each R-R interval and, where each is a file of
-    /// its own, what it says of the scan.
+    /// The gates that were read one by one from the volumes `frames` of which those in `lost` tell nothing, what their
+    /// file says of the beats of each R-R interval and, where each is a file of its own, what it says of the scan.
     ///
     /// # Errors
     /// [`VolumeError::OtherGate`] if their headers are of several scans.

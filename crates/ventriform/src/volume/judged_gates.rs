@@ -1,4 +1,5 @@
-//! A file of gates without the volumes that are none, or of volumes that are no gates although nothing in the header says so.
+//! A file of gates without the volumes that are none, or of volumes that are no gates although nothing in the header
+//! says so.
 
 use super::dicom::one_scan::ScanStatement;
 use super::gate_files::FILES_TAKEN_FOR_GATES;

@@ -15,16 +15,16 @@
 //!
 //! Guaranteed: a file gives the values and positions that its standard assigns to them, or an error
 //! with the name and value of the invalid field. Before memory is taken for a stated size, the file
-//! must be large enough to hold it. Memory beyond the voxels stays under one mebibyte (two where volumes are taken for gates), except for
-//! gzipped files of at most 16 MiB (packed and unpacked), which are held in memory whole.
+//! must be large enough to hold it. Memory beyond the voxels stays under one mebibyte (two where volumes are taken for
+//! gates), except for gzipped files of at most 16 MiB (packed and unpacked), which are held in memory whole.
 //!
 //! Not guaranteed: that the file's statements about the patient are true. Contradictions inside a
 //! file appear as warnings.
 //!
 //! `array_file` reads volumes that are in memory already.
 //!
-//! `gate_files` reads files of one gate each as the gates of one study. `gate_look` tells whether volumes that are taken for gates look
-//! like those of one beat, and which are none; `judged_gates` is the file without these.
+//! `gate_files` reads files of one gate each as the gates of one study. `gate_look` tells whether volumes that are
+//! taken for gates look like those of one beat, and which are none; `judged_gates` is the file without these.
 //!
 //! `surface_file` reads a closed surface (STL, PLY, OBJ, VTK, VTP, glTF) as the voxels inside it.
 //!

@@ -75,8 +75,9 @@ fn read_with_statements(
 }
 
 /// Reads every gate of a study from `files`: one file whose volumes are the gates, or one file for each gate, in the
-/// order that DICOM headers state, or else of the numbers in their names ([`order_by_numbers`](super::order_by_numbers)), or else in the order given. Volumes whose header says
-/// that they are no gates are refused unless `gated` says that they are.
+/// order that DICOM headers state, or else of the numbers in their names
+/// ([`order_by_numbers`](super::order_by_numbers)), or else in the order given. Volumes whose header says that they are
+/// no gates are refused unless `gated` says that they are.
 ///
 /// # Errors
 /// [`VolumeError`], also for a single volume, and for gates that have together more voxels than a volume may.

@@ -227,8 +227,8 @@ impl VolumeFile {
         }
     }
 
-    /// Gives the stored bytes to `take`, portion by portion. Of arrays these are for each volume its shape (64-bit whole
-    /// numbers), the affine to LPS mm (64-bit floats, by rows) and the voxels (32-bit floats, i fastest), least
+    /// Gives the stored bytes to `take`, portion by portion. Of arrays these are for each volume its shape (64-bit
+    /// whole numbers), the affine to LPS mm (64-bit floats, by rows) and the voxels (32-bit floats, i fastest), least
     /// significant byte first.
     ///
     /// # Errors
@@ -269,8 +269,8 @@ impl VolumeFile {
 }
 
 impl VolumeError {
-    /// The error with the whole path in place of the name of that one of `files` which it is about, where the caller named
-    /// it by its path: many folders hold files of one name.
+    /// The error with the whole path in place of the name of that one of `files` which it is about, where the caller
+    /// named it by its path: many folders hold files of one name.
     #[must_use]
     pub(super) fn with_path(mut self, files: &[VolumeFile]) -> Self {
         if let Some(named) = self.file_mut() {

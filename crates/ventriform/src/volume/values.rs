@@ -4,9 +4,9 @@
 //! sex written as the standard writes them, and without identifiers, dates and times that are none. A file may
 //! hold anything; an archive refuses an object with such a value, or files it where nobody finds it.
 //!
-//! Texts may be longer than their representation. Objects state them as far as they fit ([`Provenance::fit`]), without those
-//! that name a patient or an order: cut off, they would name another. The record of the scan keeps them whole, since people
-//! look for what the header has.
+//! Texts may be longer than their representation. Objects state them as far as they fit ([`Provenance::fit`]), without
+//! those that name a patient or an order: cut off, they would name another. The record of the scan keeps them whole,
+//! since people look for what the header has.
 
 use super::Provenance;
 
@@ -178,8 +178,8 @@ impl Provenance {
         })
     }
 
-    /// Makes texts that are longer than their representation fit: cut off, or left out where the rest would name somebody or
-    /// something else. Returns what was changed, for people to read, without any value of it.
+    /// Makes texts that are longer than their representation fit: cut off, or left out where the rest would name
+    /// somebody or something else. Returns what was changed, for people to read, without any value of it.
     pub(crate) fn fit(&mut self) -> Vec<String> {
         let mut notes = Vec::new();
         for (kind, may_be_cut, field, name) in TEXTS {

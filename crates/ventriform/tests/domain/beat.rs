@@ -280,8 +280,8 @@ fn noisy(deviation: f64, seed: u64) -> Vec<Volume> {
     gates().iter().enumerate().map(noisy).collect()
 }
 
-/// Scatter of the segments' phases by noise of this deviation, root mean square over three studies, and what the reports
-/// tell of it, degrees.
+/// Scatter of the segments' phases by noise of this deviation, root mean square over three studies, and what the
+/// reports tell of it, degrees.
 fn phase_errors(deviation: f64) -> [f64; 2] {
     let clean = whole().report().segments;
     let (mut squares, mut told, mut count) = (0.0, 0.0, 0.0);

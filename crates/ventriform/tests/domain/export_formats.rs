@@ -1,6 +1,6 @@
 //! Writes a mesh in every format and reads it back with readers that are part of this test.
 //!
-//! The files are kept in `target/tmp/formats/`, where `scripts/check_formats.sh` checks them with
+//! The files are kept in `target/tmp/formats/`, where `scripts/check/formats.sh` checks them with
 //! other programs: Khronos' validator, trimesh and VTK.
 
 // The helpers of a test state their expectations by panicking, as the test does.

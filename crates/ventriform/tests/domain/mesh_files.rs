@@ -447,10 +447,10 @@ fn vtp(data: Data, packed: bool, wide: bool, big: bool, fields: &str) -> Vec<u8>
         words(&ends),
     );
     let mut bytes = format!(
-        "<?xml version=\"1.0\"?>\n<!-- by hand > -->\n<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"{order}\" \
+        "<?xml version=\"1.0\"?>\n<!-- by hand > -->\n<VTKFile type=\"PolyData\" version=\"0.1\" \
+         byte_order=\"{order}\" \
          header_type=\"{word}\"{compressor}>\n<PolyData>\n<FieldData>{fields}</FieldData>\n<Piece NumberOfPoints=\"6\" \
-         NumberOfPolys=\"5\">\n<PointData/>\n<Points>{points}</Points>\n<Polys>{connectivity}{offsets}</Polys>\n</Piece>\n\
-         </PolyData>\n"
+         NumberOfPolys=\"5\">\n<PointData/>\n<Points>{points}</Points>\n<Polys>{connectivity}{offsets}</Polys>\n</Piece>\n</PolyData>\n"
     )
     .into_bytes();
     if matches!(data, Data::AppendedBase64 | Data::AppendedRaw) {
@@ -825,7 +825,8 @@ fn stated_counts_are_compared_with_the_bytes_before_memory_is_taken() {
     };
     let vtk = |points: &str, cells: &str| {
         format!(
-            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS {points} float\n0 0 0\nPOLYGONS {cells} {cells}\n"
+            "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS {points} float\n0 0 0\nPOLYGONS {cells} \
+             {cells}\n"
         )
     };
     for text in [
@@ -852,8 +853,9 @@ fn stated_counts_are_compared_with_the_bytes_before_memory_is_taken() {
         .concat();
     let array = format!("{}{}", STANDARD.encode(header), STANDARD.encode(block));
     let bomb = format!(
-        "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\"><PolyData><Piece><Points>\
-         <DataArray type=\"Float32\" format=\"binary\">{array}</DataArray></Points></Piece></PolyData></VTKFile>"
+        "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" \
+         compressor=\"vtkZLibDataCompressor\"><PolyData><Piece><Points><DataArray type=\"Float32\" \
+         format=\"binary\">{array}</DataArray></Points></Piece></PolyData></VTKFile>"
     );
     let refused = read(bomb.as_bytes(), &silent(), 1 << 16).unwrap_err();
     assert!(

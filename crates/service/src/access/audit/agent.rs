@@ -1,13 +1,13 @@
 //! Who changes something, and the row that says so.
 //!
-//! A use case that changes something takes the [`Agent`] for whom it does, and makes the change by [`Agent::change`]. While
-//! the change runs, [`Agent::acting`] tells the store who acts; the store names the act where it makes the change, and writes
-//! its row ([`Agent::acts`]) in the transaction of the change. Both are on disk, or neither: a row that cannot be written
-//! undoes the change, and a process that dies between the two leaves none of them.
+//! A use case that changes something takes the [`Agent`] for whom it does, and makes the change by [`Agent::change`].
+//! While the change runs, [`Agent::acting`] tells the store who acts; the store names the act where it makes the
+//! change, and writes its row ([`Agent::acts`]) in the transaction of the change. Both are on disk, or neither: a row
+//! that cannot be written undoes the change, and a process that dies between the two leaves none of them.
 //!
-//! The change is a task of its own, which goes on if the caller goes away. So a request whose connection is reset, or that is
-//! refused after a part of it was done, leaves the rows of what it has done. What the service does of itself, without an
-//! agent, leaves no row.
+//! The change is a task of its own, which goes on if the caller goes away. So a request whose connection is reset, or
+//! that is refused after a part of it was done, leaves the rows of what it has done. What the service does of itself,
+//! without an agent, leaves no row.
 
 use super::event::{Activity, AuditEvent};
 use super::recorder::Recorder;
@@ -90,8 +90,8 @@ impl Agent {
         }
     }
 
-    /// Makes a change for this agent, in a task of its own, which goes on if the caller goes away. The store writes the row of
-    /// each act in the transaction of the change.
+    /// Makes a change for this agent, in a task of its own, which goes on if the caller goes away. The store writes the
+    /// row of each act in the transaction of the change.
     ///
     /// # Errors
     /// Those of `change`; one is that the row cannot be written: then nothing was changed.
@@ -115,7 +115,8 @@ impl Agent {
         ACTING.try_with(Clone::clone).ok()
     }
 
-    /// Runs a part of a change that has a task of its own for `agent`, which [`Agent::acting`] told before that task began.
+    /// Runs a part of a change that has a task of its own for `agent`, which [`Agent::acting`] told before that task
+    /// began.
     pub async fn scope<T>(agent: Option<Self>, part: impl Future<Output = T>) -> T {
         match agent {
             Some(agent) => ACTING.scope(agent, part).await,

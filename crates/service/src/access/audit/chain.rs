@@ -39,8 +39,8 @@ pub enum BrokenLink {
     UnrecordedRemoval(i64),
     /// Another place names a row that the trail does not have.
     #[error(
-        "{place} names row {sequence} with the hash {hash}, which the trail does not have: rows are lost, or the database \
-         is an older copy"
+        "{place} names row {sequence} with the hash {hash}, which the trail does not have: rows are lost, or the \
+         database is an older copy"
     )]
     Unconfirmed {
         /// The place: the id of a receipt, or what keeps the newest row.

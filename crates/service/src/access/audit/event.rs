@@ -38,8 +38,9 @@ pub enum Activity {
     /// A repair found that rows of a table are lost. The object is `TABLE` or, with the last row that was known,
     /// `TABLE:SEQUENCE:HASH`; `count` says how many rows at least.
     RowsLost,
-    /// A repair gave an item to a tenant, or put it on hold, because who had it is not known for sure; or it removed the row of
-    /// an item whose files are damaged. The object is the item, or a table of which `count` rows named what nobody has.
+    /// A repair gave an item to a tenant, or put it on hold, because who had it is not known for sure; or it removed
+    /// the row of an item whose files are damaged. The object is the item, or a table of which `count` rows named what
+    /// nobody has.
     Repaired,
     /// What a newer trail says was revoked and erased was done here too. The object is `SEQUENCE:HASH`, the end of
     /// that trail.

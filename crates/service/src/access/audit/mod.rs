@@ -5,8 +5,9 @@
 //! of patients or contents of files. [`mod@fhir`] shows a row as an AuditEvent of FHIR R4, in the form
 //! of IHE BALP.
 //!
-//! Receipts of erasures name rows of the trail, and the store keeps the newest number and hash outside of it; [`verify`]
-//! compares: a trail that was lost, or restored from an older copy, is not in order however whole its chain is.
+//! Receipts of erasures name rows of the trail, and the store keeps the newest number and hash outside of it;
+//! [`verify`] compares: a trail that was lost, or restored from an older copy, is not in order however whole its chain
+//! is.
 //!
 //! Not guaranteed: somebody who can write to the database and to the files beside it can write the whole chain anew.
 //! Against that, keep the newest hash in another place; `ventriform audit verify` prints it.

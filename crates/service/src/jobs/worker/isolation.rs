@@ -5,9 +5,9 @@
 //! apart, so the job is computed in a child process from then on. If the child dies while the
 //! service lives, the job is to blame; if both die, it is not.
 //!
-//! A job on a volume of more than [`IN_PROCESS_VOXELS`](super::run::IN_PROCESS_VOXELS) is so from the start: how much memory it takes is not known
-//! before (where all is noise, the muscle's model takes a hundred bytes for each voxel), and the child that
-//! cannot get it ends alone.
+//! A job on a volume of more than [`IN_PROCESS_VOXELS`](super::run::IN_PROCESS_VOXELS) is so from the start: how much
+//! memory it takes is not known before (where all is noise, the muscle's model takes a hundred bytes for each voxel),
+//! and the child that cannot get it ends alone.
 //!
 //! The service starts the program of [`Isolation`], which calls [`serve_isolated`]:
 //!

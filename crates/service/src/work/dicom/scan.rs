@@ -44,8 +44,8 @@ fn provenance(fields: &ScanFields) -> Provenance {
     serde_json::from_value(fields.0.clone().into()).unwrap_or_default()
 }
 
-/// The scan that the objects of a result belong to, which was made at that moment: of the volume with the number `frame`,
-/// or of all where it is `None`.
+/// The scan that the objects of a result belong to, which was made at that moment: of the volume with the number
+/// `frame`, or of all where it is `None`.
 /// With a `secret` it is freed of the patient's identity.
 ///
 /// # Errors

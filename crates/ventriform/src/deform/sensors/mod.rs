@@ -133,8 +133,8 @@ pub fn read_some(
     read_sensors(mesh, field, settings, density, &mut Vec::new(), monitor)
 }
 
-/// As [`read`], but sensors less than [`SAME_PLACE_MM`] from where they were read into `known` keep the edge that they saw
-/// there. The settings must be the same each time; an empty list knows nothing.
+/// As [`read`], but sensors less than [`SAME_PLACE_MM`] from where they were read into `known` keep the edge that they
+/// saw there. The settings must be the same each time; an empty list knows nothing.
 ///
 /// # Errors
 /// [`Cancelled`].

@@ -6,7 +6,8 @@
 //!
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
-//! segments, unless the gates are no beat, and those beside normal limits ([`normals`]). A figure that the report lacks is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
+//! segments, unless the gates are no beat, and those beside normal limits ([`normals`]). A figure that the report lacks
+//! is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
 use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};

@@ -2,13 +2,13 @@
 //! Captures.
 //!
 //! In: the report of a comparison, both scans with their images, and the pictures. Out: the bytes of
-//! [`ComparisonObject`]s. The page joins the pictures and what the report says into one. All belong to the patient and the study of the scan at stress; the report refers to the images
-//! of both scans, each in its own study.
+//! [`ComparisonObject`]s. The page joins the pictures and what the report says into one. All belong to the patient and
+//! the study of the scan at stress; the report refers to the images of both scans, each in its own study.
 //!
-//! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one of
-//! each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17 segments
-//! in each state, and one of each segment's change. The group of a scan names the limits that its scores stand beside
-//! ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
+//! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one
+//! of each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17
+//! segments in each state, and one of each segment's change. The group of a scan names the limits that its scores stand
+//! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
 
 use super::codes::{Code, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
@@ -58,8 +58,8 @@ impl ComparisonObject {
         self.facts().name
     }
 
-    /// The files of the comparison with the pictures that the object shows, PNG: of a page those that there are, of a polar
-    /// map the one that it is. None for the figures.
+    /// The files of the comparison with the pictures that the object shows, PNG: of a page those that there are, of a
+    /// polar map the one that it is. None for the figures.
     pub fn pictures(self) -> &'static [&'static str] {
         match self {
             Self::Measurements => &[],
@@ -131,8 +131,8 @@ pub struct DicomComparison<'a> {
 }
 
 impl<'a> DicomComparison<'a> {
-    /// The results of a comparison of `structure`. `scans` are the scan at stress and the scan at rest; `text` is the report
-    /// as JSON in one line, from which UIDs are derived.
+    /// The results of a comparison of `structure`. `scans` are the scan at stress and the scan at rest; `text` is the
+    /// report as JSON in one line, from which UIDs are derived.
     pub fn new(
         structure: Structure,
         scans: &'a [SourceScan; 2],
@@ -171,8 +171,9 @@ impl<'a> DicomComparison<'a> {
         set.file()
     }
 
-    /// The bytes of an object that shows pictures: `pictures` are those of [`ComparisonObject::pictures`] that there are, each
-    /// with its name. `None` for the figures, and for an object whose [`ComparisonObject::needed_picture`] is not there.
+    /// The bytes of an object that shows pictures: `pictures` are those of [`ComparisonObject::pictures`] that there
+    /// are, each with its name. `None` for the figures, and for an object whose [`ComparisonObject::needed_picture`] is
+    /// not there.
     ///
     /// # Errors
     /// See [`DicomError`].

@@ -8,11 +8,11 @@
 //! 3. [`DicomResults::write`] builds the object: the modules that all have in common here, the
 //!    rest in the module of its kind (`segmentation`, `structure_set`, `stl`, `surface`,
 //!    `measurements` with `normals`, `capture`).
-//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest and
-//!    stress: a report and pictures.
+//! 4. [`DicomBeat`] does so for a beat: two Segmentations and a report; [`DicomComparison`] for a comparison of rest
+//!    and stress: a report and pictures.
 //!
-//! The picture of a page names patient and study in its pixels (Burned In Annotation YES), unless the scan is freed of the
-//! identity.
+//! The picture of a page names patient and study in its pixels (Burned In Annotation YES), unless the scan is freed of
+//! the identity.
 //!
 //! Guaranteed: the same patient, study and Frame of Reference as the source, which is referenced
 //! (of a multi-frame image, the frames); millimetres in LPS; standard attributes only; the same
@@ -319,7 +319,8 @@ impl<'a> DicomResults<'a> {
         }
     }
 
-    /// The bytes of `object`; `None` for a picture that is not there: a polar map, or a page where there are no figures.
+    /// The bytes of `object`; `None` for a picture that is not there: a polar map, or a page where there are no
+    /// figures.
     ///
     /// # Errors
     /// See [`DicomError`].
@@ -440,8 +441,8 @@ impl<'a> DicomResults<'a> {
     }
 }
 
-/// The modules that all objects have: patient, study, series, equipment and SOP Common. `uids` are those of the instance
-/// and of its series.
+/// The modules that all objects have: patient, study, series, equipment and SOP Common. `uids` are those of the
+/// instance and of its series.
 fn put_facts(
     scan: &SourceScan,
     facts: &ObjectFacts,

@@ -1,11 +1,11 @@
 //! A scan beside normal limits, as measurement groups of a structured report
 //! ([`structured_report`](super::structured_report)).
 //!
-//! Groups of TID 1501: one of the whole wall, which names the limits ([`limits_used`]), one of each artery's territory, and
-//! one of each of the 17 segments (CID 3717). Their Measurement Method says that they stand beside limits: the extent below a
-//! share of the scan's own maximum is another figure of the same concept. Where the protocol of scan and limits is one at stress
-//! or at rest, the groups have that Patient State, and the summed score is that of stress or of rest. Parts without limits or
-//! muscle have no group.
+//! Groups of TID 1501: one of the whole wall, which names the limits ([`limits_used`]), one of each artery's territory,
+//! and one of each of the 17 segments (CID 3717). Their Measurement Method says that they stand beside limits: the
+//! extent below a share of the scan's own maximum is another figure of the same concept. Where the protocol of scan and
+//! limits is one at stress or at rest, the groups have that Patient State, and the summed score is that of stress or of
+//! rest. Parts without limits or muscle have no group.
 
 use super::Structure;
 use super::codes::{Code, dcm, loinc, own, sct, ucum};

@@ -2,9 +2,10 @@
 //! segment 2, of a ventricle, its cavity. No voxel is of both.
 //!
 //! Every slice of a segment is a frame, also where it is empty: viewers that count frames would otherwise
-//! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order of the slices if the
-//! volume is left-handed (negative Spacing Between Slices), and each has its own Image Position. Each names the image or
-//! frame that its slice was read from, pixel for pixel (Spatial Locations Preserved), so that readers find it by that.
+//! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order
+//! of the slices if the volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
+//! Each names the image or frame that its slice was read from, pixel for pixel (Spatial Locations Preserved), so that
+//! readers find it by that.
 
 use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
 use super::data_set::DataSet;

@@ -386,7 +386,8 @@ impl SourceScan {
         Some(item)
     }
 
-    /// Whether [`SourceScan::slice_reference`] names the one image or frame of slice `k`, and not an instance with others.
+    /// Whether [`SourceScan::slice_reference`] names the one image or frame of slice `k`, and not an instance with
+    /// others.
     pub(super) fn names_slice(&self, k: usize) -> bool {
         let p = &self.provenance;
         let is_alone = self.shape[2] == 1 && p.sop_instance_uid.is_some();

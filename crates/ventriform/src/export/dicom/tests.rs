@@ -298,8 +298,8 @@ fn the_cavity_is_a_segment_of_its_own() {
     assert_ne!(uid(&alone), uid(&set));
 }
 
-/// A slice whose image or frame is named is that image pixel for pixel; of an instance that is named as a whole, nothing is
-/// claimed; and no picture has the places of its scan.
+/// A slice whose image or frame is named is that image pixel for pixel; of an instance that is named as a whole,
+/// nothing is claimed; and no picture has the places of its scan.
 #[test]
 fn what_lies_as_its_source_does_says_so() {
     let slices = SCAN_SHAPE[2];

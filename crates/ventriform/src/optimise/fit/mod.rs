@@ -229,7 +229,8 @@ mod tests {
 
     #[test]
     fn samples_are_no_denser_than_the_surface_where_there_are_many() {
-        // Few, more than the surface has triangles; as many as asked; limited by the surface; at least six; fewer asked.
+        // Few, more than the surface has triangles; as many as asked; limited by the surface; at least six; fewer
+        // asked.
         let cases = [
             (296, 1000, 16, 4736),
             (2000, 19_000, 16, 32_000),

@@ -37,8 +37,9 @@ const KEEPING_FROM_FACES: usize = 600;
 /// Smallest number of triangles per parallel task.
 const TRIANGLES_PER_TASK: usize = 16;
 
-/// Whether the closest points of the midpoints are searched in a round of `rounds`, or the planes that the round before found
-/// are kept: edges are flipped after every second round, and nothing moves far between two. Small models take little time.
+/// Whether the closest points of the midpoints are searched in a round of `rounds`, or the planes that the round before
+/// found are kept: edges are flipped after every second round, and nothing moves far between two. Small models take
+/// little time.
 pub fn searches_midpoints(round: usize, rounds: usize, faces: usize) -> bool {
     round.is_multiple_of(2) || round + 1 >= rounds || faces < KEEPING_FROM_FACES
 }

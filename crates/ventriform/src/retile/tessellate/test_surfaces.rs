@@ -124,8 +124,8 @@ pub(super) fn stacked(n: usize, seed: u64) -> TriMesh {
     mesh
 }
 
-/// Rough, thin and pinched surfaces that do not intersect themselves: some holes in them can be closed in some ways only,
-/// some flips are impossible, turn triangles over or cause intersections.
+/// Rough, thin and pinched surfaces that do not intersect themselves: some holes in them can be closed in some ways
+/// only, some flips are impossible, turn triangles over or cause intersections.
 pub(super) fn awkward() -> Vec<TriMesh> {
     let ball = shapes::icosphere(30.0, 1);
     let mut all = vec![shapes::tetrahedron(30.0), shapes::torus(30.0, 12.0, 6, 3)];

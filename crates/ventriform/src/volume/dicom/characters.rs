@@ -402,7 +402,7 @@ mod tests {
     }
 
     /// PS3.5 annexes H, I, J and K, byte by byte as in David Clunie's example files, which pydicom brings along
-    /// (`scripts/check_names.py` reads those files themselves).
+    /// (`scripts/check/names.py` reads those files themselves).
     #[test]
     fn the_examples_of_the_standard_are_read() {
         let yamada: &[u8] = b"Yamada^Tarou=\x1b$B;3ED\x1b(B^\x1b$BB@O:\x1b(B=\

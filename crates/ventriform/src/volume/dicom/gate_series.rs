@@ -1,15 +1,15 @@
 //! A gated study in DICOM files of one gate each, or in one series for each gate.
 //!
-//! In: 6 to 32 Nuclear Medicine or Enhanced images of one study, or as many PET series of slices. Out: what one image with all
-//! gates would be.
+//! In: 6 to 32 Nuclear Medicine or Enhanced images of one study, or as many PET series of slices. Out: what one image
+//! with all gates would be.
 //!
 //! They are gates if each holds one volume, all lie on one grid, all say that they are gates ([`timing::is_one_gate`],
-//! [`timing::is_of_gates`]), nothing says that they are of several scans ([`one_scan`](super::one_scan)), and a number in their headers
-//! orders them: of [`ORDERING_ATTRIBUTES`] the first that all have and no two share. Otherwise they are volumes of their own, which
-//! only a person can call gates.
+//! [`timing::is_of_gates`]), nothing says that they are of several scans ([`one_scan`](super::one_scan)), and a number
+//! in their headers orders them: of [`ORDERING_ATTRIBUTES`] the first that all have and no two share. Otherwise they
+//! are volumes of their own, which only a person can call gates.
 //!
-//! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that gates are moments of one beat; a fit
-//! tells ([`crate::beat`]), and a warning says what was taken for what.
+//! Guaranteed: the order in which the files are given does not matter. Not guaranteed: that gates are moments of one
+//! beat; a fit tells ([`crate::beat`]), and a warning says what was taken for what.
 
 use super::attributes::{
     ACQUISITION_NUMBER, Attribute, Attributes, INSTANCE_NUMBER, RR_INTERVALS, SERIES_NUMBER,
@@ -142,7 +142,8 @@ fn are_all(places: &[Place]) -> bool {
     { said }.all(|of| of <= 1 || of == places.len())
 }
 
-/// All `gates`, which say that they are gates, as one file, without those that are there twice. `what` holds one gate each.
+/// All `gates`, which say that they are gates, as one file, without those that are there twice. `what` holds one gate
+/// each.
 ///
 /// # Errors
 /// [`VolumeError`] if the pixels of a gate that may be there twice cannot be read.
@@ -182,8 +183,8 @@ pub(super) fn joined(
     Ok(Joined::Gates(Box::new(file)))
 }
 
-/// The gates that repeat an earlier one, in their order, and what is said of them; or why one of them can be none. A gate repeats
-/// another if both have one SOP Instance UID, or the same place among the gates, and the same pixels.
+/// The gates that repeat an earlier one, in their order, and what is said of them; or why one of them can be none. A
+/// gate repeats another if both have one SOP Instance UID, or the same place among the gates, and the same pixels.
 fn repeats(
     gates: &[DicomFile],
     places: &[Place],
@@ -206,8 +207,8 @@ fn repeats(
             }
             if one_uid {
                 return Ok(Err(format!(
-                    "{first} and {own} have the same SOP Instance UID (0008,0018) and are different images; an export that gives each \
-                     image its own is needed"
+                    "{first} and {own} have the same SOP Instance UID (0008,0018) and are different images; an export \
+                     that gives each image its own is needed"
                 )));
             }
         }

@@ -37,8 +37,8 @@ pub struct DicomHeader {
     pub series: String,
     /// Whether the object is one slice or one gate of its series, and not a volume of its own.
     pub is_part: bool,
-    /// What the objects of one gate each have in common, although each gate may be a series of its own: a hash. `None` if the object does
-    /// not say that it is one gate of several, or a slice of one.
+    /// What the objects of one gate each have in common, although each gate may be a series of its own: a hash. `None`
+    /// if the object does not say that it is one gate of several, or a slice of one.
     pub gates: Option<String>,
     /// Modality (0008,0060).
     pub modality: Option<String>,
@@ -99,8 +99,8 @@ pub fn read_header(
     })
 }
 
-/// A hash of what the headers of all gates of one acquisition have in common: what they say of the scan, the time to the minute, the
-/// description without its numbers, and the grid of a slice.
+/// A hash of what the headers of all gates of one acquisition have in common: what they say of the scan, the time to
+/// the minute, the description without its numbers, and the grid of a slice.
 fn gates_key(a: &Attributes) -> String {
     /// Characters of a time of day to the minute.
     const TO_THE_MINUTE: usize = 4;

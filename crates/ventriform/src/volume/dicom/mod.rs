@@ -10,14 +10,14 @@
 //!    than the standard's.
 //! 3. `kind`: what the object is. One that holds no slices is refused by its name, with what to send;
 //!    `company`: beside others it is left out.
-//! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them; `posture`: what else
-//!    says how they lie in the patient.
+//! 4. `frames`: orders the frames of a Nuclear Medicine Image by its vectors; `geometry` places them; `posture`: what
+//!    else says how they lie in the patient.
 //!    `stack`: orders and places all other frames by their positions; `volumes` tells which of those at
 //!    one place belong together. `segments`: labels. `gate_series`: files or series of one gate each.
 //!    `one_scan`: what files of one volume must agree on; `scans` lists those that are several.
 //! 5. `pixels`, `fragments` and `codec`: checks the pixel format and decodes frame by frame.
-//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text; `rest_stress`: which scan
-//!    of a study they name.
+//! 6. `provenance`: patient, study, series, instances and acquisition; `characters`: their text; `rest_stress`: which
+//!    scan of a study they name.
 //!
 //! Guaranteed: no memory is taken for a stated size before the file was found large enough for it;
 //! beside the voxels, one compressed frame and at most 16 MiB of attributes are held. A damaged
@@ -656,8 +656,8 @@ impl Series {
         gate_series::joined(gates, places, said, "series")
     }
 
-    /// The volumes that the files make up, with the place of the first slice among gates; of a series that is one gate of several
-    /// if `one_gate`.
+    /// The volumes that the files make up, with the place of the first slice among gates; of a series that is one gate
+    /// of several if `one_gate`.
     fn volumes(
         mut self,
         one_gate: bool,

@@ -1,17 +1,17 @@
 //! Whether files are of one scan: what may lie in one volume, or be gates of one beat, by all that their headers say.
 //!
-//! In: the header of each file. Out: the first attribute of [`TABLE`] of which two files state different values, with both
-//! values and one file of each. A row says how values are compared and how far they must agree:
+//! In: the header of each file. Out: the first attribute of [`TABLE`] of which two files state different values, with
+//! both values and one file of each. A row says how values are compared and how far they must agree:
 //!
 //! - [`Reach::Series`]: in all files of one series, whatever volumes they make up: whose scan it is, and its unit.
-//! - [`Reach::Volume`]: in all slices of one volume, and in all gates of one beat: how it was made. Volumes of one series may
-//!   differ, as those of two filters do.
-//! - [`Reach::Gates`]: in all gates of one beat that are files of their own: when it was acquired. Slices are acquired one after
-//!   the other.
+//! - [`Reach::Volume`]: in all slices of one volume, and in all gates of one beat: how it was made. Volumes of one
+//!   series may differ, as those of two filters do.
+//! - [`Reach::Gates`]: in all gates of one beat that are files of their own: when it was acquired. Slices are acquired
+//!   one after the other.
 //!
-//! What differs from slice to slice of one scan is in no row: times and numbers of images, scaling, frame times, decay factors.
-//! A value that a file leaves out contradicts nothing. Neither do other spellings of one value: padding, capitals and
-//! trailing parts of a name, digits of a number.
+//! What differs from slice to slice of one scan is in no row: times and numbers of images, scaling, frame times, decay
+//! factors. A value that a file leaves out contradicts nothing. Neither do other spellings of one value: padding,
+//! capitals and trailing parts of a name, digits of a number.
 //!
 //! Guaranteed: the order of the files changes neither the verdict nor which two files an error names.
 
@@ -249,8 +249,8 @@ fn contradictions<'a>(files: &[&'a ScanStatement], reach: Reach) -> Vec<Contradi
     wanted.filter_map(of_row).collect()
 }
 
-/// Why `files` are not of one scan, in words that continue a sentence: the first attribute that they contradict each other on,
-/// both values and one file of each, and the names of the others.
+/// Why `files` are not of one scan, in words that continue a sentence: the first attribute that they contradict each
+/// other on, both values and one file of each, and the names of the others.
 pub(crate) fn contradiction(files: &[&ScanStatement], reach: Reach) -> Option<String> {
     let all = contradictions(files, reach);
     let (first, others) = all.split_first()?;
@@ -273,7 +273,8 @@ pub(crate) fn contradiction(files: &[&ScanStatement], reach: Reach) -> Option<St
     Some(text)
 }
 
-/// The values of each of `scans` by which they differ from another, with the attributes' names, at most `most` for each.
+/// The values of each of `scans` by which they differ from another, with the attributes' names, at most `most` for
+/// each.
 pub(super) fn differing(scans: &[&ScanStatement], most: usize) -> Vec<String> {
     let all = contradictions(scans, Gates);
     let named: Vec<usize> = (TABLE.iter().enumerate())

@@ -1,20 +1,21 @@
 //! How slices lie in the patient, by attributes other than Image Orientation (Patient).
 //!
-//! In: the attributes of a data set. Out: the directions that rows and columns have where no Image Orientation (Patient)
-//! states them, and what contradicts them where one does.
+//! In: the attributes of a data set. Out: the directions that rows and columns have where no Image Orientation
+//! (Patient) states them, and what contradicts them where one does.
 //!
 //! - Patient Orientation (0020,0020) names the directions of rows and columns by letters.
-//! - Patient Position (0018,5100), the Patient Orientation Modifier Code (0054,0412) and the Patient Gantry Relationship
-//!   Code (0054,0414) say how the patient lay in the scanner, whose rows run to the right of somebody who looks from the
-//!   foot of the table, and whose columns run down (PS3.3 C.7.3.1.1.2).
-//! - View Code (0054,0220) of the detector names the kind of slices, Slice Progression Direction (0054,0500) the wall of the
-//!   heart at which they begin (PS3.3 C.8.4.15). The latter is for slices across or along the heart only, and stands for
-//!   their View Code where there is none.
+//! - Patient Position (0018,5100), the Patient Orientation Modifier Code (0054,0412) and the Patient Gantry
+//!   Relationship Code (0054,0414) say how the patient lay in the scanner, whose rows run to the right of somebody who
+//!   looks from the foot of the table, and whose columns run down (PS3.3 C.7.3.1.1.2).
+//! - View Code (0054,0220) of the detector names the kind of slices, Slice Progression Direction (0054,0500) the wall
+//!   of the heart at which they begin (PS3.3 C.8.4.15). The latter is for slices across or along the heart only, and
+//!   stands for their View Code where there is none.
 //!
-//! Without Image Orientation (Patient), letters decide, then a coronal or sagittal view, then the patient's position; two
-//! attributes that contradict each other about that position are an error. With it, they are warnings.
+//! Without Image Orientation (Patient), letters decide, then a coronal or sagittal view, then the patient's position;
+//! two attributes that contradict each other about that position are an error. With it, they are warnings.
 //!
-//! Not told by any attribute: which side of short-axis slices the septum lies on where their directions are not the patient's.
+//! Not told by any attribute: which side of short-axis slices the septum lies on where their directions are not the
+//! patient's.
 
 use super::super::VolumeError;
 use super::attributes::{
@@ -81,7 +82,8 @@ enum View {
     Oblique,
 }
 
-/// Codes (SNOMED CT, SNOMED RT) and words of Code Meanings, in small letters without spaces and hyphens. The first that fits counts.
+/// Codes (SNOMED CT, SNOMED RT) and words of Code Meanings, in small letters without spaces and hyphens. The first that
+/// fits counts.
 type Codes<T> = [(T, [&'static str; 2], &'static str)];
 
 const LYING: &Codes<Option<Lying>> = &[
@@ -117,7 +119,8 @@ const VIEWS: &Codes<View> = &[
     (View::Across(2), ["24422004", "R-11300"], "transaxial"),
 ];
 
-/// Directions of rows and columns in slices across an axis of the patient, as they are shown: the front or the head on top.
+/// Directions of rows and columns in slices across an axis of the patient, as they are shown: the front or the head on
+/// top.
 const SHOWN: [[f64; 6]; 3] = [
     [0.0, 1.0, 0.0, 0.0, 0.0, -1.0],
     [1.0, 0.0, 0.0, 0.0, 0.0, -1.0],
@@ -260,7 +263,8 @@ impl Position {
     }
 }
 
-/// The directions that the letters of Patient Orientation (0020,0020) name, each with all letters but the first left out.
+/// The directions that the letters of Patient Orientation (0020,0020) name, each with all letters but the first left
+/// out.
 fn letters(a: &Attributes) -> Option<(Said<[Vec3; 2]>, bool)> {
     let texts = a.texts(PATIENT_LETTERS);
     let [row, column] = texts.as_slice() else {
@@ -384,14 +388,15 @@ fn sides(a: &Attributes) -> String {
         |said| format!("{}.", said.cited()),
     );
     format!(
-        "{end} Septum and lateral wall are exchanged in the result where the first of short-axis slices is that of the apex \
-         and the pictures show the septum on the right of the anterior wall on top, or where the first is that of the base and \
-         they show it on the left: send such slices with their true Image Orientation (Patient) and Image Position (Patient), or \
-         transaxial slices."
+        "{end} Septum and lateral wall are exchanged in the result where the first of short-axis slices is that of the \
+         apex and the pictures show the septum on the right of the anterior wall on top, or where the first is that of \
+         the base and they show it on the left: send such slices with their true Image Orientation (Patient) and Image \
+         Position (Patient), or transaxial slices."
     )
 }
 
-/// What contradicts the stated directions `x` of rows and `y` of columns, and that of the slices' order, `step`; for people to read.
+/// What contradicts the stated directions `x` of rows and `y` of columns, and that of the slices' order, `step`; for
+/// people to read.
 pub(super) fn contradictions(a: &Attributes, [x, y]: [Vec3; 2], step: Vec3) -> Vec<String> {
     const STATED: &str = "Image Orientation (Patient) (0020,0037)";
     let cosines: Vec<String> = x
@@ -445,8 +450,9 @@ pub(super) fn contradictions(a: &Attributes, [x, y]: [Vec3; 2], step: Vec3) -> V
         let cosine = step.normalize().dot(&said.what.normalize());
         if cosine < -LEAST_COSINE {
             found.push(format!(
-                "{}, but by Image Position (Patient), Spacing Between Slices and {STATED}, {cosines}, the slices run the other way \
-                 through a heart that points to the left, to the front and down: compare apex and base of the result with the image.",
+                "{}, but by Image Position (Patient), Spacing Between Slices and {STATED}, {cosines}, the slices run \
+                 the other way through a heart that points to the left, to the front and down: compare apex and base \
+                 of the result with the image.",
                 said.cited()
             ));
         }

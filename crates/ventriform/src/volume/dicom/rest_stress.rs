@@ -4,12 +4,13 @@
 //! exactly one of them. Steps:
 //!
 //! 1. A text is cut into runs of letters.
-//! 2. A run is taken apart into the words of scans ([`REST`], [`STRESS`], [`BESIDE`]) from end to end, as in `STRESSGATED`
-//!    or `restac`. Where that fails, it is cut where its case changes, as in `RestG` or `MIBIStressSA`, and each part is
-//!    taken apart.
+//! 2. A run is taken apart into the words of scans ([`REST`], [`STRESS`], [`BESIDE`]) from end to end, as in
+//!    `STRESSGATED` or `restac`. Where that fails, it is cut where its case changes, as in `RestG` or `MIBIStressSA`,
+//!    and each part is taken apart.
 //! 3. What follows `pre`, `no` or `non` as a word of its own is not counted.
 //!
-//! A run that only contains the letters of such a word (`Forrest`, `arrest`, `interest`, `distress`, `prestress`) names neither.
+//! A run that only contains the letters of such a word (`Forrest`, `arrest`, `interest`, `distress`, `prestress`) names
+//! neither.
 
 use super::attributes::{
     Attributes, CONTEXT_MEANING, PROTOCOL_MEANING, PROTOCOL_NAME, SERIES_DESCRIPTION,
@@ -104,8 +105,8 @@ const WITHOUT: [&str; 4] = ["pre", "no", "non", "without"];
 /// Longest run of letters that is taken apart.
 const LONGEST_RUN: usize = 64;
 
-/// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one. What is said of the
-/// series goes before what is said of a protocol, which may name both scans of a study, and of the study.
+/// `rest` or `stress` if exactly one of them is named, by the most telling attribute that names one. What is said of
+/// the series goes before what is said of a protocol, which may name both scans of a study, and of the study.
 pub(super) fn rest_or_stress(a: &Attributes) -> Option<String> {
     [
         CONTEXT_MEANING,
@@ -152,7 +153,8 @@ fn in_run(run: &str) -> [bool; 2] {
     })
 }
 
-/// Whether `word`, in small letters, names rest, and stress; `None` where it is not made of known words from end to end.
+/// Whether `word`, in small letters, names rest, and stress; `None` where it is not made of known words from end to
+/// end.
 fn in_word(word: &str) -> Option<[bool; 2]> {
     // For each end in the word: what the known words up to there name, of the first way to take it apart.
     let mut ends: Vec<Option<[bool; 2]>> = vec![None; word.len() + 1];
@@ -175,7 +177,8 @@ fn in_word(word: &str) -> Option<[bool; 2]> {
     ends[word.len()]
 }
 
-/// The parts of a run of letters: a capital after a small letter begins one, and the last of several capitals before a small one.
+/// The parts of a run of letters: a capital after a small letter begins one, and the last of several capitals before a
+/// small one.
 fn by_case(run: &str) -> Vec<&str> {
     let letters: Vec<(usize, char)> = run.char_indices().collect();
     let mut parts = Vec::new();

@@ -97,8 +97,9 @@ impl Scans {
                 )
             }
             (whole, 0) if GATE_COUNTS.contains(&whole) => format!(
-                "they are {whole} scans, of which each file is a volume of its own, since they do not all say that they are gates of one \
-                 heart beat (Image Type RECON GATED TOMO, or a Trigger Time (0018,1060)): {list}; send one of them alone"
+                "they are {whole} scans, of which each file is a volume of its own, since they do not all say that \
+                 they are gates of one heart beat (Image Type RECON GATED TOMO, or a Trigger Time (0018,1060)): \
+                 {list}; send one of them alone"
             ),
             (whole, 0) => format!(
                 "they are {whole} scans, of which each file is a volume of its own: {list}; send one of them alone"

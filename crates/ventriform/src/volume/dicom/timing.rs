@@ -1,9 +1,9 @@
 //! The timing of the beats that gated images state, and whether volumes are gates.
 //!
 //! In: the attributes of a file. Out: [`GateTiming`] of each R-R interval, of which the file may leave out any part.
-//! Nuclear Medicine images have it in the Gated Information Sequence (PS3.3 C.8.4.9), with an item of the Data Information
-//! Sequence for each interval, images of a PET series beside the slice (C.8.9.4), Enhanced images in the Cardiac
-//! Synchronization functional group (C.7.6.16.2.7).
+//! Nuclear Medicine images have it in the Gated Information Sequence (PS3.3 C.8.4.9), with an item of the Data
+//! Information Sequence for each interval, images of a PET series beside the slice (C.8.9.4), Enhanced images in the
+//! Cardiac Synchronization functional group (C.7.6.16.2.7).
 
 use super::super::VolumeError;
 use super::super::gate_timing::GateTiming;
@@ -92,8 +92,8 @@ pub(super) fn is_of_gates(a: &Attributes) -> bool {
     }
 }
 
-/// Whether a slice says that the series it belongs to is one gate of several: as one of a gated series, or by its moment after the R
-/// wave.
+/// Whether a slice says that the series it belongs to is one gate of several: as one of a gated series, or by its
+/// moment after the R wave.
 pub(super) fn is_slice_of_a_gate(a: &Attributes) -> bool {
     let uptake = matches!(a.text(MODALITY).as_deref(), Some("NM" | "PT"));
     let kind = a.texts(SERIES_TYPE).into_iter().next();
@@ -102,8 +102,8 @@ pub(super) fn is_slice_of_a_gate(a: &Attributes) -> bool {
     is_of_gates(a) || (uptake && moment && !other)
 }
 
-/// Whether an image of one volume says that it is one gate of several: a gated Nuclear Medicine image whose frames are of one R-R
-/// interval and one time slot, or an image of a moment after the R wave.
+/// Whether an image of one volume says that it is one gate of several: a gated Nuclear Medicine image whose frames are
+/// of one R-R interval and one time slot, or an image of a moment after the R wave.
 pub(super) fn is_one_gate(a: &Attributes, kind: Kind) -> bool {
     let one = |vector| counted(a, vector).iter().all(|number| *number == 1);
     match kind {

@@ -213,8 +213,8 @@ fn still() -> PhantomParameters {
     }
 }
 
-/// The sums of a volume of 48 x 48 x 48 voxels along its rays, for each slice over the bins of a row at this angle from i to j.
-/// Rows along i and j have each voxel in one bin.
+/// The sums of a volume of 48 x 48 x 48 voxels along its rays, for each slice over the bins of a row at this angle from
+/// i to j. Rows along i and j have each voxel in one bin.
 fn projected(p: &Phantom, degrees: f64) -> Vec<f64> {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let mut sums = vec![0.0; 48 * 80];

@@ -23,7 +23,7 @@
 //! 5. The search ends when the nearest entry of the queue lies beyond the radius.
 //!
 //! Guaranteed: exact up to rounding. This is tested against a search through all strips (in this
-//! folder) and against another implementation (`scripts/check_geodesics.py`). If there are
+//! folder) and against another implementation (`scripts/check/geodesics.py`). If there are
 //! several shortest paths, the direction is that of one of them. No bound better than
 //! O(n² log n) is known; with the filters the time is about proportional to the area within the
 //! radius.

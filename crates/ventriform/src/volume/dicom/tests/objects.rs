@@ -623,8 +623,8 @@ fn gated_pet(gates: usize, told: fn(usize, usize) -> Elements) -> Vec<Elements> 
         .collect()
 }
 
-/// Gates are told apart by the time after the R wave, or by the slots that Image Index counts; their order is that of the
-/// beat whatever the order of the files.
+/// Gates are told apart by the time after the R wave, or by the slots that Image Index counts; their order is that of
+/// the beat whatever the order of the files.
 #[test]
 fn a_series_of_gated_pet_is_read_gate_by_gate() {
     type Said = fn(usize, usize) -> Elements;
@@ -815,8 +815,8 @@ fn images_of_one_gate_each_are_read_as_one_gated_study() {
     }
 }
 
-/// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was made
-/// of single ones, their Trigger Time.
+/// Frames of an Enhanced PET image in two gates of two slices, told apart by a delay, a phase or, where the image was
+/// made of single ones, their Trigger Time.
 #[test]
 fn an_enhanced_image_of_several_moments_of_the_beat_is_gated() {
     let of = |tag: (u16, u16), modality: &'static str| {

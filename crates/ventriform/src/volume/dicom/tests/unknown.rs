@@ -32,8 +32,8 @@ fn value_of(vr: VR) -> Value {
     }
 }
 
-/// The data set with `value` in nested sequences. Sequence number `unknown` has the VR UN; the value if there are so many
-/// sequences.
+/// The data set with `value` in nested sequences. Sequence number `unknown` has the VR UN; the value if there are so
+/// many sequences.
 fn nested(path: &[Tag], (tag, value): ((u16, u16), Value), unknown: Option<usize>) -> Elements {
     let vr = standard(Tag(tag.0, tag.1)).to_string();
     let bytes = |elements: &Elements| {
