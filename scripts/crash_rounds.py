@@ -4,18 +4,20 @@
     scripts/crash_rounds.py [--program target/release/ventriform] [--rounds 1000] [--seed 1]
 
 Of every ten rounds, eight are kills under mixed load (uploads, models, segmentations, deletions,
-cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while an
-old database is migrated. Loopback only; stops by itself; needs Python 3 and nothing else. Takes about
+cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while the data of
+a released version is opened (tests/data). Loopback only; stops by itself; needs Python 3 and nothing else. Takes about
 1.5 s a round on two cores. After each kill under load, every stored volume, filed job, cancellation and erasure
 has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
 corrupt, orphaned, made twice or without its row.
 """
-import argparse, gzip, hashlib, http.client, json, os, random, shutil, socket, sqlite3, struct, subprocess
-import sys, tempfile, threading, time
+import argparse, glob, gzip, hashlib, http.client, json, os, random, shutil, socket, sqlite3, struct, subprocess
+import sys, tempfile, threading, time, zipfile
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 FINAL = ("succeeded", "failed", "cancelled")
-SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
+SHELVES = ("volumes", "models", "segmentations", "beats", "comparisons", "normals", "templates", "readers")
+# What released versions had stored.
+RELEASED = os.path.join(ROOT, "tests/data")
 
 
 class Service:
@@ -77,7 +79,7 @@ class Rounds:
         self.folder = tempfile.mkdtemp(prefix="ventriform-crash-")
         self.figures = dict.fromkeys(
             ("rounds", "acknowledged", "lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans",
-             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "migrations"), 0)
+             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "upgrades"), 0)
         self.ready, self.number, self.lock = [], 0, threading.Lock()
         self.fresh()
 
@@ -267,6 +269,10 @@ class Rounds:
     def finish(self):
         """After the last round on a folder."""
         self.check_results()
+        self.end()
+
+    def end(self):
+        """Stops the service, and looks for files without a record, records without files and defects."""
         self.service.stop()
         self.start()
         deadline = time.time() + 60
@@ -315,69 +321,47 @@ class Rounds:
         self.figures["rounds"] += 1
         self.finish()
 
-    def migration(self):
-        """Killed while the tables of an old version are brought up to date."""
-        self.start()
-        for _ in range(4):
-            self.upload()
-        order = {"volume": next(iter(self.volumes)), "parameters": {"points": 67}}
-        self.service.json("POST", "/v1/jobs", json.dumps(order), {"content-type": "application/json"})
-        self.service.stop()
-        database = sqlite3.connect(f"{self.data}/ventriform.db")
-        database.row_factory = sqlite3.Row
-        rows = [dict(row) for row in database.execute("SELECT * FROM volumes")]
-        parameters = database.execute("SELECT parameters FROM jobs").fetchone()[0]
-        database.close()
-        for suffix in ("", "-wal", "-shm"):
-            if os.path.exists(path := f"{self.data}/ventriform.db{suffix}"):
-                os.remove(path)
-        jobs = self.old_database(rows, parameters)
+    def upgrade(self):
+        """Killed while the tables of a released version are brought up to date, in a copy of what it had stored."""
+        version = self.random.choice(sorted(os.listdir(RELEASED)))
+        with zipfile.ZipFile(f"{RELEASED}/{version}/folder.zip") as archive:
+            archive.extractall(self.data)
+        items, jobs = self.stored()
         service = Service(self.program, self.data, wait=False)
         time.sleep(self.random.uniform(0, 0.12))
         service.kill()
         self.start()
-        self.check_volumes(self.volumes)
         deadline = time.time() + 60
-        for job in jobs:
-            while (now := self.service.json("GET", "/v1/jobs/" + job)[1]).get("state") not in FINAL:
-                if now.get("state") is None or time.time() > deadline:
-                    break
-                time.sleep(0.05)
-            if now.get("state") != "succeeded":
-                self.note("lost", f"{job} of the old database: {now}")
-        self.figures["migrations"] += 1
+        while time.time() < deadline and not set(self.stored()[1].values()) <= set(FINAL):
+            time.sleep(0.05)
+        items_now, jobs_now = self.stored()
+        for job, state in jobs.items():
+            self.figures["acknowledged"] += 1
+            expected = state if state in FINAL else "succeeded"
+            if jobs_now.get(job) != expected:
+                self.note("lost", f"{job} of {version}: {jobs_now.get(job)}, not {expected}")
+        for item, files in items.items():
+            self.figures["acknowledged"] += 1
+            if items_now.get(item) != files:
+                self.note("lost", f"{item} of {version}")
+                continue
+            for file in json.loads(files):
+                self.figures["files_checked"] += 1
+                (path,) = glob.glob(f"{self.data}/*/{item}/{file['name']}")
+                with open(path, "rb") as content:
+                    if hashlib.sha256(content.read()).hexdigest() != file["sha256"]:
+                        self.note("corrupt", f"{item} {file['name']} of {version}")
+        self.figures["upgrades"] += 1
         self.figures["rounds"] += 1
-        self.finish()
+        self.end()
 
-    def old_database(self, rows, parameters):
-        """Makes the database of the first version, with these volumes and a job on each; returns the jobs."""
-        folder = os.path.join(ROOT, "crates/store/src/migrations")
-        name = min(os.listdir(folder))
-        with open(os.path.join(folder, name)) as file:
-            script = file.read()
-        database = sqlite3.connect(f"{self.data}/ventriform.db")
-        database.executescript(script)
-        database.execute("""CREATE TABLE _sqlx_migrations (version BIGINT PRIMARY KEY, description TEXT NOT NULL,
-            installed_on TIMESTAMP NOT NULL DEFAULT CURRENT_TIMESTAMP, success BOOLEAN NOT NULL,
-            checksum BLOB NOT NULL, execution_time BIGINT NOT NULL)""")
-        version, description = name.removesuffix(".sql").split("_", 1)
-        database.execute(
-            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) VALUES (?, ?, 1, ?, 0)",
-            (int(version), description.replace("_", " "), hashlib.sha384(script.encode()).digest()))
-        jobs = []
-        for row in rows:
-            files = [file["name"] if isinstance(file, dict) else file for file in json.loads(row["files"])]
-            database.execute(
-                "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES (?, ?, ?, ?, ?)",
-                (row["id"], row["created_at"], row["bytes"], json.dumps(files), row["facts"]))
-            job = "job_" + row["id"][4:]
-            database.execute(
-                "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key, fingerprint) "
-                "VALUES (?, 'model', ?, ?, ?, NULL, NULL)", (job, row["id"], parameters, row["created_at"]))
-            jobs.append(job)
-        database.commit()
+    def stored(self):
+        """The files of each item, and the state of each job."""
+        database = sqlite3.connect(f"file:{self.data}/ventriform.db?mode=ro", uri=True, timeout=30)
+        items = dict(database.execute("SELECT id, files FROM volumes UNION ALL SELECT id, files FROM products"))
+        jobs = dict(database.execute("SELECT id, state FROM jobs"))
         database.close()
-        return jobs
+        return items, jobs
 
 
 def main():
@@ -398,7 +382,7 @@ def main():
             rounds.mixed(min(max(left - 2, 1), 8))
             if left > 2:
                 rounds.retention()
-                rounds.migration()
+                rounds.upgrade()
             print(rounds.figures["rounds"], "rounds, ready after", round(rounds.ready[-1]), "ms", flush=True)
     finally:
         if rounds.service is not None and rounds.service.process.poll() is None:
