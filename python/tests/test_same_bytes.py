@@ -136,8 +136,8 @@ def test_a_calibration_and_an_evaluation(folder: pathlib.Path, command: Command,
 
     (cohort / "p0").rename(cohort / "t0")
     evaluation = vf.evaluate(cohort, tmp_path / "ours", points=[67], models=["optimised", "auto"])
-    arguments = ["--points", 67, "--models", "optimised,auto", "--out", tmp_path / "theirs"]
-    command("evaluate", "--cohort", cohort, *arguments)
+    arguments = ["--points", 67, "--models", "optimised,auto", "--output", tmp_path / "theirs"]
+    command("evaluate", cohort, *arguments)
     for name in ("table1.csv", "figure3.csv"):
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes()
     assert evaluation.table("table1") and evaluation.to_dict()

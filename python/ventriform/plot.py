@@ -40,7 +40,7 @@ def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str =
     if not isinstance(fit, Fit):
         raise InputError("fit", f"A {type(fit).__name__} is no fit.", "Give what `segment` returned.")
     found = fit.polar_map
-    if found is None or found.level_ends is None or found.rings is None:
+    if found is None:
         raise InputError("fit", "It has no polar map.", "Give a fit of a left ventricle.")
     pyplot = extra("matplotlib.pyplot", "plot")
     if ax is None:

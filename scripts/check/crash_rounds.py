@@ -4,13 +4,14 @@
     scripts/check/crash_rounds.py [--program target/release/ventriform] [--rounds 1000] [--seed 1]
 
 Of every ten rounds, eight are kills under mixed load (uploads, models, segmentations, deletions,
-cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while an
-old database is migrated. Loopback only; stops by itself; needs Python 3 and nothing else. Takes about
+cancellations, repeated requests), one is a kill while items are erased by age, and one a kill while the data of
+a released version is opened (tests/data). Loopback only; stops by itself; needs Python 3 and nothing else. Takes about
 1.5 s a round on two cores. After each kill under load, every stored volume, filed job, cancellation and erasure
 has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
 corrupt, orphaned, made twice or without its row.
 """
 import argparse
+import glob
 import gzip
 import hashlib
 import json
@@ -24,11 +25,14 @@ import sys
 import tempfile
 import threading
 import time
+import zipfile
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.service import FINAL, ROOT, Service
 
-SHELVES = ("volumes", "models", "segmentations", "templates", "readers")
+SHELVES = ("volumes", "models", "segmentations", "beats", "comparisons", "normals", "templates", "readers")
+# What released versions had stored.
+RELEASED = os.path.join(ROOT, "tests/data")
 
 
 class Rounds:
@@ -40,7 +44,7 @@ class Rounds:
         self.folder = tempfile.mkdtemp(prefix="ventriform-crash-")
         self.figures = dict.fromkeys(
             ("rounds", "acknowledged", "lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans",
-             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "migrations"), 0)
+             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "upgrades"), 0)
         self.ready, self.number, self.lock = [], 0, threading.Lock()
         self.fresh()
 
@@ -230,6 +234,10 @@ class Rounds:
     def finish(self):
         """After the last round on a folder."""
         self.check_results()
+        self.end()
+
+    def end(self):
+        """Stops the service, and looks for files without a record, records without files and defects."""
         self.service.stop()
         self.start()
         deadline = time.time() + 60
@@ -278,39 +286,39 @@ class Rounds:
         self.figures["rounds"] += 1
         self.finish()
 
-    def migration(self):
-        """Killed while the tables of an old version are brought up to date."""
-        self.start()
-        for _ in range(4):
-            self.upload()
-        order = {"volume": next(iter(self.volumes)), "parameters": {"points": 67}}
-        self.service.json("POST", "/v1/jobs", json.dumps(order), {"content-type": "application/json"})
-        self.service.stop()
-        database = sqlite3.connect(f"{self.data}/ventriform.db")
-        database.row_factory = sqlite3.Row
-        rows = [dict(row) for row in database.execute("SELECT * FROM volumes")]
-        parameters = database.execute("SELECT parameters FROM jobs").fetchone()[0]
-        database.close()
-        for suffix in ("", "-wal", "-shm"):
-            if os.path.exists(path := f"{self.data}/ventriform.db{suffix}"):
-                os.remove(path)
-        jobs = self.old_database(rows, parameters)
+    def upgrade(self):
+        """Killed while the tables of a released version are brought up to date, in a copy of what it had stored."""
+        version = self.random.choice(sorted(os.listdir(RELEASED)))
+        with zipfile.ZipFile(f"{RELEASED}/{version}/folder.zip") as archive:
+            archive.extractall(self.data)
+        items, jobs = self.stored()
         service = Service(self.program, self.data, wait=False)
         time.sleep(self.random.uniform(0, 0.12))
         service.kill()
         self.start()
-        self.check_volumes(self.volumes)
         deadline = time.time() + 60
-        for job in jobs:
-            while (now := self.service.json("GET", "/v1/jobs/" + job)[1]).get("state") not in FINAL:
-                if now.get("state") is None or time.time() > deadline:
-                    break
-                time.sleep(0.05)
-            if now.get("state") != "succeeded":
-                self.note("lost", f"{job} of the old database: {now}")
-        self.figures["migrations"] += 1
+        while time.time() < deadline and not set(self.stored()[1].values()) <= set(FINAL):
+            time.sleep(0.05)
+        items_now, jobs_now = self.stored()
+        for job, state in jobs.items():
+            self.figures["acknowledged"] += 1
+            expected = state if state in FINAL else "succeeded"
+            if jobs_now.get(job) != expected:
+                self.note("lost", f"{job} of {version}: {jobs_now.get(job)}, not {expected}")
+        for item, files in items.items():
+            self.figures["acknowledged"] += 1
+            if items_now.get(item) != files:
+                self.note("lost", f"{item} of {version}")
+                continue
+            for file in json.loads(files):
+                self.figures["files_checked"] += 1
+                (path,) = glob.glob(f"{self.data}/*/{item}/{file['name']}")
+                with open(path, "rb") as content:
+                    if hashlib.sha256(content.read()).hexdigest() != file["sha256"]:
+                        self.note("corrupt", f"{item} {file['name']} of {version}")
+        self.figures["upgrades"] += 1
         self.figures["rounds"] += 1
-        self.finish()
+        self.end()
 
     def old_database(self, rows, parameters):
         """Makes the database of the first version, with these volumes and a job on each; returns the jobs."""
@@ -340,7 +348,7 @@ class Rounds:
             jobs.append(job)
         database.commit()
         database.close()
-        return jobs
+        return items, jobs
 
 
 def main():
@@ -361,7 +369,7 @@ def main():
             rounds.mixed(min(max(left - 2, 1), 8))
             if left > 2:
                 rounds.retention()
-                rounds.migration()
+                rounds.upgrade()
             print(rounds.figures["rounds"], "rounds, ready after", round(rounds.ready[-1]), "ms", flush=True)
     finally:
         if rounds.service is not None and rounds.service.process.poll() is None:

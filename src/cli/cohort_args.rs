@@ -2,7 +2,7 @@
 
 use super::mesh_args::MeshArgs;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use ventriform::evaluate::{Cohort, CohortError};
 use ventriform::volume::given_mask::MaskChoice;
 
@@ -12,11 +12,8 @@ use ventriform::volume::given_mask::MaskChoice;
 pub struct CohortArgs {
     /// Folder of the cohort: one folder for each case with spect.nii.gz, lv_expert_img.nii.gz
     /// and lv_truth.nii.gz; manifest.json says which are templates (without it: names with t)
-    #[arg(value_name = "COHORT", required_unless_present = "cohort")]
-    folder: Option<PathBuf>,
-    /// The same, as older versions take it
-    #[arg(long, value_name = "DIR", hide = true, conflicts_with = "folder")]
-    cohort: Option<PathBuf>,
+    #[arg(value_name = "COHORT")]
+    folder: PathBuf,
     /// Numbers of points of our models
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub points: Vec<usize>,
@@ -40,9 +37,7 @@ impl CohortArgs {
     /// # Errors
     /// [`CohortError`].
     pub fn open(&self) -> Result<Cohort, CohortError> {
-        let folder = self.folder.as_ref().or(self.cohort.as_ref());
-        let folder = folder.map_or(Path::new(""), PathBuf::as_path);
-        let mut cohort = Cohort::open(folder, self.manual.as_deref())?;
+        let mut cohort = Cohort::open(&self.folder, self.manual.as_deref())?;
         cohort.masks = MaskChoice {
             label: self.label.as_deref().map(|text| {
                 let Ok(label) = text.parse();

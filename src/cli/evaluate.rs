@@ -84,7 +84,7 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "CASE,...|all", value_delimiter = ',')]
     in_sample: Vec<String>,
     /// Folder for the results (created if missing)
-    #[arg(short, long = "output", alias = "out", value_name = "DIR")]
+    #[arg(short, long = "output", value_name = "DIR")]
     out: PathBuf,
 }
 

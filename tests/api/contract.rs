@@ -309,7 +309,6 @@ contracts!(
     work_items_change_once,
     figures_are_counted,
     changes_and_their_rows_are_one,
-    failures_of_earlier_versions_quote_no_file,
     everything_stored_counts_for_its_tenant,
     a_full_queue_and_a_full_intake_keep_a_share_for_others,
     work_items_are_read_in_batches_of_few_bytes,
@@ -2325,91 +2324,6 @@ async fn work_items_change_once(on: &Stores) {
     performed.performer = Performer::Claimed;
     assert!(on.a.change_workitem(&performed).await.unwrap());
     assert_eq!(erase(&own).await.unwrap(), Erased::InUse);
-}
-
-/// A failure that an earlier version has stored may quote a header. It is read without the sentence; one of this version with it.
-async fn failures_of_earlier_versions_quote_no_file(on: &Stores) {
-    let sourced = NewJob {
-        source: Some(series_source()),
-        volume: None,
-        ..new_job("")
-    };
-    let pulled = on.file(&sourced).await.id;
-    let why = failure("invalid-header").at("Rescale Slope (0028,1053)");
-    on.a.pull_given_up(&pulled, &why, now()).await.unwrap();
-    let job = on.file(&new_job(&on.volume(&tenant()).await)).await.id;
-    let (_, lease) = on.claim().await.unwrap();
-    let why = failure("no-such-label");
-    on.a.finish(&lease, &JobOutcome::Failed(why), now())
-        .await
-        .unwrap();
-    let room = IntakeRoom {
-        objects: 99,
-        bytes: 9999,
-        tenant_bytes: None,
-    };
-    let added =
-        on.a.add(&received_object(&tenant(), "8"), room, now())
-            .await;
-    let Added::New(group, _) = added.unwrap() else {
-        panic!("the object is new");
-    };
-    let revision = on.a.group(&group).await.unwrap().unwrap().revision;
-    on.a.failed(&group, revision, &failure("unusable-volume"), now())
-        .await
-        .unwrap();
-    let told = async || {
-        let of_job = |id: String| async move { on.b.job(&id).await.unwrap().unwrap().failure };
-        let pulls = on.b.pulls(&[&pulled]).await.unwrap();
-        [
-            of_job(pulled.clone()).await.unwrap().detail,
-            of_job(job.clone()).await.unwrap().detail,
-            on.b.group(&group)
-                .await
-                .unwrap()
-                .unwrap()
-                .failure
-                .unwrap()
-                .detail,
-            pulls[&pulled].last_error.clone().unwrap(),
-        ]
-    };
-    assert_eq!(told().await, [(); 4].map(|()| "It failed.".to_owned()));
-    for earlier in [
-        "UPDATE jobs SET failure = '{\"code\":\"invalid-header\",\"fault\":\"content\",
-            \"field\":\"Rescale Slope (0028,1053)\",\"detail\":\"a.dcm: it is Zzyzx^Maria: no number.\"}'
-         WHERE failure LIKE '%invalid-header%'",
-        "UPDATE jobs SET failure = '{\"code\":\"no-such-label\",\"fault\":\"request\",
-            \"detail\":\"The mask holds 1 (Zzyzx^Maria).\"}' WHERE failure LIKE '%no-such-label%'",
-        "UPDATE pulls SET last_error = 'a.dcm: it is Zzyzx^Maria: no number.'",
-        "UPDATE intake_groups SET failure = '{\"code\":\"unusable-volume\",\"fault\":\"content\",
-            \"detail\":\"Patient Name is Zzyzx^Maria in a.dcm.\"}'",
-    ] {
-        assert!(on.tamper(earlier).await);
-    }
-    let told = told().await;
-    assert!(!told.join(" ").contains("Zzyzx"), "{told:?}");
-    assert!(
-        told[0].starts_with("Rescale Slope (0028,1053) cannot be used"),
-        "{told:?}"
-    );
-    // What the service says of itself, and figures, stay.
-    for (earlier, kept) in [
-        (
-            "UPDATE jobs SET failure = '{\"code\":\"job-time-limit\",\"fault\":\"service\",\"detail\":\"It took 1 h.\"}'
-             WHERE failure LIKE '%no-such-label%'",
-            "It took 1 h.",
-        ),
-        (
-            "UPDATE jobs SET failure = '{\"code\":\"no-heart\",\"fault\":\"content\",\"detail\":\"No heart: 3 of 7.\"}'
-             WHERE failure LIKE '%job-time-limit%'",
-            "No heart: 3 of 7.",
-        ),
-    ] {
-        assert!(on.tamper(earlier).await);
-        let read = on.b.job(&job).await.unwrap().unwrap().failure.unwrap();
-        assert_eq!(read.detail, kept);
-    }
 }
 
 /// A change that somebody makes: its name, the act and the item of its row, and how it is made; `true` if it was.

@@ -4,9 +4,8 @@ use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
 use ventriform_service::records::{
-    Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, ItemFilter, JobOutcome,
-    JobState, JobStore, Lease, ListRequest, NewJob, Resource, StoredVolume, Tags, Tenant,
-    random_id,
+    Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, JobOutcome, JobState,
+    JobStore, Lease, NewJob, StoredVolume, Tags, Tenant, random_id,
 };
 use ventriform_store::Store;
 
@@ -207,94 +206,5 @@ async fn filed(store: &Store) -> String {
     match store.rows.file(&order, 10, 0).await.unwrap() {
         Filed::New(job) => job.id,
         other => panic!("{other:?}"),
-    }
-}
-
-/// A database in `folder` as the program left it when it had the first `count` migrations.
-async fn older_database(folder: &std::path::Path, count: usize) -> sqlx::SqlitePool {
-    let older = folder.join("migrations");
-    std::fs::create_dir(&older).unwrap();
-    for file in migrations().iter().take(count) {
-        std::fs::copy(file, older.join(file.file_name().unwrap())).unwrap();
-    }
-    let options = sqlx::sqlite::SqliteConnectOptions::new()
-        .filename(folder.join("ventriform.db"))
-        .create_if_missing(true);
-    let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
-    let migrator = sqlx::migrate::Migrator::new(older.as_path()).await.unwrap();
-    migrator.run(&pool).await.unwrap();
-    pool
-}
-
-/// The files of the migrations, in the order in which they run.
-fn migrations() -> Vec<std::path::PathBuf> {
-    let source =
-        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/store/src/migrations");
-    let files = std::fs::read_dir(source).unwrap();
-    let mut files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
-    files.sort();
-    files
-}
-
-/// The parts of the database in `folder`: kind, name and definition of each.
-async fn parts(folder: &std::path::Path) -> Vec<(String, String, Option<String>)> {
-    let options = sqlx::sqlite::SqliteConnectOptions::new().filename(folder.join("ventriform.db"));
-    let pool = sqlx::SqlitePool::connect_with(options).await.unwrap();
-    let sound: String = sqlx::query_scalar("PRAGMA integrity_check")
-        .fetch_one(&pool)
-        .await
-        .unwrap();
-    assert_eq!(sound, "ok");
-    let parts = sqlx::query_as("SELECT type, name, sql FROM sqlite_schema ORDER BY type, name")
-        .fetch_all(&pool)
-        .await
-        .unwrap();
-    pool.close().await;
-    parts
-}
-
-#[tokio::test]
-async fn every_older_database_becomes_what_a_new_one_is() {
-    let new = tempfile::tempdir().unwrap();
-    let mut store = Store::open(new.path()).await.unwrap();
-    store.close().await;
-    let expected = parts(new.path()).await;
-    for count in 1..migrations().len() {
-        let folder = tempfile::tempdir().unwrap();
-        let pool = older_database(folder.path(), count).await;
-        pool.close().await;
-        let mut store = Store::open(folder.path()).await.unwrap();
-        store.close().await;
-        assert_eq!(parts(folder.path()).await, expected, "from {count}");
-    }
-}
-
-#[tokio::test]
-async fn models_of_an_older_database_are_migrated() {
-    let folder = tempfile::tempdir().unwrap();
-    let pool = older_database(folder.path(), 1).await;
-    sqlx::query(
-        "INSERT INTO models (id, created_at, volume, parameters, summary, software, files)
-         VALUES ('mdl_1', 5, 'vol_1', '{}', '{}', '0', '[]')",
-    )
-    .execute(&pool)
-    .await
-    .unwrap();
-    pool.close().await;
-
-    let store = Store::open(folder.path()).await.unwrap();
-    let tenant = Tenant::default();
-    let model = store.rows.product(&tenant, "mdl_1").await.unwrap().unwrap();
-    assert_eq!(model.volume.as_deref(), Some("vol_1"));
-    assert_eq!(model.created_at, 5);
-    let page = ListRequest {
-        before: None,
-        limit: 9,
-    };
-    for (kind, count) in [(Resource::Model, 1), (Resource::Segmentation, 0)] {
-        let filter = ItemFilter::default();
-        let listed = store.rows.products(&tenant, kind, &filter, page).await;
-        let listed = listed.unwrap();
-        assert_eq!(listed.items.len(), count);
     }
 }

@@ -68,6 +68,7 @@ mod stores_found;
 mod tenants;
 mod tls;
 mod traces;
+mod upgrades;
 mod volumes;
 mod webhooks;
 mod workitems;

@@ -525,7 +525,7 @@ async fn a_scan_that_is_not_dicom_needs_a_stated_identity() {
 }
 
 #[tokio::test]
-async fn volumes_of_older_versions_are_read_at_the_next_start() {
+async fn volumes_whose_scan_a_repair_has_lost_are_read_at_the_next_start() {
     let app = real().await;
     let volume = upload(&app, nm(&JANE, 1)).await;
     let data = app.stop().await;

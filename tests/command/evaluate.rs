@@ -72,9 +72,8 @@ fn evaluate(cohort: &Path, out: &Path, threads: usize) -> Output {
             "--models",
             "reference,optimised,auto",
         ])
-        .arg("--cohort")
         .arg(cohort)
-        .arg("--out")
+        .arg("--output")
         .arg(out)
         .env("RAYON_NUM_THREADS", threads.to_string())
         .output()
@@ -192,9 +191,8 @@ fn an_unusable_cohort_is_an_error_with_the_reason() {
     let run = |cohort: &Path| {
         let output = Command::new(env!("CARGO_BIN_EXE_ventriform"))
             .arg("evaluate")
-            .arg("--cohort")
             .arg(cohort)
-            .arg("--out")
+            .arg("--output")
             .arg(&out)
             .output()
             .unwrap();

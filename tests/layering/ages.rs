@@ -83,8 +83,7 @@ const AGE_FIELDS: &[&str] = &[
 
 /// The statements that compare a stamp with a moment: the file, the column and the comparison, and by which time.
 const COMPARISONS: &[(&str, &str)] = &[
-    // Whether a key is valid, or was made since the operator opened the store.
-    ("tables/access.rs: created_at >", "keys since the opening"),
+    // Whether a key is valid.
     ("tables/access.rs: expires_at >", "valid keys"),
     // Two stamps of one store.
     (

@@ -63,7 +63,7 @@ const WITHOUT_ROW: &[(&str, &str)] = &[
     ),
     (
         "tables/scans.rs: note_scan",
-        "read of a header after an upgrade",
+        "read of a header after a repair",
     ),
     // Secrets that are made once, when they are first needed.
     ("tables/hooks.rs: signing_secret", "made once"),

@@ -54,7 +54,7 @@ export interface Opened {
 /** Reads the results among files, by their path. */
 export async function openFolder(all: Map<string, File>): Promise<Opened> {
   const found = [...all.keys()].filter(path => /(^|\/)evaluation\.json$/.test(path)).sort((a, b) => a.length - b.length)[0];
-  if (found === undefined) throw new Error("There is no evaluation.json in it. Choose the folder that ventriform evaluate --out wrote.");
+  if (found === undefined) throw new Error("There is no evaluation.json in it. Choose the folder that ventriform evaluate --output wrote.");
   const folder = found.slice(0, -"evaluation.json".length);
   const files = new Map([...all].flatMap(([path, file]): [string, File][] => (path.startsWith(folder) ? [[path.slice(folder.length), file]] : [])));
   let evaluation: Evaluation;

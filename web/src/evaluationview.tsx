@@ -26,7 +26,7 @@ export function EvaluationView() {
       <section class={`drop${over ? " over" : ""}${opened ? "" : " empty"}`} aria-label="Open an evaluation">
         <div class="choose">
           <strong>{over ? "Let go to open" : opened ? "Another evaluation" : "Drop the folder of an evaluation here"}</strong>
-          <span class="quiet">The folder that <code>ventriform evaluate --out</code> wrote. It stays on this computer: nothing is sent.</span>
+          <span class="quiet">The folder that <code>ventriform evaluate --output</code> wrote. It stays on this computer: nothing is sent.</span>
         </div>
         <div class="buttons">
           <button type="button" class={opened ? "" : "main"} onClick={() => folder.current?.click()}>Choose a folder</button>
@@ -181,7 +181,7 @@ function Patient({ opened, name, cases, onShow }: PatientProps) {
           </figcaption>
         </figure>
       ) : (
-        <p class="quiet">{picture ? `The folder lacks ${picture.file}.` : "There are no slices of this patient: it has no fit, or an older program wrote the folder; run it again with the same --out, which takes seconds."}</p>
+        <p class="quiet">{picture ? `The folder lacks ${picture.file}.` : "There are no slices of this patient: it has no fit."}</p>
       )}
       <details>
         <summary>{fits.length} fits</summary>

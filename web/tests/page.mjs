@@ -1003,7 +1003,7 @@ async function main() {
       cpSync(join(cohort, name, "lv_truth.nii.gz"), join(cohort, name, "lv_expert_img.nii.gz"));
     }
     const folder = join(SCREENSHOTS, "evaluation");
-    const made = spawnSync(PROGRAM, ["evaluate", "--cohort", cohort, "--points", "67,110", "--reference-points", "67", "--out", folder], { encoding: "utf8" });
+    const made = spawnSync(PROGRAM, ["evaluate", cohort, "--points", "67,110", "--reference-points", "67", "--output", folder], { encoding: "utf8" });
     assert.equal(made.status, 0, made.stderr);
     for (const [width, dark] of [[1280, false], [400, true]]) {
       const { page, faults, close } = await tab(browser, address, { width, dark });

@@ -38,13 +38,11 @@ use utoipa::{IntoParams, IntoResponses, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform::export::{Format, Part};
 use ventriform::progress::Monitor;
-use ventriform::report::header_text;
 use ventriform_service::access::Scope;
 use ventriform_service::decoding::LITTLE_MEMORY;
-use ventriform_service::items::OutputFile;
 use ventriform_service::records::{
-    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, ProductFile, Resource,
-    StoreError, Tenant,
+    Bounded, Catalogue, ItemFilter, ListPage, ListRequest, Owned, Product, Resource, StoreError,
+    Tenant,
 };
 use ventriform_service::work::dicom::{self, ResultObject};
 use ventriform_service::work::{UploadFacts, part};
@@ -135,9 +133,7 @@ pub struct Presented {
 
 impl Presented {
     /// A product as its tenant has it.
-    pub fn of(app: &App, mut held: Owned<Product>) -> Self {
-        // What earlier versions have stored.
-        header_text::withhold(&mut held.item.summary);
+    pub fn of(app: &App, held: Owned<Product>) -> Self {
         Self {
             expires_at: app.expires_at(held.item.resource(), &held.ownership),
             scan: ScanUidsBody::of(&held.ownership.scan),
@@ -508,13 +504,13 @@ async fn send_part(
         None => Err(Problem::new(
             StatusCode::NOT_FOUND,
             "not-found",
-            format!("The triangles of this mesh do not say which are {}.", part.as_str()),
+            format!(
+                "The triangles of this mesh do not say which are {}.",
+                part.as_str()
+            ),
         )
         .at("part")
-        .fix(
-            "Leave out `part`. Meshes of left ventricles have parts; those of older versions get them when the same \
-             job is started again.",
-        )),
+        .fix("Leave out `part`. Meshes of left ventricles have parts.")),
     }
 }
 
@@ -711,9 +707,6 @@ async fn send_named(
     headers: &HeaderMap,
 ) -> Answer {
     if let Some(file) = product.file(name) {
-        if let Some(document) = older_document(app, product, file).await? {
-            return files::send_derived(product, document, headers).await;
-        }
         return files::send(app, product, file, headers).await;
     }
     let work = app.service.engine.work(product.resource().noun());
@@ -746,39 +739,6 @@ async fn send_named(
 
 /// The parameter of a comparison that names the volume at rest.
 const REST_FIELD: &str = "rest";
-
-/// The names of documents in which earlier versions have stored text of headers.
-const DOCUMENTS: [&str; 3] = ["report.json", "beat.json", "comparison.json"];
-
-/// A stored document that holds text of headers, without it; `None` if it holds none.
-async fn older_document(
-    app: &App,
-    product: &Product,
-    file: &ProductFile,
-) -> Answer<Option<OutputFile>> {
-    if !DOCUMENTS.contains(&file.name.as_str()) {
-        return Ok(None);
-    }
-    charge(DOCUMENT_MEMORY_PER_BYTE * file.bytes).await?;
-    let wanted = [file.name.as_str()];
-    let stored = app.service.items().whole(product.clone(), &wanted).await?;
-    let (name, media_type) = (file.name.clone(), file.media_type.clone());
-    let read = move |_: &Monitor<'_>| {
-        let bytes = stored.read_whole(&name)?;
-        let withheld = bytes.and_then(|bytes| header_text::withheld(&bytes));
-        Ok::<_, std::io::Error>(withheld.map(|bytes| OutputFile {
-            name,
-            media_type: media_type.into(),
-            bytes,
-        }))
-    };
-    let decoding = &app.service.decoding;
-    let read = decoding.run_on(file.bytes, LITTLE_MEMORY, read).await?;
-    read.map_err(Problem::internal)
-}
-
-/// Memory for a byte of a document: its text, parsed, and its text again.
-const DOCUMENT_MEMORY_PER_BYTE: u64 = 8;
 
 /// Whether a product of that kind may have a mesh of this name.
 fn is_mesh<P: ProductCollection>(name: &str) -> bool {

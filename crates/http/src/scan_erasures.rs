@@ -79,8 +79,8 @@ pub struct PlanBody {
     unfinished_jobs: Vec<String>,
     /// Items that a request needs at this moment. Nothing is erased while there are any.
     pinned: Vec<String>,
-    /// Volumes that an older version has stored and of which it is not known yet whose scan they are, so that they may be
-    /// missing here.
+    /// Volumes whose scan a repair of the database has lost and that were not read again yet, so that they may be missing
+    /// here.
     unread_volumes: u64,
 }
 

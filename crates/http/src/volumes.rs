@@ -22,7 +22,6 @@ use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 use ventriform::progress::Monitor;
-use ventriform::report::header_text;
 use ventriform::volume::GateFacts;
 use ventriform_service::access::Scope;
 use ventriform_service::error::ServiceError;
@@ -276,10 +275,7 @@ impl VolumeBody {
             },
             label_values: facts.labels,
             gates: facts.gates,
-            // Earlier versions have stored values of headers in them.
-            warnings: (facts.warnings.iter())
-                .map(|text| header_text::warning(text).into_owned())
-                .collect(),
+            warnings: facts.warnings,
             dicom: scans::shown(&ownership.scan, scope),
             links: VolumeLinks {
                 preview: format!("{itself}/preview.png"),

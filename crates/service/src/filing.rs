@@ -94,9 +94,9 @@ impl JobOrder {
     ) -> Option<Idempotency> {
         let key = self.key.clone()?;
         let parameters = Value::Object(parameters.clone()).to_string();
-        // What an order does not give is not hashed, so that its fingerprint stays as older versions
-        // stored it. These are JSON objects with different fields, names are a JSON array: no
-        // order is like another.
+        // What an order does not give is not hashed, so that a field that is added leaves the fingerprints
+        // of stored orders as they are. These are JSON objects with different fields, names are a JSON array:
+        // no order is like another.
         let given = [
             self.webhook.as_ref().map(|webhook| json!(webhook)),
             self.source.as_ref().map(|source| json!(source)),

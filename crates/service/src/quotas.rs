@@ -18,7 +18,7 @@ use crate::reservations::{Reservation, Reservations};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Bytes that the record of a job counts at least; see the migrations of the jobs table.
+/// Bytes that the record of a job counts at least; see the column `bytes` of the jobs table.
 const JOB_RECORD_BYTES: u64 = 2048;
 
 /// Pause before a job is filed again that found the tenant's jobs full.

@@ -1,4 +1,4 @@
-//! Whose scan a volume is: read from its files when it is stored, and later of what older versions stored.
+//! Whose scan a volume is: read from its files when it is stored, and again if a repair of the database has lost it.
 
 use crate::error::ServiceError;
 use crate::records::{BlobError, FileRecord, ScanFields, StoreFault, Tenant};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use tokio_util::sync::CancellationToken;
 use ventriform::progress::Monitor;
 
-/// Pause of the reading of old volumes after a failure.
+/// Pause after a failure to read the volumes whose scan was lost.
 const READ_RETRY: Duration = Duration::from_secs(30);
 
 impl Service {
@@ -53,7 +53,7 @@ impl Service {
         Ok(found.unwrap_or_default())
     }
 
-    /// Reads the scans of volumes that older versions have stored. Ends when all are read, or at `end`.
+    /// Reads the scans of volumes that a repair has lost. Ends when all are read, or at `end`.
     pub(crate) async fn read_unread_scans(&self, end: CancellationToken) {
         end.run_until_cancelled(async {
             let mut after = 0;
@@ -62,7 +62,7 @@ impl Service {
                 let Some(unread) = (match next {
                     Ok(page) => page.into_iter().next(),
                     Err(error) => {
-                        tracing::warn!(%error, "whose scans old volumes are could not be read; again soon");
+                        tracing::warn!(%error, "the volumes whose scan a repair has lost could not be listed; again soon");
                         tokio::time::sleep(READ_RETRY).await;
                         continue;
                     }
@@ -72,7 +72,7 @@ impl Service {
                 after = unread.sequence;
                 if self.note_scan(&unread.tenant, &unread.volume, &unread.files).await.is_err() {
                     let volume = &unread.volume;
-                    tracing::warn!(volume, "whose scan this is could not be read; the next start tries again");
+                    tracing::warn!(volume, "the scan of this volume could not be read; the next start tries again");
                 }
             }
         })

@@ -215,7 +215,7 @@ pub(super) fn copy_item(folder: &Path, target: &Path, record: &ItemRecord) -> io
             }
             other => other?,
         };
-        if !content::hash(&File::open(&copy)?)?.starts_with(&file.sha256) {
+        if content::hash(&File::open(&copy)?)? != file.sha256 {
             let how = format!("{} has another content than was stored", file.name);
             return Ok(Copied::Not(how));
         }
@@ -237,6 +237,6 @@ fn is_whole(place: &Path, record: &ItemRecord) -> bool {
     record.files().iter().all(|file| {
         let open = File::open(place.join(&file.name));
         let hash = open.and_then(|open| content::hash(&open));
-        hash.is_ok_and(|hash| hash.starts_with(&file.sha256))
+        hash.is_ok_and(|hash| hash == file.sha256)
     })
 }

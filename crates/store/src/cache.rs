@@ -252,7 +252,7 @@ impl LocalCache {
             let how = format!("{bytes} bytes instead of {}", record.bytes);
             return Err(content::damaged(&path, &how));
         }
-        if !sha256.starts_with(&record.sha256) {
+        if sha256 != record.sha256 {
             return Err(content::damaged(&path, "its SHA-256 is another"));
         }
         let _in_use = self.put(place, record, &draft.0, sha256)?;

@@ -711,9 +711,9 @@ impl<'a> Doctor<'a> {
             self.found.files += 1;
             let bytes = file.metadata()?.len();
             let sha256 = content::hash(&file)?;
-            if bytes != expected.bytes && !expected.sha256.is_empty() {
+            if bytes != expected.bytes {
                 wrong.push(format!("{name} has {bytes} bytes, not {}", expected.bytes));
-            } else if !sha256.starts_with(&expected.sha256) {
+            } else if sha256 != expected.sha256 {
                 wrong.push(format!("{name} has another content than was stored"));
             }
             found.push(FileRecord {

@@ -163,7 +163,7 @@ impl SqlStore {
         if whole && marks.access.is_some() {
             return Ok((open, None));
         }
-        // The marks are lost, or this is the first start of this version on the database.
+        // The marks are lost, or this is the first start.
         if marks.access.is_none() && self.had_keys().await? {
             return Ok((Access::Closed, None));
         }
@@ -230,7 +230,7 @@ impl SqlStore {
         loop {
             let marks = self.marks().await?;
             if marks.store.is_none() {
-                // Written by a program that did not settle it; the next start does.
+                // It was not settled yet; the next start does that.
                 return Ok(());
             }
             let note = self.note_of(&marks).await?;

@@ -22,7 +22,7 @@ use ventriform_service::records::{News, NewsFeed};
 const LISTEN_RETRY: Duration = Duration::from_secs(1);
 /// Number of different news that wait to be followed.
 const QUEUED_NEWS: usize = 10_000;
-/// The channel of the notifications of migration 2.
+/// The channel on which the function `tell_processes` of the database notifies.
 const SELECT_CHANNEL: &str = "SELECT 'ventriform_' || md5(current_schema())";
 
 /// News that wait to be followed, in the order in which they came.

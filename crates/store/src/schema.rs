@@ -1,6 +1,6 @@
 //! The tables of SQLite and PostgreSQL as migrations: SQL files in `migrations/` and `migrations_postgres/`, embedded
-//! in the program. A file is named `VERSION_DESCRIPTION.sql`; what has landed is never changed, since a database keeps
-//! the sum of each file that it was made by.
+//! in the program. A file is named `VERSION_DESCRIPTION.sql`. What has been released is never changed, since a database
+//! keeps the sum of each file that it was made by.
 //!
 //! `sqlx::migrate!` would do the same. Its macro crate compiles both drivers, TLS and tokio a second time for the
 //! compiler's own use.

@@ -92,34 +92,16 @@ export function colourOn({ range: [low, high], below }: Pick<DrawnMap, "range" |
   return below && value < low ? below : colour(lut, (value - low) / (high - low));
 }
 
-/** Apex, apical, mid and basal, in maps that do not say how wide they are. */
-const RINGS = [1 / 4, 2 / 4, 3 / 4, 1];
-
-function ringsOf(map: Laid): number[] {
-  return map.rings ?? RINGS;
-}
-
-function level(segment: number): number {
-  return segment === 17 ? 0 : segment > 12 ? 1 : segment > 6 ? 2 : 3;
-}
-
-/** The rows at which the levels of a column end; as well as the segments tell it in maps of older versions. */
+/** The rows at which the levels of a column end. */
 function ends(map: Laid, column: number): number[] {
-  const known = map.level_ends?.[column];
-  if (known) return known;
-  const out = [0, 0, 0, map.rows];
-  for (let row = 0; row < map.rows; row++) {
-    const at = level(map.segment_of[row]![column]!);
-    for (let n = at; n < 3; n++) out[n] = row + 1;
-  }
-  return out;
+  return map.level_ends[column]!;
 }
 
 /** Share of the radius of a place `rows` from the apex. */
 export function radiusOf(map: Laid, rows: number, column: number): number {
   let [from, inner] = [0, 0];
   const all = ends(map, column);
-  for (const [n, outer] of ringsOf(map).entries()) {
+  for (const [n, outer] of map.rings.entries()) {
     const to = all[n]!;
     if (rows <= to) return inner + ((outer - inner) * (rows - from)) / Math.max(1e-6, to - from);
     [from, inner] = [to, outer];
@@ -129,7 +111,7 @@ export function radiusOf(map: Laid, rows: number, column: number): number {
 
 function rowsAt(map: Laid, radius: number, column: number): number {
   const all = ends(map, column);
-  const rings = ringsOf(map);
+  const { rings } = map;
   const found = rings.findIndex(outer => radius < outer);
   const n = found < 0 ? rings.length - 1 : found;
   const [from, inner] = n === 0 ? [0, 0] : [all[n - 1]!, rings[n - 1]!];
@@ -315,7 +297,7 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   }
   context.stroke();
   context.strokeStyle = "rgba(255,255,255,.55)";
-  const rings = ringsOf(map);
+  const { rings } = map;
   for (const ring of rings) {
     context.beginPath();
     context.arc(middle, middle, full * ring, 0, 2 * Math.PI);
@@ -443,7 +425,7 @@ export function middleOfSegment(map: Laid, number: number): [number, number] {
 
 function labelPlace(map: Laid, number: number): [number, number] {
   if (number === 17) return [0, 0];
-  const rings = ringsOf(map);
+  const { rings } = map;
   const between = (n: number) => (rings[n - 1]! + rings[n]!) / 2;
   const turn = (first: number, of: number, from: number) => (first + (number - from) / of) % 1;
   if (number <= 6) return [between(3), turn(0.25, 6, 1)];

@@ -15,8 +15,7 @@
 
 use super::Items;
 use crate::records::{
-    BlobError, FileRecord, ItemRecord, RecordPages, Resource, StoreError, StoreFault, StoreResult,
-    volume_id,
+    BlobError, ItemRecord, RecordPages, Resource, StoreError, StoreFault, StoreResult,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,8 +29,6 @@ const BATCH_ITEMS: usize = 500;
 const BATCH_PAUSE: Duration = Duration::from_millis(5);
 /// Shortest time between the starts of two scrubs.
 const SCRUB_EVERY: Duration = Duration::from_secs(86_400);
-/// Hexadecimal digits of a whole SHA-256.
-const HASH_DIGITS: usize = 64;
 
 /// Looks after the files of a running service.
 pub struct Custodian {
@@ -179,10 +176,9 @@ impl Custodian {
         Ok(damaged)
     }
 
-    async fn scrub_item(&self, mut record: ItemRecord) -> StoreResult<()> {
+    async fn scrub_item(&self, record: ItemRecord) -> StoreResult<()> {
         let items = &self.items;
         let id = record.id().to_owned();
-        let mut found = Vec::new();
         for expected in record.files() {
             let file = match items.blobs.hash(&id, &expected).await {
                 Err(error) if error.cause == StoreFault::DamagedFile => {
@@ -192,24 +188,17 @@ impl Custodian {
             };
             let seconds = file.bytes as f64 / self.scrub_rate as f64;
             tokio::time::sleep(BATCH_PAUSE + Duration::from_secs_f64(seconds)).await;
-            if !file.sha256.starts_with(&expected.sha256) {
+            if file.sha256 != expected.sha256 {
                 let how = format!("{id}/{}: its SHA-256 is another", file.name);
                 return self
                     .unless_erased(&id, BlobError::new(StoreFault::DamagedFile, how))
                     .await;
             }
-            found.push(file);
         }
         // An erasure that comes between would leave a description of nothing.
         let _lock = items.locks.lock(&id).await;
         if items.catalogue.record(&id).await?.is_none() {
             return Ok(());
-        }
-        if let ItemRecord::Volume(volume) = &mut record
-            && volume.files.iter().any(|f| f.sha256.len() < HASH_DIGITS)
-        {
-            complete(&mut volume.files, found, &id)?;
-            items.catalogue.amend(&record).await?;
         }
         items.blobs.describe(&record).await?;
         // So would one by another process, which does not know the lock.
@@ -226,20 +215,4 @@ impl Custodian {
             None => Ok(()),
         }
     }
-}
-
-/// Fills in the hashes that older versions did not store, if they give the id.
-fn complete(
-    files: &mut Vec<FileRecord>,
-    found: Vec<FileRecord>,
-    id: &str,
-) -> Result<(), BlobError> {
-    if volume_id(&found) != id {
-        return Err(BlobError::new(
-            StoreFault::DamagedFile,
-            format!("{id}: the content is not what was uploaded"),
-        ));
-    }
-    *files = found;
-    Ok(())
 }

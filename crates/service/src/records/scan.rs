@@ -77,7 +77,7 @@ pub struct ScanFilter {
     pub accession: Option<String>,
 }
 
-/// A volume of which is not known yet whose scan it is.
+/// A volume whose scan a repair of the database has lost.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnreadScan {
     /// The place in the list of such volumes.
@@ -93,8 +93,8 @@ pub struct UnreadScan {
 /// The table of scans. Every method is one transaction and fails only if the database does.
 #[async_trait]
 pub trait Scans: Send + Sync + 'static {
-    /// The scan of a tenant's volume, as the tenant knows it; `None` if the volume was not read for it yet,
-    /// or the tenant has no such volume.
+    /// The scan of a tenant's volume, as the tenant knows it; `None` if a repair has lost it and it was not read again
+    /// yet, or the tenant has no such volume.
     async fn scan(&self, tenant: &Tenant, volume: &str) -> StoreResult<Option<ScanIdentity>>;
 
     /// Notes what the file of a tenant's volume says, unless that is known or erased.
@@ -117,8 +117,7 @@ pub trait Scans: Send + Sync + 'static {
     /// nothing is known any more.
     async fn erase_scan(&self, tenant: &Tenant, volume: &str, now: Timestamp) -> StoreResult<bool>;
 
-    /// At most `limit` volumes after position `after` that were stored by a version of the program
-    /// that did not read whose scan they are.
+    /// At most `limit` volumes after position `after` whose scan a repair has lost.
     async fn unread_scans(&self, after: i64, limit: u32) -> StoreResult<Vec<UnreadScan>>;
 
     /// The secret from which the UIDs of a tenant's de-identified objects are derived. It is drawn

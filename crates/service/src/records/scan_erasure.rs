@@ -83,7 +83,7 @@ pub struct ScanErasurePlan {
     pub unfinished_jobs: Vec<String>,
     /// Items that a request needs at this moment.
     pub pinned: Vec<String>,
-    /// Volumes of the tenant of which it is not known yet whose scan they are, so that they may be meant too.
+    /// Volumes of the tenant whose scan a repair has lost and nobody has read again yet, so that they may be meant too.
     pub unread: u64,
     /// Whether there is more than one receipt may hold. The lists are not complete then.
     pub is_too_large: bool,

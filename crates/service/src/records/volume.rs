@@ -11,8 +11,7 @@ pub struct FileRecord {
     pub name: String,
     /// Its length in bytes.
     pub bytes: u64,
-    /// SHA-256 of its content, hexadecimal. Volumes stored by older versions have the first half
-    /// of it, or (those of several files, until they are first verified) nothing and no length.
+    /// SHA-256 of its content, hexadecimal.
     pub sha256: String,
     /// In a store that keeps every publication of an item apart, the one that this file is part of;
     /// see [`StagedFiles::place`](super::StagedFiles::place).

@@ -7,12 +7,11 @@
 //! may be shown of it.
 
 use serde_json::{Map, Value};
-use std::borrow::Cow;
 use std::io;
 use ventriform::export::read_json::{self, ReadMeshError};
 use ventriform::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
-    SegmentationPage, SegmentationReport, header_text,
+    SegmentationPage, SegmentationReport,
 };
 use ventriform::volume::Provenance;
 
@@ -112,7 +111,7 @@ pub(super) fn model_page(
 }
 
 /// The page of a segmentation, made of `report.json`, `mesh.json` and those of [`SEGMENTATION_FILES`] that
-/// exist. Segmentations of older versions have no `region.nii.gz`: their slices are a picture.
+/// exist.
 ///
 /// # Errors
 /// [`PageError`].
@@ -238,6 +237,5 @@ fn from_json<T: serde::de::DeserializeOwned>(
     name: &'static str,
     text: &[u8],
 ) -> Result<T, PageError> {
-    let text = header_text::withheld(text).map_or(Cow::Borrowed(text), Cow::Owned);
-    serde_json::from_slice(&text).map_err(|error| PageError::Json(name, error))
+    serde_json::from_slice(text).map_err(|error| PageError::Json(name, error))
 }

@@ -137,8 +137,7 @@ pub struct UploadFacts {
     pub intensity: IntensityFacts,
     /// The labels, rising, if the volume looks like a label map.
     pub labels: Option<Vec<i64>>,
-    /// The gates, if it is gated; `None` for volumes stored by versions that did not keep this.
-    #[serde(default)]
+    /// The gates, if it is gated.
     pub gates: Option<GateFacts>,
     /// Oddities of the file that do not prevent its use.
     pub warnings: Vec<String>,

@@ -121,7 +121,7 @@ impl Source {
 async fn note_of(folder: &Path, rows: &SqlStore) -> StoreResult<Option<Note>> {
     let judged = rows.judge(&Beside::folder(folder), false).await?;
     if rows.marks().await?.store.is_none() {
-        // No service of this version ever ran on it; the first one on the target finds out.
+        // No service ever ran on it; the first one on the target finds out.
         return Ok(None);
     }
     rows.mark(&judged.marks).await?;

@@ -117,7 +117,7 @@ impl BucketDoctor<'_> {
             if content.bytes != file.bytes {
                 let (found, stored) = (content.bytes, file.bytes);
                 wrong.push(format!("{name} has {found} bytes, not {stored}"));
-            } else if !content.sha256.starts_with(&file.sha256) {
+            } else if content.sha256 != file.sha256 {
                 wrong.push(format!("{name} has another content than was stored"));
             }
         }

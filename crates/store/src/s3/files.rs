@@ -258,9 +258,7 @@ impl S3Blobs {
         }
         let bucket = &self.shared.bucket;
         let content = bucket.put_file(to, from).await?;
-        let known = !expected.sha256.is_empty();
-        if known && content.bytes != expected.bytes || !content.sha256.starts_with(&expected.sha256)
-        {
+        if (content.bytes, &content.sha256) != (expected.bytes, &expected.sha256) {
             bucket.delete([to.to_owned()]).await?;
             return Ok(Sent::Not("has another content than was stored"));
         }

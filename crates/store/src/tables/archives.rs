@@ -1,4 +1,4 @@
-//! The tables of archives. Triggers of the jobs table write their rows; see the migration.
+//! The tables of archives. Triggers of the jobs table write their rows; see `migrations/0001_schema.sql`.
 
 use super::access::{record, record_outcome};
 use super::errands::{self, Errands};
@@ -130,7 +130,7 @@ impl ArchiveStore for SqlStore {
                     revision = revision + 1
              WHERE id = $3 AND state = 'queued' AND volume = '' RETURNING *",
         )
-        .bind(rows::failure_json(failure)?)
+        .bind(to_json(failure)?)
         .bind(now)
         .bind(job)
         .fetch_optional(&mut transaction)
@@ -149,13 +149,10 @@ impl ArchiveStore for SqlStore {
     }
 
     async fn pulls(&self, jobs: &[&str]) -> StoreResult<BTreeMap<String, Pull>> {
-        let rows = query(
-            "SELECT p.*, j.failure FROM pulls AS p LEFT JOIN jobs AS j ON j.id = p.job
-             WHERE p.job IN (SELECT value FROM json_each($1))",
-        )
-        .bind(to_json(&jobs)?)
-        .fetch_all(&self.readers)
-        .await?;
+        let rows = query("SELECT * FROM pulls WHERE job IN (SELECT value FROM json_each($1))")
+            .bind(to_json(&jobs)?)
+            .fetch_all(&self.readers)
+            .await?;
         rows.iter()
             .map(|row| {
                 let state = match row.try_get("state")? {
@@ -167,11 +164,7 @@ impl ArchiveStore for SqlStore {
                     state,
                     attempts: rows::count(row, "attempts")?,
                     next_attempt_at: errands::next_attempt(row, state)?,
-                    last_error: match (state, row.try_get::<Option<&str>, _>("failure")?) {
-                        // Earlier versions wrote more into the row of the fetch.
-                        (DeliveryState::Dead, Some(text)) => Some(rows::failure(text)?.detail),
-                        _ => row.try_get("last_error")?,
-                    },
+                    last_error: row.try_get("last_error")?,
                 };
                 Ok((row.try_get("job")?, pull))
             })

@@ -1,6 +1,6 @@
 //! The common columns of the tables of errands. An errand is work towards a destination on the network
 //! (fetch a series, deliver an object, call a webhook) that waits in a table until it succeeds, is
-//! given up or is taken back. Triggers of the jobs table write the rows; see the migrations.
+//! given up or is taken back. Triggers of the jobs table write the rows; see `migrations/0001_schema.sql`.
 
 use super::access::record;
 use super::rows;

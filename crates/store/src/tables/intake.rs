@@ -4,7 +4,7 @@ use super::access::{append, record, stored_bytes};
 use super::erasure::{What, write_receipt};
 use super::owners::repaired;
 use super::pages::push_page;
-use super::rows;
+use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
@@ -142,7 +142,7 @@ impl IntakeStore for SqlStore {
              WHERE id = $4 AND state = 'filing'",
         )
         .bind(job)
-        .bind(failure.map(rows::failure_json).transpose()?)
+        .bind(failure.map(to_json).transpose()?)
         .bind(now)
         .bind(group)
         .execute(&mut transaction)
@@ -166,7 +166,7 @@ impl IntakeStore for SqlStore {
             "UPDATE intake_groups SET state = 'failed', failure = $1, changed_at = $2
              WHERE id = $3 AND revision = $4 AND state = 'gathering'",
         )
-        .bind(rows::failure_json(failure)?)
+        .bind(to_json(failure)?)
         .bind(now)
         .bind(group)
         .bind(revision)
@@ -564,8 +564,6 @@ async fn files_of(to: &mut Transaction<'_>, group: &str) -> StoreResult<Vec<Stri
 fn group(row: DbRow) -> StoreResult<IntakeGroup> {
     let damaged = |what: &str| StoreError::database(format!("damaged row: {what}"));
     let instance: String = row.try_get("instance")?;
-    let failure: Option<&str> = row.try_get("failure")?;
-    let failure = failure.map(rows::failure).transpose();
     Ok(IntakeGroup {
         id: row.try_get("id")?,
         sequence: row.try_get("sequence")?,
@@ -588,7 +586,7 @@ fn group(row: DbRow) -> StoreResult<IntakeGroup> {
         revision: row.try_get("revision")?,
         volume: row.try_get("volume")?,
         job: row.try_get("job")?,
-        failure: failure?,
+        failure: rows::optional_json(&row, "failure")?,
         objects: rows::unsigned(row.try_get("objects")?),
         waiting_bytes: rows::unsigned(row.try_get("waiting_bytes")?),
         created_at: row.try_get("created_at")?,

@@ -21,7 +21,7 @@ use super::access::{append, record, stored_bytes};
 use super::catalogue::insert_product;
 use super::erasure::{erasure_event, record_deletion};
 use super::pages::{Times, push_page, push_tags, push_times};
-use super::rows::{self, failure_json, to_json};
+use super::rows::{self, to_json};
 use super::scans::push_scan;
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
@@ -100,7 +100,7 @@ const LEFT_BY_WORKER: &str = "
     stage = NULL, progress = 0, lease_token = NULL, lease_run = NULL, lease_expires_at = NULL,
     revision = revision + 1";
 
-/// The time by which leases expire where several machines share the database; see the migration.
+/// The time by which leases expire where several machines share the database; see `database_now` of the schema.
 const SERVER_CLOCK: &str = "database_now()";
 
 /// A length that can be added to any time.
@@ -387,7 +387,7 @@ impl JobStore for SqlStore {
     ) -> StoreResult<Option<Job>> {
         let (state, failure, product) = match outcome {
             JobOutcome::Succeeded(product) => (JobState::Succeeded, None, Some(product)),
-            JobOutcome::Failed(failure) => (JobState::Failed, Some(failure_json(failure)?), None),
+            JobOutcome::Failed(failure) => (JobState::Failed, Some(to_json(failure)?), None),
             JobOutcome::Cancelled => (JobState::Cancelled, None, None),
         };
         let mut transaction = self.writer.begin().await?;
@@ -471,7 +471,7 @@ impl JobStore for SqlStore {
              WHERE id = $3 AND lease_token = $4 AND (crashes + 1 >= $5) = $6
              RETURNING *"
         );
-        let reason = failure_json(&limit.reason)?;
+        let reason = to_json(&limit.reason)?;
         for at_limit in [false, true] {
             let row = query(counted.clone())
                 .bind(now)
@@ -504,7 +504,7 @@ impl JobStore for SqlStore {
                  RETURNING *"
             )
         };
-        let reason = limit.map(|limit| failure_json(&limit.reason)).transpose()?;
+        let reason = limit.map(|limit| to_json(&limit.reason)).transpose()?;
         let deaths = limit.map_or(i64::MAX, |limit| i64::from(limit.deaths));
         let mut jobs = Vec::new();
         for at_limit in [false, true] {
@@ -731,7 +731,7 @@ async fn fail(to: &mut Transaction<'_>, id: &str, failure: &Failure) -> StoreRes
     let row = query(
         "UPDATE jobs SET state = 'failed', failure = $1, result = NULL WHERE id = $2 RETURNING *",
     )
-    .bind(failure_json(failure)?)
+    .bind(to_json(failure)?)
     .bind(id)
     .fetch_one(to)
     .await?;

@@ -2,17 +2,16 @@
 
 use crate::database::SqlStore;
 use crate::query::{DbRow, Query};
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 use ventriform_service::records::{
-    Bounded, Failure, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan,
-    Priority, Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume,
-    Tags, Tenant, Timestamp,
+    Bounded, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority,
+    Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags,
+    Tenant, Timestamp,
 };
 
 pub(super) fn job(row: DbRow) -> StoreResult<Job> {
     let state: &str = row.try_get("state")?;
-    let failure: Option<&str> = row.try_get("failure")?;
     Ok(Job {
         id: row.try_get("id")?,
         tenant: tenant(&row)?,
@@ -36,7 +35,7 @@ pub(super) fn job(row: DbRow) -> StoreResult<Job> {
         created_at: row.try_get("created_at")?,
         started_at: row.try_get("started_at")?,
         finished_at: row.try_get("finished_at")?,
-        failure: failure.map(self::failure).transpose()?,
+        failure: optional_json(&row, "failure")?,
         result: row.try_get("result")?,
         trace_parent: row.try_get("trace_parent")?,
     })
@@ -201,45 +200,16 @@ pub(crate) fn to_json(value: &impl Serialize) -> StoreResult<String> {
     serde_json::to_string(value).map_err(|e| StoreError::database(e.to_string()))
 }
 
-/// A failure as a table holds it: with the mark that it quotes no file, which earlier versions did.
-pub(super) fn failure_json(failure: &Failure) -> StoreResult<String> {
-    #[derive(Serialize)]
-    struct Stored<'a> {
-        #[serde(flatten)]
-        failure: &'a Failure,
-        quotes_file: bool,
-    }
-    to_json(&Stored {
-        failure,
-        quotes_file: false,
-    })
-}
-
-/// A stored failure; one of an earlier version without what it may quote.
-pub(super) fn failure(text: &str) -> StoreResult<Failure> {
-    #[derive(Deserialize)]
-    struct Stored {
-        #[serde(flatten)]
-        failure: Failure,
-        quotes_file: Option<bool>,
-    }
-    let Stored {
-        failure,
-        quotes_file,
-    } = from_json(text)?;
-    Ok(match quotes_file {
-        Some(false) => failure,
-        _ => failure.of_earlier_version(),
-    })
-}
-
 /// The value of a JSON column.
 pub(super) fn json<T: DeserializeOwned>(row: &DbRow, column: &str) -> StoreResult<T> {
     from_json(row.try_get(column)?)
 }
 
 /// The value of a JSON column that may be null.
-fn optional_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> StoreResult<Option<T>> {
+pub(super) fn optional_json<T: DeserializeOwned>(
+    row: &DbRow,
+    column: &str,
+) -> StoreResult<Option<T>> {
     let text: Option<&str> = row.try_get(column)?;
     text.map(from_json).transpose()
 }

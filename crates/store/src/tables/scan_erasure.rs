@@ -203,7 +203,7 @@ fn patient_on_postgres() -> String {
     "coalesce(json_field(c.found, 'patient_id'), json_field(c.stated, 'patient_id'))".into()
 }
 
-/// The number of the tenant's volumes of which nobody has read yet whose scan they are.
+/// The number of the tenant's volumes whose scan a repair has lost and that were not read again yet.
 async fn unread(from: &mut Transaction<'_>, tenant: &Tenant) -> StoreResult<u64> {
     let row = query(
         "SELECT count(*) FROM holdings AS h

@@ -22,7 +22,7 @@ impl TimeStore for SqlStore {
         if let Some(row) = noted {
             return row.try_get(0);
         }
-        // Nothing was noted before this version.
+        // Nothing is noted: the newest stamp of a row stands for it.
         let row = query(
             "SELECT max(at) FROM (
                  SELECT (SELECT created_at FROM jobs ORDER BY sequence DESC LIMIT 1) AS at

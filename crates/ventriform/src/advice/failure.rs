@@ -39,38 +39,6 @@ pub enum Fault {
     Service,
 }
 
-/// Codes of requests whose sentences name structures or values of a file.
-const QUOTING_REQUESTS: [&str; 6] = [
-    "frame-needed",
-    "identity-differs",
-    "identity-needed",
-    "label-needed",
-    "no-such-label",
-    "unsuitable-model",
-];
-
-/// Codes of failures by the content of a file whose sentences have figures alone.
-const FIGURES_ALONE: [&str; 18] = [
-    "blank-volume",
-    "empty-gate",
-    "empty-mask",
-    "gate-count",
-    "hint-outside",
-    "hot-voxels",
-    "mask-elsewhere",
-    "no-heart",
-    "no-surface",
-    "no-ventricle",
-    "not-optimised",
-    "nothing-in-common",
-    "other-grid",
-    "same-scan",
-    "single-slice",
-    "truncated-volume",
-    "unusable-surface",
-    "volume-too-large",
-];
-
 impl Failure {
     /// A failure without field and advice; add them with [`Failure::at`] and [`Failure::fix`].
     pub fn new(fault: Fault, code: &str, detail: impl Into<String>) -> Self {
@@ -82,24 +50,6 @@ impl Failure {
             fix: None,
             to_sender: None,
         }
-    }
-
-    /// The failure without the sentence, if a version that stored what files say in words can have written it: what
-    /// quotes a file, and all that is not known to quote none. Code, field and advice stay.
-    #[must_use]
-    pub fn of_earlier_version(mut self) -> Self {
-        let quotes = match self.fault {
-            Fault::Service => false,
-            Fault::Request => QUOTING_REQUESTS.contains(&self.code.as_str()),
-            Fault::Content | Fault::TooLarge => !FIGURES_ALONE.contains(&self.code.as_str()),
-        };
-        if quotes {
-            let what = self.field.as_deref().unwrap_or("The file");
-            self.detail = format!(
-                "{what} cannot be used; an earlier version has stored more, which is not shown."
-            );
-        }
-        self
     }
 
     /// Sets the field that caused the failure.

@@ -65,9 +65,8 @@ pub struct Perfusion {
 pub struct NormalsUsed {
     /// SHA-256 of the limits, hexadecimal.
     pub sha256: String,
-    /// Version of the program that built them; null in reports of versions that did not say.
-    #[serde(default)]
-    pub program_version: Option<String>,
+    /// Version of the program that built them.
+    pub program_version: String,
     /// Whether the people are simulated.
     pub simulated: bool,
     /// What the people are.
@@ -364,7 +363,7 @@ pub fn apply(
         flags: flags(&found, kind, limits, group),
         group: NormalsUsed {
             sha256: limits.sha256.clone(),
-            program_version: Some(limits.program_version.clone()),
+            program_version: limits.program_version.clone(),
             simulated: limits.simulated,
             people: limits.people.clone(),
             sex: group.sex,

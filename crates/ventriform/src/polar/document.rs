@@ -20,16 +20,12 @@ pub struct PolarSummary {
     /// The 17 segments.
     pub segments: Vec<PolarSegment>,
     /// The walls of the three arteries; none if the orientation is unknown.
-    #[serde(default)]
-    #[cfg_attr(feature = "schema", schema(required))]
     pub territories: Vec<PolarTerritory>,
     /// Rows of pixels, from apex to base.
     pub rows: usize,
     /// Columns of pixels, around the axis.
     pub columns: usize,
     /// Source of the sides of the wall: `superior`, `anterior`, `body`, `frame` or `unknown`.
-    #[serde(default)]
-    #[cfg_attr(feature = "schema", schema(required))]
     pub orientation: String,
     /// Where the first column looks; null if the orientation is unknown.
     pub first_column: Option<String>,
@@ -46,17 +42,15 @@ pub struct PolarDocument {
     pub summary: PolarSummary,
     /// The pixels in per cent of the reference; null where there is no muscle.
     pub values_percent: Vec<Vec<Option<f64>>>,
-    /// What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. Absent from maps of older
-    /// versions, which have no valve plane.
-    pub states: Option<Vec<Vec<PlaceState>>>,
+    /// What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`.
+    pub states: Vec<Vec<PlaceState>>,
     /// The number of the segment to which each pixel belongs.
     pub segment_of: Vec<Vec<usize>>,
     /// For every column, the distances from the apex in rows at which apex, apical, mid and basal level
-    /// end; row n reaches from n to n + 1. Absent from maps of older versions.
-    pub level_ends: Option<Vec<[f64; 4]>>,
-    /// The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of
-    /// older versions.
-    pub rings: Option<Vec<f64>>,
+    /// end; row n reaches from n to n + 1.
+    pub level_ends: Vec<[f64; 4]>,
+    /// The radii at which these levels end on the drawn map, as shares of its own.
+    pub rings: [f64; 4],
 }
 
 /// The wall that an artery usually feeds.
@@ -194,10 +188,10 @@ impl PolarDocument {
         Self {
             summary: PolarSummary::of(map),
             values_percent: pixels.collect(),
-            states: Some(states(map)),
+            states: states(map),
             segment_of: segment_numbers(map),
-            level_ends: Some(level_ends(map)),
-            rings: Some(ring_shares(map).into()),
+            level_ends: level_ends(map),
+            rings: ring_shares(map),
         }
     }
 }

@@ -83,11 +83,6 @@ impl ReaderKind {
             Self::Level => "level",
         }
     }
-
-    /// The name of the kind that documents have which were written before there were kinds.
-    pub fn of_old_documents() -> String {
-        Self::Edge.as_str().to_owned()
-    }
 }
 
 /// One distance of a reader's profile, mm.
@@ -174,7 +169,7 @@ pub enum ProfileError {
     #[error("this is no reader's profile: {0}")]
     Syntax(String),
     /// It was written by a program that knows more.
-    #[error("the profile has version {0}; this program reads versions 1 to {PROFILE_VERSION}")]
+    #[error("the profile has version {0}; this program reads version {PROFILE_VERSION}")]
     Version(u32),
     /// A field holds something that no profile can hold.
     #[error("`{field}`: {reason}")]
@@ -186,7 +181,7 @@ pub enum ProfileError {
     },
 }
 
-/// The version of the JSON. Version 1 has no kind: its readers draw by distances.
+/// The version of the JSON.
 const PROFILE_VERSION: u32 = 2;
 /// The JSON's statement of its format.
 const PROFILE_FORMAT: &str = "ventriform-reader-profile";
@@ -206,22 +201,21 @@ const MOST_MASKS: usize = 5000;
 pub struct ProfileDocument {
     /// `ventriform-reader-profile`.
     format: String,
-    /// 2, or 1, which has no `kind`.
+    /// 2.
     #[cfg_attr(feature = "schema", schema(value_type = u64))]
     version: u32,
     /// `edge`: the reader draws the edge that the image shows, by the distances `offsets_mm` off. `level`: where the image
     /// has a share of the polar map's reference.
-    #[serde(default)]
-    kind: Option<String>,
+    kind: String,
     /// The wall that is drawn from: `apparent` or `anatomical`.
     edge: String,
     /// Number of masks that it was learnt on: the length of `learnt_on`.
     masks: usize,
     /// The distances of a reader of kind `edge`, mm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     offsets_mm: Option<LearntOffsets>,
     /// The level of a reader of kind `level`, a share of the polar map's reference.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     level: Option<ReaderLevel>,
     /// The masks it was learnt on.
     #[serde(deserialize_with = "at_most::<_, _, { MOST_MASKS + 1 }>")]
@@ -277,7 +271,7 @@ impl ReaderProfile {
         let document = ProfileDocument {
             format: PROFILE_FORMAT.into(),
             version: PROFILE_VERSION,
-            kind: Some(self.learnt.kind().as_str().into()),
+            kind: self.learnt.kind().as_str().into(),
             edge: self.edge.as_str().into(),
             masks: self.masks(),
             offsets_mm,
@@ -312,7 +306,7 @@ impl ReaderProfile {
             return Err(ProfileError::Syntax(reason));
         }
         let version = head.version;
-        if !(1..=u64::from(PROFILE_VERSION)).contains(&version) {
+        if version != u64::from(PROFILE_VERSION) {
             let version = u32::try_from(version).unwrap_or(u32::MAX);
             return Err(ProfileError::Version(version));
         }
@@ -345,16 +339,11 @@ impl ReaderProfile {
 impl ProfileDocument {
     /// The distances or the level, as the kind says.
     fn learnt(&self) -> Result<Learnt, ProfileError> {
-        let kind = match (self.version, self.kind.as_deref()) {
-            (1, None) => "edge",
-            (1, Some(_)) => return Err(refused("kind", "a profile of version 1 has none")),
-            (_, kind) => kind.unwrap_or_default(),
-        };
         let (missing, other) = (
             "it must be there, and is not",
             "a reader of this kind has none",
         );
-        match kind {
+        match self.kind.as_str() {
             "edge" => {
                 if self.level.is_some() {
                     return Err(refused("level", other));
@@ -456,7 +445,6 @@ pub(super) mod tests {
             ("\"kind\": \"level\"", "\"kind\": \"edge\"", "level"),
             ("\"kind\": \"level\"", "\"kind\": \"both\"", "kind"),
             ("\"value\": 0.5", "\"value\": 1.5", "level"),
-            ("\"version\": 2", "\"version\": 1", "kind"),
         ] {
             let changed = text.replacen(from, to, 1);
             assert_ne!(changed, text);
@@ -466,22 +454,12 @@ pub(super) mod tests {
         }
     }
 
-    /// Profiles of version 1 were learnt before there were kinds.
-    #[test]
-    fn a_profile_of_version_1_has_distances() {
-        let written = profile([0.5, -1.25, 3.0]);
-        let text = written
-            .to_json()
-            .replace("\"version\": 2", "\"version\": 1");
-        let text = text.replace("  \"kind\": \"edge\",\n", "");
-        assert_eq!(ReaderProfile::from_json(text.as_bytes()), Ok(written));
-    }
-
     #[test]
     fn what_no_profile_can_hold_is_refused_by_name() {
         let text = profile([0.5, -1.25, 3.0]).to_json();
         for (from, to, field) in [
             ("\"version\": 2", "\"version\": 3", "version 3"),
+            ("\"version\": 2", "\"version\": 1", "version 1"),
             ("-1.25", "-9.25", "offsets_mm.epicardium"),
             ("-1.25", "1e999", "profile"),
             ("\"masks\": 1", "\"masks\": 2", "masks"),

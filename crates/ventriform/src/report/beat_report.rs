@@ -4,7 +4,7 @@
 
 use super::fit_report::{LongAxis, Posture};
 use super::input::FileFacts;
-use super::json_number::{not_stated, or_nan, round};
+use super::json_number::{or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{Resolution, SegmentationReport};
@@ -79,7 +79,6 @@ pub struct BeatReport {
     /// Reasons to look closer: of the fit to the gates' sum, of what the file and the caller say, then of the beat.
     pub flags: Vec<RaisedFlag>,
     /// Uptake and beat beside normal limits, if some were given.
-    #[serde(default)]
     pub perfusion: Option<PerfusionReport>,
     /// Every parameter, defaults written out.
     pub parameters: Map<String, Value>,
@@ -159,8 +158,7 @@ pub struct PhaseReport {
     /// Entropy of the histogram as a share of that of an even one, per cent.
     pub entropy_percent: f64,
     /// How far the noise of the gates alone scatters the phases: of the standard deviation, the part that says nothing of the heart.
-    #[serde(default = "not_stated", deserialize_with = "or_nan")]
-    #[cfg_attr(feature = "schema", schema(required))]
+    #[serde(deserialize_with = "or_nan")]
     pub noise_degrees: f64,
     /// Whether enough of the wall moves, more than noise does, and the gates are a beat.
     pub reliable: bool,

@@ -52,7 +52,6 @@ pub struct ComparisonReport {
     pub beat: Option<BeatChange>,
     /// Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one entry for each scan
     /// that is a reason. Empty where they were.
-    #[serde(default)]
     pub no_beat: Vec<NoBeat>,
     /// The scan at stress.
     pub stress: ComparedScan,

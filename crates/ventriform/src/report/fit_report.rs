@@ -1,6 +1,6 @@
 //! The parts of a segmentation's report that come from its fit.
 
-use super::json_number::{not_stated, or_nan, point, round};
+use super::json_number::{or_nan, point, round};
 use crate::deform::FittedModel;
 use crate::deform::base_plane::rim_deviation_mm;
 use crate::geometry::Vec3;
@@ -202,12 +202,10 @@ pub struct EvidenceReport {
     /// Distance of the septum from the axis over that of the free wall.
     pub septal_bulge: f64,
     /// Share of the wall that takes up less than half as much as the bright wall does.
-    #[serde(default = "not_stated", deserialize_with = "or_nan")]
-    #[cfg_attr(feature = "schema", schema(required))]
+    #[serde(deserialize_with = "or_nan")]
     pub dark: f64,
     /// Share of the wall beside which something takes up more than that.
-    #[serde(default = "not_stated", deserialize_with = "or_nan")]
-    #[cfg_attr(feature = "schema", schema(required))]
+    #[serde(deserialize_with = "or_nan")]
     pub beside: f64,
     /// Mean correlation of image and wall in their projections; null where the orientation is unknown.
     pub agreement_of_views: Option<f64>,

@@ -3,9 +3,7 @@
 //! Whose scan a volume is may be erased, and not everybody who may read a result may see it. A store therefore keeps
 //! results without what headers say: series descriptions, tracers and doses of a comparison, the values that a flag
 //! compares, and the codes, names of structures and names of files that a warning quotes. Pages and objects are given
-//! it when they are made ([`ComparisonReport::with_scans`]).
-//!
-//! Sentences are told by how they begin, so that documents of earlier versions lose the same text when they are read.
+//! it when they are made ([`ComparisonReport::with_scans`]). Sentences are told by how they begin.
 
 use super::comparison_report::{ComparedScan, ComparisonReport};
 use crate::volume::Provenance;

@@ -13,8 +13,3 @@ pub(super) fn point(p: &Vec3) -> [f64; 3] {
 pub(super) fn or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
-
-/// The value that stands for a number that reports of older versions do not have.
-pub(super) fn not_stated() -> f64 {
-    f64::NAN
-}

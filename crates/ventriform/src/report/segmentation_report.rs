@@ -1,22 +1,22 @@
 //! The report of a segmentation: what is written as `report.json`, read again for pages and DICOM
 //! objects, and described in the OpenAPI document.
 //!
-//! A report is stored and may be read by a later version than the one that wrote it: a field that
-//! older reports lack is an `Option` or has `#[serde(default)]`.
+//! A report is stored and may be read by a later version than the one that wrote it: a field that is
+//! added is an `Option` or has `#[serde(default)]`.
 
 use super::fit_report::{
     EvidenceReport, FitReport, FittedVolumes, LocalisationReport, LongAxis, Posture, Thicknesses,
     Uncertainties,
 };
 use super::input::FileFacts;
-use super::json_number::{not_stated, or_nan, round};
+use super::json_number::{or_nan, round};
 use super::perfusion_report::PerfusionReport;
 use super::raised_flag::RaisedFlag;
 use crate::geometry::Vec3;
 use crate::grid::agreement::Agreement;
 use crate::judge::Fit;
 use crate::polar::PolarSummary;
-use crate::reader::{ReaderKind, ReaderOffsets, ReaderProfile};
+use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -59,7 +59,6 @@ pub struct SegmentationReport {
     /// Uptake of the wall; ventricles only.
     pub polar: Option<PolarSummary>,
     /// The wall's uptake beside normal limits, if some were given.
-    #[serde(default)]
     pub perfusion: Option<PerfusionReport>,
     /// Reasons to look closer.
     pub flags: Vec<RaisedFlag>,
@@ -81,8 +80,7 @@ pub struct CandidateReport {
     /// The model's name.
     pub template: String,
     /// Its confidence by its own figures, by which templates are ranked.
-    #[serde(default = "not_stated", deserialize_with = "or_nan")]
-    #[cfg_attr(feature = "schema", schema(required))]
+    #[serde(deserialize_with = "or_nan")]
     pub confidence: f64,
     /// Figure that decides between equals.
     pub merit: f64,
@@ -125,7 +123,6 @@ pub struct AppliedReaderReport {
     pub sha256: String,
     /// `edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
     /// reference.
-    #[serde(default = "ReaderKind::of_old_documents")]
     pub kind: String,
     /// The wall that was drawn from.
     pub edge: String,
@@ -134,7 +131,6 @@ pub struct AppliedReaderReport {
     /// The distances, mm; `null` for a reader of kind `level`.
     pub offsets_mm: Option<ReaderOffsets>,
     /// The level, a share of the polar map's reference; `null` for a reader of kind `edge`.
-    #[serde(default)]
     pub level: Option<f64>,
     /// Share of the movement that was applied: 1 unless the surface would intersect itself.
     pub share_applied: f64,
@@ -332,13 +328,13 @@ pub(crate) mod tests {
     use super::*;
     use serde_json::json;
 
-    /// A report with no more fields than those of the first version had, of an organ without cavity.
+    /// A report of an organ without cavity.
     pub(crate) fn first_report() -> SegmentationReport {
         let one = [1.0, 0.0, 0.0, 0.0];
         serde_json::from_value(json!({
             "template": "mdl_1",
             "choice": "mdl_1 was the only model fitted",
-            "candidates": [{"template": "mdl_1", "merit": 0.5, "active": 0.9, "strain": 0.1, "residual_mm": null}],
+            "candidates": [{"template": "mdl_1", "confidence": null, "merit": 0.5, "active": 0.9, "strain": 0.1, "residual_mm": null}],
             "refused": [],
             "localisation": null,
             "fit": {
@@ -367,7 +363,7 @@ pub(crate) mod tests {
             "warnings": [],
             "a_later_version": 1,
         }))
-        .expect("every later field may be missing")
+        .expect("what it lacks may be missing")
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::fit_report::FittedVolumes;
 use super::raised_flag::RaisedFlag;
 use super::segmentation_report::{AgreementReport, CandidateReport, SegmentationReport};
 use crate::normals::{GroupSex, NormalGroup, NormalLimits};
-use crate::reader::{ReaderKind, ReaderOffsets, ReaderProfile};
+use crate::reader::{ReaderOffsets, ReaderProfile};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -116,7 +116,6 @@ pub struct TemplateSummary {
 pub struct ReaderSummary {
     /// `edge`: the reader draws by distances from the edge that the image shows. `level`: where the image has a share of the
     /// polar map's reference.
-    #[serde(default = "ReaderKind::of_old_documents")]
     pub kind: String,
     /// The wall that is drawn from: `apparent` or `anatomical`.
     pub edge: String,
@@ -125,7 +124,6 @@ pub struct ReaderSummary {
     /// The distances that are applied, mm; `null` for a reader of kind `level`.
     pub offsets_mm: Option<ReaderOffsets>,
     /// The level that is applied, a share of the polar map's reference; `null` for a reader of kind `edge`.
-    #[serde(default)]
     pub level: Option<f64>,
 }
 

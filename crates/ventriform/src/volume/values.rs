@@ -1,6 +1,6 @@
 //! Which texts are values of their representation, in what the objects made of a scan state (PS3.5 6.2 and 9.1).
 //!
-//! In: whose scan it is, as a file or an older record says it. Out: the same with dates, times and the patient's
+//! In: whose scan it is, as a file says it. Out: the same with dates, times and the patient's
 //! sex written as the standard writes them, and without identifiers, dates and times that are none. A file may
 //! hold anything; an archive refuses an object with such a value, or files it where nobody finds it.
 //!

@@ -5,13 +5,11 @@ use crate::items::StoredItem;
 use crate::records::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use std::borrow::Cow;
 use ventriform::advice::Explain;
 use ventriform::export::read_json;
 use ventriform::grid::voxelise::Mask;
 use ventriform::mesh::TriMesh;
 use ventriform::progress::Monitor;
-use ventriform::report::header_text;
 use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 /// A file's content; `None` if the result has no such file.
@@ -30,13 +28,12 @@ pub fn required(item: &StoredItem, name: &str) -> Result<Vec<u8>, Failure> {
     read(item, name)?.ok_or_else(|| broken_result(&format!("the file {name} is missing")))
 }
 
-/// A report of type `R`, without text of headers.
+/// A report of type `R`.
 ///
 /// # Errors
 /// If it is none.
 pub fn report<R: DeserializeOwned>(bytes: &[u8]) -> Result<R, Failure> {
-    let bytes = header_text::withheld(bytes).map_or(Cow::Borrowed(bytes), Cow::Owned);
-    serde_json::from_slice(&bytes).map_err(|error| broken_result(&error))
+    serde_json::from_slice(bytes).map_err(|error| broken_result(&error))
 }
 
 /// A report without its spaces; UIDs are derived from this text.

@@ -135,21 +135,23 @@ pub(super) fn limits_used(perfusion: &PerfusionReport) -> Vec<DataSet> {
         used.cases
     );
     let says = |code, said: &str| text("CONTAINS", code, said);
-    let mut content = vec![
+    let program = format!("ventriform {}", used.program_version);
+    vec![
         says(own("NORMALS-GROUP", "Group of the normal limits"), &group),
         says(
             own("NORMALS-PEOPLE", "People of the normal limits"),
             &used.people,
         ),
-    ];
-    content.extend(used.program_version.as_ref().map(|version| {
-        let program = own("NORMALS-PROGRAM", "Program that built the normal limits");
-        says(program, &format!("ventriform {version}"))
-    }));
-    let hash = own("NORMALS-SHA256", "SHA-256 of the normal limits");
-    content.push(says(hash, &used.sha256));
-    content.push(comment(&perfusion.note));
-    content
+        says(
+            own("NORMALS-PROGRAM", "Program that built the normal limits"),
+            &program,
+        ),
+        says(
+            own("NORMALS-SHA256", "SHA-256 of the normal limits"),
+            &used.sha256,
+        ),
+        comment(&perfusion.note),
+    ]
 }
 
 /// The state of the patient in a scan (CID 3207).

@@ -223,8 +223,6 @@ pub fn identity(
 ) -> Result<Provenance, DicomError> {
     stated.check()?;
     let mut whole = file.cloned().unwrap_or_default();
-    // Records of older versions hold what the file said.
-    whole.put_right();
     whole.fit();
     let mut undecoded = std::mem::take(&mut whole.undecoded);
     for (field, stated, known) in stated.beside(&mut whole) {

@@ -522,7 +522,7 @@ fn perfusion(protocol: &str) -> PerfusionReport {
     PerfusionReport {
         normals: NormalsUsed {
             sha256: "5eba".repeat(16),
-            program_version: Some("0.0.9".into()),
+            program_version: "0.0.9".into(),
             simulated: true,
             people: "simulated, not patients".into(),
             sex: GroupSex::F,
