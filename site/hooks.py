@@ -11,8 +11,8 @@ LOGS = "docs/log/"
 
 
 def on_page_markdown(markdown, page, files, **_):
-    """Links to folders lead to the folder's own page, as they do where the sources are shown. Logs are left out of the search,
-    so that it finds the pages for users."""
+    """Links to folders lead to the folder's own page, as they do where the sources are shown. Logs are left out of the
+    search, so that it finds the pages for users."""
     if page.file.src_uri.startswith(LOGS):
         page.meta["search"] = {"exclude": True}
     folder = posixpath.dirname(page.file.src_uri)

@@ -22,10 +22,11 @@ case ${1:-} in
     fi
     ruff() { "$tools/python/bin/ruff" "$@"; }
     if [ "${2:-}" = --write ]; then
-      ruff check --quiet --fix .
+      ruff format --quiet .
+      ruff check --output-format concise --fix .
       ruff format --quiet .
     else
-      ruff check . && ruff format --check .
+      ruff check --output-format concise . && ruff format --check .
     fi
     ;;
   web)
@@ -35,6 +36,8 @@ case ${1:-} in
       npm install --silent --no-fund --no-audit --no-save --prefix "$tools/web" "@biomejs/biome@$wanted"
     fi
     cd web
+    # What it has joined it may join with more: it is done when it changes nothing.
+    if [ "${2:-}" = --write ]; then "$biome" check --diagnostic-level=error --write .; fi
     "$biome" check --diagnostic-level=error ${2:+"$2"} .
     ;;
   *) sed -n '2,7s/^# *//p' "$0" && exit 2 ;;
