@@ -6,16 +6,18 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ventriform::deform::DeformParameters;
-use ventriform::fit::fit;
-use ventriform::grid::voxelise::voxelise;
-use ventriform::locate;
-use ventriform::model::{Organ, Template};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::DeformParameters;
+use ventriform::heart::fit::fit;
+use ventriform::heart::model::{Organ, Template};
+use ventriform::image::grid::voxelise::voxelise;
+use ventriform::image::locate;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::parameters::ModelParameters;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::{optimise, retile, surface};
+use ventriform::surface;
+use ventriform::surface::optimise;
+use ventriform::surface::retile;
 
 fn benchmarks(criterion: &mut Criterion) {
     // One thread, so that the times compare work and not the number of cores.

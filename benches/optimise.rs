@@ -1,11 +1,13 @@
 //! Fit and flips, and flips alone, of re-tiled models of a ventricle-shaped cup.
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
+use ventriform::base::progress::Monitor;
 use ventriform::mesh::shapes;
-use ventriform::optimise::{LeastSquaresParameters, OptimiseParameters, Reference, optimise};
-use ventriform::progress::Monitor;
-use ventriform::retile::{RetileParameters, retile};
 use ventriform::surface::from_mesh;
+use ventriform::surface::optimise::{
+    LeastSquaresParameters, OptimiseParameters, Reference, optimise,
+};
+use ventriform::surface::retile::{RetileParameters, retile};
 
 fn bench(criterion: &mut Criterion) {
     let monitor = Monitor::silent();

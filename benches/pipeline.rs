@@ -2,11 +2,13 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{
+    self, PhantomParameters, ReadLimits, ReadOptions, VolumeFile, phantom,
+};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline;
-use ventriform::progress::Monitor;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, PhantomParameters, ReadLimits, ReadOptions, VolumeFile, phantom};
+use ventriform::runs::pipeline;
 
 fn bench(criterion: &mut Criterion) {
     let monitor = Monitor::silent();

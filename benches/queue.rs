@@ -11,18 +11,18 @@ use std::net::TcpListener;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use tokio::time::{MissedTickBehavior, interval, sleep};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{PhantomParameters, ReadLimits, phantom};
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{PhantomParameters, ReadLimits, phantom};
 use ventriform_http::{Running, install_cryptography};
 use ventriform_program::server::start;
-use ventriform_service::config::{Flags, PostgresSettings, Settings};
-use ventriform_service::items::{StoredItem, WorkOutput};
-use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Claimant, Clock, Failure, JobFilter, JobOutcome, JobState, JobStore, Lease, ListRequest,
     NewJob, Resource, SystemClock, random_id,
 };
+use ventriform_service::config::{Flags, PostgresSettings, Settings};
+use ventriform_service::items::{StoredItem, WorkOutput};
+use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
 use ventriform_service::work::Engine;
 use ventriform_store::{SqlStore, open_database};
 

@@ -2,10 +2,10 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
+use ventriform::base::progress::Monitor;
 use ventriform::mesh::shapes;
-use ventriform::progress::Monitor;
-use ventriform::retile::{Method, RetileParameters, retile};
 use ventriform::surface::from_mesh;
+use ventriform::surface::retile::{Method, RetileParameters, retile};
 
 fn bench(criterion: &mut Criterion) {
     let monitor = Monitor::silent();

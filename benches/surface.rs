@@ -3,13 +3,13 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::labels::Labels;
-use ventriform::progress::Monitor;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::labels::Labels;
+use ventriform::image::volume::Volume;
 use ventriform::surface::marching_cubes::{Samples, marching_cubes};
 use ventriform::surface::{SurfaceParameters, extract};
-use ventriform::volume::Volume;
 
 /// A blurred wall, open at the base, in a dim background: `n`³ voxels that span 256 mm.
 fn phantom(n: usize) -> Volume {

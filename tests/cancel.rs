@@ -14,13 +14,13 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use serde_json::Map;
-use ventriform::progress::{CancelToken, Monitor, Silent};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, Volume};
+use ventriform::base::progress::{CancelToken, Monitor, Silent};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, Volume};
+use ventriform_service::base::records::LocalFile;
 use ventriform_service::items::StoredItem;
 use ventriform_service::jobs::{Work, WorkError, WorkInput};
-use ventriform_service::records::LocalFile;
 use ventriform_service::work::Engine;
 
 /// Most processor time after cancellation. The promise is 100 ms, also in this build, which is not

@@ -5,7 +5,7 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
 use ventriform_http::Running;
 use ventriform_program::server::start;
 use ventriform_service::config::Settings;

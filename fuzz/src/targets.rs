@@ -1,15 +1,15 @@
 //! Targets that need no service, and the files that damage starts from. All files are made here.
 
 use std::io::Write as _;
-use ventriform::export::{Format, Metadata, encode};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::mesh_files::{self, MeshStatement};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::given_mask::{MaskChoice, read_mask};
+use ventriform::image::volume::nifti::{self as nifti_files, StoredType};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::mesh::files::{self, MeshStatement};
 use ventriform::parameters::{FitParameters, ModelParameters, Parameters};
-use ventriform::progress::Monitor;
-use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::nifti::{self as nifti_files, StoredType};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::results::export::{Format, Metadata, encode};
 
 /// Small, so that a file that gets past them shows at once.
 const LIMITS: ReadLimits = ReadLimits {
@@ -32,7 +32,7 @@ pub fn dicom(data: &[u8]) {
 /// Reads the bytes as a mesh, and as an expert's mask; what is read is a closed surface.
 pub fn mesh(data: &[u8]) {
     let stated = MeshStatement::default();
-    if let Ok(read) = mesh_files::look(data, &stated, LIMITS.mesh_bytes) {
+    if let Ok(read) = files::look(data, &stated, LIMITS.mesh_bytes) {
         let mesh = &read.mesh;
         assert!(
             mesh.vertices

@@ -32,10 +32,10 @@ from pathlib import Path
 
 # Name, and the files that belong to it.
 GROUPS = [
-    ("optimise", "crates/ventriform/src/optimise/**"),
-    ("retile", "crates/ventriform/src/retile/**"),
-    ("deform", "crates/ventriform/src/deform/**"),
-    ("agreement", "crates/ventriform/src/grid/agreement.rs"),
+    ("optimise", "crates/ventriform/src/surface/optimise/**"),
+    ("retile", "crates/ventriform/src/surface/retile/**"),
+    ("deform", "crates/ventriform/src/heart/deform/**"),
+    ("agreement", "crates/ventriform/src/image/grid/agreement.rs"),
 ]
 # The tests that judge, one set after the other, each what those before it miss: target and names.
 STAGES = [

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Estimates the constants of crates/ventriform/src/judge/calibration.rs from a table of features.
+"""Estimates the constants of crates/ventriform/src/heart/judge/calibration.rs from a table of features.
 
     calibrate.py --check                    compare an estimate from the table with the constants as committed
     calibrate.py --write [MODEL...]         write the file with the constants estimated from the table
@@ -29,7 +29,7 @@ import sys
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-OUTPUT = ROOT / "crates/ventriform/src/judge/calibration.rs"
+OUTPUT = ROOT / "crates/ventriform/src/heart/judge/calibration.rs"
 TABLE = ROOT / "scripts/measure/calibration/features.csv"
 # Size of a cavity from which that of others is counted.
 USUAL_CAVITY_ML = 55.0

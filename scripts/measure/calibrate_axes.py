@@ -1,5 +1,5 @@
 """Estimates the scores below which axes of an image count as exchanged (AxisPair::flag_score of
-judge/exchanged_axes.rs).
+heart/judge/exchanged_axes.rs).
 
     cargo build --release --bin ventriform && cargo build --release --package ventriform-tools --bin exchanged_axes
     python scripts/measure/calibrate_axes.py OUT [--cases 120] [--seed 1] [--also FOLDER...]

@@ -4,7 +4,7 @@
     calibrate_comparison.py --check TABLE   figures of a table: TID, reversible wall, territories
     calibrate_comparison.py --write         estimates the constants from scripts/measure/calibration/comparisons.csv and
                                             writes
-                                            crates/ventriform/src/comparison/calibration.rs
+                                            crates/ventriform/src/heart/comparison/calibration.rs
 
 A table is what the tool `comparisons` prints; the committed one has the 20 pairs of seed 610
 of the simulator of pairs (no part of this project):
@@ -25,7 +25,7 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLE = ROOT / "scripts/measure/calibration/comparisons.csv"
-CONSTANTS = ROOT / "crates/ventriform/src/comparison/calibration.rs"
+CONSTANTS = ROOT / "crates/ventriform/src/heart/comparison/calibration.rs"
 FOUND_PERCENT = 3
 TURN_MARGIN, MUSCLE_SDS = 2.5, 4
 HEADER = """\

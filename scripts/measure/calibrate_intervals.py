@@ -6,9 +6,9 @@
     calibrate_intervals.py --write               estimates the constants from the committed tables and writes them
 
 The tables are what the tools `beats` and `volumes` print. scripts/measure/calibration/beats.csv, for
-crates/ventriform/src/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
+crates/ventriform/src/heart/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
 simulator of gated hearts; scripts/measure/calibration/volumes.csv, for
-crates/ventriform/src/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans (neither
+crates/ventriform/src/heart/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans (neither
 is part of this project):
 
     gated.py --out CASES --seed 500 --n 20
@@ -34,7 +34,7 @@ TERMS = ("bias", "usual", "dark", "small")
 # dark share, and for each constant the figure's column and what it is.
 FILES = {
     "beats": (
-        ROOT / "crates/ventriform/src/beat/calibration.rs",
+        ROOT / "crates/ventriform/src/heart/beat/calibration.rs",
         "//! Constants of the intervals about the figures of a beat.",
         "//! In: figures of fits to simulated gated studies, and the true ones. Out: mean and deviation of the error.",
         "edv",
@@ -45,7 +45,7 @@ FILES = {
         },
     ),
     "volumes": (
-        ROOT / "crates/ventriform/src/judge/volume_calibration.rs",
+        ROOT / "crates/ventriform/src/heart/judge/volume_calibration.rs",
         "//! Constants of the intervals about the volumes of a fit.",
         "//! In: volumes of fits to simulated hearts, and the true ones. Out: mean and deviation of the error.",
         "cavity",

@@ -6,7 +6,7 @@
                                             tables
     calibrate_walls.py --layout             write the files again with the constants as they are
 
-The files are crates/ventriform/src/deform/calibration.rs and crates/ventriform/src/judge/uncertainty_calibration.rs.
+The files are crates/ventriform/src/heart/deform/calibration.rs and crates/ventriform/src/heart/judge/uncertainty_calibration.rs.
 The tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are
 made by
 
@@ -44,8 +44,8 @@ import sys
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-WALLS = ROOT / "crates/ventriform/src/deform/calibration.rs"
-NODES = ROOT / "crates/ventriform/src/judge/uncertainty_calibration.rs"
+WALLS = ROOT / "crates/ventriform/src/heart/deform/calibration.rs"
+NODES = ROOT / "crates/ventriform/src/heart/judge/uncertainty_calibration.rs"
 TABLES = ROOT / "scripts/measure/calibration"
 
 REPRODUCED = """\
@@ -68,7 +68,7 @@ NODE_SETS = ["cohort", "411", "701", "702", "703", "704"]
 
 DIRECTIONS = 30
 FILTERS = 3  # fits of each heart in smoothness.csv
-OUTLIER_MM, CORRELATED, ROUNDS = 4.0, 3.0, 30  # as in deform/base_plane.rs
+OUTLIER_MM, CORRELATED, ROUNDS = 4.0, 3.0, 30  # as in heart/deform/base_plane.rs
 LOST_MM = 6.0
 LOST_MEAN_MM = 3.0  # of a whole surface, from where it is expected
 SPREAD_OFFSET_MM = 0.3
@@ -210,7 +210,7 @@ def heights(rows, name):
 
 
 def expected(rim, length, shape):
-    """The shape of a rim, as deform/base_plane.rs fits it."""
+    """The shape of a rim, as heart/deform/base_plane.rs fits it."""
     mean = np.concatenate([[0.0], shape["mean"] * length])
     prior = np.zeros((7, 7))
     prior[1:, 1:] = shape["precision"] / length**2

@@ -1,4 +1,4 @@
-"""Estimates the bounds of crates/ventriform/src/volume/gate_look.rs and beat_evidence.rs, and counts what they let
+"""Estimates the bounds of crates/ventriform/src/image/volume/gate_look.rs and beat_evidence.rs, and counts what they let
 pass.
 
 usage: gate_look.py --people SCAN.nii.gz... --gated GATED.nii.gz...

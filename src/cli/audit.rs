@@ -7,9 +7,9 @@ use anyhow::{Result, anyhow, bail};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
-use ventriform_service::access::{AccessStore, AuditFilter, fhir, verify};
+use ventriform_service::base::records::ListRequest;
+use ventriform_service::callers::{AccessStore, AuditFilter, fhir, verify};
 use ventriform_service::config::{PostgresSettings, Settings};
-use ventriform_service::records::ListRequest;
 use ventriform_store::{IfNone, NewerStore, Store, apply, missed, require_store};
 
 /// Check or print the audit trail, also while the service runs

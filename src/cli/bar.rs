@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Instant;
-use ventriform::progress::{Observer, Plan, Stage, TotalProgress};
+use ventriform::base::progress::{Observer, Plan, Stage, TotalProgress};
 
 const BAR_STEPS: u64 = 1000;
 

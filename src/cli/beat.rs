@@ -11,12 +11,12 @@ use super::volume_args::volume_files;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::export::Format;
-use ventriform::gated::{GatedHeart, GatedOrder, from_files};
-use ventriform::mesh_files::MeshStatement;
+use ventriform::base::progress::{CancelToken, Monitor, Plan};
+use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::BeatChoice;
-use ventriform::progress::{CancelToken, Monitor, Plan};
+use ventriform::results::export::Format;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::gated::{GatedHeart, GatedOrder, from_files};
 
 /// Fit one model in motion to the gates of a study: volumes, ejection fraction, motion of the wall
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! `ventriform calibrate`: [`ventriform::evaluate::calibration`] on the command line.
+//! `ventriform calibrate`: [`ventriform::runs::evaluate::calibration`] on the command line.
 
 use super::Bar;
 use super::output::{note, say, write_file};
@@ -6,13 +6,13 @@ use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::evaluate::calibration::{
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::heart::reader::{Learnt, ReaderLevel, ReaderOffset};
+use ventriform::parameters::CalibrationChoice;
+use ventriform::runs::evaluate::calibration::{
     Calibration, CalibrationError, CaseFigures, LEVEL_MARGIN_E_J, MeanJaccards, calibrate, cases_of,
 };
-use ventriform::evaluate::sample::Sample;
-use ventriform::parameters::CalibrationChoice;
-use ventriform::progress::{Monitor, Plan};
-use ventriform::reader::{Learnt, ReaderLevel, ReaderOffset};
+use ventriform::runs::evaluate::sample::Sample;
 
 /// Learn how a reader draws the wall, from scans and the reader's masks
 #[derive(Debug, Args)]

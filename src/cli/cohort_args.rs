@@ -3,8 +3,8 @@
 use super::mesh_args::MeshArgs;
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::evaluate::{Cohort, CohortError};
-use ventriform::volume::given_mask::MaskChoice;
+use ventriform::image::volume::given_mask::MaskChoice;
+use ventriform::runs::evaluate::{Cohort, CohortError};
 
 /// Which cohort, and how its templates' models are made. A command that takes these sets the
 /// default of `points`.

@@ -11,13 +11,13 @@ use super::{Bar, UnusableArgument};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::export::Format;
-use ventriform::mesh_files::MeshStatement;
+use ventriform::base::progress::{CancelToken, Monitor, Plan};
+use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::ComparisonChoice;
-use ventriform::progress::{CancelToken, Monitor, Plan};
-use ventriform::report::ComparisonReport;
-use ventriform::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
+use ventriform::results::export::Format;
+use ventriform::results::report::ComparisonReport;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
 
 /// Compare rest and stress of one patient: where the wall lacks blood only under stress
 #[derive(Debug, Args)]

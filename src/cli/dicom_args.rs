@@ -4,11 +4,11 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use time::format_description::well_known::Rfc3339;
 use time::{OffsetDateTime, UtcOffset};
-use ventriform::advice::Explain;
-use ventriform::export::dicom::{Deidentification, Moment, StatedIdentity};
-use ventriform::objects::{self, ObjectChoice, ObjectError, ObjectOrder};
-use ventriform::progress::Monitor;
-use ventriform::volume::{Provenance, ReadLimits, VolumeError, VolumeFile};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{Provenance, ReadLimits, VolumeError, VolumeFile};
+use ventriform::results::export::dicom::{Deidentification, Moment, StatedIdentity};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::objects::{self, ObjectChoice, ObjectError, ObjectOrder};
 
 /// Whether to write DICOM objects, and for whom.
 #[derive(Debug, Args)]

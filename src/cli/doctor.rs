@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::PathBuf;
 use tokio::runtime::Runtime;
-use ventriform_service::records::Tenant;
+use ventriform_service::base::records::Tenant;
 use ventriform_store::{Examination, Repair, examine, examine_on_server};
 
 /// Check a data folder, and repair it from what lies on disk (stop the service first)

@@ -1,4 +1,4 @@
-//! `ventriform evaluate`: [`ventriform::evaluate`] on the command line.
+//! `ventriform evaluate`: [`ventriform::runs::evaluate`] on the command line.
 
 use super::cohort_args::CohortArgs;
 use super::output::note;
@@ -6,16 +6,16 @@ use super::{Bar, UnusableArgument};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use ventriform::deform::DeformParameters;
-use ventriform::deform::elastic::{Stiffness, SupportScaling};
-use ventriform::evaluate::parameters::InSample;
-use ventriform::evaluate::rows::{self, Gold, Variant};
-use ventriform::evaluate::sample::Sample;
-use ventriform::evaluate::table::Evaluation;
-use ventriform::evaluate::{
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::DeformParameters;
+use ventriform::heart::deform::elastic::{Stiffness, SupportScaling};
+use ventriform::runs::evaluate::parameters::InSample;
+use ventriform::runs::evaluate::rows::{self, Gold, Variant};
+use ventriform::runs::evaluate::sample::Sample;
+use ventriform::runs::evaluate::table::Evaluation;
+use ventriform::runs::evaluate::{
     EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep, evaluate,
 };
-use ventriform::progress::Monitor;
 
 /// Make models of the templates, fit them to every patient, write tables, plots and pictures
 #[derive(Debug, Args)]

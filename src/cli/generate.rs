@@ -7,14 +7,14 @@ use super::{Bar, ModelArgs, UnusableArgument};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use ventriform::advice::Explain;
-use ventriform::export::open_part::open_part;
-use ventriform::export::{self, Format, Part};
-use ventriform::pipeline::{self, Model};
-use ventriform::progress::{CancelToken, Monitor};
-use ventriform::report::{MeasuredSurface, ModelReport};
-use ventriform::volume::Provenance;
-use ventriform::volume::{self, ReadOptions};
+use ventriform::base::progress::{CancelToken, Monitor};
+use ventriform::image::volume::Provenance;
+use ventriform::image::volume::{self, ReadOptions};
+use ventriform::results::export::open_part::open_part;
+use ventriform::results::export::{self, Format, Part};
+use ventriform::results::report::{MeasuredSurface, ModelReport};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::pipeline::{self, Model};
 
 /// Make a surface model from a volume
 #[derive(Debug, Args)]

@@ -6,10 +6,10 @@ use super::volume_args::volume_files;
 use anyhow::Result;
 use clap::Args;
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::progress::Monitor;
-use ventriform::report::{self, FileFacts};
-use ventriform::volume::{self, ReadOptions};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, ReadOptions};
+use ventriform::results::report::{self, FileFacts};
+use ventriform::runs::advice::Explain;
 
 /// Print what is read of a volume: size, place, values, gates and, of DICOM, whose scan it is
 #[derive(Debug, Args)]

@@ -6,12 +6,14 @@ use super::output::{note, say};
 use anyhow::{Result, bail};
 use clap::{Args, Subcommand};
 use tokio::runtime::Runtime;
-use ventriform::text::escaped;
-use ventriform_service::access::{
+use ventriform::base::text::escaped;
+use ventriform_service::base::records::{
+    Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339,
+};
+use ventriform_service::callers::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::{Size, Span};
-use ventriform_service::records::{Clock, ListRequest, SystemClock, Tenant, Timestamp, rfc3339};
 use ventriform_store::IfNone;
 
 /// Make, list and revoke API keys, also while the service runs

@@ -10,10 +10,10 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::runtime::Runtime;
-use ventriform::volume::ReadLimits;
-use ventriform_service::access::{Agent, Recorder};
+use ventriform::image::volume::ReadLimits;
+use ventriform_service::base::records::{Failure, ProductRoom, SystemClock, Tenant};
+use ventriform_service::callers::{Agent, Recorder};
 use ventriform_service::items::{Items, NotAdded, TemplateSource};
-use ventriform_service::records::{Failure, ProductRoom, SystemClock, Tenant};
 use ventriform_service::work::{Engine, TEMPLATE_BYTES};
 use ventriform_store::{IfNone, Store, require_store};
 

@@ -4,7 +4,7 @@ use super::serve::variable;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use std::str::FromStr;
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
 use ventriform_service::config::{Settings, Size};
 
 /// Limits on what is read.

@@ -7,14 +7,14 @@ use anyhow::{Error, Result, anyhow};
 use clap::Args;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use ventriform::advice::Explain;
-use ventriform::mesh_files::{MeshFileError, MeshStatement};
-use ventriform::progress::Monitor;
-use ventriform::report::AgreementReport;
-use ventriform::volume::given_mask::{
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::given_mask::{
     GivenMask, GivenMaskError, MaskAgreement, MaskAgreementError, MaskChoice, MaskLabel, read_mask,
 };
-use ventriform::volume::{VolumeError, VolumeFile};
+use ventriform::image::volume::{VolumeError, VolumeFile};
+use ventriform::mesh::files::{MeshFileError, MeshStatement};
+use ventriform::results::report::AgreementReport;
+use ventriform::runs::advice::Explain;
 
 /// Compare two masks: Jaccard E_J, mean contour distance E_CD, Dice, Hausdorff
 #[derive(Debug, Args)]

@@ -5,11 +5,11 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::io::Read as _;
 use std::path::Path;
-use ventriform::advice::Explain;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::ReadLimits;
 use ventriform::mesh::TriMesh;
-use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
-use ventriform::progress::Monitor;
-use ventriform::volume::ReadLimits;
+use ventriform::mesh::files::{self, MeshFrame, MeshStatement, MeshUnit};
+use ventriform::runs::advice::Explain;
 
 /// Statements about meshes.
 #[derive(Debug, Clone, Copy, Default, Args)]
@@ -66,7 +66,7 @@ pub(super) fn read_mesh(
     let context = || format!("{}", path.display());
     let advice = "give one with fewer triangles, or raise the limit: --mesh-limit 256MiB";
     let bytes = mesh_bytes(path, limits.mesh_bytes, advice).with_context(context)?;
-    let read = mesh_files::read_where_silent(&bytes, stated, limits.mesh_bytes, &Monitor::silent())
+    let read = files::read_where_silent(&bytes, stated, limits.mesh_bytes, &Monitor::silent())
         .map_err(|error| anyhow!(error.with_advice()))
         .with_context(context)?;
     for assumed in &read.notes {

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tokio::runtime::Runtime;
-use ventriform_service::access::verify;
+use ventriform_service::callers::verify;
 use ventriform_service::config::{BlobPlace, DatabaseUrl, Flags, Settings};
 use ventriform_store::{Destination, IfNone, Migrated, MovedFiles, Progress, open_database};
 

@@ -7,11 +7,11 @@ use super::parameter_args::{FitArgsOf, TableArgs, with_fit};
 use anyhow::{Context, Result, anyhow};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::evaluate::normals::{self, NormalsOptions};
-use ventriform::normals::{FEW_CASES, NormalGroup, NormalLimits, Perfusion, ScanKind};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::normals::{FEW_CASES, NormalGroup, NormalLimits, Perfusion, ScanKind};
 use ventriform::parameters::{FitParameters, NormalsChoice};
-use ventriform::progress::Monitor;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::evaluate::normals::{self, NormalsOptions};
 
 /// Build normal limits from scans of healthy people
 #[derive(Debug, Args)]

@@ -1,7 +1,7 @@
 //! Writing results to files, and lines to the terminal.
 //!
 //! Everything that a command prints goes through [`say!`](say) and [`note!`](note): control characters
-//! that come from files, names and stores are escaped ([`ventriform::text`]), and a reader that has
+//! that come from files, names and stores are escaped ([`ventriform::base::text`]), and a reader that has
 //! closed the pipe ends the printing without an error. Any other failure to print, such as a full
 //! disk, is the failure of the command ([`finish`]).
 
@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use ventriform::text::{escaped_json, escaped_lines};
+use ventriform::base::text::{escaped_json, escaped_lines};
 
 /// Prints a line to standard output, as `println!` does.
 macro_rules! say {

@@ -2,11 +2,11 @@
 
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 use std::marker::PhantomData;
-use ventriform::advice::Explain;
 use ventriform::parameters::{
     BesideFit, FitParameters, Kind, ModelParameters, ParameterError, ParameterSpec, Parameters,
     WithFit,
 };
+use ventriform::runs::advice::Explain;
 
 /// The flags of the parameters of a model.
 pub type ModelArgs = TableArgs<ModelParameters>;

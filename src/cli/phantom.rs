@@ -5,10 +5,12 @@ use super::output::{create_folder, note, write_file};
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use ventriform::progress::{CancelToken, Monitor};
-use ventriform::volume::Volume;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_person, phantom};
+use ventriform::base::progress::{CancelToken, Monitor};
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{
+    PerfusionDefect, PhantomParameters, healthy_person, phantom,
+};
 
 /// Simulate a SPECT scan, with the true mask of the wall
 #[derive(Debug, Args)]

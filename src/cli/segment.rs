@@ -11,15 +11,17 @@ use super::{Bar, FitArgs, UnusableArgument};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use ventriform::advice::Explain;
-use ventriform::export::{Format, Part};
-use ventriform::mesh_files::MeshStatement;
+use ventriform::base::progress::{CancelToken, Monitor, Plan};
+use ventriform::heart::reader::ReaderProfile;
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::FitParameters;
-use ventriform::progress::{CancelToken, Monitor, Plan};
-use ventriform::reader::ReaderProfile;
-use ventriform::segmentation::Segmentation;
-use ventriform::segmentation::{NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::results::export::{Format, Part};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::segmentation::Segmentation;
+use ventriform::runs::segmentation::{
+    NamedFile, NamedMesh, NamedReader, SegmentationOrder, from_files,
+};
 
 /// Fit a model to the left ventricle (or another organ) in a volume
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
 use std::time::Duration;
 use tokio::runtime::Runtime;
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
 use ventriform_http::Running;
 use ventriform_service::config::{Flags, Settings};
 use ventriform_service::jobs::{Isolation, serve_isolated};

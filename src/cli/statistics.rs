@@ -4,9 +4,9 @@ use super::output::{create_folder, write_file};
 use anyhow::{Context, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use ventriform::evaluate::statistics::statistics;
-use ventriform::export::{self, Format, Metadata};
 use ventriform::mesh::TriMesh;
+use ventriform::results::export::{self, Format, Metadata};
+use ventriform::runs::evaluate::statistics::statistics;
 
 /// Compute mean shape and principal modes of fits of one model
 #[derive(Debug, Args)]

@@ -5,12 +5,12 @@ use super::output::{create_folder, note, write_file};
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::evaluate::parameters::ascending;
-use ventriform::export::{self, Format};
+use ventriform::base::progress::Monitor;
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline;
-use ventriform::progress::Monitor;
+use ventriform::results::export::{self, Format};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::evaluate::parameters::ascending;
+use ventriform::runs::pipeline;
 
 /// Build models for the library, or add them to a service's library
 #[derive(Debug, Args)]

@@ -2,8 +2,8 @@
 
 use anyhow::{Result, anyhow};
 use std::path::PathBuf;
-use ventriform::advice::Explain;
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::advice::Explain;
 
 /// The files that `paths` name; a folder stands for the files in it.
 ///

@@ -10,9 +10,9 @@ use rcgen::ExtendedKeyUsagePurpose;
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::volume::{ReadLimits, Volume};
-use ventriform_service::archive::{Archive, Archives, Credentials};
+use ventriform::image::volume::{ReadLimits, Volume};
 use ventriform_service::config::Settings;
+use ventriform_service::network::archive::{Archive, Archives, Credentials};
 use ventriform_service::work::Engine;
 
 pub const STUDY_UID: &str = "1.2.826.0.1.3680043.8.498.1";

@@ -8,13 +8,13 @@ use reqwest::multipart::{Form, Part};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-use ventriform::export::Format;
-use ventriform::gated::{FILE_NAMES, GATE_FILE_PATTERN};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::progress::Monitor;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::results::export::Format;
+use ventriform::runs::gated::{FILE_NAMES, GATE_FILE_PATTERN};
 
 impl TestApp {
     /// Makes a beat; returns it.

@@ -14,13 +14,13 @@ use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
-use ventriform_service::items::{Custodian, Items};
-use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, Cutoff, Erased, ErasureAgent, ErasureOrder,
     ErasureReason, FileRecord, Filed, ItemRecord, JobState, LocalFile, NewJob, Resource, Shelved,
     StagedFiles, StagedFor, StoredVolume, SystemClock, Tags, Tenant, Timestamp,
 };
+use ventriform_service::items::{Custodian, Items};
+use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
 use ventriform_store::Store;
 
 /// Files of one item by name.

@@ -8,12 +8,14 @@ use reqwest::multipart::{Form, Part};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-use ventriform::export::Format;
-use ventriform::progress::Monitor;
-use ventriform::rest_stress::FILE_NAMES;
-use ventriform::volume::Volume;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_person, phantom};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{
+    PerfusionDefect, PhantomParameters, healthy_person, phantom,
+};
+use ventriform::results::export::Format;
+use ventriform::runs::rest_stress::FILE_NAMES;
 
 impl TestApp {
     async fn post_json(&self, path: &str, body: Value) -> Response {

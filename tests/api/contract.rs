@@ -11,20 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
-use ventriform::volume::dicom::DicomHeader;
-use ventriform_service::access::{
-    AccessStore, Activity, Agent, ApiKey, AuditEvent, AuditFilter, AuditRecord, KeyRequest, Maker,
-    Quota, Recorder, Scope, verify,
-};
-use ventriform_service::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
-use ventriform_service::hooks::{
-    AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent, Lane,
-    NextAttempt, Settlement, SigningSecret,
-};
-use ventriform_service::intake::{
-    Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, RecordedGroups,
-};
-use ventriform_service::records::{
+use ventriform::image::volume::dicom::DicomHeader;
+use ventriform_service::base::records::{
     AddedProduct, Bounded, Catalogue, Claimant, Clock, Custody, DeathLimit, Deleted, Erased,
     ErasureAgent, ErasureOrder, ErasureReason, Failure, Fault, FigureStore, FileRecord, Filed,
     Idempotency, Interrupted, ItemFilter, ItemRecord, Job, JobFilter, JobOutcome, JobState,
@@ -33,7 +21,19 @@ use ventriform_service::records::{
     ScanSelection, Scans, ScansErased, SendOrder, SeriesSource, StoreFault, StoreResult,
     StoredVolume, SystemClock, TagFilter, Tags, Tenant, TimeStore, Timestamp, random_id,
 };
-use ventriform_service::worklist::{
+use ventriform_service::callers::{
+    AccessStore, Activity, Agent, ApiKey, AuditEvent, AuditFilter, AuditRecord, KeyRequest, Maker,
+    Quota, Recorder, Scope, verify,
+};
+use ventriform_service::network::archive::{ArchiveStore, HeldSeries, SendSettlement, SeriesKey};
+use ventriform_service::network::hooks::{
+    AttemptOutcome, DeliveryLimits, DeliveryState, DeliveryStore, HookEndpoint, HookEvent, Lane,
+    NextAttempt, Settlement, SigningSecret,
+};
+use ventriform_service::network::intake::{
+    Added, GroupState, IntakeRoom, IntakeStore, NewObject, Origin, Protocol, RecordedGroups,
+};
+use ventriform_service::network::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
 use ventriform_store::{DiskGauge, PostgresError, SqlStore, Store, StoreSettings};

@@ -1,9 +1,9 @@
 //! DICOM files made in code: Nuclear Medicine slices of a simulated scan.
 
 use std::sync::OnceLock;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
-use ventriform::volume::phantom::{Phantom, PhantomParameters, phantom};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::phantom::{Phantom, PhantomParameters, phantom};
 
 /// An element of a data set in Explicit VR Little Endian.
 pub fn element(group: u16, number: u16, vr: &str, value: &[u8]) -> Vec<u8> {

@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
-use ventriform_service::access::{AccessStore, Activity, AuditFilter, verify};
-use ventriform_service::records::{ListRequest, Tenant};
+use ventriform_service::base::records::{ListRequest, Tenant};
+use ventriform_service::callers::{AccessStore, Activity, AuditFilter, verify};
 use ventriform_store::{Repair, backup, examine, open_rows};
 
 /// A volume and a model; returns the paths that must be served, and the folder's service.

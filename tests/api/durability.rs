@@ -3,7 +3,7 @@
 use crate::helpers::{Service, fake_engine, heart, scan, text};
 use serde_json::{Value, json};
 use std::time::Duration;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Catalogue, Claimant, DeathLimit, Failure, Fault, FileRecord, Filed, JobOutcome, JobState,
     JobStore, Lease, NewJob, StoredVolume, Tags, Tenant, random_id,
 };

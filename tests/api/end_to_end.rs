@@ -4,10 +4,10 @@ use crate::helpers::{Service, heart, problem, scan, text};
 use reqwest::Response;
 use reqwest::multipart::{Form, Part};
 use serde_json::Value;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::volume::Volume;
-use ventriform::volume::nifti::{self, StoredType};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::nifti::{self, StoredType};
 
 #[tokio::test]
 async fn a_scan_becomes_a_closed_mesh_of_exactly_the_points_asked_for() {
@@ -421,7 +421,7 @@ async fn a_fit_has_labels_and_parts_of_its_wall() {
         let files = [ventriform::VolumeFile::in_memory("labels", bytes)];
         let (options, limits) = Default::default();
         let quiet = ventriform::Monitor::silent();
-        let reading = ventriform::volume::read(&files, &options, &limits, &quiet).unwrap();
+        let reading = ventriform::image::volume::read(&files, &options, &limits, &quiet).unwrap();
         reading.volume.voxels
     };
     let (_, mask) = get("mask.nii.gz").await;

@@ -1,10 +1,10 @@
 //! A simulated heart in gates, and its files.
 
 use crate::dicom::NM_GREATEST;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 
 /// A small simulated heart in eight gates: it shrinks and thickens, and is smallest in the fourth.
 pub fn beating() -> &'static [Volume] {

@@ -18,8 +18,8 @@ use std::collections::BTreeSet;
 use std::io::{Read, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::volume::ReadLimits;
-use ventriform_service::access::{Quota, Scope};
+use ventriform::image::volume::ReadLimits;
+use ventriform_service::callers::{Quota, Scope};
 use ventriform_service::work::Engine;
 
 /// The beginning of every mark.

@@ -12,27 +12,27 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::export::{self, Format, Metadata};
+use ventriform::base::progress::{Monitor, Plan, Stage};
+use ventriform::image::volume::ReadLimits;
+use ventriform::image::volume::given_mask::MaskChoice;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::mesh::TriMesh;
+use ventriform::mesh::files::MeshStatement;
 use ventriform::mesh::shapes::icosphere;
-use ventriform::mesh_files::MeshStatement;
-use ventriform::progress::{Monitor, Plan, Stage};
-use ventriform::volume::ReadLimits;
-use ventriform::volume::given_mask::MaskChoice;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::results::export::{self, Format, Metadata};
 use ventriform_http::{Running, install_cryptography};
 use ventriform_program::server::start;
-use ventriform_service::access::{
+use ventriform_service::base::records::{
+    Clock, Cutoff, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock, Timestamp,
+    TrustedNow,
+};
+use ventriform_service::callers::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::Settings;
 use ventriform_service::items::{OutputFile, StoredItem, WorkOutput};
 use ventriform_service::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use ventriform_service::records::{
-    Clock, Cutoff, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock, Timestamp,
-    TrustedNow,
-};
 use ventriform_service::work::{Engine, IntensityFacts, UploadFacts, UploadReader};
 use ventriform_store::{SqlStore, open_database, open_rows};
 

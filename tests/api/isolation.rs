@@ -7,8 +7,8 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform_service::base::records::{Claimant, Filed, JobStore, NewJob, Tenant};
 use ventriform_service::jobs::{Isolation, serve_isolated};
-use ventriform_service::records::{Claimant, Filed, JobStore, NewJob, Tenant};
 use ventriform_service::work::Engine;
 use ventriform_store::Store;
 

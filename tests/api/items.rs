@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
-use ventriform_service::background::Upkeep;
-use ventriform_service::items::{Items, RetentionAges};
-use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Catalogue, Clock, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, Filed,
     JobState, JobStore, LegalHold, ListRequest, NewJob, Resource, StagedFiles, StagedFor,
     StoredVolume, Tags, Tenant, Timestamp,
 };
+use ventriform_service::items::{Items, RetentionAges};
+use ventriform_service::jobs::{Queue, QueueSettings, WorkerSettings, Workers};
+use ventriform_service::run::background::Upkeep;
 use ventriform_store::Store;
 
 /// A clock that a test sets, and whether it is in doubt.

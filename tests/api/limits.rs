@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use ventriform::mesh::shapes::icosphere;
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::callers::{Quota, Scope};
 
 const FORWARDED_HEADER: &str = "x-forwarded-for";
 

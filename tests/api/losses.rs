@@ -10,12 +10,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use ventriform_service::access::{
+use ventriform_service::base::records::{Catalogue, ListRequest, Tenant};
+use ventriform_service::callers::{
     AccessStore, Activity, ApiKey, AuditEvent, AuditFilter, BrokenLink, KeyRequest, Maker, Quota,
     Scope, verify,
 };
 use ventriform_service::config::{BlobPlace, Settings};
-use ventriform_service::records::{Catalogue, ListRequest, Tenant};
 use ventriform_store::{
     Examination, NewerStore, Repair, SqlStore, Store, StoreSettings, apply, backup, examine,
     examine_on_server, missed, open_database, open_rows,

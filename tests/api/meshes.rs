@@ -8,14 +8,14 @@ use reqwest::StatusCode;
 use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use std::io::{Cursor, Write as _};
-use ventriform::export::{self, Format, Metadata};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::voxelise::voxelise;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::voxelise::voxelise;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::progress::Monitor;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::results::export::{self, Format, Metadata};
 
 /// A cup as a heart's wall; its coordinates are exact in single precision.
 fn cup() -> TriMesh {

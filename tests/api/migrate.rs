@@ -10,9 +10,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tempfile::TempDir;
-use ventriform_service::access::{AccessStore, Activity, AuditEvent, Quota, Scope, verify};
+use ventriform_service::base::records::{Clock, Resource, SystemClock, Tenant, random_id};
+use ventriform_service::callers::{AccessStore, Activity, AuditEvent, Quota, Scope, verify};
 use ventriform_service::config::{AwsVariables, PostgresSettings, Settings};
-use ventriform_service::records::{Clock, Resource, SystemClock, Tenant, random_id};
 use ventriform_store::{
     Destination, MigrateError, Migrated, MovedFiles, OpenError, Progress, Store, StoreSettings,
     migrate, note_moved_files, open_database, open_rows,

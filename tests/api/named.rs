@@ -6,7 +6,7 @@ use reqwest::multipart::{Form, Part};
 use serde_json::Value;
 use std::io::{Cursor, Read, Write};
 use std::time::{Duration, Instant};
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::callers::{Quota, Scope};
 
 /// The patient, short enough for every field of text.
 const PATIENT_NAME: &str = "Kanarienvogel";

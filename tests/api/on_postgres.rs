@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
-use ventriform_service::access::AccessStore;
+use ventriform_service::callers::AccessStore;
 use ventriform_store::open_database;
 
 #[tokio::test]

@@ -153,7 +153,7 @@ impl Server {
 
     /// Makes an empty database, and returns its URL.
     pub async fn database(&self) -> String {
-        let name = ventriform_service::records::random_id("t_");
+        let name = ventriform_service::base::records::random_id("t_");
         self.run("postgres", &format!("CREATE DATABASE {name}"))
             .await;
         self.url(&name)

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use ventriform_http::document_json;
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::callers::{Quota, Scope};
 use ventriform_service::config::Settings;
 
 /// More than the buffers of both sockets hold.

@@ -13,12 +13,12 @@ use std::net::SocketAddr;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform::base::progress::{Monitor, Stage};
 use ventriform::mesh::shapes::icosphere;
-use ventriform::progress::{Monitor, Stage};
-use ventriform_service::archive::Archives;
 use ventriform_service::config::Settings;
 use ventriform_service::items::WorkOutput;
 use ventriform_service::jobs::{WorkError, WorkInput};
+use ventriform_service::network::archive::Archives;
 use ventriform_service::work::Engine;
 
 const EVENT_PATIENCE: Duration = Duration::from_secs(60);

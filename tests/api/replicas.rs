@@ -10,11 +10,11 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform_service::config::Settings;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Catalogue, Erased, ErasureAgent, ErasureOrder, ErasureReason, FileRecord, News, Resource,
     StoreFault, StoredVolume, Tags, Tenant, random_id,
 };
+use ventriform_service::config::Settings;
 use ventriform_store::{OpenError, Store, StoreSettings};
 
 /// Longest time until another process knows of a change. Their own looks come later.

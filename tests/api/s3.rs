@@ -13,12 +13,12 @@ use std::sync::Arc;
 use std::time::Duration;
 use tempfile::TempDir;
 use tokio::io::AsyncWriteExt;
-use ventriform_service::config::{AwsVariables, Settings};
-use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobStore, FileRecord, ItemRecord, Resource, StagedFiles, StagedFor, StoreFault,
     StoredVolume, random_id,
 };
+use ventriform_service::config::{AwsVariables, Settings};
+use ventriform_service::network::intake::ReceivedFiles;
 use ventriform_store::{DiskGauge, FileBlobs, S3Blobs, S3Location, Store, StoreSettings, examine};
 
 const CACHE_BYTES: u64 = 64 << 20;

@@ -4,7 +4,7 @@
 use crate::helpers::{TestApp, closed, key, problem, text};
 use reqwest::StatusCode;
 use serde_json::{Value, json};
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::callers::{Quota, Scope};
 
 /// The ids of a list.
 fn ids(list: &Value) -> Vec<String> {

@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use ventriform::progress::Monitor;
-use ventriform::volume::Provenance;
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
-use ventriform_service::access::{Quota, Scope};
-use ventriform_service::records::Tenant;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Provenance;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform_service::base::records::Tenant;
+use ventriform_service::callers::{Quota, Scope};
 use ventriform_service::work::Engine;
 use ventriform_store::open_rows;
 
@@ -546,7 +546,7 @@ async fn volumes_whose_scan_a_repair_has_lost_are_read_at_the_next_start() {
     }
     let data = app.stop().await;
     let rows = open_rows(data.path()).await.unwrap();
-    use ventriform_service::records::Scans;
+    use ventriform_service::base::records::Scans;
     let id = text(&volume["id"]);
     assert!(rows.scan(&Tenant::default(), &id).await.unwrap().is_some());
     assert!(rows.unread_scans(0, 10).await.unwrap().is_empty());

@@ -219,8 +219,11 @@ impl Object {
 
     /// The object as a file.
     pub fn file(&self) -> Vec<u8> {
-        let start =
-            ventriform::export::dicom::file_start(self.class, &self.instance, EXPLICIT_LITTLE);
+        let start = ventriform::results::export::dicom::file_start(
+            self.class,
+            &self.instance,
+            EXPLICIT_LITTLE,
+        );
         [start.unwrap(), self.data_set(EXPLICIT_LITTLE)].concat()
     }
 }

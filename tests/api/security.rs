@@ -16,12 +16,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use ventriform_http::{ServeError, document_json};
 use ventriform_program::server::start;
-use ventriform_service::access::{
+use ventriform_service::base::records::{Clock, StoreError, SystemClock, Tenant, rfc3339};
+use ventriform_service::callers::{
     AccessStore, Activity, Agent, AuditEvent, BrokenLink, Quota, Recorder, Scope, verify,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::hooks::{DeliveryStore, SigningSecret};
-use ventriform_service::records::{Clock, StoreError, SystemClock, Tenant, rfc3339};
+use ventriform_service::network::hooks::{DeliveryStore, SigningSecret};
 use ventriform_store::{SqlStore, open_rows};
 
 async fn plain_key(app: &TestApp, scope: Scope) -> String {

@@ -8,13 +8,13 @@ use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use ventriform_http::document_json;
-use ventriform_service::access::{
+use ventriform_service::base::records::{
+    Catalogue, Clock, Filed, Idempotency, JobStore, NewJob, StoredVolume, SystemClock, Tags, Tenant,
+};
+use ventriform_service::callers::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope,
 };
 use ventriform_service::config::Settings;
-use ventriform_service::records::{
-    Catalogue, Clock, Filed, Idempotency, JobStore, NewJob, StoredVolume, SystemClock, Tags, Tenant,
-};
 use ventriform_store::Store;
 
 #[tokio::test]

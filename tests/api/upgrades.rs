@@ -28,17 +28,17 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::TempDir;
-use ventriform::progress::Monitor;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, Volume};
-use ventriform_service::access::{
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, Volume};
+use ventriform_service::base::records::{
+    Clock, Custody, Filed, ItemRecord, JobStore, NewJob, Resource, SystemClock, Tags, Tenant, hex,
+};
+use ventriform_service::callers::{
     AccessStore, Activity, ApiKey, AuditEvent, KeyRequest, Maker, Quota, Scope, verify,
 };
 use ventriform_service::config::{PostgresSettings, Settings};
-use ventriform_service::records::{
-    Clock, Custody, Filed, ItemRecord, JobStore, NewJob, Resource, SystemClock, Tags, Tenant, hex,
-};
 use ventriform_service::work::Engine;
 use ventriform_store::{
     Destination, MovedFiles, Store, backup, examine, migrate, note_moved_files, open_database,

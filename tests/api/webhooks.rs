@@ -7,7 +7,7 @@ use axum::response::IntoResponse;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 use ventriform_service::config::Settings;
-use ventriform_service::hooks::SigningSecret;
+use ventriform_service::network::hooks::SigningSecret;
 
 const HOOK_SECRET: &str = "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw";
 

@@ -3,7 +3,7 @@
 use crate::helpers::{TestApp, closed, key, problem, text};
 use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
-use ventriform_service::access::{Quota, Scope};
+use ventriform_service::callers::{Quota, Scope};
 
 const ITEMS_PATH: &str = "/dicom-web/workitems";
 

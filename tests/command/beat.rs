@@ -6,9 +6,9 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
-use ventriform::gated::FILE_NAMES;
-use ventriform::volume::Volume;
-use ventriform::volume::nifti::{self, StoredType};
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::runs::gated::FILE_NAMES;
 
 fn beat(folder: &Path, line: &str, threads: usize) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ventriform"))

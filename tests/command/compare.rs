@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
-use ventriform::export::dicom::ComparisonObject;
-use ventriform::progress::Monitor;
-use ventriform::rest_stress::FILE_NAMES;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::results::export::dicom::ComparisonObject;
+use ventriform::runs::rest_stress::FILE_NAMES;
 
 fn compare(here: &Path, arguments: &str, threads: usize) -> Output {
     Command::new(env!("CARGO_BIN_EXE_ventriform"))

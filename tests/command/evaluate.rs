@@ -8,9 +8,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::SystemTime;
 
-use ventriform::progress::Monitor;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
 
 /// A case's folder with scan and truth.
 fn case(cohort: &Path, name: &str, seed: u64, defects: Vec<PerfusionDefect>) {

@@ -9,16 +9,16 @@ use std::process::{Command, Output};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use ventriform::export::{self, Format, Metadata};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use ventriform::mesh::shapes;
 use ventriform::parameters::FitParameters;
-use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
-use ventriform::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::results::export::{self, Format, Metadata};
+use ventriform::runs::segmentation::{SegmentationFilesError, SegmentationOrder, from_files};
 
 /// A folder with `scan.nii.gz`, its `truth.nii.gz`, and masks that do not match it.
 fn folder() -> TempDir {

@@ -1,6 +1,6 @@
 //! Where a clock is read and where an age is counted: exact lists, so that no new one is forgotten.
 //!
-//! Ages count by a trusted clock only (`records/clock.rs` of the service): a method that erases, gives up or forgets
+//! Ages count by a trusted clock only (`base/records/clock.rs` of the service): a method that erases, gives up or forgets
 //! what is old takes a `Cutoff` or a `TrustedNow`, which only a trusted clock makes. The compiler watches that; here is
 //! who does so, who reads a clock that is not trusted and why, and which statements compare stamps.
 
@@ -20,12 +20,21 @@ const SEARCHED: [&str; 5] = [
 
 /// Who reads the clock of the machine, and what for. None of these is an age.
 const RAW_CLOCKS: &[(&str, &str)] = &[
-    ("crates/http/src/connections/requests.rs", "the header Date"),
-    ("crates/http/src/observe.rs", "ids of requests sort by time"),
-    ("crates/service/src/records/clock.rs", "the clock itself"),
-    ("crates/service/src/records/mod.rs", "its name"),
     (
-        "crates/service/src/records/service_clock.rs",
+        "crates/http/src/edge/connections/requests.rs",
+        "the header Date",
+    ),
+    (
+        "crates/http/src/edge/observe.rs",
+        "ids of requests sort by time",
+    ),
+    (
+        "crates/service/src/base/records/clock.rs",
+        "the clock itself",
+    ),
+    ("crates/service/src/base/records/mod.rs", "its name"),
+    (
+        "crates/service/src/base/records/service_clock.rs",
         "the clock of the service",
     ),
     ("crates/service/src/telemetry/spans.rs", "the end of a span"),
@@ -60,25 +69,25 @@ const DIFFERENCES: &[(&str, &str)] = &[
 
 /// The functions that take a moment or a time by which ages count.
 const AGES: &[&str] = &[
-    "crates/service/src/access/storage.rs: prune",
-    "crates/service/src/hooks/schedule.rs: next",
-    "crates/service/src/intake/record.rs: failed_before",
-    "crates/service/src/intake/record.rs: kept",
+    "crates/service/src/callers/storage.rs: prune",
+    "crates/service/src/network/hooks/schedule.rs: next",
+    "crates/service/src/network/intake/record.rs: failed_before",
+    "crates/service/src/network/intake/record.rs: kept",
     "crates/service/src/items/erase.rs: by_retention",
     "crates/service/src/items/erase.rs: new",
-    "crates/service/src/records/blobs.rs: tidy",
-    "crates/service/src/records/catalogue.rs: expired",
-    "crates/service/src/records/peers.rs: tidy",
-    "crates/service/src/records/time_store.rs: note_trusted",
-    "crates/service/src/worklist/storage.rs: delete_ended_workitems",
+    "crates/service/src/base/records/blobs.rs: tidy",
+    "crates/service/src/base/records/catalogue.rs: expired",
+    "crates/service/src/base/records/peers.rs: tidy",
+    "crates/service/src/base/records/time_store.rs: note_trusted",
+    "crates/service/src/network/worklist/storage.rs: delete_ended_workitems",
 ];
 
 /// The fields that hold such a moment.
 const AGE_FIELDS: &[&str] = &[
-    "crates/service/src/hooks/record.rs: ended_since",
-    "crates/service/src/hooks/record.rs: pending_since",
+    "crates/service/src/network/hooks/record.rs: ended_since",
+    "crates/service/src/network/hooks/record.rs: pending_since",
     "crates/service/src/items/erase.rs: before",
-    "crates/service/src/records/erasure.rs: renewed_before",
+    "crates/service/src/base/records/erasure.rs: renewed_before",
 ];
 
 /// The statements that compare a stamp with a moment: the file, the column and the comparison, and by which time.

@@ -120,7 +120,7 @@ const WRITES: [&str; 5] = [
 /// Who appends rows by themselves: the recorder, for what is read or refused; a repair, to a draft that nobody uses
 /// yet; a command, for the end of a trail that was followed.
 const APPENDERS: [&str; 3] = [
-    "crates/service/src/access/audit/recorder.rs",
+    "crates/service/src/callers/audit/recorder.rs",
     "crates/store/src/doctor.rs",
     "crates/store/src/missed.rs",
 ];

@@ -47,450 +47,81 @@ const FORBIDDEN_CRATES: &[(&str, &[&str])] = &[
 /// any of its dependencies either.
 const INTERFACE_CRATES: &[&str] = &["axum", "hyper", "reqwest", "utoipa", "sqlx", "object_store"];
 
-/// Each module of the library and the modules it uses, in reading order: a module uses only what
-/// stands above it.
-const LIBRARY_USES: &[(&str, &[&str])] = &[
-    ("text", &[]),
-    ("geometry", &[]),
-    ("progress", &[]),
-    ("numeric", &["geometry", "progress"]),
-    ("mesh", &["geometry", "numeric"]),
-    ("mesh_files", &["geometry", "numeric", "mesh", "progress"]),
-    ("grid", &["geometry", "numeric", "mesh", "progress"]),
-    ("draw", &["geometry", "numeric", "mesh"]),
-    (
-        "volume",
-        &[
-            "text",
-            "geometry",
-            "mesh",
-            "mesh_files",
-            "progress",
-            "grid",
-            "draw",
-        ],
-    ),
-    (
-        "locate",
-        &["geometry", "numeric", "mesh", "progress", "grid"],
-    ),
-    (
-        "surface",
-        &["geometry", "numeric", "mesh", "progress", "grid", "locate"],
-    ),
-    ("retile", &["geometry", "mesh", "progress", "surface"]),
-    (
-        "optimise",
-        &[
-            "geometry", "numeric", "mesh", "progress", "surface", "retile",
-        ],
-    ),
-    ("decimate", &["geometry", "mesh", "progress"]),
-    ("model", &["geometry", "mesh", "progress", "grid", "locate"]),
-    (
-        "deform",
-        &[
-            "geometry", "numeric", "mesh", "progress", "grid", "locate", "model",
-        ],
-    ),
-    (
-        "judge",
-        &[
-            "geometry", "numeric", "mesh", "progress", "grid", "locate", "model", "deform",
-        ],
-    ),
-    ("fit", &["progress", "grid", "model", "deform", "judge"]),
-    ("polar", &["geometry", "grid", "draw", "locate", "model"]),
-    (
-        "beat",
-        &[
-            "geometry", "numeric", "mesh", "progress", "grid", "model", "polar",
-        ],
-    ),
-    (
-        "normals",
-        &["text", "numeric", "progress", "model", "polar"],
-    ),
-    ("comparison", &["model", "polar", "normals"]),
-    (
-        "reader",
-        &[
-            "text", "geometry", "numeric", "mesh", "progress", "grid", "model", "deform",
-        ],
-    ),
-    (
-        "parameters",
-        &[
-            "geometry",
-            "mesh_files",
-            "grid",
-            "volume",
-            "locate",
-            "surface",
-            "retile",
-            "optimise",
-            "model",
-            "deform",
-            "polar",
-            "normals",
-            "comparison",
-        ],
-    ),
-    (
-        "report",
-        &[
-            "geometry",
-            "numeric",
-            "mesh",
-            "progress",
-            "grid",
-            "draw",
-            "volume",
-            "locate",
-            "surface",
-            "retile",
-            "optimise",
-            "model",
-            "deform",
-            "judge",
-            "polar",
-            "beat",
-            "normals",
-            "comparison",
-            "reader",
-            "parameters",
-        ],
-    ),
-    (
-        "export",
-        &[
-            "text",
-            "geometry",
-            "numeric",
-            "mesh",
-            "progress",
-            "grid",
-            "draw",
-            "volume",
-            "polar",
-            "normals",
-            "comparison",
-            "report",
-        ],
-    ),
-    (
-        "pipeline",
-        &[
-            "mesh",
-            "progress",
-            "grid",
-            "volume",
-            "surface",
-            "retile",
-            "optimise",
-            "export",
-            "model",
-            "report",
-            "parameters",
-        ],
-    ),
-    (
-        "segmentation",
-        &[
-            "geometry",
-            "mesh",
-            "progress",
-            "grid",
-            "draw",
-            "volume",
-            "locate",
-            "export",
-            "model",
-            "deform",
-            "judge",
-            "fit",
-            "polar",
-            "normals",
-            "reader",
-            "report",
-            "parameters",
-            "pipeline",
-        ],
-    ),
-    (
-        "gated",
-        &[
-            "numeric",
-            "mesh",
-            "progress",
-            "grid",
-            "volume",
-            "locate",
-            "export",
-            "model",
-            "deform",
-            "polar",
-            "beat",
-            "normals",
-            "report",
-            "parameters",
-            "segmentation",
-        ],
-    ),
-    (
-        "rest_stress",
-        &[
-            "geometry",
-            "numeric",
-            "mesh",
-            "progress",
-            "grid",
-            "draw",
-            "volume",
-            "locate",
-            "export",
-            "model",
-            "polar",
-            "normals",
-            "comparison",
-            "report",
-            "parameters",
-            "segmentation",
-            "gated",
-        ],
-    ),
-    (
-        "evaluate",
-        &[
-            "text",
-            "geometry",
-            "mesh",
-            "mesh_files",
-            "progress",
-            "grid",
-            "draw",
-            "volume",
-            "locate",
-            "surface",
-            "optimise",
-            "decimate",
-            "export",
-            "model",
-            "deform",
-            "judge",
-            "normals",
-            "reader",
-            "parameters",
-            "pipeline",
-            "segmentation",
-            "gated",
-        ],
-    ),
-    (
-        "objects",
-        &[
-            "progress",
-            "volume",
-            "export",
-            "segmentation",
-            "gated",
-            "rest_stress",
-        ],
-    ),
-    (
-        "advice",
-        &[
-            "mesh_files",
-            "grid",
-            "volume",
-            "locate",
-            "surface",
-            "retile",
-            "model",
-            "deform",
-            "beat",
-            "normals",
-            "comparison",
-            "reader",
-            "parameters",
-            "export",
-            "pipeline",
-            "segmentation",
-            "gated",
-            "rest_stress",
-            "evaluate",
-            "objects",
-        ],
-    ),
-    (
-        "front",
-        &[
-            "progress",
-            "grid",
-            "volume",
-            "parameters",
-            "pipeline",
-            "segmentation",
-        ],
-    ),
+/// The rooms of the library, in reading order: a file uses its own room, and those that stand above it. A wing is
+/// the folder of some rooms; a wing's name alone is the room of its other files.
+const LIBRARY_ROOMS: &[&str] = &[
+    "base/text",
+    "base/geometry",
+    "base/progress",
+    "base/numeric",
+    "mesh",
+    "mesh/files",
+    "mesh/decimate",
+    "image/grid",
+    "image/draw",
+    "image/volume",
+    "image/locate",
+    "surface",
+    "surface/retile",
+    "surface/optimise",
+    "heart/model",
+    "heart/deform",
+    "heart/judge",
+    "heart/fit",
+    "heart/polar",
+    "heart/beat",
+    "heart/normals",
+    "heart/comparison",
+    "heart/reader",
+    "parameters",
+    "results/report",
+    "results/export",
+    "runs/pipeline",
+    "runs/segmentation",
+    "runs/gated",
+    "runs/rest_stress",
+    "runs/evaluate",
+    "runs/objects",
+    "runs/advice",
+    "front",
 ];
 
 /// The same for the service.
-const SERVICE_USES: &[(&str, &[&str])] = &[
-    ("records", &[]),
-    ("error", &["records"]),
-    ("dicom_tags", &[]),
-    ("client", &[]),
-    ("pem", &[]),
-    ("http_client", &[]),
-    ("memory", &["records", "error", "client"]),
-    ("access", &["records", "http_client", "memory"]),
-    ("items", &["records", "error", "memory", "access"]),
-    ("jobs", &["records", "items"]),
-    ("reservations", &["records", "access"]),
-    ("quotas", &["records", "error", "access", "reservations"]),
-    ("hooks", &["records", "http_client"]),
-    (
-        "archive",
-        &[
-            "records",
-            "error",
-            "dicom_tags",
-            "pem",
-            "http_client",
-            "items",
-            "jobs",
-            "access",
-            "hooks",
-        ],
-    ),
-    (
-        "intake",
-        &["records", "error", "client", "memory", "jobs", "access"],
-    ),
-    ("worklist", &["records", "dicom_tags"]),
-    (
-        "stores",
-        &[
-            "records", "access", "hooks", "archive", "intake", "worklist",
-        ],
-    ),
-    (
-        "config",
-        &["records", "hooks", "archive", "intake", "worklist"],
-    ),
-    ("places", &["memory"]),
-    (
-        "decoding",
-        &["records", "error", "memory", "config", "places"],
-    ),
-    (
-        "telemetry",
-        &[
-            "records",
-            "http_client",
-            "jobs",
-            "access",
-            "hooks",
-            "archive",
-            "intake",
-            "config",
-        ],
-    ),
-    ("work", &["records", "items", "jobs"]),
-    (
-        "service",
-        &[
-            "records",
-            "http_client",
-            "items",
-            "jobs",
-            "access",
-            "quotas",
-            "memory",
-            "hooks",
-            "archive",
-            "intake",
-            "worklist",
-            "config",
-            "decoding",
-            "telemetry",
-            "work",
-        ],
-    ),
-    ("series", &["records", "error", "work", "service"]),
-    (
-        "filing",
-        &["records", "error", "jobs", "access", "quotas", "service"],
-    ),
-    ("erasures", &["records", "error", "access", "service"]),
-    ("scans", &["records", "error", "work", "service"]),
-    (
-        "uploads",
-        &[
-            "records", "error", "items", "access", "quotas", "memory", "work", "service",
-        ],
-    ),
-    (
-        "library",
-        &[
-            "records", "error", "items", "access", "quotas", "decoding", "service",
-        ],
-    ),
-    ("pairs", &["records", "intake", "work"]),
-    (
-        "rules",
-        &[
-            "records", "error", "client", "intake", "service", "filing", "uploads", "pairs",
-        ],
-    ),
-    (
-        "procedures",
-        &[
-            "records", "error", "access", "hooks", "archive", "worklist", "service", "series",
-            "filing",
-        ],
-    ),
-    (
-        "background",
-        &[
-            "records",
-            "error",
-            "items",
-            "jobs",
-            "access",
-            "quotas",
-            "hooks",
-            "archive",
-            "intake",
-            "work",
-            "service",
-            "uploads",
-            "procedures",
-        ],
-    ),
-    (
-        "start",
-        &[
-            "records",
-            "http_client",
-            "items",
-            "jobs",
-            "access",
-            "quotas",
-            "memory",
-            "hooks",
-            "archive",
-            "intake",
-            "stores",
-            "config",
-            "decoding",
-            "telemetry",
-            "work",
-            "service",
-            "background",
-        ],
-    ),
+const SERVICE_ROOMS: &[&str] = &[
+    "base/records",
+    "base/error",
+    "base/dicom_tags",
+    "base/client",
+    "base/pem",
+    "base/http_client",
+    "base/memory",
+    "callers",
+    "items",
+    "jobs",
+    "network/hooks",
+    "network/archive",
+    "network/intake",
+    "network/worklist",
+    "config/stores",
+    "config",
+    "limits/reservations",
+    "limits/quotas",
+    "limits/places",
+    "limits/decoding",
+    "telemetry",
+    "work",
+    "use_cases/service",
+    "use_cases/series",
+    "use_cases/filing",
+    "use_cases/erasures",
+    "use_cases/scans",
+    "use_cases/uploads",
+    "use_cases/library",
+    "use_cases/pairs",
+    "use_cases/rules",
+    "use_cases/procedures",
+    "run/background",
+    "run/start",
 ];
 
 /// Crates of the service and the command line: the library knows no network, no database, no runtime,
@@ -536,81 +167,48 @@ fn src(folder: &str) -> PathBuf {
     root().join(folder).join("src")
 }
 
-/// The modules of a crate that use each other, by the first word of their paths.
-fn used_modules(folder: &str) -> BTreeMap<String, BTreeSet<String>> {
-    let mut used: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for (file, others) in Sources::read(&src(folder)).arrows() {
-        let Some(module) = file.first() else {
-            continue;
-        };
-        let entry = used.entry(module.clone()).or_default();
-        entry.extend(
-            others
-                .iter()
-                .filter_map(|o| o.first())
-                .filter(|o| *o != module)
-                .cloned(),
-        );
-    }
-    used
+/// The place of a file's room in the list; `None` for a crate's root and the page of a wing that lists its rooms.
+fn room_of(file: &ModulePath, rooms: &[&str]) -> Option<usize> {
+    let path = file.join("/");
+    let holds = |room: &str| {
+        let rest = path.strip_prefix(room);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    let found = rooms.iter().enumerate().filter(|(_, room)| holds(room));
+    let longest = found.max_by_key(|(_, room)| room.len());
+    longest.map(|(at, _)| at)
 }
 
 #[test]
-fn modules_use_exactly_what_the_tables_say() {
+fn no_room_uses_one_that_stands_below_it() {
     let mut wrong = Vec::new();
-    for (folder, uses) in [
-        ("crates/ventriform", LIBRARY_USES),
-        ("crates/service", SERVICE_USES),
+    for (folder, rooms) in [
+        ("crates/ventriform", LIBRARY_ROOMS),
+        ("crates/service", SERVICE_ROOMS),
     ] {
-        let table: BTreeMap<String, BTreeSet<String>> = uses
-            .iter()
-            .map(|(module, uses)| {
-                let uses = uses.iter().map(|u| u.to_string()).collect();
-                (module.to_string(), uses)
-            })
-            .collect();
-        assert_eq!(
-            table.len(),
-            uses.len(),
-            "a module stands in a table twice: {folder}"
-        );
-        let used = used_modules(folder);
-        for module in table.keys().chain(used.keys()).collect::<BTreeSet<_>>() {
-            let empty = BTreeSet::new();
-            let (said, found) = (
-                table.get(module).unwrap_or(&empty),
-                used.get(module).unwrap_or(&empty),
-            );
-            for extra in found.difference(said) {
-                wrong.push(format!(
-                    "`{module}` uses `{extra}`, which the table does not allow"
-                ));
-            }
-            for unused in said.difference(found) {
-                wrong.push(format!(
-                    "the table lets `{module}` use `{unused}`; it does not"
-                ));
-            }
-            if !table.contains_key(module) {
-                wrong.push(format!("`{module}` is not in the table"));
+        let mut seen = BTreeSet::new();
+        for (file, others) in Sources::read(&src(folder)).arrows() {
+            let Some(room) = room_of(&file, rooms) else {
+                let lists_rooms = src(folder).join(file.join("/")).is_dir();
+                if !lists_rooms {
+                    wrong.push(format!("{folder}: `{}` is in no room", file.join("/")));
+                }
+                continue;
+            };
+            seen.insert(room);
+            for other in others {
+                if room_of(&other, rooms).is_some_and(|other| other > room) {
+                    let (file, other) = (file.join("/"), other.join("/"));
+                    wrong.push(format!(
+                        "{folder}: `{file}` uses `{other}`, which stands below it"
+                    ));
+                }
             }
         }
+        let empty = (0..rooms.len()).filter(|room| !seen.contains(room));
+        wrong.extend(empty.map(|room| format!("{folder}: no file is in `{}`", rooms[room])));
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-#[test]
-fn no_module_uses_one_that_stands_below_it() {
-    for table in [LIBRARY_USES, SERVICE_USES] {
-        for (at, (module, uses)) in table.iter().enumerate() {
-            for used in *uses {
-                assert!(
-                    table[..at].iter().any(|(above, _)| above == used),
-                    "`{module}` uses `{used}`, which does not stand above it"
-                );
-            }
-        }
-    }
 }
 
 #[test]

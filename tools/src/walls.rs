@@ -5,15 +5,15 @@ use std::path::Path;
 
 use serde_json::Value;
 use ventriform::TriMesh;
-use ventriform::deform::WallSurface;
-use ventriform::deform::anatomical::ray_terms;
-use ventriform::deform::ray_terms::RayTerms;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::bvh::{Aabb, Bvh};
-use ventriform::grid::Volume;
-use ventriform::grid::field::Field;
-use ventriform::mesh_files::{self, MeshFrame, MeshStatement, MeshUnit};
-use ventriform::model::wall::crossing;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::bvh::{Aabb, Bvh};
+use ventriform::heart::deform::WallSurface;
+use ventriform::heart::deform::anatomical::ray_terms;
+use ventriform::heart::deform::ray_terms::RayTerms;
+use ventriform::heart::model::wall::crossing;
+use ventriform::image::grid::Volume;
+use ventriform::image::grid::field::Field;
+use ventriform::mesh::files::{self, MeshFrame, MeshStatement, MeshUnit};
 use ventriform::parameters::FitParameters;
 
 /// Width of the image about the wall, mm.
@@ -39,9 +39,7 @@ pub fn true_wall(case: &Path) -> Result<Option<TriMesh>> {
         frame: Some(MeshFrame::Ras),
     };
     let bytes = std::fs::read(case.join("lv_surface.ply"))?;
-    Ok(Some(
-        mesh_files::read(&bytes, &stated, MAX_MESH_BYTES)?.mesh,
-    ))
+    Ok(Some(files::read(&bytes, &stated, MAX_MESH_BYTES)?.mesh))
 }
 
 /// Every `stride`th ray through the wall `apparent` that meets the `truth`: the numbers that describe it in the image

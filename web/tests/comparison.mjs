@@ -65,7 +65,7 @@ const isDrawn = canvas => canvas.evaluate(element => {
 const likeness = (page, path) => page.evaluate(async path => {
   const picture = await createImageBitmap(await (await fetch(path)).blob());
   const shown = document.querySelector(".compared-slices");
-  // As `comparedslices.tsx` and `rest_stress/slices.rs` lay their cells.
+  // As `comparedslices.tsx` and `runs/rest_stress/slices.rs` lay their cells.
   const [aside, above, ratio] = [46, 19, shown.width / shown.clientWidth];
   const cell = Math.min((shown.clientWidth - aside) / 8, (shown.clientHeight - 3 * above) / 6);
   const left = aside + (shown.clientWidth - aside - 8 * cell) / 2;

@@ -1,13 +1,13 @@
 //! The state that all handlers share: the service, and what belongs to answering requests.
 
-use super::guard::state::Guard;
-use super::links::rfc3339;
-use super::response_cache::ResponseCache;
-use super::streams::EventStreams;
-use super::validators::ValidatedJson;
+use crate::edge::guard::state::Guard;
+use crate::wire::links::rfc3339;
+use crate::wire::response_cache::ResponseCache;
+use crate::wire::streams::EventStreams;
+use crate::wire::validators::ValidatedJson;
 use std::sync::Arc;
-use ventriform_service::records::{Ownership, Product, Resource};
-use ventriform_service::service::Service;
+use ventriform_service::base::records::{Ownership, Product, Resource};
+use ventriform_service::use_cases::service::Service;
 
 /// The shared state of handlers.
 #[derive(Clone)]

@@ -1,27 +1,48 @@
 //! The map of the API, and the layers around it.
 
 use super::app::App;
-use super::beats::Beats;
-use super::comparisons::Comparisons;
-use super::document::PublishedDocuments;
-use super::guard::{self, hosts, pages};
-use super::limits::BodyLimits;
-use super::models::Models;
-use super::normals::{NORMALS_SIZE, Normals};
-use super::observe::{self, REQUEST_ID};
 use super::openapi::{self, DocumentFrame};
-use super::problem::not_found::no_such_path;
-use super::problem::{from_panic, method_not_allowed};
-use super::readers::{PROFILE_SIZE, Readers};
-use super::segmentations::Segmentations;
-use super::templates::{MESH_SIZE, Templates};
-use super::volumes::Volumes;
-use super::{
-    audit, beats, collection, comparisons, erasures, front_page, health, idempotency, identities,
-    intake_status, jobs, keys, legal_hold, models, normals, products, readers, scan_erasures,
-    segmentations, stow, templates, volume_download, volumes, voxels, webhook_request, webhooks,
-    workitems,
-};
+use crate::admin::audit;
+use crate::admin::health;
+use crate::admin::keys;
+use crate::admin::webhooks;
+use crate::dicomweb::intake_status;
+use crate::dicomweb::stow;
+use crate::dicomweb::workitems;
+use crate::edge::front_page;
+use crate::edge::guard::{self, hosts, pages};
+use crate::edge::observe::{self, REQUEST_ID};
+use crate::resources::beats;
+use crate::resources::beats::Beats;
+use crate::resources::collection;
+use crate::resources::comparisons;
+use crate::resources::comparisons::Comparisons;
+use crate::resources::erasures;
+use crate::resources::identities;
+use crate::resources::jobs;
+use crate::resources::legal_hold;
+use crate::resources::models;
+use crate::resources::models::Models;
+use crate::resources::normals;
+use crate::resources::normals::{NORMALS_SIZE, Normals};
+use crate::resources::products;
+use crate::resources::readers;
+use crate::resources::readers::{PROFILE_SIZE, Readers};
+use crate::resources::scan_erasures;
+use crate::resources::segmentations;
+use crate::resources::segmentations::Segmentations;
+use crate::resources::templates;
+use crate::resources::templates::{MESH_SIZE, Templates};
+use crate::resources::volume_download;
+use crate::resources::volumes;
+use crate::resources::volumes::Volumes;
+use crate::resources::voxels;
+use crate::wire::document::PublishedDocuments;
+use crate::wire::idempotency;
+use crate::wire::limits::BodyLimits;
+use crate::wire::problem::not_found::no_such_path;
+use crate::wire::problem::{from_panic, method_not_allowed};
+use crate::wire::webhook_request;
 use axum::Router;
 use axum::extract::DefaultBodyLimit;
 use axum::http::{HeaderMap, header};

@@ -1,25 +1,25 @@
 //! Starting the HTTP interface on a service, and shutting both down.
 
 use super::app::App;
-use super::connections::tls::{Tls, TlsError};
-use super::connections::{self, ConnectionLimits, Linger};
-use super::cryptography::install_cryptography;
-use super::guard::hosts::HostPolicy;
-use super::guard::state::Guard;
 use super::router::router;
+use crate::edge::connections::tls::{Tls, TlsError};
+use crate::edge::connections::{self, ConnectionLimits, Linger};
+use crate::edge::cryptography::install_cryptography;
+use crate::edge::guard::hosts::HostPolicy;
+use crate::edge::guard::state::Guard;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use tokio::task::JoinHandle;
-use ventriform_service::access::{Gate, Issuer, IssuerError, IssuerSettings, Scope};
+use ventriform_service::base::http_client::ClientFactory;
+use ventriform_service::base::records::StoreError;
+use ventriform_service::callers::{Gate, Issuer, IssuerError, IssuerSettings, Scope};
+use ventriform_service::config::stores::Stores;
 use ventriform_service::config::{Role, Settings};
-use ventriform_service::http_client::ClientFactory;
-use ventriform_service::intake::{Listener, ScpSettings, TlsConfiguration};
 use ventriform_service::jobs::Queue;
-use ventriform_service::records::StoreError;
-use ventriform_service::service::Service;
-use ventriform_service::start::{OpenError, RunningService, open, scp_settings};
-use ventriform_service::stores::Stores;
+use ventriform_service::network::intake::{Listener, ScpSettings, TlsConfiguration};
+use ventriform_service::run::start::{OpenError, RunningService, open, scp_settings};
+use ventriform_service::use_cases::service::Service;
 use ventriform_service::work::Engine;
 
 /// Why the service did not start, or ended without being asked.

@@ -10,7 +10,9 @@ use reqwest::Url;
 use reqwest::dns::{Addrs, Name, Resolve, Resolving};
 use reqwest::redirect::{Action, Attempt, Policy};
 use std::sync::Arc;
-use ventriform_service::http_client::{ByteStream, HttpClient, Redirects, Resolver, SendError};
+use ventriform_service::base::http_client::{
+    ByteStream, HttpClient, Redirects, Resolver, SendError,
+};
 
 /// A client of `reqwest`.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! Errors of `reqwest` in the service's words, without URLs: these may hold names, tokens and other secrets.
 
 use std::error::Error;
-use ventriform_service::http_client::SendError;
+use ventriform_service::base::http_client::SendError;
 
 /// The kind of an error before the response's headers have come.
 pub fn send_error(error: reqwest::Error) -> SendError {

@@ -1,4 +1,4 @@
-//! The HTTP client of the service: the traits of [`ventriform_service::http_client`] on `reqwest`.
+//! The HTTP client of the service: the traits of [`ventriform_service::base::http_client`] on `reqwest`.
 //!
 //! In: [`ClientOptions`]. Out: clients that connect as these say, over HTTP/1.1 and TLS by rustls. The process's
 //! provider of cryptography has to be installed before the first client is made.
@@ -9,7 +9,9 @@ mod error;
 use client::{PinnedResolver, ReqwestClient, redirect_policy};
 use reqwest::{Certificate, Client};
 use std::sync::Arc;
-use ventriform_service::http_client::{ClientError, ClientFactory, ClientOptions, HttpClient};
+use ventriform_service::base::http_client::{
+    ClientError, ClientFactory, ClientOptions, HttpClient,
+};
 
 /// Makes clients of `reqwest`.
 #[derive(Debug, Clone, Copy, Default)]

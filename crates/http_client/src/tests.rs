@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
-use ventriform_service::http_client::{
+use ventriform_service::base::http_client::{
     ByteStream, ClientError, ClientFactory, ClientOptions, HttpClient, Redirects, Resolver,
     SendError, USER_AGENT, bounded_body, build_client,
 };

@@ -4,8 +4,8 @@ use crate::errors::{exception, refused};
 use numpy::npyffi::NPY_ORDER;
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
 use ventriform::mesh::TriMesh;
 
 /// Voxels, i fastest, as an array (i, j, k) in Fortran order, without a copy.

@@ -8,24 +8,24 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use std::path::PathBuf;
-use ventriform::deform::DeformParameters;
-use ventriform::deform::elastic::{Stiffness, SupportScaling};
-use ventriform::evaluate::calibration::{
+use ventriform::base::progress::Plan;
+use ventriform::heart::deform::DeformParameters;
+use ventriform::heart::deform::elastic::{Stiffness, SupportScaling};
+use ventriform::image::volume::ReadLimits;
+use ventriform::image::volume::given_mask::MaskChoice;
+use ventriform::mesh::files::{MeshFrame, MeshStatement, MeshUnit};
+use ventriform::parameters::CalibrationChoice;
+use ventriform::runs::evaluate::calibration::{
     Calibration, CalibrationCase, CalibrationError, CaseFigures, calibrate as learn, cases_of,
 };
-use ventriform::evaluate::normals::{self, BuildError, NormalsOptions};
-use ventriform::evaluate::parameters::InSample;
-use ventriform::evaluate::rows::Variant;
-use ventriform::evaluate::sample::Sample;
-use ventriform::evaluate::{
+use ventriform::runs::evaluate::normals::{self, BuildError, NormalsOptions};
+use ventriform::runs::evaluate::parameters::InSample;
+use ventriform::runs::evaluate::rows::Variant;
+use ventriform::runs::evaluate::sample::Sample;
+use ventriform::runs::evaluate::{
     Cohort, EvaluateError, EvaluationObserver, EvaluationParameters, EvaluationStep,
     evaluate as judge,
 };
-use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
-use ventriform::parameters::CalibrationChoice;
-use ventriform::progress::Plan;
-use ventriform::volume::ReadLimits;
-use ventriform::volume::given_mask::MaskChoice;
 
 /// The cases that a reader's profile is learnt on.
 #[derive(FromPyObject)]

@@ -2,8 +2,8 @@
 
 use pyo3::prelude::*;
 use std::fmt::Display;
-use ventriform::advice::{Explain, Failure, Fault};
-use ventriform::progress::Cancelled;
+use ventriform::base::progress::Cancelled;
+use ventriform::runs::advice::{Explain, Failure, Fault};
 
 /// Why work ended without a result.
 #[derive(Debug)]

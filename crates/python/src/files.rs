@@ -1,8 +1,8 @@
 //! Files of results: formats by name, names and bytes for Python.
 
 use crate::errors::{Stopped, broken, refused};
-use ventriform::export::Format;
-use ventriform::segmentation::{NamedFile, SegmentationFilesError};
+use ventriform::results::export::Format;
+use ventriform::runs::segmentation::{NamedFile, SegmentationFilesError};
 
 /// The formats with these names.
 pub fn formats(names: &[String]) -> Result<Vec<Format>, Stopped> {

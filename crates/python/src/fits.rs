@@ -10,16 +10,16 @@ use crate::volumes::NativeVolume;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use ventriform::export::Part;
-use ventriform::export::dicom::{Deidentification, Moment, StatedIdentity};
-use ventriform::gated::{self, GatedOrder};
-use ventriform::mesh_files::MeshStatement;
-use ventriform::objects::{self, ObjectChoice, ObjectError};
+use ventriform::base::progress::Plan;
+use ventriform::image::volume::ReadLimits;
+use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::{BeatChoice, ComparisonChoice, FitParameters};
-use ventriform::progress::Plan;
-use ventriform::rest_stress::{self, ComparisonOrder};
-use ventriform::segmentation::{self, SegmentationOrder};
-use ventriform::volume::ReadLimits;
+use ventriform::results::export::Part;
+use ventriform::results::export::dicom::{Deidentification, Moment, StatedIdentity};
+use ventriform::runs::gated::{self, GatedOrder};
+use ventriform::runs::objects::{self, ObjectChoice, ObjectError};
+use ventriform::runs::rest_stress::{self, ComparisonOrder};
+use ventriform::runs::segmentation::{self, SegmentationOrder};
 
 /// The inputs of a fit beside its parameters.
 #[derive(FromPyObject)]

@@ -5,14 +5,14 @@ use crate::models::NativeModel;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
-use ventriform::advice::advice;
-use ventriform::mesh_files::{self, MeshFileError, MeshStatement};
-use ventriform::normals::NormalLimits;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::normals::NormalLimits;
+use ventriform::heart::reader::ReaderProfile;
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::mesh::files::{self, MeshFileError, MeshStatement};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::reader::ReaderProfile;
-use ventriform::segmentation::{NamedMesh, NamedReader};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::advice::advice;
+use ventriform::runs::segmentation::{NamedMesh, NamedReader};
 
 /// A model to fit: `auto`, the path of a mesh, or a model with its name.
 #[derive(FromPyObject)]
@@ -79,7 +79,7 @@ fn mesh(path: &Path, stated: &MeshStatement, monitor: &Monitor<'_>) -> Result<Na
         return Err(Stopped::Failed(refused("model", reason, &fix)));
     }
     let bytes = std::fs::read(path).map_err(|error| unreadable("model", path, &error))?;
-    let read = mesh_files::read_where_silent(&bytes, stated, limit, monitor);
+    let read = files::read_where_silent(&bytes, stated, limit, monitor);
     let read = read.map_err(|error| match error {
         MeshFileError::Cancelled(cancelled) => Stopped::from(cancelled),
         error => {

@@ -4,13 +4,13 @@ use crate::errors::{Stopped, broken, stopped};
 use crate::run::{How, run};
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
-use ventriform::mesh_files::{MeshFrame, MeshStatement, MeshUnit};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::report::AgreementReport;
-use ventriform::volume::given_mask::{
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::image::volume::given_mask::{
     GivenMask, GivenMaskError, MaskAgreementError, MaskChoice, MaskLabel, read_mask,
 };
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::mesh::files::{MeshFrame, MeshStatement, MeshUnit};
+use ventriform::results::report::AgreementReport;
 
 /// The figures as JSON, the structures that were compared, and whether the reference was resampled.
 type Measured = (String, [Option<String>; 2], bool);

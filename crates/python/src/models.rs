@@ -8,13 +8,13 @@ use crate::values::table;
 use crate::volumes::NativeVolume;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ventriform::export::open_part::open_part;
-use ventriform::export::{self, Format, Metadata};
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::image::volume::{self, Provenance, ReadLimits, ReadOptions};
 use ventriform::mesh::part::Part;
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline::{self, Model};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::volume::{self, Provenance, ReadLimits, ReadOptions};
+use ventriform::results::export::open_part::open_part;
+use ventriform::results::export::{self, Format, Metadata};
+use ventriform::runs::pipeline::{self, Model};
 
 /// A model, with whose scan it is of.
 #[pyclass(frozen, module = "ventriform._native")]

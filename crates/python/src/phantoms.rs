@@ -5,8 +5,8 @@ use crate::errors::{Stopped, refused};
 use crate::run::{How, run};
 use numpy::PyArray3;
 use pyo3::prelude::*;
-use ventriform::progress::Plan;
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom as simulate};
+use ventriform::base::progress::Plan;
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom as simulate};
 
 /// Figures of a phantom that Python states.
 #[derive(FromPyObject)]

@@ -20,7 +20,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use ventriform::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Plan, Stage, TotalProgress};
 
 /// Time between two looks for signals and progress.
 const LOOK_EVERY: Duration = Duration::from_millis(25);

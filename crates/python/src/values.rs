@@ -4,12 +4,12 @@ use crate::errors::{exception, refused};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 use serde_json::{Map, Number, Value};
-use ventriform::advice::Explain;
 use ventriform::parameters::{
     BEAT_SPECS, BeatChoice, BesideFit, COMPARISON_SPECS, CalibrationChoice, ComparisonChoice,
     FIT_SPECS, Kind, MODEL_SPECS, NORMALS_SPECS, NormalsChoice, ParameterError, ParameterSpec,
     Parameters, WithFit,
 };
+use ventriform::runs::advice::Explain;
 
 /// Most numbers that a value may have: a box has six.
 const MOST_NUMBERS: usize = 64;

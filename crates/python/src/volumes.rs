@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 use std::sync::OnceLock;
-use ventriform::grid::{Affine, ArrayError, Volume};
-use ventriform::progress::Plan;
-use ventriform::report::FileFacts;
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFacts, VolumeFile};
+use ventriform::base::progress::Plan;
+use ventriform::image::grid::{Affine, ArrayError, Volume};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFacts, VolumeFile};
+use ventriform::results::report::FileFacts;
 
 /// A volume, or the gates of a study. Its files are read when somebody asks for what is in them.
 #[pyclass(frozen, module = "ventriform._native")]

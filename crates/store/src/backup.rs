@@ -24,7 +24,7 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
-use ventriform_service::records::{ItemRecord, RecordPages, Resource};
+use ventriform_service::base::records::{ItemRecord, RecordPages, Resource};
 
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;

@@ -12,8 +12,8 @@ use super::{
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
+use ventriform_service::base::records::Resource;
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::Resource;
 
 /// What to do where there is no store yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -23,11 +23,11 @@ use time::format_description::StaticFormatDescription;
 use time::macros::format_description;
 use time::{Date, OffsetDateTime};
 use tokio::io::AsyncWrite;
-use ventriform_service::places::Places;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobStore, BlobStream, BlobWriter, Cutoff, DiskSpace, FileRecord, ItemRecord,
     LocalFile, Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id,
 };
+use ventriform_service::limits::places::Places;
 
 /// The name of the copy of an item's row.
 pub(super) const RECORD_FILE: &str = "record.json";

@@ -16,7 +16,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::SystemTime;
-use ventriform_service::records::{BlobError, FileRecord, LocalFile, StoreFault, random_id};
+use ventriform_service::base::records::{BlobError, FileRecord, LocalFile, StoreFault, random_id};
 
 /// Downloads that have not ended.
 const ARRIVING_FOLDER: &str = "arriving";
@@ -378,7 +378,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use ventriform_service::records::hex;
+    use ventriform_service::base::records::hex;
 
     fn record(content: &[u8]) -> FileRecord {
         FileRecord {

@@ -6,7 +6,7 @@
 //! costs one `fstat`.
 //!
 //! Not found: content that changes on the disk below the file system after it was verified. The
-//! slow check of all files ([`ventriform_service::background::Upkeep`]) reads every file anew.
+//! slow check of all files ([`ventriform_service::run::background::Upkeep`]) reads every file anew.
 
 use bytes::Bytes;
 use futures::{StreamExt, stream};
@@ -16,7 +16,7 @@ use std::fs::{File, Metadata};
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
-use ventriform_service::records::{BlobError, BlobStream, FileRecord, StoreFault, hex};
+use ventriform_service::base::records::{BlobError, BlobStream, FileRecord, StoreFault, hex};
 
 /// Files remembered at most, twice: when there are more, the older half is forgotten.
 const REMEMBERED_FILES: usize = 8192;

@@ -23,7 +23,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use ventriform_service::config::PostgresSettings;
 
-use ventriform_service::records::{StoreError, StoreFault, StoreResult, random_id};
+use ventriform_service::base::records::{StoreError, StoreFault, StoreResult, random_id};
 
 /// Connections for reading.
 pub(super) enum Readers {
@@ -166,7 +166,7 @@ impl Query {
 /// The prefix of the names of runs.
 const RUN_PREFIX: &str = "run_";
 
-/// The database. Implements [`ventriform_service::records::JobStore`] and [`ventriform_service::records::Catalogue`],
+/// The database. Implements [`ventriform_service::base::records::JobStore`] and [`ventriform_service::base::records::Catalogue`],
 /// and the traits of `access`, `hooks`, `archive`, `intake` and `worklist`.
 pub struct SqlStore {
     pub(super) writer: Writing,

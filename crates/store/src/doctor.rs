@@ -46,12 +46,12 @@ use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use ventriform_service::access::{AccessStore, Activity, Anchor, AuditEvent, KeptRow, verify};
-use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Clock, Custody, FileRecord, ItemRecord, ListRequest, RecordPages, Resource, StoreError,
     SystemClock, Tenant, Timestamp, random_id, volume_id,
 };
+use ventriform_service::callers::{AccessStore, Activity, Anchor, AuditEvent, KeptRow, verify};
+use ventriform_service::config::PostgresSettings;
 
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;

@@ -1,7 +1,7 @@
 //! Errors of SQLite and of PostgreSQL as kinds of failures of the storage.
 
 use sqlx::postgres::PgPool;
-use ventriform_service::records::{StoreError, StoreFault};
+use ventriform_service::base::records::{StoreError, StoreFault};
 
 /// Primary result codes of SQLite (<https://sqlite.org/rescode.html>).
 const SQLITE_ERROR: i32 = 1;

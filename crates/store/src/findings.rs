@@ -1,7 +1,7 @@
 //! Findings of a check of the storage, and their repair.
 
 use serde::Serialize;
-use ventriform_service::records::Tenant;
+use ventriform_service::base::records::Tenant;
 
 /// How to repair what is found.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-use ventriform_service::records::{StoreError, StoreFault};
+use ventriform_service::base::records::{StoreError, StoreFault};
 
 /// Shortest pause between two checks of the whole database; longer if a check takes long.
 const RECHECK_PAUSE: Duration = Duration::from_secs(10);

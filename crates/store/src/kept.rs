@@ -12,7 +12,7 @@
 //!   that of another database. A copy of a whole folder is told by the number of the note's inode, that of a bucket by
 //!   its name.
 //! - A note that names a row of the trail which the database lacks stays known in the database, and
-//!   [`ventriform_service::access::verify`] says so.
+//!   [`ventriform_service::callers::verify`] says so.
 //!
 //! Notes are written when the service opens, when access changes, every [`NOTE_EVERY`] if the trail has grown, and at
 //! the end. Not guaranteed: a snapshot of a whole disk from before the first key looks like that time.
@@ -22,8 +22,8 @@ use crate::note::{Beside, Found, NOTE_FILE, Note};
 use crate::tables::{Access, Marks};
 use std::sync::Weak;
 use std::time::Duration;
-use ventriform_service::access::Anchor;
-use ventriform_service::records::{Clock, StoreResult, SystemClock, random_id};
+use ventriform_service::base::records::{Clock, StoreResult, SystemClock, random_id};
+use ventriform_service::callers::Anchor;
 
 /// How often a running service looks whether the trail has grown beyond what is noted.
 pub(crate) const NOTE_EVERY: Duration = Duration::from_secs(10);

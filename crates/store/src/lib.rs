@@ -12,7 +12,7 @@
 //!   quarantine/DAY/   files that were found without a record
 //!   received/         objects that came by C-STORE or STOW-RS and are not volumes yet
 //!   volumes/vol_.../  files of a volume
-//!   models/mdl_.../   files of a model; likewise segmentations/, beats/, comparisons/, normals/, templates/
+//!   models/mdl_.../   files of a model; likewise segmentations/, beats/, comparisons/, heart/normals/, templates/
 //! ```
 //!
 //! Files are published before their record is committed, and deleted after it, so the files of a
@@ -76,10 +76,10 @@ use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform_service::base::records::{BlobError, BlobStore, Peers, Resource, random_id};
+use ventriform_service::config::stores::Stores;
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
-use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::records::{BlobError, BlobStore, Peers, Resource, random_id};
-use ventriform_service::stores::Stores;
+use ventriform_service::network::intake::ReceivedFiles;
 
 /// Limits of a store.
 #[derive(Debug, Clone)]

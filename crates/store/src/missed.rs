@@ -23,14 +23,14 @@ use std::collections::BTreeSet;
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
 use std::sync::Arc;
-use ventriform_service::access::{
-    AccessStore, Activity, Agent, Anchor, AuditEvent, AuditLink, NO_HASH, Recorder, chain_hash,
-};
-use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Catalogue, Clock, Custody, Erased, ErasureAgent, ErasureOrder, LegalHold, Receipt, Scans,
     StoreError, StoreResult, SystemClock, Tenant, Timestamp,
 };
+use ventriform_service::callers::{
+    AccessStore, Activity, Agent, Anchor, AuditEvent, AuditLink, NO_HASH, Recorder, chain_hash,
+};
+use ventriform_service::config::PostgresSettings;
 
 /// Rows of a trail that are read at a time.
 const BATCH_ROWS: u32 = 1000;
@@ -557,7 +557,7 @@ async fn erase(
             name: REPAIRER.into(),
             ..ErasureAgent::default()
         },
-        reason: ventriform_service::records::ErasureReason::Request,
+        reason: ventriform_service::base::records::ErasureReason::Request,
     };
     let receipt = match Catalogue::erase(rows, &order, &ids, SystemClock.now()).await? {
         Erased::Done(receipt) => receipt,

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::Notify;
 use tokio::task::JoinHandle;
-use ventriform_service::records::{News, NewsFeed};
+use ventriform_service::base::records::{News, NewsFeed};
 
 /// Pause between two attempts to listen.
 const LISTEN_RETRY: Duration = Duration::from_secs(1);

@@ -8,8 +8,8 @@ use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use ventriform_service::access::Anchor;
-use ventriform_service::records::{BlobError, StoreError, StoreResult, Timestamp, random_id};
+use ventriform_service::base::records::{BlobError, StoreError, StoreResult, Timestamp, random_id};
+use ventriform_service::callers::Anchor;
 
 /// The name of the note, in the folder and in the bucket.
 pub(crate) const NOTE_FILE: &str = "kept.json";

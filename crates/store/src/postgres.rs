@@ -35,9 +35,9 @@ use sqlx::{AssertSqlSafe, ConnectOptions, Connection, Postgres, Row};
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use ventriform_service::base::records::{StoreError, StoreFault, StoreResult};
 use ventriform_service::config::{PostgresSettings, PostgresUrl};
-use ventriform_service::places::Place;
-use ventriform_service::records::{StoreError, StoreFault, StoreResult};
+use ventriform_service::limits::places::Place;
 
 /// Pause between two attempts to reach the server at the start.
 const RECONNECT_PAUSE: Duration = Duration::from_secs(1);

@@ -16,7 +16,7 @@ use sqlx::{AssertSqlSafe, ColumnIndex, Decode, Postgres, Row, Sqlite, Type};
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use ventriform_service::records::StoreResult;
+use ventriform_service::base::records::StoreResult;
 
 /// How often a read is tried again on another connection after its connection was lost.
 const READ_RETRIES: u32 = 3;
@@ -322,7 +322,7 @@ where
 
 /// Half to all of a pause, so that those who wait for the same thing do not come back together.
 pub(super) fn jitter(pause: Duration) -> Duration {
-    pause.mul_f64(0.5 + 0.5 * ventriform_service::hooks::random_share())
+    pause.mul_f64(0.5 + 0.5 * ventriform_service::network::hooks::random_share())
 }
 
 fn sqlite_rows(rows: Vec<SqliteRow>) -> Vec<DbRow> {

@@ -9,11 +9,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::intake::{IncomingFile, ReceivedFiles};
-use ventriform_service::places::Places;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobWriter, LocalFile, Timestamp, TrustedNow, random_id,
 };
+use ventriform_service::limits::places::Places;
+use ventriform_service::network::intake::{IncomingFile, ReceivedFiles};
 
 /// A file on the local disk into which an object is received; deleted on drop.
 pub(super) struct Receiving {

@@ -3,8 +3,8 @@
 use super::health::Health;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::places::{Place, Places};
-use ventriform_service::records::{StoreError, StoreFault, StoreResult};
+use ventriform_service::base::records::{StoreError, StoreFault, StoreResult};
+use ventriform_service::limits::places::{Place, Places};
 
 /// Connections whose use is shared out in turn between tenants and their clients.
 pub(super) struct Shared<P> {

@@ -1,7 +1,7 @@
 //! The space of the disk that holds a data folder.
 
 use std::path::{Path, PathBuf};
-use ventriform_service::records::DiskSpace;
+use ventriform_service::base::records::DiskSpace;
 
 /// Most that is kept free unless the operator sets a size.
 const DISK_RESERVE_BYTES: u64 = 256 << 20;

@@ -13,8 +13,8 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{AssertSqlSafe, ConnectOptions, Connection, SqliteConnection};
 use std::collections::BTreeMap;
 use std::path::Path;
-use ventriform_service::access::AuditEvent;
-use ventriform_service::records::{StoreResult, Tenant, Timestamp};
+use ventriform_service::base::records::{StoreResult, Tenant, Timestamp};
+use ventriform_service::callers::AuditEvent;
 
 /// Tables whose rows are never deleted: their greatest number is how many there were.
 const NEVER_DELETED: &[&str] = &["api_keys", "erasures"];

@@ -1,7 +1,7 @@
 //! The one connection that writes, and how a failed write ends.
 //!
 //! SQLite allows one writer at a time, so writers wait for one connection in turn, tenant by tenant and client by
-//! client ([`ventriform_service::places`]), instead of polling for the database's lock. Every write goes through
+//! client ([`ventriform_service::limits::places`]), instead of polling for the database's lock. Every write goes through
 //! [`Writer::begin`] and [`WriteTransaction::commit`]:
 //!
 //! 1. wait for the connection, and for other processes that hold the database's lock, for at most
@@ -31,8 +31,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 use tokio::sync::{Mutex, MutexGuard};
 use tokio::time::{Instant, sleep, timeout_at};
-use ventriform_service::places::{Place, Places};
-use ventriform_service::records::{StoreError, StoreFault, StoreResult};
+use ventriform_service::base::records::{StoreError, StoreFault, StoreResult};
+use ventriform_service::limits::places::{Place, Places};
 
 /// How long SQLite itself waits for the database's lock before [`Writer::begin`] looks at the
 /// time and asks again.
@@ -306,7 +306,7 @@ impl Write for Query<'_, Sqlite, SqliteArguments> {
 mod tests {
     use super::*;
     use sqlx::Row;
-    use ventriform_service::memory::{Ledger, MemoryBudget};
+    use ventriform_service::base::memory::{Ledger, MemoryBudget};
 
     async fn writer(folder: &std::path::Path, wait: u64) -> Writer {
         let options = SqliteConnectOptions::new()

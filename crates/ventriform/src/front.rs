@@ -5,16 +5,16 @@
 //! show progress, cancel, or take files from strangers call those: [`pipeline::generate`],
 //! [`segmentation::from_files`], [`read_mask`].
 
-use crate::grid::Volume;
-use crate::grid::agreement::Agreement;
-use crate::parameters::{FitParameters, ModelParameters};
-use crate::pipeline::{self, Model, PipelineError};
-use crate::progress::Monitor;
-use crate::segmentation::{self, SegmentationError, SegmentationOrder, SegmentedVolume};
-use crate::volume::given_mask::{
+use crate::base::progress::Monitor;
+use crate::image::grid::Volume;
+use crate::image::grid::agreement::Agreement;
+use crate::image::volume::given_mask::{
     GivenMask, GivenMaskError, MaskAgreementError, MaskChoice, read_mask,
 };
-use crate::volume::{self, ReadLimits, VolumeError, VolumeFacts, VolumeFile};
+use crate::image::volume::{self, ReadLimits, VolumeError, VolumeFacts, VolumeFile};
+use crate::parameters::{FitParameters, ModelParameters};
+use crate::runs::pipeline::{self, Model, PipelineError};
+use crate::runs::segmentation::{self, SegmentationError, SegmentationOrder, SegmentedVolume};
 use std::path::Path;
 
 /// A volume, or the gates of a study, that can be read: files whose every voxel was decoded once, or arrays.

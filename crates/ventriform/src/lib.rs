@@ -47,7 +47,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Models of one's own, a reader's profile, normal limits, progress and cancelling: [`segmentation::from_files`].
+//! Models of one's own, a reader's profile, normal limits, progress and cancelling: [`runs::segmentation::from_files`].
 //!
 //! # Two masks compared
 //!
@@ -73,91 +73,44 @@
 //! four-term fitness; the result is measured and exported. A segmentation deforms a model to fit
 //! another volume.
 //!
-//! All positions after [`volume`] are in one frame: millimetres in patient coordinates, LPS (x to the
-//! patient's left, y to posterior, z to superior). See [`geometry::frame`].
+//! All positions after [`image::volume`] are in one frame: millimetres in patient coordinates, LPS (x to the
+//! patient's left, y to posterior, z to superior). See [`base::geometry::frame`].
 //!
 //! The modules are listed in the order in which a volume passes through them. The names that most
 //! programs need are re-exported here.
 
-pub mod text;
-
-pub mod geometry;
-
-pub mod numeric;
+pub mod base;
 
 pub mod mesh;
-pub mod mesh_files;
 
-pub mod progress;
-
-pub mod grid;
-
-pub mod draw;
-
-pub mod volume;
-
-pub mod locate;
+pub mod image;
 
 pub mod surface;
 
-pub mod retile;
-
-pub mod optimise;
-
-pub mod decimate;
-
-pub mod model;
-
-pub mod deform;
-
-pub mod judge;
-
-pub mod fit;
-
-pub mod polar;
-
-pub mod beat;
-
-pub mod normals;
-
-pub mod comparison;
-
-pub mod reader;
+pub mod heart;
 
 pub mod parameters;
 
-pub mod report;
+pub mod results;
 
-pub mod export;
-
-pub mod pipeline;
-
-pub mod segmentation;
-
-pub mod gated;
-
-pub mod rest_stress;
-
-pub mod evaluate;
-
-pub mod objects;
-
-pub mod advice;
+pub mod runs;
 
 mod front;
 
-pub use export::{Format, Metadata, encode};
+pub use base::progress::Monitor;
 pub use front::{Scan, generate, measure, open, open_mask, segment};
-pub use grid::agreement::{Agreement, compare};
-pub use grid::voxelise::{Mask, voxelise};
-pub use grid::{Affine, ArrayError, Volume};
+pub use heart::model::{Organ, Template};
+pub use image::grid::agreement::{Agreement, compare};
+pub use image::grid::voxelise::{Mask, voxelise};
+pub use image::grid::{Affine, ArrayError, Volume};
+pub use image::volume::{PhantomParameters, ReadLimits, VolumeFile, phantom};
 pub use mesh::TriMesh;
-pub use model::{Organ, Template};
 pub use parameters::{FitParameters, ModelParameters, Parameters};
-pub use pipeline::Model;
-pub use progress::Monitor;
-pub use segmentation::{NamedTemplate, Segmentation, SegmentationParameters, SegmentedVolume};
-pub use volume::{PhantomParameters, ReadLimits, VolumeFile, phantom};
+pub use results::export::{Format, Metadata, encode};
+pub use runs::pipeline::Model;
+pub use runs::segmentation::{
+    NamedTemplate, Segmentation, SegmentationParameters, SegmentedVolume,
+};
 
 /// The examples of README.md, compiled as tests.
 #[cfg(doctest)]

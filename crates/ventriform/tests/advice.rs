@@ -2,14 +2,14 @@
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
-use ventriform::advice::advice;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline::{PipelineError, generate_from};
-use ventriform::progress::Monitor;
-use ventriform::retile::RetileError;
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::runs::advice::advice;
+use ventriform::runs::pipeline::{PipelineError, generate_from};
+use ventriform::surface::retile::RetileError;
 
 /// A ball of ones among zeros, or of other values.
 fn ball(inside: f32, outside: f32) -> Volume {

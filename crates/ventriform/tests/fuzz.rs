@@ -17,14 +17,14 @@ use damage::drive;
 #[test]
 fn the_corpus_itself_is_read() {
     for (target, name) in [("nifti", "volume.nii"), ("dicom", "volume.dcm")] {
-        let monitor = ventriform::progress::Monitor::silent();
+        let monitor = ventriform::base::progress::Monitor::silent();
         let read = targets::corpus(target).into_iter().filter(|file| {
-            let files = [ventriform::volume::VolumeFile::in_memory(
+            let files = [ventriform::image::volume::VolumeFile::in_memory(
                 name,
                 file.clone(),
             )];
-            let limits = ventriform::volume::ReadLimits::default();
-            ventriform::volume::inspect(&files, &limits, &monitor).is_ok()
+            let limits = ventriform::image::volume::ReadLimits::default();
+            ventriform::image::volume::inspect(&files, &limits, &monitor).is_ok()
         });
         let least = match target {
             "dicom" => 8,

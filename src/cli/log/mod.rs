@@ -17,7 +17,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
-use ventriform::text::{escaped_json, escaped_lines};
+use ventriform::base::text::{escaped_json, escaped_lines};
 use ventriform_service::config::{LogFormat, Settings};
 
 /// Time from the first line of a batch until the batch is written.

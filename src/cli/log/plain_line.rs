@@ -18,7 +18,7 @@ use tracing_subscriber::field::RecordFields;
 use tracing_subscriber::fmt::format::{Format, FormatEvent, FormatFields, Full, Writer};
 use tracing_subscriber::fmt::{FmtContext, FormattedFields};
 use tracing_subscriber::registry::LookupSpan;
-use ventriform_service::records::rfc3339;
+use ventriform_service::base::records::rfc3339;
 
 /// The target under which events of the crate `log` arrive; their own is among their fields.
 const TARGET_OF_LOG: &str = "log";

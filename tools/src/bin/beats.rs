@@ -13,11 +13,11 @@
 use anyhow::{Context, Result, anyhow, bail};
 use serde_json::Value;
 use std::path::Path;
-use ventriform::beat::{self, Beat, BeatParameters, GatedStudy, Priors};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::beat::{self, Beat, BeatParameters, GatedStudy, Priors};
+use ventriform::image::volume::{ReadLimits, VolumeFile, read_gates};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationParameters, built_in, segment};
-use ventriform::volume::{ReadLimits, VolumeFile, read_gates};
+use ventriform::runs::segmentation::{SegmentationParameters, built_in, segment};
 use ventriform_tools::statistics;
 
 /// Contraction of a segment, as a share of a whole one's, below which it counts as akinetic.

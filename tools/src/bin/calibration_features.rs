@@ -1,5 +1,5 @@
 //! Writes the table of features from which `scripts/measure/calibrate.py` estimates the constants of
-//! `crates/ventriform/src/judge/calibration.rs`.
+//! `crates/ventriform/src/heart/judge/calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin calibration_features -- FOLDER... > features.csv` segments
 //! `CASE/spect.nii.gz` of every case in the folders with the built-in hearts, once for each wall, and compares the
@@ -14,18 +14,18 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::Value;
-use ventriform::deform::WallEdge;
-use ventriform::grid::agreement::compare;
-use ventriform::judge::Evidence;
-use ventriform::judge::confidence::{log_odds, of_agreement};
-use ventriform::locate::{LocateError, NotAHeart};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::WallEdge;
+use ventriform::heart::judge::Evidence;
+use ventriform::heart::judge::confidence::{log_odds, of_agreement};
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::locate::{LocateError, NotAHeart};
+use ventriform::image::volume::given_mask::{MaskChoice, read_mask};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{
+use ventriform::runs::segmentation::{
     Segmentation, SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
 };
-use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::{ReadLimits, VolumeFile};
 use ventriform_tools::{cases, name_of};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;

@@ -12,10 +12,10 @@
 use anyhow::{Context, Result, anyhow};
 use serde_json::Value;
 use std::path::Path;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::ComparisonParameters;
-use ventriform::progress::Monitor;
-use ventriform::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::rest_stress::{ComparedHeart, ComparedHearts, ComparisonOrder, from_files};
 
 fn main() -> Result<()> {
     println!(

@@ -13,16 +13,16 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use ventriform::deform::WallEdge;
-use ventriform::grid::agreement::compare;
-use ventriform::judge::confidence::of_agreement;
-use ventriform::judge::{Evidence, Flag};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::WallEdge;
+use ventriform::heart::judge::confidence::of_agreement;
+use ventriform::heart::judge::{Evidence, Flag};
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::volume::given_mask::{MaskChoice, read_mask};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::report::object;
-use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
-use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::results::report::object;
+use ventriform::runs::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 

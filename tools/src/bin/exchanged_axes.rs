@@ -1,4 +1,4 @@
-//! Scores by which exchanged axes are told (`judge/exchanged_axes.rs`), of scans as they are, cut out, and with two
+//! Scores by which exchanged axes are told (`heart/judge/exchanged_axes.rs`), of scans as they are, cut out, and with two
 //! axes exchanged.
 //!
 //! ```sh
@@ -12,12 +12,12 @@
 use anyhow::{Context, Result};
 use rand::RngExt;
 use std::path::Path;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::geometry::random::{Purpose, stream};
-use ventriform::judge::exchanged_axes::scores;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::random::{Purpose, stream};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::judge::exchanged_axes::scores;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 
 /// Cut-outs of each scan.
 const CUT_OUTS: usize = 3;

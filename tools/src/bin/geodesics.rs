@@ -9,10 +9,10 @@ use std::io::{read_to_string, stdin};
 
 use anyhow::Context;
 use serde::Deserialize;
-use ventriform::geometry::Vec3;
+use ventriform::base::geometry::Vec3;
 use ventriform::mesh::{FaceId, TriMesh};
-use ventriform::retile::geodesics::distances;
-use ventriform::retile::{Geodesics, SurfacePoint};
+use ventriform::surface::retile::geodesics::distances;
+use ventriform::surface::retile::{Geodesics, SurfacePoint};
 
 #[derive(Deserialize)]
 struct Query {

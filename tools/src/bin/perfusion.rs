@@ -16,12 +16,12 @@ use anyhow::{Context, Result, anyhow};
 use rayon::prelude::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use ventriform::evaluate::normals::table::{self, CohortRow};
-use ventriform::normals::{DEFICIT_OF_FULL_SCORE, NormalLimits, ScanKind};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::normals::{DEFICIT_OF_FULL_SCORE, NormalLimits, ScanKind};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationOrder, from_files};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::evaluate::normals::table::{self, CohortRow};
+use ventriform::runs::segmentation::{SegmentationOrder, from_files};
 use ventriform_tools::statistics::{area_under_curve, correlation, mean};
 
 /// Share below normal at which a true score begins, as the simulator has it.

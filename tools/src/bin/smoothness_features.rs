@@ -1,5 +1,5 @@
 //! Writes the table of features from which `scripts/measure/calibrate_walls.py` estimates `SMOOTHNESS_SHIFT` of
-//! `crates/ventriform/src/deform/calibration.rs`.
+//! `crates/ventriform/src/heart/deform/calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin smoothness_features -- TABLE FOLDER...` segments `CASE/spect.nii.gz`
 //! of every case in the folders, as it is and blurred by further Gaussian filters, and compares the apparent walls with
@@ -12,12 +12,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use ventriform::grid::Volume;
-use ventriform::grid::blur::FWHM_PER_SIGMA;
-use ventriform::grid::field::Field;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::Volume;
+use ventriform::image::grid::blur::FWHM_PER_SIGMA;
+use ventriform::image::grid::field::Field;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform::{Scan, TriMesh};
 use ventriform_tools::walls::{Result, true_shifts, true_wall};
 use ventriform_tools::{cases, name_of};

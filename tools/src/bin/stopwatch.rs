@@ -16,13 +16,13 @@ use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::io::{BufRead, Write};
 use std::time::Instant;
-use ventriform::grid::labels::Labels;
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::image::grid::labels::Labels;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline;
-use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::runs::pipeline;
 use ventriform::surface::IsoLevel;
 use ventriform::surface::marching_cubes::{Samples, marching_cubes};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeFile};
 
 fn main() -> Result<()> {
     let clock = Clock(Instant::now());

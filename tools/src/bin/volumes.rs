@@ -1,5 +1,5 @@
 //! Writes the table of volumes from which `scripts/measure/calibrate_intervals.py` estimates the constants of
-//! `crates/ventriform/src/judge/volume_calibration.rs`.
+//! `crates/ventriform/src/heart/judge/volume_calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin volumes -- FOLDER... > TABLE` segments `CASE/spect.nii.gz` of every
 //! case in the folders. TABLE has a row for each heart that is not refused: the folder's name, the case's, the volumes

@@ -7,8 +7,8 @@
 
 use std::io;
 use std::path::Path;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 
 fn main() -> io::Result<()> {
     for path in std::env::args().skip(1) {

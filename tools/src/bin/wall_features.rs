@@ -1,5 +1,5 @@
 //! Writes the tables of features from which `scripts/measure/calibrate_walls.py` estimates the constants of
-//! `crates/ventriform/src/deform/calibration.rs` and `crates/ventriform/src/judge/uncertainty_calibration.rs`.
+//! `crates/ventriform/src/heart/deform/calibration.rs` and `crates/ventriform/src/heart/judge/uncertainty_calibration.rs`.
 //!
 //! `cargo run --release -p ventriform-tools --bin wall_features -- TABLES FOLDER...` segments `CASE/spect.nii.gz` of
 //! every case in the folders with the built-in hearts, once for each wall, and compares rims and anatomical walls
@@ -22,15 +22,15 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use ventriform::TriMesh;
-use ventriform::deform::WallEdge;
-use ventriform::deform::base_plane::rim_heights;
-use ventriform::judge::confidence::log_odds;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::WallEdge;
+use ventriform::heart::deform::base_plane::rim_heights;
+use ventriform::heart::judge::confidence::log_odds;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::report::MeasuredSurface;
-use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
+use ventriform::results::report::MeasuredSurface;
+use ventriform::runs::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
-use ventriform::volume::{self, ReadLimits, ReadOptions, VolumeFile};
 use ventriform_tools::walls::{Result, true_shifts, true_wall};
 use ventriform_tools::{cases, name_of};
 

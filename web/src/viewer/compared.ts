@@ -72,7 +72,7 @@ export async function loadComparison(result: Result): Promise<Compared> {
 }
 
 /**
- * Slices of a kind, as many as in the service's picture of both scans (`rest_stress/slices.rs`), at the same levels.
+ * Slices of a kind, as many as in the service's picture of both scans (`runs/rest_stress/slices.rs`), at the same levels.
  */
 export const SLICES = 8;
 /** Shares of the long axis, from the apex, at which the first and the last short-axis slice lie. */

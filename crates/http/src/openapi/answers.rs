@@ -1,14 +1,14 @@
 //! Answers and problems that several handlers share.
 
 use super::bodies::MeshDocument;
-use crate::problem::{MEDIA_TYPE, ProblemBody};
+use crate::wire::problem::{MEDIA_TYPE, ProblemBody};
 use std::collections::BTreeMap;
 use utoipa::openapi::header::HeaderBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder};
 use utoipa::{IntoResponses, PartialSchema, ToSchema};
-use ventriform::export::dicom::DicomObject;
-use ventriform::export::{Format, seg_nrrd};
+use ventriform::results::export::dicom::DicomObject;
+use ventriform::results::export::{Format, seg_nrrd};
 
 /// The schema of a job, which the handlers register.
 const JOB_SCHEMA: &str = "Job";

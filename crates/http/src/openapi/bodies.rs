@@ -1,7 +1,7 @@
 //! Request bodies that the handlers read piece by piece, so that no Rust type describes them.
 
 use super::inputs::PriorityField;
-use crate::tags;
+use crate::resources::tags;
 use serde_json::json;
 use std::borrow::Cow;
 use utoipa::openapi::schema::{
@@ -10,13 +10,13 @@ use utoipa::openapi::schema::{
 };
 use utoipa::openapi::{Ref, RefOr};
 use utoipa::{PartialSchema, ToSchema};
-use ventriform::normals::{NormalLimits, Sex};
+use ventriform::heart::normals::{NormalLimits, Sex};
 use ventriform::parameters::{
     CohortCase, ComparisonParameters, FitParameters, GatedParameters, ModelParameters,
     NormalsParameters,
 };
-use ventriform_service::hooks::HookEvent;
-use ventriform_service::records::{LegalHold, Resource};
+use ventriform_service::base::records::{LegalHold, Resource};
+use ventriform_service::network::hooks::HookEvent;
 use ventriform_service::work::{MOST_CASES, dicom};
 
 /// A job to be filed, of a kind by which its parameters are told; `create_job` reads it field by field. That it has a volume or

@@ -16,12 +16,12 @@
 
 use super::answers::media_type_of;
 use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
-use crate::files::REPORT_PAGE;
-use crate::problem::MEDIA_TYPE;
+use crate::resources::files::REPORT_PAGE;
+use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
-use ventriform::export::Format;
-use ventriform::export::dicom::DicomObject;
+use ventriform::results::export::Format;
+use ventriform::results::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
 const RECORDED_EXAMPLES: &str = include_str!("examples.json");
@@ -61,7 +61,7 @@ pub fn finish(document: &mut Value) {
 }
 
 /// The media types of uploaded volumes that the document names beside `application/octet-stream`, which stands for all of
-/// [`VOLUME_TYPES`](crate::upload::media_types::VOLUME_TYPES), and forms.
+/// [`VOLUME_TYPES`](crate::wire::upload::media_types::VOLUME_TYPES), and forms.
 const UPLOAD_TYPES: [&str; 5] = [
     "application/gzip",
     "application/zip",

@@ -9,7 +9,7 @@ use ventriform::parameters::{
     BeatChoice, ComparisonChoice, ComparisonParameters, FIT_SPECS, FitParameters, GatedParameters,
     Kind, ModelParameters, ParameterSpec, Parameters, schema_of,
 };
-use ventriform_service::records::Priority;
+use ventriform_service::base::records::Priority;
 
 /// Parameters of a model as query parameters.
 pub struct ModelQuery;

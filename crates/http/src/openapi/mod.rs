@@ -1,6 +1,6 @@
 //! The building blocks of the published document, OpenAPI 3.1.
 //!
-//! The handlers' attributes describe most of it; the library describes its documents (`ventriform::report`), by
+//! The handlers' attributes describe most of it; the library describes its documents (`ventriform::results::report`), by
 //! its feature `schema`. This folder adds what attributes cannot say:
 //!
 //! | file | what it describes |
@@ -76,16 +76,16 @@ use utoipa::openapi::{RefOr, Required};
         (name = "operations", description = "For operators"),
     ),
     components(schemas(
-        super::problem::ProblemBody,
+        crate::wire::problem::ProblemBody,
         bodies::MeshDocument,
-        ventriform::report::ModelReport,
-        ventriform::report::Closeness,
-        ventriform::report::SegmentationReport,
-        ventriform::report::BeatReport,
-        ventriform::report::ComparisonReport,
-        ventriform::normals::NormalLimits,
-        ventriform::polar::PolarDocument,
-        ventriform::polar::FigureDocument,
+        ventriform::results::report::ModelReport,
+        ventriform::results::report::Closeness,
+        ventriform::results::report::SegmentationReport,
+        ventriform::results::report::BeatReport,
+        ventriform::results::report::ComparisonReport,
+        ventriform::heart::normals::NormalLimits,
+        ventriform::heart::polar::PolarDocument,
+        ventriform::heart::polar::FigureDocument,
     ))
 )]
 pub struct DocumentFrame;

@@ -1,8 +1,8 @@
 //! The archives of the settings file: `[[archives]]`.
 
 use super::ConfigError;
-use crate::archive::{Archive, Archives};
-use crate::records::Tenant;
+use crate::base::records::Tenant;
+use crate::network::archive::{Archive, Archives};
 use std::path::Path;
 
 /// The key of the file.

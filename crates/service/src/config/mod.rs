@@ -9,6 +9,8 @@
 //! The crate `config` is not used: it does not combine with flags of `clap`, does not say in an
 //! error which setting came from where, and cannot print the origins.
 
+pub mod stores;
+
 mod archives;
 mod postgres;
 mod tables;
@@ -22,10 +24,10 @@ pub use units::{
     OrKeyword, OtlpEndpoint, OwnRetention, Retention, Role, Size, Span, Words,
 };
 
-use crate::archive::Archives;
-use crate::hooks::AllowList;
-use crate::intake::{AeTitle, Rule, Sender};
-use crate::worklist::Procedure;
+use crate::network::archive::Archives;
+use crate::network::hooks::AllowList;
+use crate::network::intake::{AeTitle, Rule, Sender};
+use crate::network::worklist::Procedure;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::net::SocketAddr;

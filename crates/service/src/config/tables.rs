@@ -44,7 +44,7 @@ impl<T: Serialize> fmt::Display for Tables<T> {
 )]
 mod tests {
     use super::*;
-    use crate::intake::{Rule, Sender};
+    use crate::network::intake::{Rule, Sender};
 
     #[test]
     fn tables_read_back_as_printed() {

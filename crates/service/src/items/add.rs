@@ -4,7 +4,7 @@
 //! hangs up leaves neither files without a record nor a record that nobody waited for.
 
 use super::{Items, OutputFile, WorkOutput, to_its_end};
-use crate::records::{
+use crate::base::records::{
     AddedProduct, BlobError, Failure, Fault, FileRecord, ItemRecord, Owned, Product, ProductFile,
     ProductRoom, Resource, ScanFields, StagedFiles, StagedFor, StoreError, StoreFault,
     StoredVolume, Tags, Tenant, content_id, hex,
@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use tokio::io::AsyncWriteExt;
-use ventriform::text::is_printable;
+use ventriform::base::text::is_printable;
 
 /// Attempts at adding an item that other processes erase at the same time.
 const PUBLISH_ROUNDS: u32 = 3;

@@ -1,10 +1,10 @@
 //! Contents of items: files that were made and are to be stored, stored files to be read.
 
-use crate::records::{LocalFile, ScanIdentity, StoredVolume, Timestamp};
+use crate::base::records::{LocalFile, ScanIdentity, StoredVolume, Timestamp};
 use serde_json::{Map, Value};
 use std::borrow::Cow;
 use std::io::ErrorKind;
-use ventriform::report::header_text;
+use ventriform::results::report::header_text;
 
 /// The output of a job.
 #[derive(Debug, Clone, Default)]

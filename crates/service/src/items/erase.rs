@@ -6,7 +6,7 @@
 //! which goes on if the caller goes away.
 
 use super::{Items, to_its_end};
-use crate::records::{
+use crate::base::records::{
     Catalogue, Cutoff, Erased, ErasureAgent, ErasureOrder, ErasureReason, Expired, FileRecord,
     Receipt, Resource, StoreError, Tenant, Timestamp, milliseconds,
 };

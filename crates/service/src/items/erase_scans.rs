@@ -1,11 +1,11 @@
-//! Erasing all volumes of a patient, a study, a series or an accession: [`ScanErasures`](crate::records::ScanErasures).
+//! Erasing all volumes of a patient, a study, a series or an accession: [`ScanErasures`](crate::base::records::ScanErasures).
 //!
 //! As [`super::erase`], with the locks of all that goes: the records in one transaction with one receipt, then the
 //! files, then the freed pages of the database. What is stored while the order is at work is planned anew, so that
 //! after [`ScansErased::Done`] nothing is left that was selected when the records went.
 
 use super::{Items, to_its_end};
-use crate::records::{ScanErasureOrder, ScanErasurePlan, ScansErased, StoreError};
+use crate::base::records::{ScanErasureOrder, ScanErasurePlan, ScansErased, StoreError};
 use std::sync::Arc;
 
 /// Plans that are made before others that add or pin things are given way.

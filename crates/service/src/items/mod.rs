@@ -29,9 +29,9 @@ pub use erase::RetentionAges;
 pub use pins::Pin;
 pub use sweep::{Custodian, Swept};
 
-use crate::access::Agent;
-use crate::memory::Requester;
-use crate::records::{BlobStore, Catalogue, Clock, Peers, StoreError, Timestamp};
+use crate::base::memory::Requester;
+use crate::base::records::{BlobStore, Catalogue, Clock, Peers, StoreError, Timestamp};
+use crate::callers::Agent;
 use pins::ItemLocks;
 use std::sync::Arc;
 use tracing::Instrument;

@@ -17,7 +17,7 @@
 //! - a pin is also a row of the database, which an erasure by another process reads;
 //! - what one process leaves unsettled are its own files.
 
-use crate::records::{FileRecord, Peers, StoreError, random_id};
+use crate::base::records::{FileRecord, Peers, StoreError, random_id};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;

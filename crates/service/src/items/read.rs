@@ -1,9 +1,9 @@
 //! Reading items: records with local copies of their files, every file verified.
 
 use super::{Items, StoredItem, StoredResult, StoredSource};
-use crate::error::ServiceError;
-use crate::memory::read_row;
-use crate::records::{
+use crate::base::error::ServiceError;
+use crate::base::memory::read_row;
+use crate::base::records::{
     BlobError, BlobStream, FileRecord, ItemFilter, ListRequest, LocalFile, Product, ProductFile,
     Resource, StoreError, StoreFault, Tenant,
 };
@@ -70,7 +70,7 @@ impl Items {
         Ok(Some(files))
     }
 
-    /// A range of bytes of a file; see [`BlobStore::read`](crate::records::BlobStore::read).
+    /// A range of bytes of a file; see [`BlobStore::read`](crate::base::records::BlobStore::read).
     ///
     /// # Errors
     /// If the storage fails; [`StoreFault::Erased`] if the item was erased since its row was read.

@@ -14,7 +14,7 @@
 //! in its row. What is damaged is logged; readers of it are told already.
 
 use super::Items;
-use crate::records::{
+use crate::base::records::{
     BlobError, ItemRecord, RecordPages, Resource, StoreError, StoreFault, StoreResult,
 };
 use std::sync::Arc;

@@ -23,7 +23,7 @@
 //! cannot start such a process (`Works::isolation` is `None`) counts the deaths of the whole
 //! service instead, and cannot tell the two apart.
 //!
-//! **Time.** [`ServiceClock`](crate::records::ServiceClock) does not follow a step of the system's clock until it has
+//! **Time.** [`ServiceClock`](crate::base::records::ServiceClock) does not follow a step of the system's clock until it has
 //! lasted, and no lease of the living run depends on any clock.
 //!
 //! Guaranteed:
@@ -32,7 +32,7 @@
 //!   committed once;
 //! - a job that ends its own process is failed after a set number of times, and harms no other;
 //! - a panic in the computation fails that job only;
-//! - cancelling raises the [`CancelToken`](ventriform::progress::CancelToken) of the computation;
+//! - cancelling raises the [`CancelToken`](ventriform::base::progress::CancelToken) of the computation;
 //! - what a request stores is stored to the end although its client hangs up.
 //!
 //! Not guaranteed: that a job is computed only once. It is computed at least once.

@@ -1,6 +1,6 @@
 //! Reports of the queue about its jobs, for metrics and traces.
 
-use crate::records::Job;
+use crate::base::records::Job;
 
 /// Is told of each change of a job, in the order of the changes. Its methods are called while jobs
 /// are handled, so they must be quick.

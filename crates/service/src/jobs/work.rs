@@ -1,12 +1,12 @@
 //! The interface of a kind of job: its parameters, its computation, its input and output.
 
 use super::isolation::Isolation;
+use crate::base::records::{Failure, Fault, LocalFile, Resource};
 use crate::items::{StoredItem, WorkOutput};
-use crate::records::{Failure, Fault, LocalFile, Resource};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use ventriform::progress::{Cancelled, Monitor, Plan};
+use ventriform::base::progress::{Cancelled, Monitor, Plan};
 
 /// One kind of work. Its methods are called on blocking threads.
 pub trait Work: Send + Sync + 'static {

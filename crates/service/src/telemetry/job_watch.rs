@@ -5,8 +5,8 @@
 
 use super::metrics::JobMetrics;
 use super::spans::{JobSpan, Spans};
+use crate::base::records::{Job, JobState};
 use crate::jobs::JobObserver;
-use crate::records::{Job, JobState};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;

@@ -4,11 +4,11 @@
 //! Names follow Prometheus: base units, `_total` for counters. Every label has a fixed set of
 //! values: the pattern of a path and never the path, the code of a failure and never its text.
 
-use crate::archive::ArchiveReadings;
+use crate::base::records::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
 use crate::config::Settings;
-use crate::hooks::{Backlog, DeliveryCounts};
-use crate::intake::{AssociationEnd, IntakeObserver, Protocol};
-use crate::records::{DiskSpace, QueueFigures, QueueLoad, Timestamp};
+use crate::network::archive::ArchiveReadings;
+use crate::network::hooks::{Backlog, DeliveryCounts};
+use crate::network::intake::{AssociationEnd, IntakeObserver, Protocol};
 use prometheus::core::Collector;
 use prometheus::{
     Encoder, Gauge, Histogram, HistogramOpts, HistogramVec, IntCounter, IntCounterVec, IntGauge,

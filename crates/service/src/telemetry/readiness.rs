@@ -11,9 +11,9 @@
 //!
 //! A check that cannot be made counts as failed, and is required: what is not known to work does not count as working.
 
-use crate::access::AccessStore;
+use crate::base::records::{StoreError, StoreFault};
+use crate::callers::AccessStore;
 use crate::jobs::Queue;
-use crate::records::{StoreError, StoreFault};
 use std::time::{Duration, Instant};
 use tokio::sync::Mutex;
 

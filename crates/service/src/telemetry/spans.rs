@@ -11,8 +11,8 @@
 //! Without an endpoint nothing is made. With one, spans wait in a queue of limited length for a
 //! thread that sends them; what does not fit, or cannot be sent, is dropped.
 
-use crate::http_client::{ClientFactory, ClientOptions, HttpClient, Redirects, SendError};
-use crate::records::{Job, Timestamp};
+use crate::base::http_client::{ClientFactory, ClientOptions, HttpClient, Redirects, SendError};
+use crate::base::records::{Job, Timestamp};
 use async_trait::async_trait;
 use bytes::Bytes;
 use futures::StreamExt;

@@ -1,4 +1,4 @@
-//! Jobs of kind `beat`: [`ventriform::gated::from_files`] over a stored volume with gates and stored models.
+//! Jobs of kind `beat`: [`ventriform::runs::gated::from_files`] over a stored volume with gates and stored models.
 
 use super::failures::{unwritten, work_error};
 use super::files::volume_files;
@@ -6,17 +6,17 @@ use super::limits;
 use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
+use crate::base::records::{Failure, Resource};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
-use ventriform::export::Format;
-use ventriform::gated::{GatedOrder, from_files};
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::image::volume::ReadLimits;
 use ventriform::parameters::{BeatChoice, GatedParameters};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::report::{BeatSummary, object};
-use ventriform::volume::ReadLimits;
+use ventriform::results::export::Format;
+use ventriform::results::report::{BeatSummary, object};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::gated::{GatedOrder, from_files};
 
 /// Fits one wall in motion to the gates of volumes.
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,4 @@
-//! Jobs of kind `comparison`: [`ventriform::rest_stress::from_files`] over two stored volumes, that of the job at
+//! Jobs of kind `comparison`: [`ventriform::runs::rest_stress::from_files`] over two stored volumes, that of the job at
 //! stress and that of its parameter `rest` at rest.
 
 use super::failures::{unwritten, volume_missing, work_error};
@@ -7,17 +7,17 @@ use super::limits;
 use super::models::{MESH_FILE, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
+use crate::base::records::{Failure, Fault, Resource};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use crate::records::{Failure, Fault, Resource};
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
-use ventriform::export::Format;
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::image::volume::ReadLimits;
 use ventriform::parameters::{ComparisonChoice, ComparisonParameters};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::report::{ComparisonSummary, object};
-use ventriform::rest_stress::{ComparisonOrder, from_files};
-use ventriform::volume::ReadLimits;
+use ventriform::results::export::Format;
+use ventriform::results::report::{ComparisonSummary, object};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::rest_stress::{ComparisonOrder, from_files};
 
 /// The parameter that names the scan at rest.
 pub(super) const REST_FIELD: &str = "rest";

@@ -1,15 +1,15 @@
-//! Why jobs and requests of the works end: the domain's errors, as [`ventriform::advice`] explains them, and what only
+//! Why jobs and requests of the works end: the domain's errors, as [`ventriform::runs::advice`] explains them, and what only
 //! a service meets.
 
 use super::page::PageError;
+use crate::base::records::{Failure, Fault};
 use crate::jobs::WorkError;
-use crate::records::{Failure, Fault};
 use std::error::Error;
 use std::fmt::Display;
-use ventriform::advice::{Explain, UNSUITABLE_MODEL, failure, sentence};
-use ventriform::export::dicom::{DicomError, StatedIdentity};
-use ventriform::model::Organ;
-use ventriform::segmentation::SegmentationFilesError;
+use ventriform::heart::model::Organ;
+use ventriform::results::export::dicom::{DicomError, StatedIdentity};
+use ventriform::runs::advice::{Explain, UNSUITABLE_MODEL, failure, sentence};
+use ventriform::runs::segmentation::SegmentationFilesError;
 
 /// The failure of a job that met `error`.
 pub(super) fn work_error(error: &impl Explain) -> WorkError {

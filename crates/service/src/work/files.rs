@@ -1,10 +1,10 @@
 //! Files in and out: uploads for the domain's readers, meshes and JSON for downloads.
 
+use crate::base::records::LocalFile;
 use crate::items::OutputFile;
-use crate::records::LocalFile;
-use ventriform::export::{self, ExportError, Format, Metadata};
+use ventriform::image::volume::VolumeFile;
 use ventriform::mesh::TriMesh;
-use ventriform::volume::VolumeFile;
+use ventriform::results::export::{self, ExportError, Format, Metadata};
 
 /// The files of a stored volume for the domain's readers.
 ///

@@ -1,12 +1,12 @@
 //! Normal limits: as they are uploaded, and as jobs need them.
 
 use super::failures::{normals_missing, unreadable_model, work_error};
+use crate::base::records::Failure;
 use crate::items::{OutputFile, WorkOutput};
 use crate::jobs::{WorkError, WorkInput};
-use crate::records::Failure;
-use ventriform::advice::Explain;
-use ventriform::normals::NormalLimits;
-use ventriform::report::{NormalsSummary, object};
+use ventriform::heart::normals::NormalLimits;
+use ventriform::results::report::{NormalsSummary, object};
+use ventriform::runs::advice::Explain;
 
 /// The parameter that names normal limits.
 pub(super) const NORMALS_FIELD: &str = "normals";

@@ -50,7 +50,7 @@ pub use upload::{
 
 use crate::jobs::{Work, Works};
 use std::sync::Arc;
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
 
 /// All that the service can do with volumes and models. Tests replace its parts.
 #[derive(Clone)]

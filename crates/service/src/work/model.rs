@@ -1,20 +1,20 @@
-//! Jobs of kind `model`: [`ventriform::pipeline::generate`], from a volume's files to every download.
+//! Jobs of kind `model`: [`ventriform::runs::pipeline::generate`], from a volume's files to every download.
 
 use super::failures::{not_exportable, work_error};
 use super::files::{json_file, mesh_file, volume_files};
 use super::page;
 use super::parameters;
+use crate::base::records::{Failure, Resource};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Work, WorkError, WorkInput};
-use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
-use ventriform::export::Format;
+use ventriform::base::progress::{Monitor, Plan, Stage};
+use ventriform::image::volume::ReadLimits;
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline::{self, Model};
-use ventriform::progress::{Monitor, Plan, Stage};
-use ventriform::report::object;
-use ventriform::volume::ReadLimits;
+use ventriform::results::export::Format;
+use ventriform::results::report::object;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::pipeline::{self, Model};
 
 /// Makes models.
 #[derive(Debug, Clone, Copy)]

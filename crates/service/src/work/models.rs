@@ -5,9 +5,9 @@ use crate::items::StoredItem;
 use crate::jobs::{WorkError, WorkInput};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-use ventriform::export::read_json;
 use ventriform::parameters::FitParameters;
-use ventriform::segmentation::{NamedMesh, SegmentationError};
+use ventriform::results::export::read_json;
+use ventriform::runs::segmentation::{NamedMesh, SegmentationError};
 
 /// The file of a model that is fitted.
 pub(super) const MESH_FILE: &str = "mesh.json";

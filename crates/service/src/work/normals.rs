@@ -1,19 +1,21 @@
-//! Jobs of kind `normals`: [`ventriform::evaluate::normals::of_scans`] over stored volumes. The parameter `cases` is
+//! Jobs of kind `normals`: [`ventriform::runs::evaluate::normals::of_scans`] over stored volumes. The parameter `cases` is
 //! the cohort's table; each of its rows names a volume. The job's own volume is that of the first row.
 
 use super::failures::volume_missing;
 use super::limits;
+use crate::base::records::{Failure, Fault, Resource};
 use crate::items::{NotAdded, WorkOutput, check_name};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use crate::records::{Failure, Fault, Resource};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
-use ventriform::advice::Explain;
-use ventriform::evaluate::normals::{BuildError, CohortRow, CohortScan, NormalsOptions, of_scans};
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::base::text::is_printable;
+use ventriform::image::volume::ReadLimits;
 use ventriform::parameters::{CohortCase, NormalsParameters};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::text::is_printable;
-use ventriform::volume::ReadLimits;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::evaluate::normals::{
+    BuildError, CohortRow, CohortScan, NormalsOptions, of_scans,
+};
 
 /// The parameter with the cohort's table.
 const CASES_FIELD: &str = "cases";

@@ -8,12 +8,12 @@
 
 use serde_json::{Map, Value};
 use std::io;
-use ventriform::export::read_json::{self, ReadMeshError};
-use ventriform::report::{
+use ventriform::image::volume::Provenance;
+use ventriform::results::export::read_json::{self, ReadMeshError};
+use ventriform::results::report::{
     self, BeatPage, BeatReport, Closeness, ComparisonPage, ComparisonReport, ModelReport,
     SegmentationPage, SegmentationReport,
 };
-use ventriform::volume::Provenance;
 
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]

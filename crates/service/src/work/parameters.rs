@@ -1,10 +1,10 @@
 //! Validating the parameters of a job, the same way for every kind of work.
 
+use crate::base::records::Failure;
 use crate::jobs::GivenParameters;
-use crate::records::Failure;
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
 use ventriform::parameters::{BesideFit, ParameterError, Parameters, WithFit};
+use ventriform::runs::advice::Explain;
 
 /// Validates `given` as parameters of type `P` and writes every default out.
 pub(super) fn check<P: Parameters>(

@@ -4,11 +4,12 @@
 //! says of them.
 
 use super::failures::{broken_result, not_exportable};
+use crate::base::records::Failure;
 use crate::items::{OutputFile, StoredItem};
-use crate::records::Failure;
-use ventriform::export::open_part::open_part;
-use ventriform::export::{self, Format, Part, read_json};
-use ventriform::{polar, report};
+use ventriform::heart::polar;
+use ventriform::results::export::open_part::open_part;
+use ventriform::results::export::{self, Format, Part, read_json};
+use ventriform::results::report;
 
 /// `part` of the mesh `stem` of `item` as `<stem>_<part>.<extension>`; `None` if the mesh does not say which
 /// triangles are of that part.

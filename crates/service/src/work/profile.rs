@@ -1,11 +1,11 @@
 //! From a reader's profile as it was uploaded to one that is stored.
 
 use super::segmentation::PROFILE_FILE;
+use crate::base::records::Failure;
 use crate::items::{OutputFile, WorkOutput};
-use crate::records::Failure;
-use ventriform::advice::Explain;
-use ventriform::reader::ReaderProfile;
-use ventriform::report::{ReaderSummary, object};
+use ventriform::heart::reader::ReaderProfile;
+use ventriform::results::report::{ReaderSummary, object};
+use ventriform::runs::advice::Explain;
 
 /// Checks a reader's profile. Returns its main figures and the profile, spaced as
 /// [`ReaderProfile::to_json`] does, so that the same profile is the same file.

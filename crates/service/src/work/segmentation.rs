@@ -1,4 +1,4 @@
-//! Jobs of kind `segmentation`: [`ventriform::segmentation::from_files`] over stored models.
+//! Jobs of kind `segmentation`: [`ventriform::runs::segmentation::from_files`] over stored models.
 
 use super::failures::{profile_missing, unreadable_model, unwritten, work_error};
 use super::files::volume_files;
@@ -6,18 +6,18 @@ use super::limits;
 use super::models::{MESH_FILE, name_of, named_item, named_models, stored_models};
 use super::page;
 use super::parameters;
+use crate::base::records::{Failure, Resource};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{GivenParameters, Needs, Work, WorkError, WorkInput};
-use crate::records::{Failure, Resource};
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
-use ventriform::export::Format;
+use ventriform::base::progress::{Monitor, Plan};
+use ventriform::heart::reader::ReaderProfile;
+use ventriform::image::volume::ReadLimits;
 use ventriform::parameters::{FitParameters, Parameters};
-use ventriform::progress::{Monitor, Plan};
-use ventriform::reader::ReaderProfile;
-use ventriform::report::object;
-use ventriform::segmentation::{NamedFile, NamedReader, SegmentationOrder, from_files};
-use ventriform::volume::ReadLimits;
+use ventriform::results::export::Format;
+use ventriform::results::report::object;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::segmentation::{NamedFile, NamedReader, SegmentationOrder, from_files};
 
 /// The file of a reader's profile.
 pub(super) const PROFILE_FILE: &str = "profile.json";

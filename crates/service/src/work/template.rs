@@ -4,14 +4,14 @@
 
 use super::failures::{unknown_organ, unsuitable_mesh};
 use super::files::mesh_file;
+use crate::base::records::Failure;
 use crate::items::{OutputFile, WorkOutput};
-use crate::records::Failure;
-use ventriform::advice::Explain;
-use ventriform::export::{Format, Metadata};
-use ventriform::mesh_files::{self, MeshStatement};
-use ventriform::model::{Organ, Template, wall_parts};
-use ventriform::progress::Monitor;
-use ventriform::report::{TemplateSummary, object};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::model::{Organ, Template, wall_parts};
+use ventriform::mesh::files::{self, MeshStatement};
+use ventriform::results::export::{Format, Metadata};
+use ventriform::results::report::{TemplateSummary, object};
+use ventriform::runs::advice::Explain;
 
 /// Largest mesh of a template: a model to be fitted has at most 5000 points of about 200 bytes, and as many
 /// bytes of triangles.
@@ -27,7 +27,7 @@ pub(super) fn make(
     organ: &str,
     stated: &MeshStatement,
 ) -> Result<WorkOutput, Failure> {
-    let read = mesh_files::read(mesh, stated, TEMPLATE_BYTES).map_err(|error| error.explain())?;
+    let read = files::read(mesh, stated, TEMPLATE_BYTES).map_err(|error| error.explain())?;
     let (mesh, notes) = (read.mesh, read.notes);
     let organ = Organ::parse(organ).ok_or_else(|| unknown_organ(organ))?;
     let template =

@@ -1,18 +1,18 @@
-//! Validating uploads: volumes by [`ventriform::volume`], templates by [`ventriform::deform`].
+//! Validating uploads: volumes by [`ventriform::image::volume`], templates by [`ventriform::heart::deform`].
 
 use super::files::volume_files;
 use super::{limits, profile, template};
+use crate::base::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use crate::items::WorkOutput;
-use crate::records::{Failure, Fault, LocalFile, ScanFields, StoreError, StoredVolume};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use ventriform::advice::Explain;
-use ventriform::mesh_files::MeshStatement;
-use ventriform::progress::Monitor;
-use ventriform::report::header_text;
-use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, GateFacts, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::given_mask::{MaskChoice, read_mask};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{self, GateFacts, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::mesh::files::MeshStatement;
+use ventriform::results::report::header_text;
+use ventriform::runs::advice::Explain;
 
 /// Most memory that [`UploadReader::inspect`] takes, bytes: that of the largest DICOM Segmentation. The
 /// largest JPEG 2000 frame takes 40 MiB. A gzipped file of 16 MiB is unpacked in memory if it holds at
@@ -44,7 +44,7 @@ pub trait UploadReader: Send + Sync + 'static {
     fn inspect(&self, files: &[LocalFile], monitor: &Monitor<'_>) -> Result<UploadFacts, Failure>;
 
     /// The statements of the files of one volume about patient, study and acquisition: the fields of
-    /// [`Provenance`](ventriform::volume::Provenance), without the frames of slices, which differ
+    /// [`Provenance`](ventriform::image::volume::Provenance), without the frames of slices, which differ
     /// between gates. `None` unless they are DICOM.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use futures::{StreamExt, TryStreamExt, stream};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use ventriform_service::records::{ItemRecord, RecordPages, Resource};
+use ventriform_service::base::records::{ItemRecord, RecordPages, Resource};
 
 /// Items that are sent to a bucket at the same time.
 const PARALLEL_COPIES: usize = 8;

@@ -30,8 +30,8 @@ use source::Source;
 use std::fs;
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
+use ventriform_service::base::records::{StoreError, random_id};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::{StoreError, random_id};
 
 pub use moved::{MovedFiles, note_moved_files};
 pub use rows::TableCount;
@@ -154,8 +154,8 @@ pub enum MigrateError {
     Differs(String),
 }
 
-impl From<ventriform_service::records::BlobError> for MigrateError {
-    fn from(error: ventriform_service::records::BlobError) -> Self {
+impl From<ventriform_service::base::records::BlobError> for MigrateError {
+    fn from(error: ventriform_service::base::records::BlobError) -> Self {
         Self::Store(error.into())
     }
 }

@@ -22,8 +22,8 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use ventriform_service::base::records::{BlobError, ItemRecord, RecordPages, random_id};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::{BlobError, ItemRecord, RecordPages, random_id};
 
 /// Items that are looked for at the same time.
 const PARALLEL_ITEMS: usize = 8;

@@ -14,8 +14,8 @@ use sqlx::postgres::{PgArguments, PgRow};
 use sqlx::query::Query;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use sqlx::{AssertSqlSafe, Connection, PgConnection, Postgres, Row};
+use ventriform_service::base::records::{StoreError, StoreResult};
 use ventriform_service::config::PostgresSettings;
-use ventriform_service::records::{StoreError, StoreResult};
 
 /// Rows sent at a time.
 const BATCH_ROWS: usize = 200;

@@ -12,7 +12,7 @@ use crate::{
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
-use ventriform_service::records::{ItemRecord, RecordPages, StoreResult, hex, random_id};
+use ventriform_service::base::records::{ItemRecord, RecordPages, StoreResult, hex, random_id};
 
 /// Rows read at a time.
 pub(super) const PAGE_ROWS: u32 = 200;

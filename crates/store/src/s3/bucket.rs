@@ -26,7 +26,7 @@ use tokio::fs::File;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
-use ventriform_service::records::{BlobError, StoreFault, hex};
+use ventriform_service::base::records::{BlobError, StoreFault, hex};
 
 /// Bytes of one part.
 const PART_BYTES: usize = 8 << 20;

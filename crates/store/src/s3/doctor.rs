@@ -15,11 +15,11 @@ use crate::database::SqlStore;
 use crate::findings::{Examination, GIVEN_TO_HEIR, NO_HOLDER, NO_ROW, Repair, UNOWNED_SET_ASIDE};
 use crate::tables::{Holding, to_json};
 use std::collections::{BTreeMap, BTreeSet};
-use ventriform_service::intake::ReceivedFiles;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobStore, Clock, Custody, FileRecord, ItemRecord, RecordPages, Resource, StoreResult,
     SystemClock,
 };
+use ventriform_service::network::intake::ReceivedFiles;
 
 /// Rows read at a time.
 const PAGE_ROWS: u32 = 200;

@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobStore, BlobStream, Cutoff, DiskSpace, FileRecord, ItemRecord, LocalFile,
     Resource, Shelved, StagedFiles, StagedFor, StoreFault, Timestamp, random_id, volume_id,
 };

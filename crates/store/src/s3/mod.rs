@@ -3,7 +3,7 @@
 //! ```text
 //! s3://BUCKET/PREFIX/
 //!   volumes/vol_.../PLACE/          one publication: the files of a volume, and record.json
-//!   models/mdl_.../PLACE/           likewise segmentations/, beats/, comparisons/, normals/, templates/, readers/
+//!   models/mdl_.../PLACE/           likewise segmentations/, beats/, comparisons/, heart/normals/, templates/, readers/
 //!   received/                       objects that are not volumes yet
 //!   quarantine/DAY/volumes/...      what was found without a row
 //!   kept.json                       the note about the database ([`crate::note`])

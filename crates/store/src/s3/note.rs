@@ -5,7 +5,7 @@ use super::shared::Shared;
 use crate::note::{NOTE_FILE, NotePlace};
 use async_trait::async_trait;
 use std::sync::Arc;
-use ventriform_service::records::BlobError;
+use ventriform_service::base::records::BlobError;
 
 /// The object in the bucket that keeps what the database must not lose.
 struct BucketNote(Arc<Shared>);

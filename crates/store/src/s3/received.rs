@@ -8,10 +8,10 @@ use async_trait::async_trait;
 use object_store::ObjectMeta;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::intake::{IncomingFile, ReceivedFiles};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobWriter, FileRecord, LocalFile, Timestamp, TrustedNow,
 };
+use ventriform_service::network::intake::{IncomingFile, ReceivedFiles};
 
 /// A file on its way to the bucket.
 struct Incoming {

@@ -8,7 +8,7 @@ use object_store::ObjectMeta;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
-use ventriform_service::records::{BlobError, FileRecord, StoreFault, Timestamp};
+use ventriform_service::base::records::{BlobError, FileRecord, StoreFault, Timestamp};
 
 /// The content that checks write.
 pub(super) const PROBE_FILE: &str = "ready";

@@ -10,7 +10,7 @@ use futures::{StreamExt, TryStreamExt, stream};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     BlobError, BlobWriter, ItemRecord, LocalFile, StagedFiles, StoreFault, random_id,
 };
 

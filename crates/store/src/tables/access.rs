@@ -6,11 +6,13 @@ use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::access::{
+use ventriform_service::base::records::{
+    Cutoff, ListPage, ListRequest, StoreResult, Tenant, Timestamp,
+};
+use ventriform_service::callers::{
     AccessStore, Activity, Agent, Anchor, ApiKey, AuditEvent, AuditFilter, AuditLink, AuditRecord,
     KeptRow, Maker, NO_HASH, Outcome, Quota, Usage, chain_hash,
 };
-use ventriform_service::records::{Cutoff, ListPage, ListRequest, StoreResult, Tenant, Timestamp};
 
 /// The bytes of everything that tenant `$1` stores: volumes, products (results, templates, readers), received
 /// objects that are not part of a volume, work items, and the records of jobs.

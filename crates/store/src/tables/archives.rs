@@ -8,13 +8,13 @@ use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
-use ventriform_service::access::{Activity, Outcome};
-use ventriform_service::archive::{
+use ventriform_service::base::records::{Failure, Job, StoreResult, Tenant, Timestamp};
+use ventriform_service::callers::{Activity, Outcome};
+use ventriform_service::network::archive::{
     ArchiveBacklog, ArchiveStore, DuePull, DueSend, HeldSeries, ObjectDelivery, Pull,
     SendSettlement, SeriesKey,
 };
-use ventriform_service::hooks::{DeliveryState, Lane, NextAttempt};
-use ventriform_service::records::{Failure, Job, StoreResult, Tenant, Timestamp};
+use ventriform_service::network::hooks::{DeliveryState, Lane, NextAttempt};
 
 #[async_trait]
 impl ArchiveStore for SqlStore {

@@ -9,12 +9,12 @@ use super::scans::{note_upload, push_scan};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{Query, QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::access::Activity;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     AddedProduct, Bounded, Catalogue, Cutoff, Erased, ErasureOrder, Expired, ItemFilter, LegalHold,
     ListPage, ListRequest, Owned, PagePlan, Product, ProductRoom, Receipt, Resource,
     SELECTED_VOLUMES, ScanFields, StoreResult, StoredVolume, Tags, Tenant, Timestamp,
 };
+use ventriform_service::callers::Activity;
 
 /// A volume with the columns of its ownership. `sequence` and `created_at` are the ownership's.
 const HELD_VOLUME: Select = Select {

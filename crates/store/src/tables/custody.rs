@@ -5,7 +5,7 @@ use crate::database::SqlStore;
 use crate::query::query;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Custody, ItemRecord, Resource, StoreError, StoreFault, StoreResult,
 };
 

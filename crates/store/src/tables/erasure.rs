@@ -11,11 +11,11 @@ use super::access::append;
 use super::rows::{self, to_json};
 use crate::database::Transaction;
 use crate::query::{Target, query};
-use ventriform_service::access::{Activity, AuditEvent};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     AuditMark, Cutoff, Erased, ErasedFile, ErasedItem, ErasureAgent, ErasureOrder, ErasureReason,
     Receipt, Resource, StoreResult, Tenant, Timestamp, random_id,
 };
+use ventriform_service::callers::{Activity, AuditEvent};
 
 /// The prefix of the ids of receipts.
 pub(super) const RECEIPT_PREFIX: &str = "ers_";

@@ -6,9 +6,9 @@ use super::access::record;
 use super::rows;
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
-use ventriform_service::access::Activity;
-use ventriform_service::hooks::{Backlog, DeliveryState, Lane};
-use ventriform_service::records::{StoreResult, Tenant, Timestamp};
+use ventriform_service::base::records::{StoreResult, Tenant, Timestamp};
+use ventriform_service::callers::Activity;
+use ventriform_service::network::hooks::{Backlog, DeliveryState, Lane};
 
 /// A stamp may be so far ahead of the clock that reads it, ms: processes on one database ask for its time in turn.
 const CLOCK_NOISE_MS: i64 = 60_000;

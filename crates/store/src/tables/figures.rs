@@ -4,7 +4,7 @@ use super::rows;
 use crate::database::SqlStore;
 use crate::query::query;
 use async_trait::async_trait;
-use ventriform_service::records::{FigureStore, QueueFigures, Resource, StoreResult};
+use ventriform_service::base::records::{FigureStore, QueueFigures, Resource, StoreResult};
 
 #[async_trait]
 impl FigureStore for SqlStore {

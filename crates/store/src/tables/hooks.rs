@@ -7,12 +7,12 @@ use super::rows;
 use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::access::Activity;
-use ventriform_service::hooks::{
+use ventriform_service::base::records::{StoreResult, Tenant, Timestamp};
+use ventriform_service::callers::Activity;
+use ventriform_service::network::hooks::{
     AttemptOutcome, Backlog, Delivery, DeliveryLimits, DeliveryState, DeliveryStore, DueDelivery,
     HookEndpoint, HookEvent, Lane, Settlement, SigningSecret,
 };
-use ventriform_service::records::{StoreResult, Tenant, Timestamp};
 
 /// `last_outcome` of deliveries that were given up without an attempt.
 const TOO_OLD: &str = "too-old";

@@ -9,14 +9,14 @@ use crate::database::{SqlStore, Transaction};
 use crate::query::{DbRow, QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeSet;
-use ventriform_service::access::Activity;
-use ventriform_service::intake::{
-    Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
-    Protocol, ReceivedObject,
-};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Cutoff, ErasedFile, ErasedItem, ErasureAgent, ErasureReason, Failure, ListPage, ListRequest,
     Receipt, StoreError, StoreResult, Tenant, Timestamp, random_id,
+};
+use ventriform_service::callers::Activity;
+use ventriform_service::network::intake::{
+    Added, GROUP_PREFIX, GroupState, IntakeGroup, IntakeRoom, IntakeStore, NewObject, Origin,
+    Protocol, ReceivedObject,
 };
 
 /// The columns of a group, with what is counted of its objects.

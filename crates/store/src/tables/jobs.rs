@@ -28,13 +28,13 @@ use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
 use std::collections::BTreeMap;
 use std::time::Duration;
-use ventriform_service::access::Activity;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Bounded, Claimant, DeathLimit, Deleted, ErasureAgent, Failure, Fault, Filed, Interrupted, Job,
     JobFilter, JobOutcome, JobState, JobStore, Lease, ListPage, ListRequest, NewJob, PagePlan,
     Priority, Product, QueueLoad, Resource, ScanFilter, StoreResult, TagFilter, Tenant, Timestamp,
     random_id,
 };
+use ventriform_service::callers::Activity;
 
 /// Number of last succeeded jobs whose durations are averaged.
 const JOBS_AVERAGED: i64 = 20;

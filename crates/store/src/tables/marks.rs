@@ -4,8 +4,8 @@
 use super::rows;
 use crate::database::{SqlStore, Transaction};
 use crate::query::{Target, query};
-use ventriform_service::access::Anchor;
-use ventriform_service::records::{StoreResult, Timestamp};
+use ventriform_service::base::records::{StoreResult, Timestamp};
+use ventriform_service::callers::Anchor;
 
 /// Name of the mark with the database's identity.
 const STORE: &str = "store";

@@ -10,10 +10,10 @@ use super::rows::{self, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::query;
 use serde::{Deserialize, Serialize};
-use ventriform_service::access::{Activity, AuditEvent};
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     ItemRecord, Product, Resource, StoreResult, StoredVolume, Tenant, Timestamp,
 };
+use ventriform_service::callers::{Activity, AuditEvent};
 
 /// The reason of a legal hold in doubt.
 const HOLD_IN_DOUBT: &str = "In doubt: a repair of the storage lost the record of who has this volume, and whether it \

@@ -5,7 +5,7 @@
 //! the plan of every combination of filters.
 
 use crate::query::QueryBuilder;
-use ventriform_service::records::{ListRequest, Resource, TagFilter, Tenant, Timestamp};
+use ventriform_service::base::records::{ListRequest, Resource, TagFilter, Tenant, Timestamp};
 
 /// Adds the conditions of a filter to a query whose columns have that prefix.
 pub(super) fn push_tags(
@@ -87,11 +87,11 @@ mod tests {
     use crate::tables::catalogue::Columns;
     use crate::tables::{access, catalogue, intake, jobs, rows};
     use std::time::Duration;
-    use ventriform_service::access::AuditFilter;
-    use ventriform_service::intake::GroupState;
-    use ventriform_service::records::{
+    use ventriform_service::base::records::{
         Clock, Cutoff, Expired, ItemFilter, JobFilter, JobState, Priority, ScanFilter,
     };
+    use ventriform_service::callers::AuditFilter;
+    use ventriform_service::network::intake::GroupState;
 
     /// Every combination of so many filters, as bits.
     fn combinations(filters: u32) -> impl Iterator<Item = impl Fn(u32) -> bool> {

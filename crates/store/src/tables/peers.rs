@@ -9,7 +9,7 @@ use async_trait::async_trait;
 use sqlx::postgres::PgPool;
 use std::sync::Arc;
 use std::time::Duration;
-use ventriform_service::records::{NewsFeed, Peers, StoreResult, TrustedNow};
+use ventriform_service::base::records::{NewsFeed, Peers, StoreResult, TrustedNow};
 
 /// How long is remembered which places of files were given up: longer than any process may stand still
 /// between writing files and their row.

@@ -4,7 +4,7 @@ use crate::database::SqlStore;
 use crate::query::{DbRow, Query};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Bounded, Job, JobState, LegalHold, ListPage, ListRequest, Owned, Ownership, PagePlan, Priority,
     Product, Receipt, ScanFields, ScanIdentity, StoreError, StoreResult, StoredVolume, Tags,
     Tenant, Timestamp,

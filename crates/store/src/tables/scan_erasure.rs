@@ -17,7 +17,7 @@ use crate::database::{SqlStore, Transaction};
 use crate::query::query;
 use async_trait::async_trait;
 use std::collections::BTreeSet;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     AuditMark, ErasedItem, ErasureReason, Receipt, SELECTED_VOLUMES, ScanErasureOrder,
     ScanErasurePlan, ScanErasures, ScanSelection, ScansErased, StoreResult, Tenant, Timestamp,
     random_id,

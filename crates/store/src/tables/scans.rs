@@ -5,11 +5,11 @@ use super::rows::{self, SCAN_COLUMNS, to_json};
 use crate::database::{SqlStore, Transaction};
 use crate::query::{QueryBuilder, query};
 use async_trait::async_trait;
-use ventriform_service::access::Activity;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     ScanFields, ScanFilter, ScanIdentity, Scans, StoreResult, Tenant, Timestamp, UnreadScan,
     random_key,
 };
+use ventriform_service::callers::Activity;
 
 #[async_trait]
 impl Scans for SqlStore {

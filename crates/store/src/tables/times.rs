@@ -3,7 +3,7 @@
 use crate::database::SqlStore;
 use crate::query::query;
 use async_trait::async_trait;
-use ventriform_service::records::{StoreResult, TimeStore, Timestamp, TrustedNow};
+use ventriform_service::base::records::{StoreResult, TimeStore, Timestamp, TrustedNow};
 
 #[async_trait]
 impl TimeStore for SqlStore {

@@ -6,12 +6,12 @@ use super::rows::{self, to_json};
 use crate::database::SqlStore;
 use crate::query::{DbRow, query};
 use async_trait::async_trait;
-use ventriform_service::access::Activity;
-use ventriform_service::records::{
+use ventriform_service::base::records::{
     Bounded, Cutoff, Erased, ErasedItem, ErasureAgent, ErasureReason, StoreError, StoreResult,
     Tenant, Timestamp,
 };
-use ventriform_service::worklist::{
+use ventriform_service::callers::Activity;
+use ventriform_service::network::worklist::{
     AddedWorkitem, BATCH_BYTES, DataSetJson, Performer, Workitem, WorkitemState, Worklist,
 };
 

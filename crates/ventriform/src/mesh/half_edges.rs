@@ -339,7 +339,7 @@ pub(super) fn around(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use crate::mesh::{shapes, topology};
     use rand::RngExt;
 

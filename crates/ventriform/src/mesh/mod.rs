@@ -11,6 +11,9 @@
 //! - [`subdivide`]: the same surface with smaller triangles;
 //! - [`shapes`]: meshes with known properties, for tests and examples.
 
+pub mod decimate;
+pub mod files;
+
 mod defect;
 pub mod half_edges;
 pub mod ids;
@@ -22,7 +25,7 @@ pub mod topology;
 
 pub use ids::{FaceId, HalfEdgeId, VertexId};
 
-use crate::geometry::{Vec3, triangle};
+use crate::base::geometry::{Vec3, triangle};
 
 /// A triangle mesh: vertex positions and index triples. Nothing about its topology is promised;
 /// [`topology::check`] tells.

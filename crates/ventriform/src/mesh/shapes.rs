@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 
 use super::TriMesh;
 use super::subdivide::Subdivided;
-use crate::geometry::Vec3;
+use crate::base::geometry::Vec3;
 
 /// A regular tetrahedron of edge length `edge` mm about the origin.
 pub fn tetrahedron(edge: f64) -> TriMesh {

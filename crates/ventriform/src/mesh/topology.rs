@@ -11,8 +11,8 @@
 use super::TriMesh;
 use super::half_edges::{around, lowest_outgoing, pair_half_edges};
 use super::ids::{FaceId, VertexId};
-use crate::geometry::Vec3;
-use crate::numeric::disjoint_sets;
+use crate::base::geometry::Vec3;
+use crate::base::numeric::disjoint_sets;
 
 pub use super::defect::MeshDefect;
 

@@ -5,7 +5,7 @@ use super::{Kind, ParameterError, ParameterSpec, Parameters};
 use serde_json::json;
 use std::ops::RangeInclusive;
 
-pub use crate::volume::RR_MS;
+pub use crate::image::volume::RR_MS;
 
 /// Masses that a left ventricle's muscle can have, g.
 pub const MASS_G: RangeInclusive<f64> = 20.0..=600.0;

@@ -3,8 +3,8 @@
 use super::fit_specs::{NAME_PATTERN, direction, point, scan_name};
 use super::with_fit::{BesideFit, WithFit};
 use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
-use crate::comparison::WhichScan;
-use crate::geometry::Vec3;
+use crate::base::geometry::Vec3;
+use crate::heart::comparison::WhichScan;
 use serde_json::{Map, Value, json};
 
 /// The parameters of a comparison beside those of the fits to both scans.

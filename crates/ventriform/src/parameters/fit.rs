@@ -1,16 +1,16 @@
 //! The parameters of a fit.
 
 use super::ParameterError;
-use crate::deform::{DeformParameters, Orbit};
-use crate::geometry::Vec3;
-use crate::geometry::bvh::Aabb;
-use crate::locate::Hints;
-use crate::locate::patient_orientation::Superior;
-use crate::model::Organ;
-use crate::normals::ScanKind;
-use crate::polar::PolarParameters;
-use crate::volume::given_mask::MaskChoice;
-use crate::volume::{AffineSource, Provenance, Volume};
+use crate::base::geometry::Vec3;
+use crate::base::geometry::bvh::Aabb;
+use crate::heart::deform::{DeformParameters, Orbit};
+use crate::heart::model::Organ;
+use crate::heart::normals::ScanKind;
+use crate::heart::polar::PolarParameters;
+use crate::image::locate::Hints;
+use crate::image::locate::patient_orientation::Superior;
+use crate::image::volume::given_mask::MaskChoice;
+use crate::image::volume::{AffineSource, Provenance, Volume};
 
 /// Everything that determines a segmentation, apart from the files.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ pub enum MaskGrid {
     #[default]
     Scan,
     /// The scan's if its axes are at right angles, otherwise a grid at right angles that covers it
-    /// ([`VoxelToPatient::orthogonal_cover`](crate::geometry::frame::VoxelToPatient::orthogonal_cover)).
+    /// ([`VoxelToPatient::orthogonal_cover`](crate::base::geometry::frame::VoxelToPatient::orthogonal_cover)).
     Orthogonal,
 }
 
@@ -210,8 +210,8 @@ fn outside(field: &str, volume: &Volume) -> ParameterError {
 mod tests {
     use super::super::{FIT_SPECS, Kind, Parameters, checks};
     use super::*;
-    use crate::geometry::frame::VoxelToPatient;
-    use crate::volume::given_mask::MaskLabel;
+    use crate::base::geometry::frame::VoxelToPatient;
+    use crate::image::volume::given_mask::MaskLabel;
     use serde_json::{Value, json};
 
     fn pairs(list: &[(&str, &str)]) -> Result<FitParameters, ParameterError> {

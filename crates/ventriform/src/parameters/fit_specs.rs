@@ -2,15 +2,15 @@
 
 use super::table::{choice, integer, number, optional};
 use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters};
-use crate::deform::sensors::SensorKind;
-use crate::deform::{Orbit, WallEdge};
-use crate::geometry::Vec3;
-use crate::locate::patient_orientation::Superior;
-use crate::mesh_files::{MeshFrame, MeshUnit};
-use crate::model::Organ;
-use crate::normals::{Sex, yes_or_no};
-use crate::polar::Projection;
-use crate::volume::given_mask::MaskLabel;
+use crate::base::geometry::Vec3;
+use crate::heart::deform::sensors::SensorKind;
+use crate::heart::deform::{Orbit, WallEdge};
+use crate::heart::model::Organ;
+use crate::heart::normals::{Sex, yes_or_no};
+use crate::heart::polar::Projection;
+use crate::image::locate::patient_orientation::Superior;
+use crate::image::volume::given_mask::MaskLabel;
+use crate::mesh::files::{MeshFrame, MeshUnit};
 use serde_json::{Value, json};
 
 impl Parameters for FitParameters {

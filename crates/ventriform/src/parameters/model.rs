@@ -2,8 +2,8 @@
 
 use super::ParameterError;
 use super::table::Parameters;
-use crate::optimise::{FitnessForm, Gain, OptimiseParameters};
-use crate::retile::{Method, RetileParameters};
+use crate::surface::optimise::{FitnessForm, Gain, OptimiseParameters};
+use crate::surface::retile::{Method, RetileParameters};
 use crate::surface::{Denoise, Isolate, SurfaceParameters};
 use serde_json::{Map, Value};
 

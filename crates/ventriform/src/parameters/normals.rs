@@ -2,7 +2,7 @@
 
 use super::with_fit::{BesideFit, WithFit};
 use super::{Kind, ParameterError, ParameterSpec, Parameters};
-use crate::normals::Sex;
+use crate::heart::normals::Sex;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

@@ -3,8 +3,8 @@
 use super::model::ModelDraft;
 use super::table::{choice, integer, number, optional, optional_choice};
 use super::{Kind, ModelParameters, ParameterError, ParameterSpec, Parameters};
-use crate::optimise::{FitnessForm, Gain};
-use crate::retile::{Geodesics, Method};
+use crate::surface::optimise::{FitnessForm, Gain};
+use crate::surface::retile::{Geodesics, Method};
 use crate::surface::{Denoise, IsoLevel, Isolate, TopologyMode};
 use serde_json::{Value, json};
 

@@ -31,12 +31,12 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::Vec3;
-use crate::geometry::bvh::Bvh;
+use crate::base::geometry::Vec3;
+use crate::base::geometry::bvh::Bvh;
+use crate::base::numeric::order::upper_median;
+use crate::base::progress::{Cancelled, Monitor};
 use crate::mesh::intersections::self_intersections_while;
 use crate::mesh::{TriMesh, vertex_normals};
-use crate::numeric::order::upper_median;
-use crate::progress::{Cancelled, Monitor};
 
 /// Length of the filter that separates noise from shape, voxels.
 const PROBE_LENGTH_VOXELS: f64 = 1.25;

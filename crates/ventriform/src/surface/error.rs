@@ -1,8 +1,8 @@
 //! Why there is no surface.
 
 use super::marching_cubes::{self, MarchingCubesError};
+use crate::base::progress::Cancelled;
 use crate::mesh::topology::MeshDefect;
-use crate::progress::Cancelled;
 
 /// Why there is no surface.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -7,14 +7,14 @@
 use super::object::Object;
 use super::region::WallShell;
 use super::{IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, iso_value};
-use crate::grid::Volume;
-use crate::grid::components::Components;
-use crate::grid::labels::Labels;
-use crate::grid::size::OddSize;
-use crate::grid::survey::Survey;
-use crate::locate::rays::{PLAUSIBLE_SCORE, UNCERTAIN_SCORE};
-use crate::locate::{self, LocateError};
-use crate::progress::Monitor;
+use crate::base::progress::Monitor;
+use crate::image::grid::Volume;
+use crate::image::grid::components::Components;
+use crate::image::grid::labels::Labels;
+use crate::image::grid::size::OddSize;
+use crate::image::grid::survey::Survey;
+use crate::image::locate::rays::{PLAUSIBLE_SCORE, UNCERTAIN_SCORE};
+use crate::image::locate::{self, LocateError};
 
 /// Chooses the ventricle, or the part that `parameters` select.
 ///

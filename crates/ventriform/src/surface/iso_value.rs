@@ -8,9 +8,9 @@
 //!    fractions near by are tried.
 
 use super::{IsoLevel, SurfaceError, SurfaceFacts, region};
-use crate::grid::Volume;
-use crate::grid::survey::{self, Survey};
-use crate::progress::{Cancelled, Monitor};
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::Volume;
+use crate::image::grid::survey::{self, Survey};
 
 /// Volume of enclosed voids above which the cavity counts as closed, ml.
 const CLOSED_ML: f64 = 2.0;

@@ -4,12 +4,12 @@ use super::object::{MaskObject, Object};
 use super::{
     IsoLevel, SurfaceError, SurfaceFacts, SurfaceParameters, TopologyMode, VolumeKind, masks,
 };
-use crate::geometry::Vec3;
-use crate::geometry::frame::VoxelToPatient;
-use crate::grid::Volume;
-use crate::grid::components::Components;
-use crate::grid::labels::Labels;
-use crate::progress::{Cancelled, Monitor};
+use crate::base::geometry::Vec3;
+use crate::base::geometry::frame::VoxelToPatient;
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::Volume;
+use crate::image::grid::components::Components;
+use crate::image::grid::labels::Labels;
 
 /// Selects the voxels of `label`, smoothed so that their surface has no staircase.
 ///

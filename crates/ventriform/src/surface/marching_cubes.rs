@@ -17,11 +17,11 @@
 use rayon::prelude::*;
 
 use super::table::{CUBE_CASES, Case};
-use crate::geometry::Vec3;
-use crate::geometry::frame::VoxelToPatient;
-use crate::grid::labels::{Labels, following, set_bits};
+use crate::base::geometry::Vec3;
+use crate::base::geometry::frame::VoxelToPatient;
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::labels::{Labels, following, set_bits};
 use crate::mesh::TriMesh;
-use crate::progress::{Cancelled, Monitor};
 
 /// Least distance of a vertex from its edge's ends, in voxels. Keeps triangles from
 /// degenerating where samples equal the iso-value; moves no vertex by more.
@@ -405,7 +405,7 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use crate::mesh::topology;
     use nalgebra::Matrix3;
     use rand::RngExt;

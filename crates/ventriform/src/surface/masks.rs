@@ -19,12 +19,12 @@
 
 use super::marching_cubes::{MarchingCubesError, Samples, marching_cubes};
 use super::{smoothing, topology_control};
-use crate::geometry::frame::VoxelToPatient;
-use crate::grid::blur::{Kernel, blur};
-use crate::grid::components::Components;
-use crate::grid::labels::Labels;
+use crate::base::geometry::frame::VoxelToPatient;
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::blur::{Kernel, blur};
+use crate::image::grid::components::Components;
+use crate::image::grid::labels::Labels;
 use crate::mesh::TriMesh;
-use crate::progress::{Cancelled, Monitor};
 
 /// Multiple of sigma at which the Gaussian is cut off.
 const KERNEL_SIGMAS: f64 = 4.0;
@@ -421,7 +421,7 @@ fn keeping(values: &[f32], count: usize) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::base::geometry::Vec3;
     use proptest::prelude::*;
 
     fn frame(spacing: [f64; 3]) -> VoxelToPatient {

@@ -3,13 +3,13 @@
 //! In: a [`Volume`] of intensities or labels. Out: a [`Surface`]: closed, oriented, manifold,
 //! LPS millimetres, and [`SurfaceFacts`] about the volume and every change made.
 //!
-//! 1. [`survey`](mod@crate::grid::survey): range, missing values, label map or intensities.
+//! 1. [`survey`](mod@crate::image::grid::survey): range, missing values, label map or intensities.
 //! 2. Region ([`select`]). Intensities ([`intensity`]): the left ventricle is searched
-//!    ([`crate::locate`]) and cut from its neighbours ([`region`]), or a part is taken as asked
+//!    ([`crate::image::locate`]) and cut from its neighbours ([`region`]), or a part is taken as asked
 //!    for. Labels ([`label`]): the mask is made grey ([`masks`]).
 //! 3. Iso-value ([`iso_value`]): half the wall's reference intensity unless asked otherwise.
 //! 4. [`topology_control`]: one component without cavities and handles.
-//! 5. [`marching_cubes`] (with its generated [`table`]) on [`labels`](crate::grid::labels).
+//! 5. [`marching_cubes`] (with its generated [`table`]) on [`labels`](crate::image::grid::labels).
 //! 6. [`smoothing`]: the smoothed twin for geodesics and curvature.
 //! 7. [`denoise`](mod@denoise): for intensities, the noise is measured and taken off the surface.
 //!
@@ -19,6 +19,9 @@
 //! step 7 moves none by more than three times the noise there or half a voxel; the same bytes on any number of threads.
 //! Not guaranteed: that a doubtful ventricle is the right one; `facts.ventricle_score` and the warnings say how sure
 //! the search is.
+
+pub mod optimise;
+pub mod retile;
 
 pub mod denoise;
 mod error;
@@ -38,15 +41,15 @@ pub mod topology_control;
 
 use std::sync::Arc;
 
-use crate::geometry::Vec3;
-use crate::geometry::bvh::Bvh;
-use crate::grid::Volume;
+use crate::base::geometry::Vec3;
+use crate::base::geometry::bvh::Bvh;
+use crate::base::progress::{Cancelled, Monitor, Stage};
+use crate::image::grid::Volume;
 use crate::mesh::TriMesh;
 use crate::mesh::topology::{self, Census};
-use crate::progress::{Cancelled, Monitor, Stage};
 
-use crate::grid::components::Components;
-use crate::grid::survey::Survey;
+use crate::image::grid::components::Components;
+use crate::image::grid::survey::Survey;
 pub use error::SurfaceError;
 pub use facts::{SurfaceFacts, VolumeKind};
 use marching_cubes::Samples;
@@ -112,7 +115,7 @@ pub fn extract(
     if let IsoLevel::Below(level) = parameters.iso {
         return below(volume, level, parameters, monitor);
     }
-    let survey = crate::grid::survey::survey(volume, monitor)?;
+    let survey = crate::image::grid::survey::survey(volume, monitor)?;
     let mut facts = SurfaceFacts::default();
     let mut object = select::select(volume, parameters, &survey, &mut facts, monitor)?;
     monitor.report(Stage::Surface, 0.5)?;

@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use crate::geometry::Vec3;
-use crate::geometry::frame::VoxelToPatient;
-use crate::grid::Volume;
-use crate::grid::labels::Labels;
+use crate::base::geometry::Vec3;
+use crate::base::geometry::frame::VoxelToPatient;
+use crate::image::grid::Volume;
+use crate::image::grid::labels::Labels;
 
 /// The voxels to surface, and the samples that place the vertices.
 pub(super) struct Object<'a> {

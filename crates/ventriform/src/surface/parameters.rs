@@ -1,8 +1,8 @@
 //! Parameters of the surface's extraction.
 
 use super::SurfaceError;
-use crate::grid::Volume;
-use crate::locate::Hints;
+use crate::image::grid::Volume;
+use crate::image::locate::Hints;
 
 /// Choice of the iso-value.
 #[derive(Debug, Clone, Copy, PartialEq)]

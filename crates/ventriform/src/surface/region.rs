@@ -1,6 +1,6 @@
 //! The ventricle's voxels at the iso-value, cut from its neighbours.
 //!
-//! In: the place of the ventricle ([`crate::locate::rays::Cavity`]) and the voxels. Out: its labels
+//! In: the place of the ventricle ([`crate::image::locate::rays::Cavity`]) and the voxels. Out: its labels
 //! at full resolution, and the reference intensity that fractions refer to.
 //!
 //! 1. The reference is the 98th percentile of the wall's voxels above 0.3 of its maximum (not
@@ -15,13 +15,13 @@ use std::collections::BinaryHeap;
 
 use rayon::prelude::*;
 
-use crate::geometry::Vec3;
-use crate::grid::Volume;
-use crate::grid::components::Components;
-use crate::grid::labels::Labels;
-use crate::locate::directions::Compass;
-use crate::locate::rays::Cavity;
-use crate::progress::{Cancelled, Monitor};
+use crate::base::geometry::Vec3;
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::Volume;
+use crate::image::grid::components::Components;
+use crate::image::grid::labels::Labels;
+use crate::image::locate::directions::Compass;
+use crate::image::locate::rays::Cavity;
 
 /// Greatest distance of the ventricle's voxels outward from the middle of the wall, mm.
 const MAX_OUTWARD_MM: f64 = 24.0;

@@ -6,9 +6,9 @@ use super::object::Object;
 use super::{
     IsoLevel, Isolate, SurfaceError, SurfaceFacts, SurfaceParameters, VolumeKind, intensity, label,
 };
-use crate::grid::Volume;
-use crate::grid::survey::{self, Survey};
-use crate::progress::Monitor;
+use crate::base::progress::Monitor;
+use crate::image::grid::Volume;
+use crate::image::grid::survey::{self, Survey};
 use std::cmp::Reverse;
 
 /// Labels from which none is taken for the object because it is the largest.

@@ -3,8 +3,8 @@
 //! Passes alternate between a shrinking and a growing umbrella step, which removes the staircase
 //! and the noise without shrinking the surface.
 
-use crate::geometry::Vec3;
-use crate::progress::{Cancelled, Monitor};
+use crate::base::geometry::Vec3;
+use crate::base::progress::{Cancelled, Monitor};
 
 /// Weight of the shrinking step.
 const SHRINKING_WEIGHT: f64 = 0.5;

@@ -310,7 +310,7 @@ mod tests {
         let [t] = triangles(1)[..] else { panic!() };
         let [a, b, c] = t
             .map(|e| middle(e).map(f64::from))
-            .map(crate::geometry::Vec3::from);
-        assert!(crate::geometry::triangle::area_normal(&a, &b, &c).sum() > 0.0);
+            .map(crate::base::geometry::Vec3::from);
+        assert!(crate::base::geometry::triangle::area_normal(&a, &b, &c).sum() > 0.0);
     }
 }

@@ -17,9 +17,9 @@
 use std::collections::BinaryHeap;
 
 use super::region::ordered;
-use crate::grid::components::Components;
-use crate::grid::labels::Labels;
-use crate::progress::{Cancelled, Monitor};
+use crate::base::progress::{Cancelled, Monitor};
+use crate::image::grid::components::Components;
+use crate::image::grid::labels::Labels;
 
 /// The most voxels of a bounding box that is filled from outside; larger ones are only cut.
 const MOST_FILLED: usize = 8_000_000;
@@ -329,7 +329,7 @@ fn is_simple(around: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use rand::RngExt;
 
     fn assert_ball(labels: &Labels) {

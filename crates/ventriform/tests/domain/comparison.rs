@@ -6,15 +6,15 @@
 use std::collections::BTreeSet;
 use std::sync::Mutex;
 
-use ventriform::comparison::{REVERSIBLE_POINTS, WhichScan};
-use ventriform::geometry::Vec3;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::heart::comparison::{REVERSIBLE_POINTS, WhichScan};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, Volume, VolumeFile};
 use ventriform::parameters::ComparisonParameters;
-use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
-use ventriform::report::NoBeatCode;
-use ventriform::rest_stress::{ComparedHearts, ComparisonError, ComparisonOrder, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+use ventriform::results::report::NoBeatCode;
+use ventriform::runs::rest_stress::{ComparedHearts, ComparisonError, ComparisonOrder, from_files};
 
 /// Mid and apical segments of the LAD.
 const LAD_SEGMENTS: [u8; 4] = [7, 8, 13, 14];
@@ -209,6 +209,6 @@ fn files_that_name_no_patient_are_flagged() {
     let not_gated = |scan| (scan, NoBeatCode::NotGated);
     assert_eq!(why, [WhichScan::Stress, WhichScan::Rest].map(not_gated));
     let text = serde_json::to_string(&report).unwrap();
-    let read: ventriform::report::ComparisonReport = serde_json::from_str(&text).unwrap();
+    let read: ventriform::results::report::ComparisonReport = serde_json::from_str(&text).unwrap();
     assert_eq!(read, report);
 }

@@ -4,15 +4,15 @@
 #![allow(clippy::unwrap_used)]
 
 use serde_json::Value;
-use ventriform::export::Format;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, Volume, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{NamedFile, SegmentationOrder, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, Volume, VolumeFile};
+use ventriform::results::export::Format;
+use ventriform::runs::segmentation::{NamedFile, SegmentationOrder, from_files};
 
 /// One element of a DICOM file, explicit VR, little endian.
 fn element(group: u16, number: u16, vr: &str, mut value: Vec<u8>) -> Vec<u8> {

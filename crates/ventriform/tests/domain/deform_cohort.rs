@@ -8,15 +8,15 @@
 use crate::shared_data::shared_data;
 use std::path::Path;
 
-use ventriform::grid::voxelise::Mask;
-use ventriform::model::{Organ, Template};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::model::{Organ, Template};
+use ventriform::image::grid::voxelise::Mask;
+use ventriform::image::volume::given_mask::{MaskChoice, read_mask};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeFile};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{NamedTemplate, SegmentationParameters, segment};
-use ventriform::volume::given_mask::{MaskChoice, read_mask};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, Volume, VolumeFile};
+use ventriform::runs::pipeline;
+use ventriform::runs::segmentation::{NamedTemplate, SegmentationParameters, segment};
 
 fn read(path: &Path) -> Reading {
     volume::read(

@@ -4,27 +4,27 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::Rotation3;
-use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness};
-use ventriform::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
-use ventriform::deform::{DeformError, DeformParameters, WallEdge};
-use ventriform::fit::{Fit, fit};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::agreement::compare;
-use ventriform::grid::field::Field;
-use ventriform::grid::voxelise::voxelise;
-use ventriform::judge::Flag;
-use ventriform::judge::flags::DarkPart;
-use ventriform::locate::{Hints, LocateError};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::{CancelToken, Monitor, Silent};
+use ventriform::heart::deform::dynamics::{self, Motion, StopReason};
+use ventriform::heart::deform::elastic::{Elastic, Stiffness};
+use ventriform::heart::deform::sensors::{EdgeShift, SensorKind, SensorSettings};
+use ventriform::heart::deform::{DeformError, DeformParameters, WallEdge};
+use ventriform::heart::fit::{Fit, fit};
+use ventriform::heart::judge::Flag;
+use ventriform::heart::judge::flags::DarkPart;
+use ventriform::heart::model::struts::struts;
+use ventriform::heart::model::{Organ, Template, TemplateError};
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::grid::field::Field;
+use ventriform::image::grid::voxelise::voxelise;
+use ventriform::image::locate::{Hints, LocateError};
+use ventriform::image::volume::Volume;
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::model::struts::struts;
-use ventriform::model::{Organ, Template, TemplateError};
-use ventriform::optimise::Reference;
-use ventriform::progress::{CancelToken, Monitor, Silent};
-use ventriform::segmentation::{OrganSearch, fit_built_in};
+use ventriform::runs::segmentation::{OrganSearch, fit_built_in};
+use ventriform::surface::optimise::Reference;
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
-use ventriform::volume::Volume;
 
 const SPACING_MM: f64 = 3.5;
 

@@ -8,18 +8,20 @@ use crate::shared_data::shared_data;
 
 use nalgebra::{Rotation3, Unit};
 use rayon::prelude::*;
-use ventriform::deform::DeformParameters;
-use ventriform::fit::fit;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::field::Field;
-use ventriform::model::{Organ, Template};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::DeformParameters;
+use ventriform::heart::fit::fit;
+use ventriform::heart::model::{Organ, Template};
+use ventriform::heart::polar::{self, PolarParameters};
+use ventriform::image::grid::field::Field;
+use ventriform::image::volume::phantom::{PerfusionDefect, Phantom, PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, ReadOptions, Volume, VolumeFile, read};
 use ventriform::parameters::ModelParameters;
-use ventriform::polar::{self, PolarParameters};
-use ventriform::progress::Monitor;
-use ventriform::volume::phantom::{PerfusionDefect, Phantom, PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, ReadOptions, Volume, VolumeFile, read};
-use ventriform::{optimise, retile, surface};
+use ventriform::surface;
+use ventriform::surface::optimise;
+use ventriform::surface::retile;
 
 /// A patient with a defect; the same pose for every seed.
 fn parameters(seed: u64, noise: f64) -> PhantomParameters {

@@ -8,17 +8,19 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::dynamics::{self, Motion, StopReason};
-use ventriform::deform::elastic::{Elastic, Stiffness};
-use ventriform::deform::sensors::{self, EdgeShift, PER_TRIANGLE, SensorKind, SensorSettings};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::field::Field;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::dynamics::{self, Motion, StopReason};
+use ventriform::heart::deform::elastic::{Elastic, Stiffness};
+use ventriform::heart::deform::sensors::{
+    self, EdgeShift, PER_TRIANGLE, SensorKind, SensorSettings,
+};
+use ventriform::heart::model::area_shares;
+use ventriform::heart::model::struts::struts;
+use ventriform::image::grid::field::Field;
+use ventriform::image::volume::Volume;
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::model::area_shares;
-use ventriform::model::struts::struts;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
 
 const SPACING_MM: f64 = 4.0;
 

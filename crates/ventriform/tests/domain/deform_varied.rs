@@ -3,15 +3,15 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::deform::{DeformParameters, WallEdge};
-use ventriform::fit::fit;
-use ventriform::grid::agreement::compare;
-use ventriform::grid::voxelise::{Mask, voxelise};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::{DeformParameters, WallEdge};
+use ventriform::heart::fit::fit;
+use ventriform::heart::model::{Organ, Template};
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::grid::voxelise::{Mask, voxelise};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters};
+use ventriform::image::volume::{self, Phantom};
 use ventriform::mesh::shapes;
-use ventriform::model::{Organ, Template};
-use ventriform::progress::Monitor;
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters};
-use ventriform::volume::{self, Phantom};
 
 fn defects(segments: &[u8], severity: f64) -> Vec<PerfusionDefect> {
     segments

@@ -3,15 +3,15 @@
 
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{ReadLimits, Volume, VolumeError, VolumeFile};
 use ventriform::mesh::{intersections, topology};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline::{self, Model, PipelineError};
-use ventriform::progress::Monitor;
-use ventriform::retile::RetileError;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{ReadLimits, Volume, VolumeError, VolumeFile};
+use ventriform::runs::pipeline::{self, Model, PipelineError};
+use ventriform::surface::retile::RetileError;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();

@@ -6,15 +6,16 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::decimate::decimate;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::mesh::TriMesh;
+use ventriform::mesh::decimate::decimate;
 use ventriform::mesh::intersections::self_intersections;
-use ventriform::optimise::{self, Reference};
 use ventriform::parameters::ModelParameters;
-use ventriform::progress::Monitor;
-use ventriform::volume::Volume;
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::{retile, surface};
+use ventriform::surface;
+use ventriform::surface::optimise::{self, Reference};
+use ventriform::surface::retile;
 
 fn heart(seed: u64) -> Volume {
     let parameters = PhantomParameters {

@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::{Monitor, Volume};
 
 /// The program of an example; `None`, after a line that says so, if it was not compiled.

@@ -10,11 +10,13 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use ventriform::export::animated::{self, Cycle};
-use ventriform::export::open_part::open_part;
-use ventriform::export::{ExportError, Format, Metadata, Part, VertexField, encode, read_json};
-use ventriform::geometry::Vec3;
+use ventriform::base::geometry::Vec3;
 use ventriform::mesh::{TriMesh, shapes};
+use ventriform::results::export::animated::{self, Cycle};
+use ventriform::results::export::open_part::open_part;
+use ventriform::results::export::{
+    ExportError, Format, Metadata, Part, VertexField, encode, read_json,
+};
 
 /// A cup at the position of a heart, with coordinates that have no short decimals.
 fn cup() -> TriMesh {

@@ -3,16 +3,16 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::fit::Fit;
-use ventriform::geometry::Vec3;
-use ventriform::grid::agreement::compare;
-use ventriform::grid::voxelise::{Mask, voxelise};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::fit::Fit;
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::grid::voxelise::{Mask, voxelise};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::image::volume::{Phantom, ReadLimits, Volume, VolumeFile};
 use ventriform::parameters::FitParameters;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationError, SegmentationOrder, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{Phantom, ReadLimits, Volume, VolumeFile};
+use ventriform::runs::segmentation::{SegmentationError, SegmentationOrder, from_files};
 
 fn patient() -> PhantomParameters {
     PhantomParameters {

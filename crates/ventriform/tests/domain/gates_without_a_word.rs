@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 use std::f64::consts::TAU;
-use ventriform::geometry::Vec3;
-use ventriform::grid::Affine;
-use ventriform::progress::Monitor;
-use ventriform::volume::gates::GATE_COUNTS;
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::{
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::Affine;
+use ventriform::image::volume::gates::GATE_COUNTS;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::{
     ReadLimits, ReadOptions, Volume, VolumeError, VolumeFile, inspect, read, read_gates,
 };
 

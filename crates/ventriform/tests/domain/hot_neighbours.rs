@@ -4,14 +4,14 @@
 // Helpers of a test state their expectations by panicking, as tests do.
 #![allow(clippy::unwrap_used)]
 
-use ventriform::grid::agreement::compare;
-use ventriform::grid::voxelise::Mask;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::agreement::compare;
+use ventriform::image::grid::voxelise::Mask;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, Phantom, PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::{FitParameters, Parameters};
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, Phantom, PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::segmentation::{SegmentationOrder, SegmentedVolume, from_files};
 
 fn scan(change: impl FnOnce(&mut PhantomParameters)) -> Phantom {
     let mut parameters = PhantomParameters {

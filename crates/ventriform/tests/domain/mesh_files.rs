@@ -10,13 +10,13 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::collections::BTreeSet;
 use std::io::Write as _;
-use ventriform::export::{Format, Metadata, Part, encode};
-use ventriform::geometry::Vec3;
-use ventriform::mesh::{TriMesh, shapes, topology};
-use ventriform::mesh_files::{
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::{CancelToken, Cancelled, Monitor, Silent};
+use ventriform::mesh::files::{
     MeshFileError, MeshFrame, MeshStatement, MeshUnit, ReadMesh, look, read, read_watched,
 };
-use ventriform::progress::{CancelToken, Cancelled, Monitor, Silent};
+use ventriform::mesh::{TriMesh, shapes, topology};
+use ventriform::results::export::{Format, Metadata, Part, encode};
 
 const MAX_BYTES: u64 = 1 << 24;
 

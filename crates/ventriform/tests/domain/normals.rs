@@ -5,15 +5,19 @@
 
 use std::fs;
 use std::sync::LazyLock;
-use ventriform::evaluate::normals::{NormalsOptions, build};
-use ventriform::normals::{NormalLimits, NormalsError, ScanKind, Sex};
+use ventriform::base::progress::Monitor;
+use ventriform::heart::normals::{NormalLimits, NormalsError, ScanKind, Sex};
+use ventriform::heart::polar::PlaceState;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{
+    PerfusionDefect, PhantomParameters, healthy_person, phantom,
+};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
 use ventriform::parameters::{FitParameters, NormalsChoice, NormalsParameters};
-use ventriform::polar::PlaceState;
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{SegmentationError, SegmentationOrder, SegmentedVolume, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, healthy_person, phantom};
-use ventriform::volume::{ReadLimits, VolumeFile};
+use ventriform::runs::evaluate::normals::{NormalsOptions, build};
+use ventriform::runs::segmentation::{
+    SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
+};
 
 /// Healthy hearts of the limits, and the first seed of others.
 const HEALTHY_PEOPLE: u64 = 14;

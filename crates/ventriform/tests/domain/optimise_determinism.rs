@@ -1,11 +1,11 @@
 //! The optimised mesh has the same bytes for any number of threads.
 
-use ventriform::geometry::Vec3;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::Monitor;
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::optimise::{OptimiseParameters, Optimised, Reference, optimise};
-use ventriform::progress::Monitor;
-use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
+use ventriform::surface::optimise::{OptimiseParameters, Optimised, Reference, optimise};
+use ventriform::surface::retile::{RetileFacts, Tiled};
 
 fn stretched(mut mesh: TriMesh) -> TriMesh {
     for v in &mut mesh.vertices {

@@ -5,21 +5,21 @@
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::Matrix3;
-use ventriform::deform::DeformParameters;
-use ventriform::fit::{Fit, fit};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::field::Field;
-use ventriform::locate::patient_orientation::{OrientationSource, Superior};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::heart::deform::DeformParameters;
+use ventriform::heart::fit::{Fit, fit};
+use ventriform::heart::model::{Organ, Template};
+use ventriform::heart::polar::{self, PolarMap, PolarParameters};
+use ventriform::image::grid::field::Field;
+use ventriform::image::locate::patient_orientation::{OrientationSource, Superior};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::image::volume::{Phantom, ReadLimits, Volume, VolumeFile};
 use ventriform::mesh::shapes;
-use ventriform::model::{Organ, Template};
 use ventriform::parameters::{FitParameters, Parameters};
-use ventriform::polar::{self, PolarMap, PolarParameters};
-use ventriform::progress::Monitor;
-use ventriform::segmentation::{Segmentation, SegmentationOrder, from_files};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{Phantom, ReadLimits, Volume, VolumeFile};
+use ventriform::runs::segmentation::{Segmentation, SegmentationOrder, from_files};
 
 /// A patient whose inferior wall takes up little.
 fn patient() -> Phantom {

@@ -3,16 +3,16 @@
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 use std::sync::OnceLock;
-use ventriform::export::{self, Format};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
+use ventriform::image::volume::{self, ReadLimits, Volume, VolumeFile};
 use ventriform::mesh::{intersections, topology};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline::{self, Model, PipelineError};
-use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
-use ventriform::volume::{self, ReadLimits, Volume, VolumeFile};
+use ventriform::results::export::{self, Format};
+use ventriform::runs::pipeline::{self, Model, PipelineError};
 
 /// A simulated scan, small enough for many runs.
 fn scan() -> &'static [u8] {

@@ -5,13 +5,13 @@
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 use ventriform::TriMesh;
-use ventriform::optimise::Reference;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::parameters::ModelParameters;
-use ventriform::pipeline;
-use ventriform::progress::Monitor;
-use ventriform::report::{MeasureParameters, measure};
+use ventriform::results::report::{MeasureParameters, measure};
+use ventriform::runs::pipeline;
+use ventriform::surface::optimise::Reference;
 use ventriform::surface::{self, Denoise, IsoLevel, SurfaceParameters};
-use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// Voxel size, noise, points, and the figures known: mean distance to the truth in mm, 2r/R in the
 /// mean and of the worst triangle.

@@ -5,28 +5,28 @@
 
 use std::path::Path;
 use tempfile::TempDir;
-use ventriform::deform::WallEdge;
-use ventriform::evaluate::calibration::{Calibration, CalibrationError, calibrate, cases_of};
-use ventriform::evaluate::sample::Sample;
-use ventriform::export::Format;
-use ventriform::grid::Volume;
-use ventriform::grid::voxelise::voxelise;
-use ventriform::mesh::intersections::self_intersections;
-use ventriform::mesh::topology::check;
-use ventriform::model::Organ;
-use ventriform::parameters::FitParameters;
-use ventriform::progress::{CancelToken, Monitor, Silent};
-use ventriform::reader::{
+use ventriform::base::progress::{CancelToken, Monitor, Silent};
+use ventriform::heart::deform::WallEdge;
+use ventriform::heart::model::Organ;
+use ventriform::heart::reader::{
     Learnt, LearntOn, ReaderDrawing, ReaderKind, ReaderLevel, ReaderOffset, ReaderOffsets,
     ReaderProfile, WallImage, drawn, measure,
 };
-use ventriform::report::{SegmentationReport, object};
-use ventriform::segmentation::{
+use ventriform::image::grid::Volume;
+use ventriform::image::grid::voxelise::voxelise;
+use ventriform::image::volume::nifti::{self, StoredType};
+use ventriform::image::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
+use ventriform::image::volume::{ReadLimits, VolumeFile};
+use ventriform::mesh::intersections::self_intersections;
+use ventriform::mesh::topology::check;
+use ventriform::parameters::FitParameters;
+use ventriform::results::export::Format;
+use ventriform::results::report::{SegmentationReport, object};
+use ventriform::runs::evaluate::calibration::{Calibration, CalibrationError, calibrate, cases_of};
+use ventriform::runs::evaluate::sample::Sample;
+use ventriform::runs::segmentation::{
     NamedReader, SegmentationError, SegmentationOrder, SegmentedVolume, from_files,
 };
-use ventriform::volume::nifti::{self, StoredType};
-use ventriform::volume::phantom::{PerfusionDefect, PhantomParameters, phantom};
-use ventriform::volume::{ReadLimits, VolumeFile};
 
 fn write(path: &Path, volume: &Volume, stored: StoredType) {
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();

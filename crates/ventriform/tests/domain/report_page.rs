@@ -9,21 +9,21 @@ use base64::Engine;
 use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::grid::Volume;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::Volume;
+use ventriform::image::volume::describe;
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::optimise::{
-    FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
-};
-use ventriform::progress::Monitor;
-use ventriform::report::{
+use ventriform::results::report::{
     Closeness, FileFacts, MeasureParameters, ModelReport, ReportInput, StartSummary, measure,
     model_page, object,
 };
-use ventriform::retile::{RetileFacts, Tiled};
 use ventriform::surface::Surface;
-use ventriform::volume::describe;
+use ventriform::surface::optimise::{
+    FitnessForm, FitnessSummary, OptimiseFacts, OptimiseParameters, Optimised, Reference,
+};
+use ventriform::surface::retile::{RetileFacts, Tiled};
 
 const HOSTILE_TEXT: &str = "</script><img src=x onerror=alert(1)>\"'&";
 
@@ -193,7 +193,7 @@ fn the_page_fetches_nothing_and_lets_no_text_become_markup() {
 fn the_policy_allows_the_pages_own_style_and_script_alone() {
     let model = model();
     let page = model_page(&report(&model), &model, None, None);
-    let policy = ventriform::draw::document::content_security_policy(true);
+    let policy = ventriform::image::draw::document::content_security_policy(true);
     assert!(page.contains(&policy) && policy.starts_with("default-src 'none'"));
     let mut hashed = 0;
     for kind in ["style", "script"] {

@@ -2,11 +2,11 @@
 //! topology of the surface.
 
 use std::sync::Mutex;
-use ventriform::geometry::Vec3;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Silent, Stage};
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::mesh::{TriMesh, shapes, topology};
-use ventriform::progress::{CancelToken, Monitor, Observer, Silent, Stage};
-use ventriform::retile::{Method, RetileError, RetileParameters, Tiled, retile};
+use ventriform::surface::retile::{Method, RetileError, RetileParameters, Tiled, retile};
 use ventriform::surface::{Surface, from_mesh};
 
 fn surface(mesh: TriMesh) -> Surface {

@@ -3,12 +3,12 @@
 //! number of threads.
 
 use rand::RngExt;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::random::{Purpose, stream};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::random::{Purpose, stream};
+use ventriform::base::progress::Monitor;
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::mesh::{TriMesh, shapes, topology};
-use ventriform::progress::Monitor;
-use ventriform::retile::{RetileError, RetileParameters, Tiled, retile};
+use ventriform::surface::retile::{RetileError, RetileParameters, Tiled, retile};
 use ventriform::surface::{Surface, from_mesh};
 
 fn surface(mesh: TriMesh) -> Surface {

@@ -9,12 +9,12 @@ use std::io::Read;
 use std::path::Path;
 
 use nalgebra::Matrix4;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::locate;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::locate;
+use ventriform::image::volume::Volume;
 use ventriform::mesh::topology;
-use ventriform::progress::Monitor;
 use ventriform::surface::{SurfaceParameters, extract, region};
-use ventriform::volume::Volume;
 
 /// Just enough NIfTI-1 for the cohort: little endian, sform, int16, uint8 or float32.
 fn read(path: &Path) -> Volume {

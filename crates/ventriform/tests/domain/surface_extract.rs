@@ -3,15 +3,15 @@
 #![allow(clippy::unwrap_used)] // Helpers state expectations by panicking too.
 
 use nalgebra::Matrix3;
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::{CancelToken, Monitor, Silent};
+use ventriform::image::volume::Volume;
 use ventriform::mesh::{shapes, topology};
-use ventriform::progress::{CancelToken, Monitor, Silent};
 use ventriform::surface::{
     IsoLevel, Isolate, Surface, SurfaceError, SurfaceParameters, TopologyMode, VolumeKind, extract,
     from_mesh,
 };
-use ventriform::volume::Volume;
 
 fn volume(shape: [usize; 3], spacing: [f64; 3], value: impl Fn(Vec3) -> f64) -> Volume {
     let frame = VoxelToPatient::centred(shape, spacing, Vec3::zeros()).unwrap();

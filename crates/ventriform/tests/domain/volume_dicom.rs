@@ -2,8 +2,8 @@
 
 use crate::shared_data::shared_data;
 use std::path::Path;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, AffineSource, ReadLimits, ReadOptions, Reading, VolumeFile};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, AffineSource, ReadLimits, ReadOptions, Reading, VolumeFile};
 
 fn read(path: &Path) -> Result<Reading, volume::VolumeError> {
     let options = ReadOptions::default();

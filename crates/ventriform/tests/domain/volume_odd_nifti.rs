@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)] // A test states its expectations by panicking.
 
 use crate::shared_data::shared_data;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Reading, VolumeError, VolumeFile};
 
 fn read(names: &[&str], frame: Option<usize>) -> Option<Result<Reading, VolumeError>> {
     let folder = shared_data("nifti-odd")?;

@@ -3,16 +3,16 @@
 //! Nearly all are made by Marching Cubes, as those of real scans are.
 
 use rand::{Rng, RngExt};
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::geometry::random::{Purpose, stream};
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::geometry::random::{Purpose, stream};
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::Volume;
+use ventriform::image::volume::phantom::{PhantomParameters, phantom};
 use ventriform::mesh::{TriMesh, shapes};
-use ventriform::progress::Monitor;
 use ventriform::surface::{
     IsoLevel, Isolate, Surface, SurfaceParameters, TopologyMode, extract, from_mesh,
 };
-use ventriform::volume::Volume;
-use ventriform::volume::phantom::{PhantomParameters, phantom};
 
 /// Iso-value of the fields below. Most of them grow by 1 per millimetre towards the inside.
 const ISO_LEVEL: f64 = 50.0;

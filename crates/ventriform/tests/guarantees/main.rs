@@ -16,14 +16,14 @@ mod families;
 use std::collections::BTreeMap;
 use std::fs;
 
-use ventriform::export::{Format, Metadata, encode};
+use ventriform::base::progress::Monitor;
 use ventriform::mesh::intersections::self_intersections;
 use ventriform::mesh::{TriMesh, topology};
-use ventriform::optimise::{Reference, optimise};
 use ventriform::parameters::ModelParameters;
-use ventriform::progress::Monitor;
-use ventriform::retile::{RetileError, retile};
+use ventriform::results::export::{Format, Metadata, encode};
 use ventriform::surface::Surface;
+use ventriform::surface::optimise::{Reference, optimise};
+use ventriform::surface::retile::{RetileError, retile};
 
 /// Numbers of points; the sweeps take them in turn.
 const POINT_COUNTS: [usize; 9] = [12, 150, 35, 300, 67, 20, 110, 500, 200];

@@ -1,10 +1,10 @@
 //! Ending a job with what it made.
 
 use super::Queue;
-use crate::items::WorkOutput;
-use crate::records::{
+use crate::base::records::{
     Failure, Fault, Job, JobOutcome, JobState, Lease, Product, Resource, StoreError,
 };
+use crate::items::WorkOutput;
 use serde_json::Value;
 
 impl Queue {

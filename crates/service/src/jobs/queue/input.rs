@@ -1,9 +1,9 @@
 //! Collecting the input of a job from the store.
 
 use super::Queue;
+use crate::base::records::{Failure, Fault, Job, StoreError, StoreFault};
 use crate::items::StoredItem;
 use crate::jobs::{Needs, Work, WorkInput};
-use crate::records::{Failure, Fault, Job, StoreError, StoreFault};
 use std::collections::BTreeMap;
 
 impl Queue {

@@ -5,16 +5,16 @@ mod input;
 mod peers;
 
 use super::JobObserver;
-use crate::items::{ExpiredPages, Items};
-use crate::records::{
+use crate::base::records::{
     Clock, DeathLimit, Deleted, ErasureAgent, Filed, Interrupted, Job, JobState, JobStore, Lease,
     NewJob, QueueLoad, Resource, StoreError, Tenant, Timestamp, random_id,
 };
+use crate::items::{ExpiredPages, Items};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 use tokio::sync::{Notify, broadcast};
-use ventriform::progress::CancelToken;
+use ventriform::base::progress::CancelToken;
 
 /// How many changes are buffered for a slow subscriber. One that falls further behind misses
 /// changes and has to read the table.

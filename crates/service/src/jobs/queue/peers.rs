@@ -12,7 +12,7 @@
 //! A process alone on its store has no peers: it is the leader, and never polls.
 
 use super::Queue;
-use crate::records::{JobState, News, Peers, StoreError};
+use crate::base::records::{JobState, News, Peers, StoreError};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

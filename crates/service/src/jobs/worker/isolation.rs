@@ -26,9 +26,9 @@
 //! goes to the service's.
 
 use super::run::Ended;
+use crate::base::records::{Failure, Fault, LocalFile};
 use crate::items::{OutputFile, StoredItem, WorkOutput};
 use crate::jobs::{Isolation, WorkError, WorkInput, Works};
-use crate::records::{Failure, Fault, LocalFile};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
-use ventriform::progress::{CancelToken, Monitor, Observer, Stage};
+use ventriform::base::progress::{CancelToken, Monitor, Observer, Stage};
 
 /// Longest time until the parent notices that the computation was cancelled.
 const CANCEL_POLL: Duration = Duration::from_millis(20);

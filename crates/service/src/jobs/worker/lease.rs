@@ -5,8 +5,8 @@
 //! dead. The expiry is for other runs on the same store.
 
 use super::WorkerSettings;
+use crate::base::records::{Claimant, Lease, random_id};
 use crate::jobs::Queue;
-use crate::records::{Claimant, Lease, random_id};
 use std::time::Duration;
 
 /// The outcome of renewing a lease.

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
-use ventriform::progress::{Observer, Plan, Stage, TotalProgress};
+use ventriform::base::progress::{Observer, Plan, Stage, TotalProgress};
 
 /// Shortest time between two writes within a stage. A new stage is written at once.
 const WRITE_INTERVAL: Duration = Duration::from_millis(200);

@@ -10,18 +10,18 @@
 use super::WorkerSettings;
 use super::lease::{self, Renewal};
 use super::progress::{ProgressReport, ProgressSender, WriteLimiter};
-use crate::items::WorkOutput;
-use crate::jobs::{Isolation, Queue, WorkError, Works};
-use crate::records::{
+use crate::base::records::{
     DeathLimit, Failure, Fault, Job, JobOutcome, Lease, LocalFile, StoreError, StoreFault,
 };
+use crate::items::WorkOutput;
+use crate::jobs::{Isolation, Queue, WorkError, Works};
 use std::convert::Infallible;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
-use ventriform::progress::{CancelToken, Monitor};
+use ventriform::base::progress::{CancelToken, Monitor};
 
 /// Voxels of a volume up to which a job is computed on the threads of the service: 128 x 128 x 128, or 8 gates of
 /// 64 x 64 x 64.

@@ -6,13 +6,13 @@
 use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
+use crate::base::records::{Failure, Product};
 use crate::items::{StoredItem, StoredResult};
-use crate::records::{Failure, Product};
-use ventriform::advice::Explain;
-use ventriform::export::dicom::{BeatEnd, BeatObject, DicomBeat, EndWall, Structure};
-use ventriform::gated::{end_mesh, gate_labels};
-use ventriform::report::{BeatReport, BeatSummary};
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
+use ventriform::results::export::dicom::{BeatEnd, BeatObject, DicomBeat, EndWall, Structure};
+use ventriform::results::report::{BeatReport, BeatSummary};
+use ventriform::runs::advice::Explain;
+use ventriform::runs::gated::{end_mesh, gate_labels};
 
 const REPORT_FILE: &str = "beat.json";
 

@@ -3,12 +3,14 @@
 use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
+use crate::base::records::Failure;
 use crate::items::{StoredResult, StoredSource};
-use crate::records::Failure;
-use ventriform::advice::Explain;
-use ventriform::export::dicom::{ComparisonObject, DicomComparison, SourceScan, Structure};
-use ventriform::report::ComparisonReport;
-use ventriform::volume::ReadLimits;
+use ventriform::image::volume::ReadLimits;
+use ventriform::results::export::dicom::{
+    ComparisonObject, DicomComparison, SourceScan, Structure,
+};
+use ventriform::results::report::ComparisonReport;
+use ventriform::runs::advice::Explain;
 
 const REPORT_FILE: &str = "comparison.json";
 

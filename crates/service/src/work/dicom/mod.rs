@@ -24,11 +24,11 @@ mod stored;
 
 pub use scan::check_stated;
 
+use crate::base::records::{Failure, Product, Resource};
 use crate::items::{OutputFile, StoredResult};
-use crate::records::{Failure, Product, Resource};
-use ventriform::comparison::WhichScan;
-use ventriform::export::dicom::{BeatEnd, BeatObject, ComparisonObject, DicomObject};
-use ventriform::volume::ReadLimits;
+use ventriform::heart::comparison::WhichScan;
+use ventriform::image::volume::ReadLimits;
+use ventriform::results::export::dicom::{BeatEnd, BeatObject, ComparisonObject, DicomObject};
 
 /// A DICOM object of a stored result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

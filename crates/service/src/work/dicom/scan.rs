@@ -5,18 +5,18 @@ use super::super::failures::{
 };
 use super::super::files::volume_files;
 use super::super::upload::UploadFacts;
+use crate::base::records::{Failure, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use crate::items::StoredSource;
-use crate::records::{Failure, ScanFields, ScanIdentity, Timestamp, rfc3339};
 use nalgebra::Matrix3;
 use serde_json::{Map, Value};
-use ventriform::advice::Explain;
-use ventriform::export::dicom::{
+use ventriform::base::geometry::Vec3;
+use ventriform::base::geometry::frame::VoxelToPatient;
+use ventriform::base::progress::Monitor;
+use ventriform::image::volume::{self, AffineSource, Provenance, ReadLimits, ReadOptions};
+use ventriform::results::export::dicom::{
     Deidentification, DicomError, Moment, SourceScan, StatedIdentity, identity,
 };
-use ventriform::geometry::Vec3;
-use ventriform::geometry::frame::VoxelToPatient;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, AffineSource, Provenance, ReadLimits, ReadOptions};
+use ventriform::runs::advice::Explain;
 
 /// Checks what a person states of a scan's identity beside what its file says, and completes one by
 /// the other.

@@ -3,16 +3,16 @@
 use super::super::failures::broken_result;
 use super::super::upload::UploadFacts;
 use super::{scan, stored};
+use crate::base::records::{Failure, Resource};
 use crate::items::{StoredItem, StoredResult};
-use crate::records::{Failure, Resource};
 use serde_json::Value;
-use ventriform::advice::Explain;
-use ventriform::export::dicom::{DicomObject, DicomResults, Structure};
-use ventriform::grid::voxelise::voxelise;
-use ventriform::progress::Monitor;
-use ventriform::report::SegmentationReport;
-use ventriform::segmentation::cavity;
-use ventriform::volume::ReadLimits;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::voxelise::voxelise;
+use ventriform::image::volume::ReadLimits;
+use ventriform::results::export::dicom::{DicomObject, DicomResults, Structure};
+use ventriform::results::report::SegmentationReport;
+use ventriform::runs::advice::Explain;
+use ventriform::runs::segmentation::cavity;
 
 /// The files of a result of which objects are made.
 pub const SOURCE_FILES: [&str; 5] = [MASK_FILE, MESH_FILE, REPORT_FILE, SLICES_FILE, POLAR_FILE];

@@ -1,16 +1,16 @@
 //! The stored files of a result.
 
 use super::super::failures::{broken_result, not_exportable};
+use crate::base::records::Failure;
 use crate::items::StoredItem;
-use crate::records::Failure;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
-use ventriform::advice::Explain;
-use ventriform::export::read_json;
-use ventriform::grid::voxelise::Mask;
+use ventriform::base::progress::Monitor;
+use ventriform::image::grid::voxelise::Mask;
+use ventriform::image::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
 use ventriform::mesh::TriMesh;
-use ventriform::progress::Monitor;
-use ventriform::volume::{self, ReadLimits, ReadOptions, Volume, VolumeFile};
+use ventriform::results::export::read_json;
+use ventriform::runs::advice::Explain;
 
 /// A file's content; `None` if the result has no such file.
 ///

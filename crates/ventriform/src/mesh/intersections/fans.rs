@@ -14,7 +14,7 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::Vec3;
+use crate::base::geometry::Vec3;
 use crate::mesh::TriMesh;
 
 /// Smallest volume of the parallelepiped of two edges and n over the product of their lengths. Rounding
@@ -84,7 +84,7 @@ fn is_embedded(vertices: &[Vec3], v: usize, ring: &[[u32; 2]]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use crate::mesh::intersections::triangles_intersect;
     use crate::mesh::{FaceId, shapes};
     use rand::RngExt;

@@ -5,8 +5,8 @@
 //! exactly ([`triangles_intersect`]). The answer is that of a test of all triangles.
 
 use super::pair::triangles_intersect;
-use crate::geometry::bvh::Aabb;
-use crate::geometry::{Vec3, triangle};
+use crate::base::geometry::bvh::Aabb;
+use crate::base::geometry::{Vec3, triangle};
 use crate::mesh::ids::{FaceId, VertexId, typed};
 
 /// Largest number of cells along one axis; limits the memory for very long shapes.
@@ -180,7 +180,7 @@ impl CellPlane {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use crate::mesh::shapes;
     use rand::RngExt;
 

@@ -18,7 +18,7 @@ use std::convert::Infallible;
 use rayon::prelude::*;
 
 use super::{FaceId, TriMesh};
-use crate::geometry::bvh::Bvh;
+use crate::base::geometry::bvh::Bvh;
 
 pub use index::IntersectionIndex;
 pub use pair::triangles_intersect;
@@ -81,7 +81,7 @@ pub fn self_intersections_while<E: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec3;
+    use crate::base::geometry::Vec3;
     use crate::mesh::shapes;
 
     #[test]

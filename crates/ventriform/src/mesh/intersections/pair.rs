@@ -6,8 +6,8 @@
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
-use crate::geometry::Vec3;
-use crate::geometry::bvh::Aabb;
+use crate::base::geometry::Vec3;
+use crate::base::geometry::bvh::Aabb;
 use crate::mesh::VertexId;
 
 /// Whether the closed triangles `s` and `t` have more in common than the vertices and edges
@@ -226,7 +226,7 @@ fn sign(x: f64) -> i8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::random::{Purpose, stream};
+    use crate::base::geometry::random::{Purpose, stream};
     use crate::mesh::ids::typed;
     use rand::RngExt;
 

@@ -1,0 +1,418 @@
+//! `/v1/keys`: the keys of the caller's tenant, for callers with the scope `admin`. The operator
+//! makes the first one, and keys of other tenants, by `ventriform keys create`.
+
+use crate::app::App;
+use crate::edge::caller::Caller;
+use crate::edge::guard::AlreadyRecorded;
+use crate::openapi::{ListProblems, LookupProblems, UploadProblems};
+use crate::wire::links::rfc3339;
+use crate::wire::pagination::{PageQuery, next_cursor};
+use crate::wire::problem::{Answer, Problem, ProblemBody, shorten};
+use crate::wire::public_base::public_path;
+use crate::wire::query::{NoQuery, Query};
+use crate::wire::request::{PathSegments, json_object, unknown};
+use crate::wire::words::{ScopeName, Word};
+use axum::Extension;
+use axum::Json;
+use axum::extract::{Request, State};
+use axum::http::{StatusCode, header};
+use axum::response::IntoResponse;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::fmt::Display;
+use utoipa::{IntoParams, ToSchema};
+use ventriform_service::base::records::{Timestamp, parse_rfc3339};
+use ventriform_service::callers::{
+    Activity, ApiKey, KeyError, KeyRequest, MOST_MAKERS, Maker, Quota, Scope,
+};
+
+/// A key. Its secret is shown once, when it is made.
+#[derive(Serialize, ToSchema)]
+#[schema(as = Key)]
+pub struct KeyBody {
+    /// Its id.
+    #[schema(example = "0123456789abcdef")]
+    id: String,
+    /// Its name, which says what it is for.
+    #[schema(example = "scanner 2")]
+    name: String,
+    /// Whose items and jobs it opens.
+    #[schema(example = "default")]
+    tenant: String,
+    /// The acts that it allows.
+    scope: ScopeName,
+    /// Whether it opens the service.
+    state: KeyStateName,
+    /// The key that has made it, if a key has: its requests count as requests of that key too.
+    #[schema(example = "fedcba9876543210")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    made_by: Option<String>,
+    /// The subject of the OpenID Connect issuer whose key it is: that made it with a token, or with a key of its own.
+    #[schema(example = "contractor-7")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    owner: Option<String>,
+    /// When it was made (RFC 3339).
+    #[schema(format = DateTime)]
+    created_at: String,
+    /// From when on it is refused (RFC 3339).
+    #[schema(format = DateTime)]
+    expires_at: Option<String>,
+    /// When it was revoked (RFC 3339).
+    #[schema(format = DateTime)]
+    revoked_at: Option<String>,
+    /// Requests per minute; `null` is the service's general limit.
+    requests_per_minute: Option<u64>,
+    /// Bytes that its tenant may store; `null` is the service's general limit.
+    stored_bytes: Option<u64>,
+    /// Jobs of its tenant that may wait; `null` is the service's general limit.
+    queued_jobs: Option<u64>,
+    /// The key itself, to be sent as `Authorization: Bearer KEY`. Only in the answer that makes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    key: Option<String>,
+}
+
+/// Whether a key opens the service.
+#[derive(Serialize, ToSchema)]
+#[schema(as = KeyState)]
+#[serde(rename_all = "snake_case")]
+enum KeyStateName {
+    /// It does.
+    Active,
+    /// Its time is over.
+    Expired,
+    /// It was revoked.
+    Revoked,
+}
+
+/// A page of keys.
+#[derive(Serialize, ToSchema)]
+pub struct KeyList {
+    /// The keys, newest first.
+    keys: Vec<KeyBody>,
+    /// `cursor` of the next page; absent on the last.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    next_cursor: Option<String>,
+}
+
+/// A key to be made.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it documents the body, which is read field by field"
+)]
+pub struct NewKey {
+    /// Its name, which says what it is for.
+    #[schema(min_length = 1, max_length = 80, example = "scanner 2")]
+    name: String,
+    /// The acts that it allows: `read`, `submit` or `admin`.
+    #[schema(pattern = "^(read|submit|admin)$", example = "submit")]
+    scope: String,
+    /// From when on it is refused (RFC 3339). If absent, when the key or the token ends that makes it; never if that
+    /// never ends.
+    #[schema(format = DateTime)]
+    expires_at: Option<String>,
+    /// Requests per minute; the service's general limit if absent.
+    requests_per_minute: Option<u64>,
+    /// Bytes that the tenant may store; the service's general limit if absent.
+    stored_bytes: Option<u64>,
+    /// Jobs of the tenant that may wait; the service's general limit if absent.
+    queued_jobs: Option<u64>,
+}
+
+const KEY_FIELDS: [&str; 6] = [
+    "name",
+    "scope",
+    "expires_at",
+    "requests_per_minute",
+    "stored_bytes",
+    "queued_jobs",
+];
+
+/// Make a key
+///
+/// For the caller's tenant. The answer is the only place where the key itself is shown. Requests with it count as
+/// requests of the caller's key too, so that all keys that a key makes have together what it has. A key does not outlive
+/// the key that makes it. One that is made with a token ends with the token, unless `expires_at` asks for more and the
+/// operator allows it (`oidc_key_life`).
+#[utoipa::path(post, path = "/v1/keys", tag = "access", operation_id = "create_key",
+    request_body(content = NewKey, content_type = "application/json"),
+    responses(
+        (status = 201, description = "Made", body = KeyBody,
+            headers(("Location" = String, description = "The key's path"))),
+        UploadProblems))]
+pub async fn create_key(
+    State(app): State<App>,
+    caller: Caller,
+    _: NoQuery,
+    request: Request,
+) -> Answer {
+    let now = app.service.now();
+    let ends = Ends::of(&app, &caller, now);
+    let wanted = read(&json_object(&app, request).await?, &caller, ends)?;
+    let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
+    let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
+    app.service.access.add_key(&key, &event).await?;
+    app.guard.gate.refresh();
+    let location = public_path(&format!("/v1/keys/{}", key.id));
+    let body = KeyBody {
+        key: Some(text),
+        ..KeyBody::of(key, now)
+    };
+    let headers = [
+        (header::LOCATION, location),
+        (header::CACHE_CONTROL, "no-store".to_owned()),
+    ];
+    Ok((
+        StatusCode::CREATED,
+        headers,
+        Extension(AlreadyRecorded),
+        Json(body),
+    )
+        .into_response())
+}
+
+/// List keys
+///
+/// Those of the caller's tenant, revoked ones included.
+#[utoipa::path(get, path = "/v1/keys", tag = "access", operation_id = "list_keys",
+    params(PageQuery),
+    responses((status = 200, description = "A page, newest first", body = KeyList), ListProblems))]
+pub async fn list_keys(
+    State(app): State<App>,
+    caller: Caller,
+    Query(page): Query<PageQuery>,
+) -> Answer<Json<KeyList>> {
+    let page = page.charged().await?;
+    let now = app.service.now();
+    let page = app.service.access.keys(Some(&caller.tenant), page).await?;
+    let next_cursor = next_cursor(&page);
+    let keys = page.items.into_iter().map(|key| KeyBody::of(key, now));
+    Ok(Json(KeyList {
+        keys: keys.collect(),
+        next_cursor,
+    }))
+}
+
+/// Revoke a key
+///
+/// From now on it is refused. It stays in the list.
+#[utoipa::path(delete, path = "/v1/keys/{id}", tag = "access", operation_id = "revoke_key",
+    params(("id" = String, Path, description = "The key's id")),
+    responses((status = 204, description = "Revoked, now or earlier"), LookupProblems))]
+pub async fn revoke_key(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(id): PathSegments<String>,
+    _: NoQuery,
+) -> Answer {
+    let key = app.service.access.key(&id).await?;
+    if key.is_none_or(|key| key.tenant != caller.tenant) {
+        return Err(Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("There is no key `{}`.", shorten(&id)),
+        )
+        .fix("Take an id from the list at GET /v1/keys."));
+    }
+    let now = app.service.now();
+    let event = caller.by.event(Activity::KeyRevoked, now).on(&id);
+    app.service.access.revoke_key(&id, now, &event).await?;
+    app.guard.gate.refresh();
+    Ok((StatusCode::NO_CONTENT, Extension(AlreadyRecorded)).into_response())
+}
+
+/// When a key ends that a caller makes.
+#[derive(Clone, Copy)]
+struct Ends {
+    /// If it does not ask.
+    unasked: Option<Timestamp>,
+    /// At the latest.
+    last: Option<Timestamp>,
+}
+
+impl Ends {
+    fn of(app: &App, caller: &Caller, now: Timestamp) -> Self {
+        let (_, unasked) = caller.own;
+        let is_token = caller.key.is_none() && caller.owner.is_some();
+        let life = app.service.settings.oidc_key_life.0;
+        let life = Timestamp::try_from(life.as_millis()).unwrap_or(Timestamp::MAX);
+        let asked = is_token.then(|| now.saturating_add(life));
+        Self {
+            unasked,
+            last: unasked.map(|end| asked.map_or(end, |asked| asked.max(end))),
+        }
+    }
+}
+
+/// Keys to revoke.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct OwnerQuery {
+    /// The subject whose keys they are: `owner` in the list of keys
+    // An option, so that a query without it is refused by the handler.
+    #[param(required = true, min_length = 1, example = "contractor-7")]
+    owner: Option<String>,
+}
+
+/// The keys that were revoked.
+#[derive(Serialize, ToSchema)]
+pub struct RevokedKeys {
+    /// Their ids; those that had been revoked before are none of them.
+    #[schema(example = json!(["0123456789abcdef"]))]
+    revoked: Vec<String>,
+}
+
+/// Revoke the keys of a subject
+///
+/// All keys of the caller's tenant that a subject of the OpenID Connect issuer has made with its tokens, and those that
+/// were made with these. From now on they are refused. They stay in the list.
+#[utoipa::path(delete, path = "/v1/keys", tag = "access", operation_id = "revoke_keys_of_owner",
+    params(OwnerQuery),
+    responses(
+        (status = 200, description = "Revoked", body = RevokedKeys),
+        (status = 422, description = "It is not said whose keys to revoke",
+            body = ProblemBody, content_type = "application/problem+json"),
+        ListProblems))]
+pub async fn revoke_keys_of_owner(
+    State(app): State<App>,
+    caller: Caller,
+    Query(OwnerQuery { owner }): Query<OwnerQuery>,
+) -> Answer {
+    let owner = owner.filter(|owner| !owner.is_empty()).ok_or_else(|| {
+        Problem::invalid_field("owner", "`owner` is missing. Nothing was revoked.")
+            .fix("Give the `owner` that GET /v1/keys shows; or DELETE /v1/keys/ID for one key.")
+    })?;
+    let now = app.service.now();
+    let event = caller.by.event(Activity::KeyRevoked, now);
+    let access = &app.service.access;
+    let revoked = access
+        .revoke_keys_of(&owner, Some(&caller.tenant), now, &event)
+        .await?;
+    app.guard.gate.refresh();
+    Ok((Extension(AlreadyRecorded), Json(RevokedKeys { revoked })).into_response())
+}
+
+fn read(object: &Map<String, Value>, caller: &Caller, ends: Ends) -> Answer<KeyRequest> {
+    if let Some(name) = object
+        .keys()
+        .find(|name| !KEY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &KEY_FIELDS));
+    }
+    for required in ["name", "scope"] {
+        if !object.contains_key(required) {
+            return Err(
+                Problem::invalid_field(required, format!("`{required}` is missing."))
+                    .fix("Give a name, and one of the scopes read, submit and admin."),
+            );
+        }
+    }
+    let wrong = |field: &str, fix: &str| {
+        Problem::invalid_field(field, format!("`{field}` cannot be used.")).fix(fix)
+    };
+    let text = |field: &str, fix: &str| match object.get(field) {
+        None | Some(Value::Null) => Ok(None),
+        Some(Value::String(text)) => Ok(Some(text.clone())),
+        Some(_) => Err(wrong(field, fix)),
+    };
+    let number = |field: &str| match object.get(field) {
+        None | Some(Value::Null) => Ok(None),
+        Some(value) => value
+            .as_u64()
+            .filter(|number| i64::try_from(*number).is_ok())
+            .map(Some)
+            .ok_or_else(|| wrong(field, "Give a whole number from 0 to 9223372036854775807.")),
+    };
+    let scopes = "Give one of read, submit, admin.";
+    let scope = text("scope", scopes)?.and_then(|name| name.parse::<Scope>().ok());
+    let scope = scope.ok_or_else(|| wrong("scope", scopes))?;
+    let time = "Give a time such as 2027-01-31T00:00:00Z.";
+    let expires_at = text("expires_at", time)?
+        .map(|text| parse_rfc3339(&text).ok_or_else(|| wrong("expires_at", time)))
+        .transpose()?;
+    if !caller.scope.includes(scope) {
+        return Err(beyond("scope", caller.scope));
+    }
+    if scope == Scope::Admin && caller.makers + 1 >= MOST_MAKERS {
+        // It could make one more.
+        return Err(beyond("scope", Scope::Submit));
+    }
+    // What the maker has itself, and what the operator allows everybody.
+    let (own, _) = caller.own;
+    let bounded = |field: &str, own: Option<u64>, allowed: Option<u64>| {
+        let asked = number(field)?;
+        match (asked, allowed) {
+            (Some(asked), Some(allowed)) if asked > allowed => Err(beyond(field, allowed)),
+            (None, _) => Ok(own),
+            (asked, _) => Ok(asked),
+        }
+    };
+    let expires_at = match (expires_at, ends.last) {
+        (Some(asked), Some(last)) if asked > last => {
+            return Err(beyond("expires_at", rfc3339(last)));
+        }
+        (asked, _) => asked.or(ends.unasked),
+    };
+    Ok(KeyRequest {
+        name: text("name", "Give a text.")?.unwrap_or_default(),
+        tenant: caller.tenant.clone(),
+        scope,
+        quota: Quota {
+            requests: bounded("requests_per_minute", own.requests, caller.quota.requests)?,
+            bytes: bounded("stored_bytes", own.bytes, caller.quota.bytes)?,
+            jobs: bounded("queued_jobs", own.jobs, caller.quota.jobs)?,
+        },
+        maker: Maker::Caller(caller.key.clone()),
+        owner: caller.owner.clone(),
+        expires_at,
+    })
+}
+
+/// 422: a key gets no more than the one that makes it has, and than the operator allows.
+fn beyond(field: &str, allowed: impl Display) -> Problem {
+    Problem::invalid_field(
+        field,
+        format!("`{field}` is more than this caller may give: at most {allowed}."),
+    )
+    .fix("Give less, or leave it out; the operator can make keys with more by `ventriform keys create`.")
+}
+
+fn unusable(error: KeyError) -> Problem {
+    match error {
+        KeyError::Name => {
+            Problem::invalid_field("name", format!("Unusable: {error}.")).fix("Give a short name.")
+        }
+        KeyError::Expired => Problem::invalid_field("expires_at", format!("Unusable: {error}."))
+            .fix("Give a time in the future."),
+        KeyError::NoRandomNumbers => Problem::internal(error),
+    }
+}
+
+impl KeyBody {
+    fn of(key: ApiKey, now: Timestamp) -> Self {
+        use ventriform_service::callers::KeyState;
+        Self {
+            state: match key.state(now) {
+                KeyState::Active => KeyStateName::Active,
+                KeyState::Expired => KeyStateName::Expired,
+                KeyState::Revoked => KeyStateName::Revoked,
+            },
+            scope: Word(key.scope),
+            id: key.id,
+            name: key.name,
+            tenant: key.tenant.to_string(),
+            made_by: match key.maker {
+                Maker::Operator => None,
+                Maker::Caller(key) => key,
+            },
+            owner: key.owner,
+            created_at: rfc3339(key.created_at),
+            expires_at: key.expires_at.map(rfc3339),
+            revoked_at: key.revoked_at.map(rfc3339),
+            requests_per_minute: key.quota.requests,
+            stored_bytes: key.quota.bytes,
+            queued_jobs: key.quota.jobs,
+            key: None,
+        }
+    }
+}

@@ -1,0 +1,646 @@
+//! `/dicom-web/workitems`: Unified Procedure Steps over HTTP (UPS-RS, DICOM PS3.18 section 11), as
+//! the IHE profile AI Workflow for Imaging (AIW-I) uses them.
+//!
+//! Bodies are DICOM JSON: an array with one data set, or the data set alone. The Transaction UID of a
+//! claimed item is taken from the query (`transaction-uid`, `transaction`), from the header
+//! `Transaction-UID`, or from the body (0008,1195); clients differ. No answer shows it.
+
+use crate::app::App;
+use crate::edge::caller::Caller;
+use crate::edge::quota::reserve_item;
+use crate::openapi::{self, LookupProblems};
+use crate::resources::erasures::{ReceiptBody, acknowledged};
+use crate::wire::links::rfc3339;
+use crate::wire::memory::{charge, end_rows, read_row};
+use crate::wire::problem::{Answer, Problem, ProblemBody, body, shorten};
+use crate::wire::public_base::public_path;
+use crate::wire::query::{NoQuery, QueryReader};
+use crate::wire::request::{PathSegments, bytes_of, parsed};
+use axum::Json;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{AppendHeaders, IntoResponse};
+use serde::Deserialize;
+use serde_json::{Map, Value};
+use std::time::{Duration, Instant};
+use utoipa::IntoParams;
+use ventriform::base::progress::{Monitor, Stage};
+use ventriform::results::export::dicom::is_uid;
+use ventriform_service::base::dicom_tags::{
+    PROCEDURE_STEP_STATE, SOP_INSTANCE_UID, TRANSACTION_UID,
+    UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE,
+};
+use ventriform_service::base::records::{Erased, Timestamp};
+use ventriform_service::network::worklist::{
+    AddedWorkitem, Change, DataSetJson, Matching, Refusal, Workitem, WorkitemState, dicom_time,
+    new_uid,
+};
+
+const MEDIA_TYPE: &str = "application/dicom+json";
+
+/// Media types of DICOM JSON.
+const JSON_TYPES: [&str; 2] = [MEDIA_TYPE, "application/json"];
+
+/// Most items of a tenant.
+const MAX_WORKITEMS: u64 = 100_000;
+
+/// Items of a page, unless the client asks for fewer, and at most.
+const PAGE_ITEMS: (usize, usize) = (100, 1000);
+
+/// Items read from the table at a time.
+const BATCH_ITEMS: u32 = 200;
+
+/// Bytes of a page of items, unless one alone has more.
+const ANSWER_BYTES: usize = 2 << 20;
+
+/// Memory of a search: a batch of items, parsed, and the answer.
+const SEARCH_MEMORY: u64 = 20 << 20;
+
+/// Longest search.
+const LONGEST_SEARCH: Duration = Duration::from_secs(10);
+
+/// Attempts at a change that another one came before.
+const CHANGE_TRIES: u32 = 20;
+
+/// Pause before the second try of a change; it grows by as much with each further one, so that the tries
+/// of many requests spread.
+const CHANGE_PAUSE: Duration = Duration::from_millis(2);
+
+/// The query of a new work item.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct WorkitemQuery {
+    /// SOP Instance UID of the item
+    workitem: Option<String>,
+}
+
+/// The UID that is the whole query: PS3.18 writes `?workitem=UID`, but many clients write `?UID`.
+fn bare_uid(query: &QueryReader) -> Option<String> {
+    query.bare().filter(|uid| is_uid(uid)).map(str::to_owned)
+}
+
+/// Create a work item
+///
+/// A scheduled Unified Procedure Step. Its UID is given in the query, in the body (0008,0018), or
+/// made by the service. Absent attributes that a schedule needs get neutral values, which a
+/// `Warning` says.
+#[utoipa::path(post, path = "/dicom-web/workitems", tag = "workitems",
+    operation_id = "create_workitem",
+    params(WorkitemQuery),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses(
+        (status = 201, description = "Created",
+            headers(("Location" = String, description = "The item's path"))),
+        (status = 409, description = "There is an item of this UID",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::WorkitemProblems))]
+pub async fn create_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    query: QueryReader,
+    request: Request,
+) -> Answer {
+    let named = match bare_uid(&query) {
+        None => query.all::<WorkitemQuery>()?.workitem,
+        uid => uid,
+    };
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
+    let attributes = data_set(&app, request).await?;
+    let (field, named) = match named {
+        None => (SOP_INSTANCE_UID, attributes.text(SOP_INSTANCE_UID)),
+        Some(ref uid) => ("workitem", Some(uid.as_str())),
+    };
+    let uid = named.map_or_else(new_uid, str::to_owned);
+    require_uid(field, &uid)?;
+    let size = text_of(&attributes)?.len() as u64;
+    counting.arrived(size).await?;
+    let moment = now(&app);
+    let made = Workitem::create(&caller.tenant, &uid, attributes, (moment.0, &moment.1));
+    let (item, completed) = made.map_err(refused)?;
+    let worklist = app.service.worklist.clone();
+    let add = async move { worklist.add_workitem(&item, MAX_WORKITEMS).await };
+    match caller.by.change(add).await? {
+        AddedWorkitem::Done => {}
+        AddedWorkitem::Exists => {
+            return Err(Problem::new(
+                StatusCode::CONFLICT,
+                "workitem-exists",
+                "There is a work item of this UID.",
+            )
+            .fix("Give another UID, or none: then the service makes one."));
+        }
+        AddedWorkitem::Full => {
+            return Err(Problem::new(
+                StatusCode::INSUFFICIENT_STORAGE,
+                "too-many-workitems",
+                format!("There are {MAX_WORKITEMS} work items."),
+            )
+            .fix("Set `job_retention`, so that ended items are deleted."));
+        }
+    }
+    app.service.scheduled.notify_one();
+    let location = [(header::LOCATION, path(&uid))];
+    let warning = completed.then(|| {
+        let text = "The Workitem was created with modifications.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::CREATED, location, AppendHeaders(warning)).into_response())
+}
+
+/// Show a work item
+///
+/// Without its Transaction UID.
+#[utoipa::path(get, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "get_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item")),
+    responses(
+        (status = 200, description = "The item", body = openapi::WorkitemBody,
+            content_type = "application/dicom+json"),
+        openapi::ScopeProblems, LookupProblems))]
+pub async fn get_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    _: NoQuery,
+) -> Answer {
+    let item = find(&app, &caller, &uid).await?;
+    Ok(shown(StatusCode::OK, &[item.shown()]))
+}
+
+/// Erase a work item
+///
+/// With all that it says of the patient, in whatever state it is; whoever has claimed it finds it gone. Refused while this
+/// service performs it. The receipt is at the path in `Location`; `Prefer: return=representation` asks for it in the answer.
+#[utoipa::path(delete, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "delete_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        openapi::ErasureHeader),
+    responses(
+        (status = 200, description = "Erased; the receipt", body = ReceiptBody),
+        (status = 204, description = "Erased"),
+        (status = 409, description = "This service performs it",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::ScopeProblems, LookupProblems))]
+pub async fn delete_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    _: NoQuery,
+    headers: HeaderMap,
+) -> Answer {
+    let erased = app
+        .service
+        .erase_workitem(&caller.by, &caller.tenant, &uid)
+        .await?;
+    match erased {
+        Erased::Done(receipt) => Ok(acknowledged(*receipt, &headers)),
+        Erased::InUse | Erased::OnHold { .. } => Err(Problem::new(
+            StatusCode::CONFLICT,
+            "in-use",
+            "This service performs the work item.",
+        )
+        .fix("Wait for its job to end, or DELETE the job; GET /v1/jobs lists the jobs.")),
+        Erased::Unknown => Err(missing(&app, &caller, &uid).await),
+    }
+}
+
+/// A search for work items, besides the attributes that are matched.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct SearchQuery {
+    /// Greatest number of items
+    limit: Option<usize>,
+    /// Number of matching items to skip
+    offset: Option<usize>,
+    /// Only items in this state; any other attribute can be given likewise
+    #[serde(rename = "ProcedureStepState")]
+    state: Option<String>,
+}
+
+/// Search work items
+///
+/// Attributes are named by keyword or tag, with points between a sequence and what is in it:
+/// `ProcedureStepState=SCHEDULED`, `InputInformationSequence.StudyInstanceUID=1.2.3`. `*` and `?` are
+/// wildcards, `FIRST-LAST` is a range of dates. Items come with all their attributes, oldest first; a `Warning`
+/// says that there are more than one answer holds, to be asked for by `offset`.
+#[utoipa::path(get, path = "/dicom-web/workitems", tag = "workitems",
+    operation_id = "search_workitems",
+    params(SearchQuery),
+    responses(
+        (status = 200, description = "The items", body = openapi::WorkitemBody,
+            content_type = "application/dicom+json"),
+        (status = 204, description = "No item matches"),
+        (status = 413, description = "The search takes too long",
+            body = ProblemBody, content_type = "application/problem+json"),
+        openapi::ScopeProblems, openapi::ListProblems))]
+pub async fn search_workitems(
+    State(app): State<App>,
+    caller: Caller,
+    mut query: QueryReader,
+) -> Answer {
+    let search: SearchQuery = query.take()?;
+    let limit = search.limit.unwrap_or(PAGE_ITEMS.0).min(PAGE_ITEMS.1);
+    let mut skip = search.offset.unwrap_or(0);
+    let mut matching = Matching::default();
+    let state = search.state.map(|it| ("ProcedureStepState".to_owned(), it));
+    // All attributes are answered, and names are compared without regard to case.
+    let needless = ["includefield", "fuzzymatching"];
+    let mut wanted = query.rest();
+    wanted.retain(|(name, _)| !needless.contains(&name.as_str()));
+    for (name, value) in wanted.into_iter().chain(state) {
+        matching.add(&name, &value).map_err(|error| {
+            Problem::bad_request("unknown-parameter", format!("{error}."))
+                .at(&error.name)
+                .fix("Name attributes by keyword or tag, such as ProcedureStepState.")
+        })?;
+    }
+    charge(SEARCH_MEMORY).await?;
+    let state = matching
+        .wanted(PROCEDURE_STEP_STATE)
+        .and_then(WorkitemState::parse);
+    let late = Instant::now() + LONGEST_SEARCH;
+    let (mut found, mut count, mut after) = (String::new(), 0, 0);
+    let mut more = false;
+    'search: while count < limit {
+        if Instant::now() > late {
+            return Err(too_broad());
+        }
+        let page = app
+            .service
+            .worklist
+            .workitems(&caller.tenant, state, after, BATCH_ITEMS);
+        let page = page.await?;
+        let Some(last) = page.last() else { break };
+        after = last.sequence;
+        for item in matched(&app, &matching, page).await? {
+            if skip > 0 {
+                skip -= 1;
+                continue;
+            }
+            if count == limit {
+                break 'search;
+            }
+            let item = serde_json::to_string(item.shown()).map_err(Problem::internal)?;
+            if count > 0 && found.len() + item.len() > ANSWER_BYTES {
+                more = true;
+                break 'search;
+            }
+            found.push(match count {
+                0 => '[',
+                _ => ',',
+            });
+            found.push_str(&item);
+            count += 1;
+        }
+    }
+    if count == 0 {
+        return Ok(StatusCode::NO_CONTENT.into_response());
+    }
+    found.push(']');
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    // PS3.18, 8.3.4.4.
+    let warning = more.then(|| {
+        let text = "The number of results exceeded the maximum supported by the server. \
+                    Additional results can be requested.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::OK, headers, AppendHeaders(warning), found).into_response())
+}
+
+/// The items that match. Wildcards may be compared with much text, so that takes turns with what is decoded.
+async fn matched(app: &App, matching: &Matching, items: Vec<Workitem>) -> Answer<Vec<Workitem>> {
+    let is_match = |item: &Workitem, matching: &Matching| matching.matches(item.shown());
+    if !matching.has_patterns() {
+        let matched = items.into_iter().filter(|item| is_match(item, matching));
+        return Ok(matched.collect());
+    }
+    let matching = matching.clone();
+    let search = move |monitor: &Monitor<'_>| {
+        let mut matched = Vec::new();
+        for item in items {
+            if monitor.report(Stage::Read, 0.0).is_err() {
+                break;
+            }
+            if is_match(&item, &matching) {
+                matched.push(item);
+            }
+        }
+        matched
+    };
+    Ok(app.service.decoding.run(1, search).await?)
+}
+
+/// 413: PS3.18, table 8.3.4-1.
+fn too_broad() -> Problem {
+    Problem::new(
+        StatusCode::PAYLOAD_TOO_LARGE,
+        "search-too-broad",
+        format!("The search has not ended within {} seconds.", LONGEST_SEARCH.as_secs()),
+    )
+    .fix("Name the state, as in ProcedureStepState=SCHEDULED, or ask for fewer items by `limit` and `offset`.")
+}
+
+/// Change a work item
+///
+/// The attributes of the body replace those of the item. A claimed item needs the Transaction UID
+/// of its claim.
+#[utoipa::path(post, path = "/dicom-web/workitems/{uid}", tag = "workitems",
+    operation_id = "update_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        TransactionQuery, openapi::TransactionHeader),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses((status = 200, description = "Changed"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn update_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    query: QueryReader,
+    headers: HeaderMap,
+    request: Request,
+) -> Answer {
+    let counting = reserve_item(&app, &caller, request.headers()).await?;
+    let (changes, stated) = claimed_data_set(&app, query, &headers, request).await?;
+    counting.arrived(text_of(&changes)?.len() as u64).await?;
+    change(&app, &caller, &uid, |item, now| {
+        item.update(stated.as_deref(), changes.clone(), now)?;
+        Ok(Change::Done)
+    })
+    .await?;
+    // It may be ready now.
+    app.service.scheduled.notify_one();
+    Ok(StatusCode::OK.into_response())
+}
+
+/// Change the state of a work item
+///
+/// The body names the new state (0074,1000) and the Transaction UID (0008,1195). `IN PROGRESS` claims
+/// the item for the performer that made up this UID; `COMPLETED` and `CANCELED` end it.
+#[utoipa::path(put, path = "/dicom-web/workitems/{uid}/state", tag = "workitems",
+    operation_id = "change_workitem_state",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item"),
+        TransactionQuery, openapi::TransactionHeader),
+    request_body(content = openapi::WorkitemBody, content_type = "application/dicom+json"),
+    responses((status = 200, description = "The item is in this state"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn change_workitem_state(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    query: QueryReader,
+    headers: HeaderMap,
+    request: Request,
+) -> Answer {
+    let (wanted, stated) = claimed_data_set(&app, query, &headers, request).await?;
+    if let Some(uid) = &stated {
+        require_uid(TRANSACTION_UID, uid)?;
+    }
+    let state = wanted
+        .text(PROCEDURE_STEP_STATE)
+        .and_then(WorkitemState::parse);
+    let state = state.ok_or_else(|| {
+        Problem::bad_request(
+            "invalid-field",
+            "Procedure Step State (0074,1000) is missing or unknown.",
+        )
+        .at(PROCEDURE_STEP_STATE)
+        .fix("Give IN PROGRESS, COMPLETED or CANCELED.")
+    })?;
+    let done = change(&app, &caller, &uid, |item, now| {
+        item.change_state(stated.as_deref(), state, now)
+    });
+    let already = done.await? == Change::Already;
+    let warning = already.then(|| {
+        let state = state.as_str();
+        let text = format!("The UPS is already in the requested state of {state}.");
+        (header::WARNING, warning(&text))
+    });
+    Ok((StatusCode::OK, AppendHeaders(warning)).into_response())
+}
+
+/// Ask to cancel a work item
+///
+/// A scheduled item is canceled at once. Of a claimed one, the request is noted in the Procedure Step
+/// Progress Information, where its performer sees it. The body may say why.
+#[utoipa::path(post, path = "/dicom-web/workitems/{uid}/cancelrequest", tag = "workitems",
+    operation_id = "cancel_workitem",
+    params(("uid" = String, Path, description = "SOP Instance UID of the item")),
+    request_body(content = Option<openapi::WorkitemBody>, content_type = "application/dicom+json"),
+    responses((status = 202, description = "Accepted"),
+        openapi::WorkitemProblems, openapi::WorkitemConflict, LookupProblems))]
+pub async fn cancel_workitem(
+    State(app): State<App>,
+    caller: Caller,
+    PathSegments(uid): PathSegments<String>,
+    _: NoQuery,
+    request: Request,
+) -> Answer {
+    let bytes = bytes_of(request, &JSON_TYPES).await?;
+    let details = if bytes.is_empty() {
+        DataSetJson::default()
+    } else {
+        parsed(&app, bytes, parse).await?
+    };
+    let done = change(&app, &caller, &uid, |item, now| {
+        item.request_cancel(&details, now)
+    });
+    let already = done.await? == Change::Already;
+    let warning = already.then(|| {
+        let text = "The UPS is already in the requested state of CANCELED.";
+        (header::WARNING, warning(text))
+    });
+    Ok((StatusCode::ACCEPTED, AppendHeaders(warning)).into_response())
+}
+
+/// Changes an item, again if another change came before.
+async fn change(
+    app: &App,
+    caller: &Caller,
+    uid: &str,
+    how: impl Fn(&mut Workitem, (Timestamp, &str)) -> Result<Change, Refusal>,
+) -> Answer<Change> {
+    for tried in 0..CHANGE_TRIES {
+        tokio::time::sleep(CHANGE_PAUSE * tried).await;
+        let mut item = find(app, caller, uid).await?;
+        let moment = now(app);
+        let before = text_of(&item.attributes)?.len();
+        let done = how(&mut item, (moment.0, &moment.1)).map_err(refused)?;
+        let size = text_of(&item.attributes)?.len();
+        let limit = app.service.settings.json_limit;
+        if size > before && size as u64 > limit.0 {
+            return Err(body::too_large(limit));
+        }
+        if done == Change::Already {
+            return Ok(done);
+        }
+        let worklist = app.service.worklist.clone();
+        let change = async move { worklist.change_workitem(&item).await };
+        if caller.by.change(change).await? {
+            return Ok(done);
+        }
+        // It is read anew.
+        end_rows(0).await;
+    }
+    Err(Problem::contended("this work item"))
+}
+
+/// An item's attributes as they are stored.
+fn text_of(attributes: &DataSetJson) -> Answer<String> {
+    serde_json::to_string(attributes.object()).map_err(Problem::internal)
+}
+
+async fn find(app: &App, caller: &Caller, uid: &str) -> Answer<Workitem> {
+    let worklist = &app.service.worklist;
+    match read_row(|bytes| worklist.workitem_within(&caller.tenant, uid, bytes)).await? {
+        Some(item) => Ok(item),
+        None => Err(missing(app, caller, uid).await),
+    }
+}
+
+/// 410 if the item was erased, else 404.
+async fn missing(app: &App, caller: &Caller, uid: &str) -> Problem {
+    let catalogue = app.service.items().catalogue();
+    match catalogue.erased_at(&caller.tenant, uid).await {
+        Ok(Some(at)) if is_uid(uid) => Problem::new(
+            StatusCode::GONE,
+            "gone",
+            format!("The work item `{uid}` was erased at {}.", rfc3339(at)),
+        )
+        .fix("Create the work item again if it is still needed."),
+        Ok(_) => Problem::new(
+            StatusCode::NOT_FOUND,
+            "not-found",
+            format!("There is no work item `{}`.", shorten(uid)),
+        )
+        .fix("Take a UID from the list at GET /dicom-web/workitems."),
+        Err(error) => error.into(),
+    }
+}
+
+/// The time, also as DICOM writes it.
+fn now(app: &App) -> (Timestamp, String) {
+    let now = app.service.now();
+    (now, dicom_time(now))
+}
+
+fn path(uid: &str) -> String {
+    public_path(&format!("/dicom-web/workitems/{uid}"))
+}
+
+fn require_uid(field: &str, uid: &str) -> Answer<()> {
+    if is_uid(uid) {
+        Ok(())
+    } else {
+        Err(
+            Problem::bad_request("invalid-parameter", format!("`{field}` is not a UID."))
+                .at(field)
+                .fix("Give numbers separated by dots, at most 64 characters."),
+        )
+    }
+}
+
+/// The Transaction UID under which an item is claimed, under the names that clients give it.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(rename_all = "kebab-case")]
+pub struct TransactionQuery {
+    /// The Transaction UID under which the item is claimed; it may also be in the body
+    transaction_uid: Option<String>,
+    /// The Transaction UID under which the item is claimed; it may also be in the body
+    transaction: Option<String>,
+}
+
+/// The Transaction UID of the query or of the header.
+fn transaction(query: QueryReader, headers: &HeaderMap) -> Answer<Option<String>> {
+    let bare = bare_uid(&query);
+    if bare.is_some() {
+        return Ok(bare);
+    }
+    let query: TransactionQuery = query.all()?;
+    let header = headers
+        .get("transaction-uid")
+        .and_then(|value| value.to_str().ok());
+    let header = header.map(str::to_owned);
+    Ok(query.transaction_uid.or(query.transaction).or(header))
+}
+
+/// The data set of the body, and the Transaction UID wherever the client states it.
+async fn claimed_data_set(
+    app: &App,
+    query: QueryReader,
+    headers: &HeaderMap,
+    request: Request,
+) -> Answer<(DataSetJson, Option<String>)> {
+    let stated = transaction(query, headers)?;
+    let body = data_set(app, request).await?;
+    let stated = stated.or_else(|| body.text(TRANSACTION_UID).map(str::to_owned));
+    Ok((body, stated))
+}
+
+async fn data_set(app: &App, request: Request) -> Answer<DataSetJson> {
+    let bytes = bytes_of(request, &JSON_TYPES).await?;
+    parsed(app, bytes, parse).await
+}
+
+/// The data set in an array with one, or alone.
+fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
+    let malformed = |reason: &str| body::malformed_json(reason);
+    let value = serde_json::from_slice(bytes).map_err(|error| malformed(&error.to_string()))?;
+    let object = match value {
+        Value::Object(object) => Some(object),
+        Value::Array(mut sets) if sets.len() == 1 => match sets.pop() {
+            Some(Value::Object(object)) => Some(object),
+            _ => None,
+        },
+        _ => None,
+    };
+    let object: Map<String, Value> =
+        object.ok_or_else(|| malformed("DICOM JSON is an array with one data set"))?;
+    DataSetJson::of(object).map_err(|error| {
+        Problem::bad_request("malformed-dicom-json", format!("{error}."))
+            .at(&error.tag)
+            .fix("Send DICOM JSON (PS3.18 annex F), such as [{\"00741000\": {\"vr\": \"CS\", \"Value\": \
+                [\"SCHEDULED\"]}}].")
+    })
+}
+
+fn shown(status: StatusCode, sets: &[&Map<String, Value>]) -> axum::response::Response {
+    let headers = [
+        (header::CONTENT_TYPE, MEDIA_TYPE),
+        (header::CACHE_CONTROL, "no-store"),
+    ];
+    (status, headers, Json(sets)).into_response()
+}
+
+fn warning(text: &str) -> String {
+    format!("299 ventriform: {text}")
+}
+
+fn refused(refusal: Refusal) -> Problem {
+    let text = refusal.to_string();
+    let (problem, fix) = match &refusal {
+        Refusal::Attribute { tag, .. } => (
+            Problem::bad_request("invalid-field", format!("{text}.")).at(*tag),
+            "Correct the attribute.".to_owned(),
+        ),
+        Refusal::NoTransaction | Refusal::OtherTransaction => (
+            Problem::new(StatusCode::CONFLICT, "transaction-uid", &text).at(TRANSACTION_UID),
+            "Send the Transaction UID under which the item was claimed; whoever lost it cannot \
+             change the item."
+                .into(),
+        ),
+        Refusal::State { state } => (
+            Problem::new(StatusCode::CONFLICT, "workitem-state", &text).at(PROCEDURE_STEP_STATE),
+            format!("The item is {}.", state.as_str()),
+        ),
+        Refusal::Unfinished(_) => (
+            Problem::new(StatusCode::CONFLICT, "workitem-unfinished", &text)
+                .at(UNIFIED_PROCEDURE_STEP_PERFORMED_PROCEDURE_SEQUENCE),
+            "Add what was performed by POST to the item, then complete it.".into(),
+        ),
+    };
+    problem.fix(fix).header(header::WARNING, warning(&text))
+}

@@ -1,0 +1,275 @@
+//! `/v1/comparisons`: rest and stress of one patient, and the request that compares them.
+
+use crate::app::App;
+use crate::edge::caller::Caller;
+use crate::edge::quota::reserve_job;
+use crate::openapi::{self, FileProblems, UploadProblems, WaitAnswers};
+use crate::resources::files;
+use crate::resources::jobs::filing::{self, UploadJob};
+use crate::resources::jobs::{PriorityQuery, archives, order_of};
+use crate::resources::products::{self, Offer, ProductCollection, body_of_product, object_paths};
+use crate::resources::tags::TagQuery;
+use crate::wire::limits::BodyLimits;
+use crate::wire::links::path_of;
+use crate::wire::negotiate::preferred_wait;
+use crate::wire::problem::{Answer, Problem, shorten};
+use crate::wire::query::QueryReader;
+use crate::wire::request::{json_object, media_type, parameters_of, text, unknown};
+use crate::wire::webhook_request::{WebhookQuery, webhook_of};
+use axum::extract::{Request, State};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use ventriform::heart::comparison::WhichScan;
+use ventriform::parameters::ComparisonChoice;
+use ventriform::runs::rest_stress::{FILE_NAMES, mesh_of};
+use ventriform_service::base::records::{Product, Resource, Tenant};
+
+/// The collection of comparisons.
+pub struct Comparisons;
+
+const REPORT_FILE: &str = "comparison.json";
+const STRESS_MESH: &str = mesh_of(WhichScan::Stress);
+
+impl ProductCollection for Comparisons {
+    const RESOURCE_KIND: Resource = Resource::Comparison;
+    type Body = ComparisonBody;
+    const MESH_NAMES: &'static [&'static str] = &[STRESS_MESH, mesh_of(WhichScan::Rest)];
+    const MAIN_MESH: &'static str = STRESS_MESH;
+    const FILE_NAMES: &'static [&'static str] = FILE_NAMES;
+    const REPORT_FILE: &'static str = REPORT_FILE;
+    const FILE_SCHEMA: &'static str = "ComparisonFileName";
+    const FILE_HELP: &'static str = "`comparison.json` (the report), `report.html` (made on request; it names patient, \
+        study and series of the scan at stress as far as the key may see them), `slices.png` (slices of stress above \
+        those of rest), `segments.csv`, polar maps (`polar_stress`, `polar_rest`, `polar_difference`; with normal \
+        limits also `polar_z_stress`, `polar_score_stress` and those of rest) as `svg`, `png` and `json`, of each scan \
+        the fitted wall in each format (`mesh_stress.*`, `mesh_rest.*`, with the parts that `part` names) and the \
+        image about the heart in 256 steps (`region_stress.nii.gz`, `region_rest.nii.gz`). The `.dcm` files are DICOM \
+        objects of the study of the scan at stress, made on request; they need the scope `submit`, or \
+        `deidentify=true`.";
+    type FileAnswer = openapi::ComparisonFileAnswer;
+}
+
+body_of_product!(
+    /// A comparison: two scans of one patient, fitted by one model, with the main figures. Its volume is the scan at
+    /// stress, its parameter `rest` the one at rest.
+    ComparisonBody,
+    Comparison,
+    ComparisonLinks,
+    ventriform::parameters::ComparisonParameters,
+    ventriform::results::report::ComparisonSummary,
+    "Ratio of the cavities, summed scores, what is reversible and what fixed, and flags; the report has all figures.",
+    "cmp_2c26b46b68ffc68ff99b453c1d304134"
+);
+
+/// Paths of one comparison.
+#[derive(Serialize, ToSchema)]
+struct ComparisonLinks {
+    /// This comparison.
+    #[serde(rename = "self")]
+    itself: String,
+    /// The wall at stress, in the format that `Accept` asks for.
+    mesh: String,
+    /// The report.
+    report: String,
+    /// The report as an HTML page.
+    page: String,
+    /// Slices of stress above those of rest.
+    slices: String,
+    /// DICOM objects of the study of the scan at stress, for the archive.
+    dicom: Vec<String>,
+    /// The volume at stress.
+    stress: String,
+    /// The volume at rest.
+    rest: String,
+}
+
+impl ComparisonLinks {
+    fn of(comparison: &Product) -> Self {
+        let itself = path_of(&comparison.id);
+        let rest = comparison.parameters.get("rest").and_then(Value::as_str);
+        Self {
+            mesh: format!("{itself}/mesh"),
+            report: format!("{itself}/report"),
+            page: format!("{itself}/{}", files::REPORT_PAGE),
+            slices: format!("{itself}/slices.png"),
+            dicom: object_paths(comparison),
+            stress: path_of(comparison.volume.as_deref().unwrap_or_default()),
+            rest: path_of(rest.unwrap_or_default()),
+            itself,
+        }
+    }
+}
+
+/// The answers that a client which waits for a comparison may ask for: the report, or the slices.
+fn offers() -> Vec<Offer> {
+    vec![
+        Offer::new("application/json", REPORT_FILE),
+        Offer::new("image/png", "slices.png"),
+    ]
+}
+
+const BODY_FIELDS: [&str; 10] = [
+    "stress",
+    "rest",
+    "normals",
+    "parameters",
+    "priority",
+    "external_id",
+    "labels",
+    "webhook",
+    "send",
+    "to",
+];
+
+/// Compare rest and stress
+///
+/// `stress` and `rest` name volumes, or segmentations or beats of them. One model is fitted anew to both; scans that are both
+/// gated become beats. Corrections of a named segmentation or beat (`center`, `axis`, `base`, `segments_from`) are kept unless
+/// `parameters` state others (`stress_center`, `rest_axis`, ...). `normals` names the normal limits that score both. A form
+/// has the files `stress` and `rest`, and everything else in the query. The answer is 202 with the job, or with
+/// `Prefer: wait=60`, once it has ended, 200 with the report (`application/json`) or the slices of stress above those of rest.
+#[utoipa::path(post, path = "/v1/comparisons", tag = "comparisons",
+    request_body(content(
+        (openapi::ComparisonRequest = "application/json"),
+        (openapi::ComparisonForm = "multipart/form-data"))),
+    params(openapi::ComparisonQuery, TagQuery, PriorityQuery,
+        openapi::IdempotencyHeader,
+        openapi::PreferHeader, WebhookQuery, openapi::WebhookSecretHeader),
+    responses(openapi::ComparisonAnswer, WaitAnswers, FileProblems, UploadProblems))]
+pub async fn create_comparison(
+    State(app): State<App>,
+    caller: Caller,
+    query: QueryReader,
+    mut request: Request,
+) -> Answer {
+    if media_type(request.headers()).as_deref() == Some("multipart/form-data") {
+        let job = UploadJob {
+            makes: Resource::Comparison,
+            apart: &["rest"],
+            offers: offers(),
+        };
+        return filing::file_upload(&app, &caller, job, query, request).await;
+    }
+    refuse_query(&app, query)?;
+    let settings = &app.service.settings;
+    let limits = BodyLimits::of_json(settings, settings.json_limit);
+    request.extensions_mut().insert(limits);
+    let headers = request.headers().clone();
+    let counting = reserve_job(&app, &caller, &headers).await?;
+    let patience = preferred_wait(&headers);
+    if patience.is_some() {
+        products::choose(&headers, &offers())?;
+    }
+    let trace_parent = crate::edge::observe::trace_parent(&request);
+    let object = json_object(&app, request).await?;
+    if let Some(name) = object
+        .keys()
+        .find(|name| !BODY_FIELDS.contains(&name.as_str()))
+    {
+        return Err(unknown("field", name, &BODY_FIELDS));
+    }
+    let work = app.service.work_of(Resource::Comparison.noun())?;
+    let mut order = order_of(&app, &caller, &headers, &object, trace_parent)?;
+    order.send = archives::send_of(
+        &app,
+        &order.tenant,
+        &object,
+        Resource::Comparison.noun(),
+        None,
+    )?;
+    let stress = scan_of(&app, &caller.tenant, &object, WhichScan::Stress).await?;
+    let mut parameters = parameters_of(&object)?.clone();
+    let rest = scan_of(&app, &caller.tenant, &object, WhichScan::Rest).await?;
+    add(&mut parameters, "rest", rest.volume)?;
+    for (name, correction) in stress.corrections.into_iter().chain(rest.corrections) {
+        parameters.entry(name).or_insert(correction);
+    }
+    if let Some(normals) = text(&object, "normals")? {
+        add(&mut parameters, "normals", normals.to_owned())?;
+    }
+    let parameters = work.parameters_from_json(&parameters)?;
+    // Last, since looking up the name of its host may take seconds.
+    order.webhook = webhook_of(&app, &object).await?;
+    let filed = app
+        .service
+        .file_job(work, Some(stress.volume), parameters, order, &counting)
+        .await
+        .map_err(|error| error.naming("volume", WhichScan::Stress.as_str()))?;
+    filing::answer(&app, &caller, filed, patience, &headers, &offers()).await
+}
+
+/// Refuses a query beside a JSON body, in which everything is: what is wrong in it first.
+fn refuse_query(app: &App, query: QueryReader) -> Answer<()> {
+    let mut known = query.clone();
+    known.take::<TagQuery>()?.tags(app)?;
+    known.take::<PriorityQuery>()?.priority()?;
+    known.take::<WebhookQuery>()?;
+    let work = app.service.work_of(Resource::Comparison.noun())?;
+    work.parameters_from_text(&known.rest())?;
+    match query.rest().first() {
+        None => Ok(()),
+        Some((name, _)) => {
+            let twice = format!("`{}` is in the query, and the body is JSON.", shorten(name));
+            Err(Problem::bad_request("invalid-parameter", twice)
+                .at(name)
+                .fix("Give it in the body, parameters under `parameters`; or send both scans as a form."))
+        }
+    }
+}
+
+/// Adds a field of the request to the parameters.
+fn add(parameters: &mut Map<String, Value>, name: &str, value: String) -> Answer<()> {
+    match parameters.insert(name.to_owned(), value.into()) {
+        None => Ok(()),
+        Some(_) => {
+            let twice = format!("`{name}` is given in the body and in `parameters`.");
+            Err(Problem::invalid_field(name, twice).fix("Leave it out of `parameters`."))
+        }
+    }
+}
+
+/// A scan that a request names.
+struct NamedScan {
+    /// The id of its volume.
+    volume: String,
+    /// What was corrected of the fit that the request names, as parameters of the comparison.
+    corrections: Map<String, Value>,
+}
+
+/// The scan that a field names: a volume, or that of the segmentation or the beat which the field names.
+async fn scan_of(
+    app: &App,
+    tenant: &Tenant,
+    object: &Map<String, Value>,
+    scan: WhichScan,
+) -> Answer<NamedScan> {
+    let field = scan.as_str();
+    let Some(id) = text(object, field)? else {
+        let missing = format!("`{field}` is missing.");
+        return Err(Problem::invalid_field(field, missing)
+            .fix("Give the id of a stored volume, segmentation or beat."));
+    };
+    match Resource::of(id) {
+        Some(Resource::Segmentation | Resource::Beat) => {
+            let product = products::stored(app, tenant, id).await?;
+            let fit = product.map(|product| (product.item.volume, product.item.parameters));
+            match fit {
+                Some((Some(volume), parameters)) => Ok(NamedScan {
+                    volume,
+                    corrections: ComparisonChoice::corrections_of(&parameters, scan),
+                }),
+                _ => Err(app.service.names_nothing(tenant, field, id).await?.into()),
+            }
+        }
+        Some(Resource::Volume) => Ok(NamedScan {
+            volume: id.to_owned(),
+            corrections: Map::new(),
+        }),
+        _ => {
+            let other = format!("`{field}` is no id of a volume, a segmentation or a beat.");
+            Err(Problem::invalid_field(field, other)
+                .fix("Give the id of a stored volume, segmentation or beat."))
+        }
+    }
+}

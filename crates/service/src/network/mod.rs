@@ -1,0 +1,6 @@
+//! Other systems: webhooks, the hospital's archive, what others send, work items.
+
+pub mod archive;
+pub mod hooks;
+pub mod intake;
+pub mod worklist;

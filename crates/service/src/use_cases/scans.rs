@@ -1,0 +1,99 @@
+//! Whose scan a volume is: read from its files when it is stored, and again if a repair of the database has lost it.
+
+use crate::base::error::ServiceError;
+use crate::base::records::{BlobError, FileRecord, ScanFields, StoreFault, Tenant};
+use crate::use_cases::service::Service;
+use crate::work::INSPECTION_MEMORY;
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
+use ventriform::base::progress::Monitor;
+
+/// Pause after a failure to read the volumes whose scan was lost.
+const READ_RETRY: Duration = Duration::from_secs(30);
+
+impl Service {
+    /// The scan fields in the files of a stored volume, unless the tenant knows them already. To be
+    /// noted when the tenant uploads the volume again.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub(crate) async fn scan_to_note(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+        files: &[FileRecord],
+    ) -> Result<Option<ScanFields>, ServiceError> {
+        match self.items().catalogue().scan(tenant, volume).await? {
+            Some(known) if known.erased_at.is_none() => Ok(None),
+            _ => self.read_scan(volume, files).await,
+        }
+    }
+
+    /// The scan fields in the files of a stored volume; `None` if they name none.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn read_scan(
+        &self,
+        volume: &str,
+        files: &[FileRecord],
+    ) -> Result<Option<ScanFields>, ServiceError> {
+        let bytes = files.iter().map(|file| file.bytes).sum();
+        let files = self.items().volume_files(volume, files).await?;
+        let files = files.ok_or_else(|| {
+            let which = format!("a file of {volume} is missing");
+            BlobError::new(StoreFault::DamagedFile, which)
+        })?;
+        let reader = self.engine.reader.clone();
+        let scan = move |monitor: &Monitor<'_>| reader.scan(&files, monitor);
+        let found = self.decoding.run_on(bytes, INSPECTION_MEMORY, scan);
+        let found = found.await?;
+        // The volume was read when it was uploaded. A program that reads less of it now leaves it
+        // without identity.
+        Ok(found.unwrap_or_default())
+    }
+
+    /// Reads the scans of volumes that a repair has lost. Ends when all are read, or at `end`.
+    pub(crate) async fn read_unread_scans(&self, end: CancellationToken) {
+        end.run_until_cancelled(async {
+            let mut after = 0;
+            loop {
+                let next = self.items().catalogue().unread_scans(after, 1).await;
+                let Some(unread) = (match next {
+                    Ok(page) => page.into_iter().next(),
+                    Err(error) => {
+                        tracing::warn!(%error, "the volumes whose scan a repair has lost could not be listed; again soon");
+                        tokio::time::sleep(READ_RETRY).await;
+                        continue;
+                    }
+                }) else {
+                    return;
+                };
+                after = unread.sequence;
+                if self.note_scan(&unread.tenant, &unread.volume, &unread.files).await.is_err() {
+                    let volume = &unread.volume;
+                    tracing::warn!(volume, "the scan of this volume could not be read; the next start tries again");
+                }
+            }
+        })
+        .await;
+    }
+
+    /// Reads the scan of a stored volume and notes it for the tenant.
+    ///
+    /// # Errors
+    /// If the storage fails.
+    pub async fn note_scan(
+        &self,
+        tenant: &Tenant,
+        volume: &str,
+        files: &[FileRecord],
+    ) -> Result<(), ServiceError> {
+        let found = self.read_scan(volume, files).await?;
+        let noted = self
+            .items()
+            .catalogue()
+            .note_scan(tenant, volume, found.as_ref());
+        Ok(noted.await?)
+    }
+}

@@ -1,0 +1,124 @@
+//! The position of an organ in a volume.
+
+use super::error::DeformError;
+use super::parameters::DeformParameters;
+use crate::base::geometry::Vec3;
+use crate::base::geometry::bvh::Aabb;
+use crate::base::progress::{Cancelled, Monitor, Stage};
+use crate::heart::model::Template;
+use crate::image::grid::Volume;
+use crate::image::grid::field::Field;
+use crate::image::grid::smoothness::smoothness_mm;
+use crate::image::locate;
+use crate::image::locate::body::{self, Blob};
+use crate::image::locate::localisation::Localisation;
+use crate::image::locate::patient_orientation::PatientOrientation;
+
+/// Half the side of the cube about a ventricle's centre whose smoothness is measured, mm.
+const SMOOTHNESS_REACH_MM: f64 = 75.0;
+/// Multiple of the wall's uptake at which that cube is clipped: large hot neighbours, such as a liver, are smooth.
+const SMOOTHNESS_CEILING: f64 = 1.3;
+/// Gaussian blur of that cube, which takes its noise away, sigma in mm.
+const SMOOTHNESS_BLUR_MM: f64 = 5.0;
+
+/// The position of an organ in a volume: the same for all templates of the organ.
+#[derive(Debug, Clone)]
+pub enum OrganPosition {
+    /// A left ventricle.
+    Ventricle {
+        /// Where it was found.
+        found: Localisation,
+        /// The patient's orientation in the frame.
+        orientation: PatientOrientation,
+        /// The smoothness of the image about it, mm ([`smoothness`](crate::image::grid::smoothness)).
+        smoothness_mm: Option<f64>,
+    },
+    /// Any other organ.
+    Body {
+        /// The bright body.
+        blob: Blob,
+        /// In a map of several labels, the mask of the label that is fitted.
+        mask: Option<Volume>,
+    },
+}
+
+impl OrganPosition {
+    /// Searches `volume` for the organ of `template`.
+    ///
+    /// # Errors
+    /// [`DeformError`].
+    pub fn find(
+        volume: &Volume,
+        template: &Template,
+        parameters: &DeformParameters,
+        monitor: &Monitor,
+    ) -> Result<Self, DeformError> {
+        parameters.validate()?;
+        monitor.report(Stage::Localise, 0.0)?;
+        let position = match template.cup {
+            Some(_) => {
+                let found = locate::find(volume, &parameters.hints, monitor)?.localisation()?;
+                let (superior, cup) = (parameters.superior, &found.cup);
+                let stated = PatientOrientation::stated(superior, parameters.anterior, &cup.axis);
+                let orientation = match stated {
+                    Some(stated) => stated,
+                    None => PatientOrientation::observed(volume, cup, superior, monitor)?,
+                };
+                OrganPosition::Ventricle {
+                    smoothness_mm: smoothness_about(&found, volume, monitor)?,
+                    found,
+                    orientation,
+                }
+            }
+            None => {
+                let mask = body::one_label(volume, &parameters.hints, monitor)?;
+                let picture = mask.as_ref().unwrap_or(volume);
+                let blob = body::find(picture, &parameters.hints, monitor)?;
+                OrganPosition::Body { blob, mask }
+            }
+        };
+        monitor.report(Stage::Localise, 1.0)?;
+        Ok(position)
+    }
+
+    /// The patient's orientation in the frame; the frame's own for organs other than ventricles.
+    pub(super) fn patient_orientation(&self) -> PatientOrientation {
+        match self {
+            OrganPosition::Ventricle { orientation, .. } => *orientation,
+            OrganPosition::Body { .. } => PatientOrientation::FRAME,
+        }
+    }
+
+    /// The smoothness of the image about a ventricle, mm; `None` for other organs.
+    pub(super) fn smoothness_mm(&self) -> Option<f64> {
+        match self {
+            OrganPosition::Ventricle { smoothness_mm, .. } => *smoothness_mm,
+            OrganPosition::Body { .. } => None,
+        }
+    }
+
+    /// The image to fit to, where it is not the volume itself.
+    pub(super) fn mask(&self) -> Option<&Volume> {
+        match self {
+            OrganPosition::Ventricle { .. } => None,
+            OrganPosition::Body { mask, .. } => mask.as_ref(),
+        }
+    }
+}
+
+/// The smoothness of the image about the ventricle that was found, mm.
+fn smoothness_about(
+    found: &Localisation,
+    volume: &Volume,
+    monitor: &Monitor,
+) -> Result<Option<f64>, Cancelled> {
+    let reach = Vec3::repeat(SMOOTHNESS_REACH_MM);
+    let region = Aabb::of(&[found.cup.centre - reach, found.cup.centre + reach]);
+    let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
+    let ceiling = (SMOOTHNESS_CEILING * found.wall) as f32;
+    let clipped = cube.values().iter().map(|value| value.min(ceiling));
+    let clipped = clipped.collect();
+    let mut cube = cube.with_values(clipped);
+    cube.blur(SMOOTHNESS_BLUR_MM, monitor)?;
+    Ok(smoothness_mm(cube.values(), cube.shape(), cube.spacing()))
+}

@@ -1,0 +1,74 @@
+//! A picture as Secondary Capture Image Storage (PS3.3 A.8.1), in colour.
+
+use super::data_set::DataSet;
+use super::{DicomError, SourceScan, Structure};
+use crate::image::draw::Image;
+use crate::results::report::DrawnPage;
+use dicom_dictionary_std::tags;
+
+/// The pixels of a PNG file of an object; `name` names the object in errors.
+///
+/// # Errors
+/// [`DicomError::Picture`].
+pub(super) fn decoded(name: &'static str, png: &[u8]) -> Result<Image<3>, DicomError> {
+    Image::from_png(png).map_err(|reason| DicomError::Picture { name, reason })
+}
+
+/// A picture that shows the organ and numbers of segments, nothing about the patient.
+pub(super) fn anonymous(image: Image<3>) -> DrawnPage {
+    DrawnPage {
+        image,
+        is_identified: false,
+    }
+}
+
+/// Puts everything that is particular to this object of `scan`; `name` names it in errors, `picture` is what it shows.
+///
+/// # Errors
+/// [`DicomError::Picture`] if the picture has more rows or columns than an image may have.
+pub(super) fn put(
+    scan: &SourceScan,
+    structure: Structure,
+    name: &'static str,
+    picture: DrawnPage,
+    set: &mut DataSet,
+) -> Result<(), DicomError> {
+    let DrawnPage {
+        image,
+        is_identified,
+    } = picture;
+    let side = |length: usize| {
+        u16::try_from(length).map_err(|_| DicomError::Picture {
+            name,
+            reason: format!("{length} rows or columns are more than 65535"),
+        })
+    };
+    let (rows, columns) = (side(image.height)?, side(image.width)?);
+    scan.put_made(set);
+    set.text(tags::IMAGE_TYPE, "DERIVED\\SECONDARY");
+    set.text(tags::CONVERSION_TYPE, "SYN");
+    set.text(tags::DERIVATION_DESCRIPTION, structure.label);
+    set.known(tags::BODY_PART_EXAMINED, Some(structure.body_part));
+    set.empty(tags::PATIENT_ORIENTATION);
+    let burned_in = if is_identified { "YES" } else { "NO" };
+    set.text(tags::BURNED_IN_ANNOTATION, burned_in);
+    set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
+    if let Some(images) = scan.images() {
+        let mut sources = images.processed();
+        for source in &mut sources {
+            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "NO");
+        }
+        set.items(tags::SOURCE_IMAGE_SEQUENCE, sources);
+    }
+    set.short(tags::SAMPLES_PER_PIXEL, 3);
+    set.text(tags::PHOTOMETRIC_INTERPRETATION, "RGB");
+    set.short(tags::PLANAR_CONFIGURATION, 0);
+    set.short(tags::ROWS, rows);
+    set.short(tags::COLUMNS, columns);
+    set.short(tags::BITS_ALLOCATED, 8);
+    set.short(tags::BITS_STORED, 8);
+    set.short(tags::HIGH_BIT, 7);
+    set.short(tags::PIXEL_REPRESENTATION, 0);
+    set.bytes(tags::PIXEL_DATA, image.pixels.into_flattened());
+    Ok(())
+}

@@ -1,0 +1,418 @@
+//! A comparison of rest and stress as DICOM objects: its figures as a structured report, its pictures as Secondary
+//! Captures.
+//!
+//! In: the report of a comparison, both scans with their images, and the pictures. Out: the bytes of
+//! [`ComparisonObject`]s. The page joins the pictures and what the report says into one. All belong to the patient and
+//! the study of the scan at stress; the report refers to the images of both scans, each in its own study.
+//!
+//! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of both scans together, one
+//! of each scan, whose patient's state says which (CID 3207), one of each artery's territory, one of each of the 17
+//! segments in each state, and one of each segment's change. The group of a scan names the limits that its scores stand
+//! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
+
+use super::codes::{Code, dcm, loinc, own, sct, ucum};
+use super::data_set::DataSet;
+use super::normals::{
+    DEFECT_EXTENT, DEFICIT_SCORE, REST_SCORE, SCORE_UNIT, SEGMENT_SCORE, STRESS_SCORE, limits_used,
+    patient_state,
+};
+use super::structured_report::{
+    self as sr, Figure, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group,
+    measured, text, tracking,
+};
+use super::uid::Uids;
+use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
+use crate::heart::comparison::WhichScan;
+use crate::image::draw::Image;
+use crate::results::report::{
+    ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
+    ComparisonSheet, DrawnPage, comparison_sheet,
+};
+use dicom_dictionary_std::uids;
+
+/// An object of a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ComparisonObject {
+    /// The figures: Comprehensive 3D SR Storage.
+    Measurements,
+    /// The page of the report as one picture: Secondary Capture.
+    Page,
+    /// The polar map of a scan: Secondary Capture.
+    Polar(WhichScan),
+    /// The difference of both maps: Secondary Capture.
+    Difference,
+}
+
+impl ComparisonObject {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Measurements,
+        Self::Page,
+        Self::Polar(WhichScan::Stress),
+        Self::Polar(WhichScan::Rest),
+        Self::Difference,
+    ];
+
+    /// The name of the file.
+    pub fn file_name(self) -> &'static str {
+        self.facts().name
+    }
+
+    /// The files of the comparison with the pictures that the object shows, PNG: of a page those that there are, of a
+    /// polar map the one that it is. None for the figures.
+    pub fn pictures(self) -> &'static [&'static str] {
+        match self {
+            Self::Measurements => &[],
+            Self::Page => &PAGE_PICTURES,
+            Self::Polar(WhichScan::Stress) => &["polar_stress.png"],
+            Self::Polar(WhichScan::Rest) => &["polar_rest.png"],
+            Self::Difference => &["polar_difference.png"],
+        }
+    }
+
+    /// The picture without which there is no such object.
+    pub fn needed_picture(self) -> Option<&'static str> {
+        match self {
+            Self::Measurements | Self::Page => None,
+            Self::Polar(_) | Self::Difference => self.pictures().first().copied(),
+        }
+    }
+
+    fn facts(self) -> ObjectFacts {
+        let picture = |name, series, description| ObjectFacts {
+            name,
+            class: uids::SECONDARY_CAPTURE_IMAGE_STORAGE,
+            modality: "OT",
+            series,
+            description,
+        };
+        match self {
+            Self::Measurements => DicomObject::Measurements.facts(),
+            Self::Page => picture("page.dcm", 9107, "page of rest and stress"),
+            Self::Polar(WhichScan::Stress) => {
+                picture("polar_stress.dcm", 9108, "polar map at stress")
+            }
+            Self::Polar(WhichScan::Rest) => picture("polar_rest.dcm", 9109, "polar map at rest"),
+            Self::Difference => {
+                picture("polar_difference.dcm", 9110, "polar map, rest less stress")
+            }
+        }
+    }
+}
+
+/// Slices of stress above those of rest.
+const SLICES_PICTURE: &str = "slices.png";
+
+/// The pictures of a page: the slices, and polar maps with their titles.
+const PAGE_MAPS: [(&str, &str); 5] = [
+    ("polar_stress.png", "Stress"),
+    ("polar_rest.png", "Rest"),
+    ("polar_difference.png", "Rest less stress"),
+    ("polar_z_stress.png", "Stress against normal limits, z"),
+    ("polar_z_rest.png", "Rest against normal limits, z"),
+];
+
+const PAGE_PICTURES: [&str; 6] = [
+    SLICES_PICTURE,
+    PAGE_MAPS[0].0,
+    PAGE_MAPS[1].0,
+    PAGE_MAPS[2].0,
+    PAGE_MAPS[3].0,
+    PAGE_MAPS[4].0,
+];
+
+/// The results of a comparison.
+pub struct DicomComparison<'a> {
+    structure: Structure,
+    /// The scan at stress and the scan at rest.
+    scans: &'a [SourceScan; 2],
+    report: &'a ComparisonReport,
+    uids: Uids,
+}
+
+impl<'a> DicomComparison<'a> {
+    /// The results of a comparison of `structure`. `scans` are the scan at stress and the scan at rest; `text` is the
+    /// report as JSON in one line, from which UIDs are derived.
+    pub fn new(
+        structure: Structure,
+        scans: &'a [SourceScan; 2],
+        report: &'a ComparisonReport,
+        text: &str,
+    ) -> Self {
+        let uids = Uids::over_all(|add| {
+            add(env!("CARGO_PKG_VERSION").as_bytes());
+            add(b"comparison");
+            scans.iter().for_each(|scan| scan.add_to(add));
+            add(text.as_bytes());
+        });
+        Self {
+            structure,
+            scans,
+            report,
+            uids,
+        }
+    }
+
+    /// The bytes of [`ComparisonObject::Measurements`].
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn measurements(&self) -> Result<Vec<u8>, DicomError> {
+        self.check()?;
+        let mut set = DataSet::new();
+        let scans = self.scans.each_ref();
+        sr::put(&scans, self.structure, self.groups(), &[], &mut set);
+        let name = ComparisonObject::Measurements.file_name();
+        self.put(
+            ComparisonObject::Measurements,
+            self.uids.uid(name),
+            &mut set,
+        );
+        set.file()
+    }
+
+    /// The bytes of an object that shows pictures: `pictures` are those of [`ComparisonObject::pictures`] that there
+    /// are, each with its name. `None` for the figures, and for an object whose [`ComparisonObject::needed_picture`] is
+    /// not there.
+    ///
+    /// # Errors
+    /// See [`DicomError`].
+    pub fn picture(
+        &self,
+        object: ComparisonObject,
+        pictures: &[(&str, &[u8])],
+    ) -> Result<Option<Vec<u8>>, DicomError> {
+        self.check()?;
+        let name = object.file_name();
+        let decoded = |picture: &str| {
+            let found = pictures.iter().find(|(known, _)| *known == picture);
+            found
+                .map(|(_, png)| capture::decoded(name, png))
+                .transpose()
+        };
+        let drawn = match object {
+            ComparisonObject::Measurements => None,
+            ComparisonObject::Page => {
+                let slices = decoded(SLICES_PICTURE)?;
+                let mut maps = Vec::new();
+                for (map, title) in PAGE_MAPS {
+                    maps.extend(decoded(map)?.map(|image| (title, image)));
+                }
+                Some(self.page(slices.as_ref(), &maps))
+            }
+            ComparisonObject::Polar(_) | ComparisonObject::Difference => {
+                let map = object.needed_picture().map(decoded).transpose()?;
+                map.flatten().map(capture::anonymous)
+            }
+        };
+        let Some(drawn) = drawn else {
+            return Ok(None);
+        };
+        let mut set = DataSet::new();
+        let scan = match object {
+            ComparisonObject::Polar(WhichScan::Rest) if self.is_one_study() => &self.scans[1],
+            _ => &self.scans[0],
+        };
+        let instance = self.uids.over(name, drawn.image.pixels.as_flattened());
+        capture::put(scan, self.structure, name, drawn, &mut set)?;
+        self.put(object, instance, &mut set);
+        set.file().map(Some)
+    }
+
+    /// The page, which names patient and studies unless a scan is freed of the identity.
+    fn page(&self, slices: Option<&Image<3>>, maps: &[(&'static str, Image<3>)]) -> DrawnPage {
+        let [stress, rest] = self.scans.each_ref().map(SourceScan::shown);
+        comparison_sheet(&ComparisonSheet {
+            report: self.report,
+            slices,
+            maps,
+            scans: stress.zip(rest).map(|(stress, rest)| [stress, rest]),
+        })
+    }
+
+    fn check(&self) -> Result<(), DicomError> {
+        self.scans.iter().try_for_each(SourceScan::check)
+    }
+
+    fn is_one_study(&self) -> bool {
+        self.scans[0].study() == self.scans[1].study()
+    }
+
+    fn put(&self, object: ComparisonObject, instance: String, set: &mut DataSet) {
+        let facts = object.facts();
+        let series = self.uids.uid(&format!("series of {}", facts.name));
+        let what = match object {
+            ComparisonObject::Measurements => "measurements of rest and stress",
+            _ => facts.description,
+        };
+        let description = format!("{}: {what}", self.structure.label);
+        put_facts(&self.scans[0], &facts, [instance, series], description, set);
+    }
+
+    fn groups(&self) -> Vec<DataSet> {
+        let (report, label) = (self.report, self.structure.label);
+        let site = self.structure.site;
+        let mut content = self.beginning(&format!("{label}, rest and stress"), None, site);
+        content.extend(measured(report, COMPARISON_FIGURES));
+        let flags = report.flags.iter();
+        content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
+        let mut groups = vec![group("1501", content)];
+        for (scan, own, summed) in [
+            (WhichScan::Stress, &report.stress, STRESS_FIGURES),
+            (WhichScan::Rest, &report.rest, REST_FIGURES),
+        ] {
+            let name = format!("{label} at {scan}");
+            let mut content = self.beginning(&name, Some(scan), site);
+            content.extend(measured(own, SCAN_FIGURES));
+            content.extend(measured(report, summed));
+            content.extend(own.perfusion.iter().flat_map(limits_used));
+            groups.push(group("1501", content));
+        }
+        for territory in &report.territories {
+            let name = format!("Territory of {}", territory.name);
+            let mut content = self.beginning(&name, None, site);
+            content.extend(measured(territory, TERRITORY_FIGURES));
+            groups.push(group("1501", content));
+        }
+        for segment in &report.segments {
+            let number = segment.segment;
+            let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
+            let Some(site) = site else { continue };
+            for (state, figures) in [
+                (Some(WhichScan::Stress), SEGMENT_AT_STRESS),
+                (Some(WhichScan::Rest), SEGMENT_AT_REST),
+                (None, SEGMENT_CHANGE),
+            ] {
+                let figures = measured(segment, figures);
+                if figures.is_empty() {
+                    continue;
+                }
+                let of = state.map_or("change".to_owned(), |scan| scan.to_string());
+                let name = format!("Segment {number}, {of}");
+                let mut content = self.beginning(&name, state, *site);
+                content.extend(figures);
+                groups.push(group("1501", content));
+            }
+        }
+        groups
+    }
+
+    /// Tracking, finding, the patient's state and the site of a group.
+    fn beginning(&self, name: &str, state: Option<WhichScan>, site: Code) -> Vec<DataSet> {
+        let mut content = tracking(name, &self.uids.uid(name));
+        let finding = dcm("121071", "Finding");
+        content.push(concept("CONTAINS", finding, self.structure.kind));
+        content.extend(state.map(patient_state));
+        content.push(finding_site(site));
+        content
+    }
+}
+
+const NO_UNITS: Code = ucum("1", "no units");
+const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
+const VOLUME: Code = sct("118565006", "Volume");
+const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
+const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");
+
+/// Measurements of both scans together.
+const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(
+        |r| Some(r.tid),
+        sct(
+            "428832008",
+            "Transient ischemic dilatation ratio of left ventricular cavity",
+        ),
+        NO_UNITS,
+    ),
+    figure(|r| Some(r.reversible_percent), REVERSIBLE_SHARE, PERCENT),
+    figure(|r| Some(r.fixed_percent), FIXED_SHARE, PERCENT),
+    figure(
+        |r| r.sds.map(f64::from),
+        loinc("82644-6", "Summed difference score"),
+        SCORE_UNIT,
+    ),
+    figure(
+        |r| r.beat.as_ref()?.ef_change_points,
+        own("EF-CHANGE", "Ejection fraction at stress less that at rest"),
+        PERCENT,
+    ),
+];
+
+const STRESS_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(|r| r.sss.map(f64::from), STRESS_SCORE, SCORE_UNIT),
+    figure(
+        |r| r.beat.as_ref()?.stress_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
+];
+
+const REST_FIGURES: &[Figure<ComparisonReport>] = &[
+    figure(|r| r.srs.map(f64::from), REST_SCORE, SCORE_UNIT),
+    figure(
+        |r| r.beat.as_ref()?.rest_ef_percent,
+        EJECTION_FRACTION,
+        PERCENT,
+    ),
+];
+
+const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");
+
+/// Measurements of one scan.
+const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
+    figure(
+        |s| Some(s.cavity_ml),
+        own("CAVITY", "Volume of the cavity, all gates"),
+        MILLILITRE,
+    ),
+    figure(|s| Some(s.muscle_ml), VOLUME, MILLILITRE),
+    figure(
+        |s| match &s.perfusion {
+            Some(perfusion) => Some(perfusion.extent_percent),
+            None => Some(s.polar.as_ref()?.extent_percent),
+        },
+        DEFECT_EXTENT,
+        PERCENT,
+    ),
+    figure(
+        |s| Some(s.perfusion.as_ref()?.deficit_percent),
+        DEFICIT_SCORE,
+        PERCENT,
+    ),
+];
+
+const TERRITORY_FIGURES: &[Figure<ComparedTerritoryReport>] = &[
+    figure(
+        |t| Some(t.uptake.reversible_percent),
+        REVERSIBLE_SHARE,
+        PERCENT,
+    ),
+    figure(|t| Some(t.uptake.fixed_percent), FIXED_SHARE, PERCENT),
+];
+
+const SEGMENT_AT_STRESS: &[Figure<ComparedSegmentReport>] = &[
+    sr::mean(|s| s.uptake.stress_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| s.stress_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
+];
+
+const SEGMENT_AT_REST: &[Figure<ComparedSegmentReport>] = &[
+    sr::mean(|s| s.uptake.rest_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| s.rest_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
+];
+
+const SEGMENT_CHANGE: &[Figure<ComparedSegmentReport>] = &[
+    figure(
+        |s| s.uptake.difference_points,
+        own("DIFFERENCE", "Uptake at rest less that at stress"),
+        PERCENT,
+    ),
+    figure(
+        |s| {
+            s.uptake
+                .difference_points
+                .map(|_| s.uptake.reversible_percent)
+        },
+        REVERSIBLE_SHARE,
+        PERCENT,
+    ),
+];

@@ -1,0 +1,262 @@
+//! The figures of a segmentation's report as measurement groups of a structured report
+//! ([`structured_report`](super::structured_report)).
+//!
+//! One measurement group holds what was measured of the whole structure ([`STRUCTURE_FIGURES`]). It is a
+//! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
+//! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
+//! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
+//! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
+//! measured, not at the figure. The volumes of the anatomical
+//! wall and cavity have the ends of the interval that holds the true one. A scan beside normal limits has the groups of
+//! [`normals`] too. A figure that the report lacks is left out.
+
+use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
+use super::data_set::{DataSet, reference};
+use super::normals::{self, DEFECT_EXTENT};
+use super::structured_report::{
+    self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, SeriesReference,
+    WALL_SEGMENTS, concept, figure, finding_site, group, image, mean, measured, text, tracking,
+    within,
+};
+use super::{DicomObject, DicomResults};
+use crate::heart::polar::PolarSegment;
+use crate::results::report::SegmentationReport;
+use dicom_dictionary_std::{tags, uids};
+
+const VOLUME: Code = sct("118565006", "Volume");
+const WALL_MASS: Code = sct("118538004", "Mass");
+const WALL_THICKNESS: Code = dcm("122445", "Wall Thickness");
+const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
+
+const NO_UNITS: Code = ucum("1", "no units");
+
+/// Measurements of the whole structure. A new figure of the report is a new line here.
+const STRUCTURE_FIGURES: &[Figure<SegmentationReport>] = &[
+    figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
+    figure(SegmentationReport::muscle_g, WALL_MASS, GRAM),
+    mean(|r| r.wall_thickness_mm, WALL_THICKNESS, MILLIMETRE),
+    figure(
+        |r| Some(r.polar.as_ref()?.extent_percent),
+        DEFECT_EXTENT,
+        PERCENT,
+    ),
+    figure(
+        |r| Some(r.measures?.jaccard),
+        own("JACCARD", "Jaccard index with the expert's mask"),
+        NO_UNITS,
+    ),
+    figure(
+        |r| Some(r.measures?.dice),
+        own("DICE", "Dice index with the expert's mask"),
+        NO_UNITS,
+    ),
+    figure(
+        |r| r.measures?.contour_distance_mm,
+        own("CONTOUR-MM", "Mean contour distance to the expert's mask"),
+        MILLIMETRE,
+    ),
+    figure(
+        |r| r.measures?.hausdorff_mm,
+        own("HAUSDORFF-MM", "Hausdorff distance to the expert's mask"),
+        MILLIMETRE,
+    ),
+];
+
+/// A part of a ventricle that has volumes of its own, and what is measured of it.
+struct Part {
+    /// Its name, after the name of the structure.
+    name: &'static str,
+    /// Method of measurement, if there are several.
+    method: Option<Code>,
+    /// Where it was measured, if not in the whole structure.
+    site: Option<Code>,
+    figures: &'static [Figure<SegmentationReport>],
+}
+
+const WITH_BLUR: Code = own("APPARENT", "With the blur of the image");
+const WITHOUT_BLUR: Code = own("ANATOMICAL", "Without the blur of the image");
+
+const WALL_FIGURES: [Part; 5] = [
+    Part {
+        name: "cavity",
+        method: None,
+        site: Some(LV_CAVITY),
+        figures: &[figure(|r| r.volumes_ml.cavity, VOLUME, MILLILITRE)],
+    },
+    Part {
+        name: "apparent wall",
+        method: Some(WITH_BLUR),
+        site: None,
+        figures: &[
+            figure(|r| Some(r.volumes_ml.apparent?.wall), VOLUME, MILLILITRE),
+            mean(
+                |r| Some(r.thickness_mm?.apparent.mean),
+                WALL_THICKNESS,
+                MILLIMETRE,
+            ),
+        ],
+    },
+    Part {
+        name: "apparent cavity",
+        method: Some(WITH_BLUR),
+        site: Some(LV_CAVITY),
+        figures: &[figure(
+            |r| Some(r.volumes_ml.apparent?.cavity),
+            VOLUME,
+            MILLILITRE,
+        )],
+    },
+    Part {
+        name: "anatomical wall",
+        method: Some(WITHOUT_BLUR),
+        site: None,
+        figures: &[
+            within(
+                figure(|r| Some(r.volumes_ml.anatomical?.wall), VOLUME, MILLILITRE),
+                |r| Some(r.volumes_ml.anatomical_interval?.wall),
+            ),
+            mean(
+                |r| Some(r.thickness_mm?.anatomical.mean),
+                WALL_THICKNESS,
+                MILLIMETRE,
+            ),
+        ],
+    },
+    Part {
+        name: "anatomical cavity",
+        method: Some(WITHOUT_BLUR),
+        site: Some(LV_CAVITY),
+        figures: &[within(
+            figure(
+                |r| Some(r.volumes_ml.anatomical?.cavity),
+                VOLUME,
+                MILLILITRE,
+            ),
+            |r| Some(r.volumes_ml.anatomical_interval?.cavity),
+        )],
+    },
+];
+
+/// Measurements of each of them.
+const SEGMENT_FIGURES: &[Figure<PolarSegment>] = &[
+    mean(|s| s.mean_percent, MYOCARDIAL_PERFUSION, PERCENT),
+    figure(|s| Some(s.extent_percent), DEFECT_EXTENT, PERCENT),
+];
+
+/// Puts everything that is particular to this object.
+pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
+    let mask = SeriesReference {
+        series: results.series(DicomObject::Mask),
+        class: uids::SEGMENTATION_STORAGE,
+        instance: results.instance(DicomObject::Mask, None),
+    };
+    report::put(
+        &[results.scan],
+        results.structure,
+        groups(results),
+        &[mask],
+        set,
+    );
+}
+
+fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
+    let mut groups = vec![whole(results)];
+    groups.extend(
+        WALL_FIGURES
+            .iter()
+            .filter_map(|part| of_part(results, part)),
+    );
+    let polar = results.figures.and_then(|report| report.polar.as_ref());
+    for segment in polar.iter().flat_map(|polar| &polar.segments) {
+        let number = segment.number;
+        let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
+        let figures = measured(segment, SEGMENT_FIGURES);
+        let (Some(site), false) = (site, figures.is_empty()) else {
+            continue;
+        };
+        let name = format!("Segment {number}");
+        let mut content = tracking(&name, &results.uids.uid(&name));
+        content.push(concept(
+            "CONTAINS",
+            dcm("121071", "Finding"),
+            results.structure.kind,
+        ));
+        content.push(finding_site(*site));
+        content.extend(figures);
+        groups.push(group("1501", content));
+    }
+    let perfusion = (results.figures).and_then(|report| report.perfusion.as_ref());
+    groups.extend(
+        perfusion
+            .into_iter()
+            .flat_map(|perfusion| normals::groups(perfusion, results.structure, &results.uids)),
+    );
+    groups
+}
+
+/// The group of the whole structure.
+fn whole(results: &DicomResults<'_>) -> DataSet {
+    let structure = results.structure;
+    let mut content = tracking(structure.label, &results.tracking());
+    content.push(concept(
+        "CONTAINS",
+        dcm("121071", "Finding"),
+        structure.kind,
+    ));
+    content.push(finding_site(structure.site));
+    let images = results.scan.images();
+    if let Some(images) = &images {
+        content.push(image(
+            "CONTAINS",
+            Some(dcm("121191", "Referenced Segment")),
+            segment_reference(results),
+        ));
+        for reference in images.references() {
+            content.push(image(
+                "CONTAINS",
+                Some(dcm("121233", "Source image for segmentation")),
+                reference,
+            ));
+        }
+    }
+    if let Some(report) = results.figures {
+        content.extend(measured(report, STRUCTURE_FIGURES));
+        let comment = dcm("121106", "Comment");
+        let flags = report.flags.iter();
+        content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
+        let ranges = report
+            .volumes_ml
+            .anatomical_interval
+            .map(|_| RANGES_COMMENT);
+        content.extend(ranges.map(|ranges| text("CONTAINS", comment, ranges)));
+    }
+    group(if images.is_some() { "1411" } else { "1501" }, content)
+}
+
+/// The group of one part; `None` where the report tells nothing of it.
+fn of_part(results: &DicomResults<'_>, part: &Part) -> Option<DataSet> {
+    let figures = measured(results.figures?, part.figures);
+    if figures.is_empty() {
+        return None;
+    }
+    let structure = results.structure;
+    let name = format!("{}, {}", structure.label, part.name);
+    let mut content = tracking(&name, &results.uids.uid(part.name));
+    let finding = dcm("121071", "Finding");
+    content.push(concept("CONTAINS", finding, structure.kind));
+    let method = sct("370129005", "Measurement Method");
+    content.extend(
+        part.method
+            .map(|code| concept("HAS CONCEPT MOD", method, code)),
+    );
+    content.push(finding_site(part.site.unwrap_or(structure.site)));
+    content.extend(figures);
+    Some(group("1501", content))
+}
+
+fn segment_reference(results: &DicomResults<'_>) -> DataSet {
+    let instance = results.instance(DicomObject::Mask, None);
+    let mut item = reference(uids::SEGMENTATION_STORAGE, &instance);
+    item.short(tags::REFERENCED_SEGMENT_NUMBER, 1);
+    item
+}

@@ -1,0 +1,215 @@
+//! The mask as Segmentation Storage (PS3.3 A.51): one bit for each voxel. Segment 1 is the structure;
+//! segment 2, of a ventricle, its cavity. No voxel is of both.
+//!
+//! Every slice of a segment is a frame, also where it is empty: viewers that count frames would otherwise
+//! shift the mask. First come the frames of segment 1. Frames follow each other along row × column, against the order
+//! of the slices if the volume is left-handed (negative Spacing Between Slices), and each has its own Image Position.
+//! Each names the image or frame that its slice was read from, pixel for pixel (Spatial Locations Preserved), so that
+//! readers find it by that.
+
+use super::codes::{LV_CAVITY, SEGMENTATION_STEP};
+use super::data_set::DataSet;
+use super::source::for_processing;
+use super::{CAVITY_CIELAB, DicomError, DicomResults, STRUCTURE_CIELAB, algorithm, put_segment};
+use crate::base::geometry::Vec3;
+use crate::base::geometry::frame::VoxelToPatient;
+use crate::image::grid::voxelise::Mask;
+use dicom_core::Tag;
+use dicom_dictionary_std::tags;
+
+/// Rows, columns and positions of the slices of a volume as DICOM describes them.
+pub(super) struct SlicePlanes {
+    /// Direction of increasing column index, then of increasing row index; unit vectors.
+    pub directions: [Vec3; 2],
+    /// Distance of rows and of columns, mm.
+    pub spacing: [f64; 2],
+    /// Distance of the slices' planes, mm.
+    pub distance: f64,
+    /// Numbers of the slices in the order of their positions along row × column.
+    pub order: Vec<usize>,
+}
+
+impl SlicePlanes {
+    /// The planes of `slices` slices.
+    ///
+    /// # Errors
+    /// [`DicomError::Oblique`] if rows and columns are not at right angles.
+    pub(super) fn of(frame: &VoxelToPatient, slices: usize) -> Result<Self, DicomError> {
+        let [columns, rows, next] = [0, 1, 2].map(|axis| frame.linear().column(axis).into_owned());
+        let directions = [columns.normalize(), rows.normalize()];
+        // The tolerance of readers for direction cosines.
+        if directions[0].dot(&directions[1]).abs() > 1e-4 {
+            return Err(DicomError::Oblique);
+        }
+        let along = next.dot(&directions[0].cross(&directions[1]).normalize());
+        let mut order: Vec<usize> = (0..slices).collect();
+        if along < 0.0 {
+            order.reverse();
+        }
+        Ok(Self {
+            directions,
+            spacing: [rows.norm(), columns.norm()],
+            distance: along.abs(),
+            order,
+        })
+    }
+}
+
+/// Puts everything that is particular to this object.
+pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), DicomError> {
+    let scan = results.scan;
+    let [columns, rows, slices] = scan.shape;
+    let (Ok(rows), Ok(columns)) = (u16::try_from(rows), u16::try_from(columns)) else {
+        return Err(DicomError::TooLarge);
+    };
+    let planes = SlicePlanes::of(&scan.frame, slices)?;
+    scan.put_frame_of_reference(set);
+    results.put_content(set);
+    results.put_referenced_series(set);
+    set.text(tags::IMAGE_TYPE, "DERIVED\\PRIMARY");
+    set.short(tags::SAMPLES_PER_PIXEL, 1);
+    set.text(tags::PHOTOMETRIC_INTERPRETATION, "MONOCHROME2");
+    set.short(tags::ROWS, rows);
+    set.short(tags::COLUMNS, columns);
+    set.short(tags::BITS_ALLOCATED, 1);
+    set.short(tags::BITS_STORED, 1);
+    set.short(tags::HIGH_BIT, 0);
+    set.short(tags::PIXEL_REPRESENTATION, 0);
+    set.text(tags::LOSSY_IMAGE_COMPRESSION, "00");
+    set.text(tags::SEGMENTATION_TYPE, "BINARY");
+    let mut segment = DataSet::new();
+    results.put_segment(&mut segment);
+    put_look(&mut segment, STRUCTURE_CIELAB);
+    let mut segments = vec![segment];
+    let masks: Vec<&Mask> = [Some(results.mask), results.cavity]
+        .into_iter()
+        .flatten()
+        .collect();
+    if results.cavity.is_some() {
+        let mut segment = DataSet::new();
+        let tracking = results.uids.uid("tracking of the cavity");
+        put_segment(&mut segment, 2, LV_CAVITY, LV_CAVITY.meaning, &tracking);
+        put_look(&mut segment, CAVITY_CIELAB);
+        segments.push(segment);
+        set.text(tags::SEGMENTS_OVERLAP, "NO");
+    }
+    set.items(tags::SEGMENT_SEQUENCE, segments);
+
+    put_dimensions(results, set);
+    set.text(tags::NUMBER_OF_FRAMES, (masks.len() * slices).to_string());
+    set.item(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, shared(&planes));
+    let numbers = 1..=masks.len() as u16;
+    let frames = numbers.flat_map(|number| {
+        let frames = planes.order.iter().enumerate();
+        frames.map(move |(place, &k)| frame_groups(results, number, place, k))
+    });
+    set.items(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, frames.collect());
+    set.bytes(tags::PIXEL_DATA, bits(&masks, &planes.order));
+    Ok(())
+}
+
+/// By what a segment was made, and its colour.
+fn put_look(segment: &mut DataSet, colour: [u16; 3]) {
+    segment.text(tags::SEGMENT_ALGORITHM_NAME, "ventriform");
+    segment.item(
+        tags::SEGMENTATION_ALGORITHM_IDENTIFICATION_SEQUENCE,
+        algorithm(),
+    );
+    segment.shorts(tags::RECOMMENDED_DISPLAY_CIE_LAB_VALUE, &colour);
+}
+
+/// The Multi-frame Dimension module: the segment, then the position of the slice.
+fn put_dimensions(results: &DicomResults<'_>, set: &mut DataSet) {
+    let organization = results.uids.uid("dimensions");
+    let mut item = DataSet::new();
+    item.text(tags::DIMENSION_ORGANIZATION_UID, organization.as_str());
+    set.item(tags::DIMENSION_ORGANIZATION_SEQUENCE, item);
+    let index = |pointer: Tag, group: Tag, label: &str| {
+        let mut item = DataSet::new();
+        item.tag(tags::DIMENSION_INDEX_POINTER, pointer);
+        item.tag(tags::FUNCTIONAL_GROUP_POINTER, group);
+        item.text(tags::DIMENSION_ORGANIZATION_UID, organization.as_str());
+        item.text(tags::DIMENSION_DESCRIPTION_LABEL, label);
+        item
+    };
+    let segment = index(
+        tags::REFERENCED_SEGMENT_NUMBER,
+        tags::SEGMENT_IDENTIFICATION_SEQUENCE,
+        "Segment Number",
+    );
+    let position = index(
+        tags::IMAGE_POSITION_PATIENT,
+        tags::PLANE_POSITION_SEQUENCE,
+        "Image Position",
+    );
+    set.items(tags::DIMENSION_INDEX_SEQUENCE, vec![segment, position]);
+}
+
+/// Attributes that all frames share.
+fn shared(planes: &SlicePlanes) -> DataSet {
+    let mut measures = DataSet::new();
+    measures.decimals(tags::PIXEL_SPACING, &planes.spacing);
+    measures.decimals(tags::SLICE_THICKNESS, &[planes.distance]);
+    measures.decimals(tags::SPACING_BETWEEN_SLICES, &[planes.distance]);
+    let mut orientation = DataSet::new();
+    let cosines = planes.directions.iter().flat_map(|d| [d.x, d.y, d.z]);
+    let cosines: Vec<f64> = cosines.collect();
+    orientation.decimals(tags::IMAGE_ORIENTATION_PATIENT, &cosines);
+    let mut group = DataSet::new();
+    group.item(tags::PIXEL_MEASURES_SEQUENCE, measures);
+    group.item(tags::PLANE_ORIENTATION_SEQUENCE, orientation);
+    group
+}
+
+/// The functional groups of a segment's frame at `place`, which shows slice `k`.
+fn frame_groups(results: &DicomResults<'_>, number: u16, place: usize, k: usize) -> DataSet {
+    let mut group = DataSet::new();
+    let mut content = DataSet::new();
+    content.longs(
+        tags::DIMENSION_INDEX_VALUES,
+        vec![u32::from(number), place as u32 + 1],
+    );
+    group.item(tags::FRAME_CONTENT_SEQUENCE, content);
+    let mut position = DataSet::new();
+    let corner = results
+        .scan
+        .frame
+        .to_patient(&Vec3::new(0.0, 0.0, k as f64));
+    position.decimals(
+        tags::IMAGE_POSITION_PATIENT,
+        &[corner.x, corner.y, corner.z],
+    );
+    group.item(tags::PLANE_POSITION_SEQUENCE, position);
+    let mut segment = DataSet::new();
+    segment.short(tags::REFERENCED_SEGMENT_NUMBER, number);
+    group.item(tags::SEGMENT_IDENTIFICATION_SEQUENCE, segment);
+    if let Some(source) = results.scan.slice_reference(k) {
+        let mut derivation = DataSet::new();
+        let mut source = for_processing(source);
+        // Rows, columns and slices are the scan's own.
+        if results.scan.names_slice(k) {
+            source.text(tags::SPATIAL_LOCATIONS_PRESERVED, "YES");
+        }
+        derivation.item(tags::SOURCE_IMAGE_SEQUENCE, source);
+        derivation.code(tags::DERIVATION_CODE_SEQUENCE, SEGMENTATION_STEP);
+        group.item(tags::DERIVATION_IMAGE_SEQUENCE, derivation);
+    }
+    group
+}
+
+/// The slices of each mask in `order`, eight voxels to a byte, the first in the lowest bit; frames
+/// follow each other without padding (PS3.5 8.1.1).
+fn bits(masks: &[&Mask], order: &[usize]) -> Vec<u8> {
+    let slices = masks.iter().flat_map(|mask| {
+        let size = mask.shape[0] * mask.shape[1];
+        order
+            .iter()
+            .map(move |k| &mask.voxels[k * size..(k + 1) * size])
+    });
+    let voxels: Vec<bool> = slices.flatten().copied().collect();
+    let byte = |eight: &[bool]| {
+        let bits = eight.iter().enumerate();
+        bits.fold(0, |byte, (bit, set)| byte | u8::from(*set) << bit)
+    };
+    voxels.chunks(8).map(byte).collect()
+}

@@ -1,0 +1,380 @@
+//! The common parts of structured reports of measurements: Comprehensive 3D SR Storage (PS3.3 A.35.13), template TID
+//! 1500 of PS3.16.
+//!
+//! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
+//! source images, and the evidence. [`Figure`] is one figure of a report and how it is coded.
+
+use super::codes::{Code, OWN_SCHEME, dcm, sct, ucum};
+use super::data_set::{DataSet, reference};
+use super::{SourceScan, Structure};
+use crate::base::numeric::decimals::round;
+use dicom_core::Tag;
+use dicom_dictionary_std::tags;
+
+/// A figure of a report, or of an entry `T` of one, and how it is coded.
+pub(super) struct Figure<T> {
+    /// The figure; `None` or not finite where there is none.
+    pub value: fn(&T) -> Option<f64>,
+    pub concept: Code,
+    pub unit: Code,
+    /// Derivation from the single values.
+    pub derivation: Option<Code>,
+    /// An interval about the figure that holds the true value with a stated chance.
+    pub interval: Option<Interval<T>>,
+}
+
+/// The ends of an interval about a figure.
+type Interval<T> = fn(&T) -> Option<[f64; 2]>;
+
+/// The distance that the true value may lie below a figure, and above it (CID 225).
+/// The comment of a group with intervals: no code says how sure a range is.
+pub(super) const RANGES_COMMENT: &str =
+    "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
+
+const RANGE_BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
+const RANGE_ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
+
+pub(super) const MEAN_VALUE: Code = sct("373098007", "Mean");
+pub(super) const MILLILITRE: Code = ucum("ml", "milliliter");
+pub(super) const GRAM: Code = ucum("g", "gram");
+pub(super) const PERCENT: Code = ucum("%", "Percent");
+
+pub(super) const fn figure<T>(
+    value: fn(&T) -> Option<f64>,
+    concept: Code,
+    unit: Code,
+) -> Figure<T> {
+    Figure {
+        value,
+        concept,
+        unit,
+        derivation: None,
+        interval: None,
+    }
+}
+
+/// `figure` with an interval about it, whose ends are properties of the measurement (TID 310).
+pub(super) const fn within<T>(figure: Figure<T>, interval: Interval<T>) -> Figure<T> {
+    Figure {
+        value: figure.value,
+        concept: figure.concept,
+        unit: figure.unit,
+        derivation: figure.derivation,
+        interval: Some(interval),
+    }
+}
+
+pub(super) const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Figure<T> {
+    Figure {
+        value,
+        concept,
+        unit,
+        derivation: Some(MEAN_VALUE),
+        interval: None,
+    }
+}
+
+/// The 17 segments of the left ventricle in their order (CID 3717).
+pub(super) const WALL_SEGMENTS: [Code; 17] = [
+    sct("264850008", "left ventricle basal anterior segment"),
+    sct("396482007", "left ventricle basal anteroseptal segment"),
+    sct("396646008", "left ventricle basal inferoseptal segment"),
+    sct("264846001", "left ventricle basal inferior segment"),
+    sct("396652009", "left ventricle basal inferolateral segment"),
+    sct("396654005", "left ventricle basal anterolateral segment"),
+    sct("264848000", "left ventricle mid anterior segment"),
+    sct("396647004", "left ventricle mid anteroseptal segment"),
+    sct("396649001", "left ventricle mid inferoseptal segment"),
+    sct("264847005", "left ventricle mid inferior segment"),
+    sct("396655006", "left ventricle mid inferolateral segment"),
+    sct("396656007", "left ventricle mid anterolateral segment"),
+    sct("264844003", "left ventricle apical anterior segment"),
+    sct("264845002", "left ventricle apical septal segment"),
+    sct("264849008", "left ventricle apical inferior segment"),
+    sct("264853005", "left ventricle apical lateral segment"),
+    sct("128564006", "Apex of left ventricle"),
+];
+
+/// A series that a report refers to beside the images of its scan.
+pub(super) struct SeriesReference {
+    /// Series Instance UID.
+    pub series: String,
+    /// SOP Class UID.
+    pub class: &'static str,
+    /// SOP Instance UID.
+    pub instance: String,
+}
+
+/// Puts everything that is particular to a report on `scans` with these measurement groups. The report and `others`
+/// belong to the study of the first.
+pub(super) fn put(
+    scans: &[&SourceScan],
+    structure: Structure,
+    groups: Vec<DataSet>,
+    others: &[SeriesReference],
+    set: &mut DataSet,
+) {
+    scans[0].put_made(set);
+    set.items(
+        tags::REFERENCED_PERFORMED_PROCEDURE_STEP_SEQUENCE,
+        Vec::new(),
+    );
+    set.items(tags::PERFORMED_PROCEDURE_CODE_SEQUENCE, Vec::new());
+    set.text(tags::PRELIMINARY_FLAG, "PRELIMINARY");
+    set.text(tags::COMPLETION_FLAG, "COMPLETE");
+    set.text(tags::VERIFICATION_FLAG, "UNVERIFIED");
+    let mut own = Vec::new();
+    let mut of_other_studies = Vec::new();
+    for (study, evidence) in evidence(scans, others) {
+        if study == scans[0].study() {
+            own.push(evidence);
+        } else {
+            of_other_studies.push(evidence);
+        }
+    }
+    if !own.is_empty() {
+        set.items(tags::CURRENT_REQUESTED_PROCEDURE_EVIDENCE_SEQUENCE, own);
+    }
+    if !of_other_studies.is_empty() {
+        set.items(tags::PERTINENT_OTHER_EVIDENCE_SEQUENCE, of_other_studies);
+    }
+    let mut scheme = DataSet::new();
+    scheme.text(tags::CODING_SCHEME_DESIGNATOR, OWN_SCHEME);
+    scheme.text(tags::CODING_SCHEME_NAME, "Concepts of ventriform");
+    scheme.text(tags::CODING_SCHEME_RESPONSIBLE_ORGANIZATION, "ventriform");
+    set.item(tags::CODING_SCHEME_IDENTIFICATION_SEQUENCE, scheme);
+
+    set.text(tags::VALUE_TYPE, "CONTAINER");
+    set.code(
+        tags::CONCEPT_NAME_CODE_SEQUENCE,
+        dcm("126000", "Imaging Measurement Report"),
+    );
+    set.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
+    set.item(tags::CONTENT_TEMPLATE_SEQUENCE, template("1500"));
+    let mut content = context(structure);
+    content.extend(image_library(scans));
+    content.push(container(dcm("126010", "Imaging Measurements"), groups));
+    set.items(tags::CONTENT_SEQUENCE, content);
+}
+
+/// Language, observer and procedure.
+fn context(structure: Structure) -> Vec<DataSet> {
+    const OBSERVER_RELATION: &str = "HAS OBS CONTEXT";
+    let english = Code {
+        value: "en",
+        scheme: "RFC5646",
+        meaning: "English",
+    };
+    let language = dcm("121049", "Language of Content Item and Descendants");
+    let study = sct("252432008", "Radionuclide myocardial perfusion study");
+    let imaging = sct("363679005", "Imaging procedure");
+    let procedure = match structure.body_part {
+        "HEART" => study,
+        _ => imaging,
+    };
+    // The device is the software: one UID for each version.
+    let device = super::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
+    vec![
+        concept("HAS CONCEPT MOD", language, english),
+        concept(
+            OBSERVER_RELATION,
+            dcm("121005", "Observer Type"),
+            dcm("121007", "Device"),
+        ),
+        unique(
+            OBSERVER_RELATION,
+            dcm("121012", "Device Observer UID"),
+            &device,
+        ),
+        text(
+            OBSERVER_RELATION,
+            dcm("121013", "Device Observer Name"),
+            "ventriform",
+        ),
+        concept(
+            "HAS CONCEPT MOD",
+            dcm("121058", "Procedure reported"),
+            procedure,
+        ),
+    ]
+}
+
+/// The source images, as TID 1600 lists them; nothing without DICOM images.
+fn image_library(scans: &[&SourceScan]) -> Option<DataSet> {
+    let all: Vec<DataSet> = (series_of(scans).into_iter())
+        .flat_map(|(_, _, instances)| instances)
+        .map(|(class, uid)| image("CONTAINS", None, reference(class, uid)))
+        .collect();
+    if all.is_empty() {
+        return None;
+    }
+    let group = container(dcm("126200", "Image Library Group"), all);
+    Some(container(dcm("111028", "Image Library"), vec![group]))
+}
+
+/// A series of a study, with class and UID of its instances.
+type SourceSeries<'a> = (&'a str, &'a str, Vec<(&'a str, &'a str)>);
+
+/// The series of the scans' images, each once, with its study and its instances, each once.
+fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<SourceSeries<'a>> {
+    let mut all: Vec<SourceSeries<'_>> = Vec::new();
+    for scan in scans {
+        let Some(images) = scan.images() else {
+            continue;
+        };
+        let at = all
+            .iter()
+            .position(|(_, series, _)| *series == images.series);
+        let at = at.unwrap_or_else(|| {
+            all.push((scan.study(), images.series, Vec::new()));
+            all.len() - 1
+        });
+        let known = &mut all[at].2;
+        for instance in images.instances() {
+            if !known.contains(&instance) {
+                known.push(instance);
+            }
+        }
+    }
+    all
+}
+
+/// Those of `figures` that `source` has, as NUM items.
+pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
+    let item = |figure: &Figure<T>| {
+        let value = (figure.value)(source).filter(|value| value.is_finite())?;
+        let mut item = number("CONTAINS", figure.concept, value, figure.unit);
+        let derived = dcm("121401", "Derivation");
+        let derivation = (figure.derivation).map(|code| concept("HAS CONCEPT MOD", derived, code));
+        let interval = figure.interval.and_then(|interval| interval(source));
+        let ends = interval.into_iter().flat_map(|[low, high]| {
+            let ends = [(RANGE_BELOW, value - low), (RANGE_ABOVE, high - value)];
+            ends.map(|(name, range)| number("HAS PROPERTIES", name, round(range), figure.unit))
+        });
+        let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();
+        if !properties.is_empty() {
+            item.items(tags::CONTENT_SEQUENCE, properties);
+        }
+        Some(item)
+    };
+    figures.iter().filter_map(item).collect()
+}
+
+/// A NUM item.
+fn number(relationship: &str, name: Code, value: f64, unit: Code) -> DataSet {
+    let mut measured = DataSet::new();
+    measured.decimals(tags::NUMERIC_VALUE, &[value]);
+    measured.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, unit);
+    let mut item = item(relationship, "NUM", Some(name));
+    item.item(tags::MEASURED_VALUE_SEQUENCE, measured);
+    item
+}
+
+pub(super) fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
+    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
+    vec![
+        text(
+            OBSERVATION_RELATION,
+            dcm("112039", "Tracking Identifier"),
+            name,
+        ),
+        unique(
+            OBSERVATION_RELATION,
+            dcm("112040", "Tracking Unique Identifier"),
+            uid,
+        ),
+    ]
+}
+
+pub(super) fn finding_site(site: Code) -> DataSet {
+    concept("HAS CONCEPT MOD", sct("363698007", "Finding Site"), site)
+}
+
+pub(super) fn group(id: &str, content: Vec<DataSet>) -> DataSet {
+    let mut group = container(dcm("125007", "Measurement Group"), content);
+    group.item(tags::CONTENT_TEMPLATE_SEQUENCE, template(id));
+    group
+}
+
+fn template(id: &str) -> DataSet {
+    let mut item = DataSet::new();
+    item.text(tags::MAPPING_RESOURCE, "DCMR");
+    item.text(tags::TEMPLATE_IDENTIFIER, id);
+    item
+}
+
+fn item(relationship: &str, kind: &str, name: Option<Code>) -> DataSet {
+    let mut item = DataSet::new();
+    item.text(tags::RELATIONSHIP_TYPE, relationship);
+    item.text(tags::VALUE_TYPE, kind);
+    if let Some(name) = name {
+        item.code(tags::CONCEPT_NAME_CODE_SEQUENCE, name);
+    }
+    item
+}
+
+fn with_text(mut item: DataSet, tag: Tag, text: &str) -> DataSet {
+    item.text(tag, text);
+    item
+}
+
+fn container(name: Code, content: Vec<DataSet>) -> DataSet {
+    let mut item = item("CONTAINS", "CONTAINER", Some(name));
+    item.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
+    item.items(tags::CONTENT_SEQUENCE, content);
+    item
+}
+
+pub(super) fn concept(relationship: &str, name: Code, code: Code) -> DataSet {
+    let mut item = item(relationship, "CODE", Some(name));
+    item.code(tags::CONCEPT_CODE_SEQUENCE, code);
+    item
+}
+
+pub(super) fn text(relationship: &str, name: Code, text: &str) -> DataSet {
+    with_text(
+        item(relationship, "TEXT", Some(name)),
+        tags::TEXT_VALUE,
+        text,
+    )
+}
+
+fn unique(relationship: &str, name: Code, uid: &str) -> DataSet {
+    with_text(item(relationship, "UIDREF", Some(name)), tags::UID, uid)
+}
+
+pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet) -> DataSet {
+    let mut item = item(relationship, "IMAGE", name);
+    item.item(tags::REFERENCED_SOP_SEQUENCE, referenced);
+    item
+}
+
+/// Every study with the instances in it that the content refers to; none if it refers to none.
+fn evidence<'a>(scans: &[&'a SourceScan], others: &[SeriesReference]) -> Vec<(&'a str, DataSet)> {
+    let mut studies: Vec<(&str, Vec<DataSet>)> = Vec::new();
+    let mut add = |study: &'a str, series: &str, instances: Vec<DataSet>| {
+        let mut item = DataSet::new();
+        item.items(tags::REFERENCED_SOP_SEQUENCE, instances);
+        item.text(tags::SERIES_INSTANCE_UID, series);
+        match studies.iter_mut().find(|(known, _)| *known == study) {
+            Some((_, all)) => all.push(item),
+            None => studies.push((study, vec![item])),
+        }
+    };
+    for (study, series, instances) in series_of(scans) {
+        let instances = instances.into_iter();
+        let references = instances.map(|(class, uid)| reference(class, uid));
+        add(study, series, references.collect());
+    }
+    for other in others {
+        let instance = reference(other.class, &other.instance);
+        add(scans[0].study(), &other.series, vec![instance]);
+    }
+    let studies = studies.into_iter().map(|(study, series)| {
+        let mut item = DataSet::new();
+        item.items(tags::REFERENCED_SERIES_SEQUENCE, series);
+        item.text(tags::STUDY_INSTANCE_UID, study);
+        (study, item)
+    });
+    studies.collect()
+}

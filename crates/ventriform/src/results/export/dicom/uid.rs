@@ -1,0 +1,64 @@
+//! Unique identifiers without a clock or chance: UUIDs of version 8 (RFC 9562) from SHA-256, in
+//! the root 2.25 (PS3.5 B.2).
+
+use sha2::{Digest, Sha256};
+
+/// Identifiers of the objects of one result.
+#[derive(Debug, Clone)]
+pub(super) struct Uids {
+    seed: [u8; 32],
+}
+
+impl Uids {
+    /// Identifiers that depend on everything that decides the bytes of the objects: `fill` passes
+    /// it on, piece by piece.
+    pub(super) fn over_all(fill: impl FnOnce(&mut dyn FnMut(&[u8]))) -> Self {
+        let mut hash = Sha256::new();
+        fill(&mut |bytes| {
+            hash.update((bytes.len() as u64).to_le_bytes());
+            hash.update(bytes);
+        });
+        Self {
+            seed: hash.finalize().into(),
+        }
+    }
+
+    /// The identifier called `name`.
+    pub(super) fn uid(&self, name: &str) -> String {
+        self.over(name, &[])
+    }
+
+    /// The identifier called `name` of an object with further `content`.
+    pub(super) fn over(&self, name: &str, content: &[u8]) -> String {
+        derived(&[&self.seed, name.as_bytes(), content])
+    }
+}
+
+/// The identifier that belongs to `parts`.
+pub(super) fn derived(parts: &[&[u8]]) -> String {
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part);
+    }
+    let digest = hash.finalize();
+    let mut uuid = [0; 16];
+    uuid.copy_from_slice(&digest[..16]);
+    uuid[6] = 0x80 | uuid[6] & 0x0f;
+    uuid[8] = 0x80 | uuid[8] & 0x3f;
+    format!("2.25.{}", u128::from_be_bytes(uuid))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::volume::is_uid;
+
+    #[test]
+    fn identifiers_are_valid_and_depend_on_every_part() {
+        let uid = derived(&[b"a", b"b"]);
+        assert!(is_uid(&uid), "{uid}");
+        assert_eq!(uid, derived(&[b"a", b"b"]));
+        assert_ne!(uid, derived(&[b"ab", b""]));
+    }
+}

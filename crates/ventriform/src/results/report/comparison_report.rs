@@ -1,0 +1,306 @@
+//! The report of a comparison: what is written as `comparison.json`.
+//!
+//! Segments are counted from 1. Uptake is in per cent of the rest scan's reference, stress scaled to rest.
+
+use super::fit_report::{LongAxis, Posture};
+use super::input::FileFacts;
+use super::json_number::round;
+use super::perfusion_report::PerfusionReport;
+use super::raised_flag::RaisedFlag;
+use super::segmentation_report::Resolution;
+use crate::heart::comparison::{PartFigures, WhichScan};
+use crate::heart::polar::PolarSummary;
+use crate::image::grid::gates::GATE_COUNTS;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// The report of a comparison of rest and stress.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ComparisonReport {
+    /// Ratio of the cavities of the anatomical walls, stress to rest (transient ischaemic dilation), in the images of all gates.
+    pub tid: f64,
+    /// Summed stress score, 0 to 68; `null` without normal limits, as for all scores.
+    pub sss: Option<u32>,
+    /// Summed rest score.
+    pub srs: Option<u32>,
+    /// Summed difference score: what the segments' scores at stress exceed those at rest by.
+    pub sds: Option<u32>,
+    /// The summed scores in per cent of 68, in that order.
+    pub summed_percent: Option<[f64; 3]>,
+    /// Share of the wall that loses more than `reversible_points` at stress.
+    pub reversible_percent: f64,
+    /// Loss of uptake at stress that counts as reversible, points: 2.5 standard deviations of the difference of two scans of an unchanged heart.
+    pub reversible_points: f64,
+    /// Share of the wall below the threshold in both scans.
+    pub fixed_percent: f64,
+    /// Counts of the stress scan that are one count of the rest scan where nothing changed.
+    pub scale: f64,
+    /// Share of the wall by which stress was scaled.
+    pub matched_percent: f64,
+    /// Share of the wall with muscle in both scans.
+    pub compared_percent: f64,
+    /// How far the stress map is turned against the rest map, degrees.
+    pub turn_degrees: f64,
+    /// Correlation of both maps.
+    pub correlation: f64,
+    /// The 17 segments.
+    pub segments: Vec<ComparedSegmentReport>,
+    /// The walls of the three arteries; none if the orientation is unknown.
+    pub territories: Vec<ComparedTerritoryReport>,
+    /// What changed of the beat; `null` unless both scans are gated.
+    pub beat: Option<BeatChange>,
+    /// Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one entry for each scan
+    /// that is a reason. Empty where they were.
+    pub no_beat: Vec<NoBeat>,
+    /// The scan at stress.
+    pub stress: ComparedScan,
+    /// The scan at rest.
+    pub rest: ComparedScan,
+    /// Reasons to look closer.
+    pub flags: Vec<RaisedFlag>,
+    /// Every parameter, defaults written out.
+    pub parameters: Map<String, Value>,
+}
+
+/// Uptake of a part of the wall at stress and at rest, means over its area.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct UptakeChange {
+    /// At stress, scaled to rest; `null` where nothing can be compared, as for the others.
+    pub stress_percent: Option<f64>,
+    /// At rest.
+    pub rest_percent: Option<f64>,
+    /// Rest less stress, points: positive where stress lacks uptake.
+    pub difference_points: Option<f64>,
+    /// Share of its compared area that is reversible.
+    pub reversible_percent: f64,
+    /// Share of its compared area that is fixed.
+    pub fixed_percent: f64,
+}
+
+/// A segment at stress and at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ComparedSegment))]
+pub struct ComparedSegmentReport {
+    /// Its number, 1 to 17.
+    pub segment: usize,
+    /// Its name.
+    pub name: String,
+    /// Its uptake.
+    #[serde(flatten)]
+    pub uptake: UptakeChange,
+    /// Score at stress, 0 to 4.
+    pub stress_score: Option<u8>,
+    /// Score at rest.
+    pub rest_score: Option<u8>,
+    /// Change of motion from rest to stress, mm; `null` unless both scans are gated.
+    pub motion_change_mm: Option<f64>,
+    /// Change of thickening from rest to stress, points.
+    pub thickening_change_points: Option<f64>,
+}
+
+/// The wall of an artery at stress and at rest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema), schema(as = ComparedTerritory))]
+pub struct ComparedTerritoryReport {
+    /// LAD, LCX or RCA.
+    pub name: String,
+    /// Its uptake.
+    #[serde(flatten)]
+    pub uptake: UptakeChange,
+}
+
+/// What changed of the beat from rest to stress.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct BeatChange {
+    /// Ejection fraction at stress, per cent; `null` if the gates are no beat.
+    pub stress_ef_percent: Option<f64>,
+    /// Ejection fraction at rest.
+    pub rest_ef_percent: Option<f64>,
+    /// Change from rest to stress, points.
+    pub ef_change_points: Option<f64>,
+    /// End-diastolic volume at stress, ml.
+    pub stress_edv_ml: f64,
+    /// End-diastolic volume at rest.
+    pub rest_edv_ml: f64,
+    /// End-systolic volume at stress.
+    pub stress_esv_ml: f64,
+    /// End-systolic volume at rest.
+    pub rest_esv_ml: f64,
+}
+
+/// A scan of which no beat could be compared.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct NoBeat {
+    /// The scan.
+    pub scan: WhichScan,
+    /// Why.
+    pub code: NoBeatCode,
+    /// The same in words.
+    pub reason: String,
+}
+
+/// Why there is no beat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum NoBeatCode {
+    /// The scan is one volume, or volumes that nobody says are gates.
+    NotGated,
+    /// It has fewer gates than a beat is fitted to.
+    FewGates,
+    /// It has more.
+    ManyGates,
+    /// The gates show no beat: there is no ejection fraction.
+    NoContraction,
+}
+
+impl NoBeat {
+    /// Of a scan whose files hold no gates, or `gates` of them that no beat is fitted to.
+    pub fn of_files(scan: WhichScan, gates: Option<usize>) -> Self {
+        let [least, most] = [GATE_COUNTS.start(), GATE_COUNTS.end()];
+        let (code, reason) = match gates {
+            None => (
+                NoBeatCode::NotGated,
+                format!("the scan at {scan} is not gated"),
+            ),
+            Some(gates) => {
+                let code = if gates < *least {
+                    NoBeatCode::FewGates
+                } else {
+                    NoBeatCode::ManyGates
+                };
+                let reason = format!(
+                    "the scan at {scan} has {gates} gates, and a beat is fitted to {least} to {most}"
+                );
+                (code, reason)
+            }
+        };
+        Self { scan, code, reason }
+    }
+
+    /// Of a scan whose gates show no beat.
+    pub fn of_gates(scan: WhichScan) -> Self {
+        Self {
+            scan,
+            code: NoBeatCode::NoContraction,
+            reason: format!("the gates at {scan} show no beat"),
+        }
+    }
+}
+
+/// One of both scans.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(utoipa::ToSchema))]
+pub struct ComparedScan {
+    /// The model that was fitted.
+    pub template: String,
+    /// Confidence of the fit, 0..=1.
+    pub confidence: f64,
+    /// Volume of the cavity of the anatomical wall.
+    pub cavity_ml: f64,
+    /// Volume of the anatomical wall's muscle.
+    pub muscle_ml: f64,
+    /// Full width at half maximum of the image's point response.
+    pub resolution_mm: Option<Resolution>,
+    /// The ventricle's long axis.
+    pub long_axis: Option<LongAxis>,
+    /// Which way is up in the patient.
+    pub posture: Option<Posture>,
+    /// Series Description, if the header has one.
+    pub series_description: Option<String>,
+    /// Whether attenuation was corrected; `null` where the header does not say.
+    pub attenuation_corrected: Option<bool>,
+    /// The tracer, if the header names one.
+    pub radiopharmaceutical: Option<String>,
+    /// Total dose by the header, MBq.
+    pub injected_dose: Option<String>,
+    /// Uptake of the wall, by its own reference.
+    pub polar: Option<PolarSummary>,
+    /// The wall's uptake beside normal limits, if some were given.
+    pub perfusion: Option<PerfusionReport>,
+    /// The file.
+    pub input: FileFacts,
+    /// Warnings about the file.
+    pub warnings: Vec<String>,
+}
+
+impl UptakeChange {
+    /// The figures, rounded.
+    pub fn of(figures: &PartFigures) -> Self {
+        Self {
+            stress_percent: figures.stress_percent.map(round),
+            rest_percent: figures.rest_percent.map(round),
+            difference_points: figures.difference_points.map(round),
+            reversible_percent: round(figures.reversible_percent),
+            fixed_percent: round(figures.fixed_percent),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::results::report::segmentation_report::tests::first_report;
+    use serde_json::json;
+
+    /// A report of two scans without beats and limits.
+    pub(crate) fn first_comparison() -> ComparisonReport {
+        let input = serde_json::to_value(first_report().input).unwrap();
+        let scan = |cavity_ml: f64| {
+            json!({
+                "template": "heart", "confidence": 0.9, "cavity_ml": cavity_ml, "muscle_ml": 120.5, "input": input,
+                "warnings": [],
+            })
+        };
+        let uptake = json!({
+            "stress_percent": 61.5, "rest_percent": 80.25, "difference_points": 18.75, "reversible_percent": 90.0,
+            "fixed_percent": 1.5,
+        });
+        let of = |name: &str, value: &str| {
+            let mut part = uptake.clone();
+            part[name] = serde_json::from_str(value).unwrap();
+            part["name"] = "LAD".into();
+            part
+        };
+        let segments: Vec<Value> = (1..=17)
+            .map(|number| of("segment", &number.to_string()))
+            .collect();
+        serde_json::from_value(json!({
+            "tid": 1.125, "reversible_percent": 12.5, "reversible_points": 12.25, "fixed_percent": 0.0, "scale": 2.0,
+            "matched_percent": 70.0, "compared_percent": 95.0, "turn_degrees": 0.0, "correlation": 0.9,
+            "segments": segments, "territories": [of("name", "\"LAD\"")],
+            "stress": scan(80.0), "rest": scan(71.0), "parameters": {},
+            "flags": [{"code": "tid_uncertain", "reason": "A large defect blurs the ratio of the cavities."}],
+        }))
+        .unwrap()
+    }
+
+    #[test]
+    fn a_reason_for_no_beat_says_which_scan_and_why() {
+        let of = NoBeat::of_files;
+        for (no_beat, code, said) in [
+            (
+                of(WhichScan::Rest, None),
+                "not_gated",
+                "at rest is not gated",
+            ),
+            (of(WhichScan::Stress, Some(4)), "few_gates", "has 4 gates"),
+            (of(WhichScan::Stress, Some(48)), "many_gates", "6 to 32"),
+            (
+                NoBeat::of_gates(WhichScan::Stress),
+                "no_contraction",
+                "at stress show no beat",
+            ),
+        ] {
+            assert!(no_beat.reason.contains(said), "{no_beat:?}");
+            let written = serde_json::to_value(&no_beat).unwrap();
+            assert_eq!(written["code"], code);
+            assert_eq!(written["scan"], no_beat.scan.as_str());
+            assert_eq!(serde_json::from_value::<NoBeat>(written).unwrap(), no_beat);
+        }
+    }
+}

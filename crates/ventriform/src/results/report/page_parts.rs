@@ -1,0 +1,188 @@
+//! The parts that the pages of fits have in common.
+
+use super::input::FileFacts;
+use super::perfusion_report::PerfusionReport;
+use crate::image::draw::document::{self, HeadlineFigure, Sign};
+use crate::image::draw::table::{Table, TableColumn};
+use crate::image::draw::text::{data_uri, number, signed};
+use maud::{Markup, html};
+use serde_json::{Map, Value};
+
+/// Format, voxels and spacing of a volume, for the line below the title.
+pub(super) fn volume_line(input: &FileFacts) -> [String; 3] {
+    let times = |numbers: [f64; 3], decimals| numbers.map(|x| number(x, decimals)).join(" × ");
+    [
+        format!("volume: {}", input.format),
+        format!("{} voxels", times(input.shape.map(|n| n as f64), 0)),
+        format!("{} mm", times(input.spacing_mm, 2)),
+    ]
+}
+
+/// The headline of a result with so many flags, by its name.
+pub(super) fn flags_headline(flags: usize, result: &str) -> (Sign, String) {
+    match flags {
+        0 => (
+            Sign::Good,
+            format!("Nothing gives reason to doubt this {result}."),
+        ),
+        1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
+        n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
+    }
+}
+
+/// A headline figure, if there is a `value`.
+pub(super) fn figure(
+    value: impl Into<Option<f64>>,
+    decimals: usize,
+    unit: &'static str,
+    label: impl Into<String>,
+) -> Option<HeadlineFigure> {
+    Some(HeadlineFigure {
+        value: number(value.into()?, decimals),
+        unit,
+        label: label.into(),
+    })
+}
+
+/// A figure's `label`, with the interval that holds the true figure of nine of ten hearts.
+pub(super) fn with_interval(label: &str, interval: Option<[f64; 2]>, decimals: usize) -> String {
+    match interval {
+        Some([low, high]) => format!(
+            "{label}; 90 %: {} to {}",
+            number(low, decimals),
+            number(high, decimals)
+        ),
+        None => label.to_owned(),
+    }
+}
+
+/// The polar maps beside each other: of `titles` (file name, title) those that `maps` (file name, SVG) has.
+pub(super) fn polar_maps(
+    titles: &[(&'static str, &'static str)],
+    maps: &[(&'static str, &[u8])],
+    hint: &str,
+) -> Markup {
+    let titled = titles.iter().filter_map(|(name, title)| {
+        let found = maps.iter().find(|(known, _)| known == name)?;
+        Some((*title, found.1))
+    });
+    let mut titled = titled.peekable();
+    html! {
+        @if titled.peek().is_some() {
+            section {
+                h2 { "Maps of the wall" }
+                p.hint { (hint) }
+                div.row {
+                    @for (title, svg) in titled {
+                        figure.paper {
+                            img src=(data_uri("image/svg+xml", svg)) alt=(format!("Polar map: {title}"));
+                            figcaption { (title) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// For the hint at maps of uptake: whether normal limits stand beside them.
+pub(super) fn limits_hint(perfusion: Option<&PerfusionReport>) -> &'static str {
+    match perfusion {
+        None => "There is no normal database behind them.",
+        Some(_) => "Comparison with normal limits: below.",
+    }
+}
+
+/// Whose limits the wall stands beside.
+pub(super) fn limits_line(perfusion: &PerfusionReport) -> String {
+    let used = &perfusion.normals;
+    let corrected = if used.attenuation_corrected {
+        "with"
+    } else {
+        "without"
+    };
+    format!(
+        "Limits: {}, {} cases, sex {}, {}, {}, {corrected} attenuation correction; SHA-256 {}. Figures: {}.",
+        used.people,
+        used.cases,
+        used.sex.as_str(),
+        used.protocol,
+        used.tracer,
+        used.sha256,
+        perfusion.note
+    )
+}
+
+/// The main figures beside normal limits.
+pub(super) fn limits_figures(perfusion: &PerfusionReport) -> Vec<HeadlineFigure> {
+    let figures = [
+        figure(perfusion.deficit_percent, 1, "%", "deficit score"),
+        figure(
+            perfusion.extent_percent,
+            1,
+            "%",
+            format!(
+                "of the wall below the limit, z = -{}",
+                number(perfusion.z_limit, 1)
+            ),
+        ),
+        figure(perfusion.severity, 1, "SD", "mean depth there"),
+        figure(
+            f64::from(perfusion.summed_score),
+            0,
+            "of 68",
+            format!("summed score ({} %)", number(perfusion.summed_percent, 0)),
+        ),
+    ];
+    figures.into_iter().flatten().collect()
+}
+
+/// The segments beside normal limits.
+pub(super) fn score_table(perfusion: &PerfusionReport) -> Table {
+    let z = |z: Option<f64>| z.map_or("–".to_owned(), |z| signed(z, 1));
+    let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
+    let rows = perfusion.segments.iter().map(|segment| {
+        vec![
+            segment.segment.to_string(),
+            segment.name.clone(),
+            z(segment.z),
+            score(segment.score),
+            number(segment.extent_percent, 1),
+        ]
+    });
+    Table {
+        columns: vec![
+            TableColumn::number("No."),
+            TableColumn::name("Segment"),
+            TableColumn::number("mean z"),
+            TableColumn::number("score, 0 to 4"),
+            TableColumn::number("below the limit, % of area"),
+        ],
+        rows: rows.collect(),
+    }
+}
+
+/// The wall beside normal limits, if some were given.
+pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
+    let Some(perfusion) = perfusion else {
+        return Markup::default();
+    };
+    html! {
+        section {
+            h2 { "Beside normal limits" }
+            p.hint { (limits_line(perfusion)) }
+            (document::figures(&limits_figures(perfusion)))
+            ul.warnings { @for flag in &perfusion.flags { li { (flag.reason) } } }
+            (document::table(&score_table(perfusion), "Table of scores"))
+        }
+    }
+}
+
+/// A table of a report without lists of an entry for each node, step or moment, and without matrices.
+pub(super) fn short(mut table: Map<String, Value>) -> Value {
+    table.retain(|name, value| {
+        let long = value.as_array().is_some_and(|list| list.len() > 4);
+        !long && !name.starts_with("affine")
+    });
+    Value::Object(table)
+}

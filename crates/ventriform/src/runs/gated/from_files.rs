@@ -1,0 +1,207 @@
+//! A beat from files: read, segment the sum, fit all gates, keep what the output needs.
+
+use super::error::GatedError;
+use super::order::GatedOrder;
+use crate::base::progress::Monitor;
+use crate::heart::beat::{self, Beat, BeatError, BeatFlag, BeatParameters, GatedStudy};
+use crate::heart::deform::WallSurface;
+use crate::heart::normals::{HeartFigure, Perfusion};
+use crate::heart::polar::SEGMENT_NAMES;
+use crate::image::volume::{GatedReading, ReadLimits, Volume, read_gates};
+use crate::mesh::TriMesh;
+use crate::parameters::{BeatChoice, FitParameters, GatedParameters};
+use crate::results::report::{
+    BeatParts, BeatReport, FileFacts, LongAxis, PerfusionReport, Posture, RaisedFlag, Resolution,
+    SegmentationReport,
+};
+use crate::runs::segmentation::{
+    Segmentation, SegmentationParameters, heart_figures, judged_by_normals, prepare, segment,
+};
+
+/// The beat of a study with what it was made from.
+#[derive(Debug)]
+pub struct GatedHeart {
+    /// The gates and the facts of their files.
+    pub reading: GatedReading,
+    /// The segmentation of the gates' sum.
+    pub segmentation: Segmentation,
+    /// The anatomical wall of the gates' sum.
+    pub wall: WallSurface,
+    /// The beat.
+    pub beat: Beat,
+    /// The sum of the gates, each scaled to equal counts.
+    pub sum: Volume,
+    /// The wall of every gate, in the mean over its width, LPS mm.
+    pub meshes: Vec<TriMesh>,
+    /// The parameters of the fit to the gates' sum.
+    pub parameters: FitParameters,
+    /// The parameters of the beat.
+    pub choice: BeatChoice,
+    /// The R-R interval, ms: as given, or as the file states it.
+    pub rr_ms: Option<f64>,
+    /// Uptake and beat beside normal limits, if some were given.
+    pub perfusion: Option<Perfusion>,
+}
+
+/// Makes the beat of the study of `order`.
+///
+/// # Errors
+/// [`GatedError`].
+pub fn from_files(
+    order: &GatedOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<GatedHeart, GatedError> {
+    if let Some((name, value, [least, greatest])) = order.choice.out_of_range() {
+        return Err(GatedError::Parameter {
+            name,
+            value,
+            least,
+            greatest,
+        });
+    }
+    let mut reading = read_gates(order.gates, order.choice.gated, limits, monitor)?;
+    let study = GatedStudy::new(std::mem::take(&mut reading.gates), &reading.lost, monitor)?;
+    let parameters = order.parameters.clone();
+    let fit = SegmentationParameters {
+        deform: parameters
+            .on(
+                &study.sum,
+                reading.facts.affine_source,
+                reading.provenance(),
+            )
+            .map_err(crate::runs::segmentation::SegmentationError::from)?,
+        polar: parameters.polar,
+        kept_model: parameters.kept_model.clone(),
+        segments_from: parameters.segments_from,
+        reader: None,
+    };
+    let (templates, refused) = prepare(order.auto, &order.models, parameters.organ, monitor)?;
+    let mut segmentation = segment(&study.sum, &templates, &fit, None, monitor)?;
+    segmentation.refused.splice(0..0, refused);
+    let model = &segmentation.fit.model;
+    let surfaces = model.surfaces.as_ref().ok_or(BeatError::NoVentricle)?;
+    let wall = surfaces.anatomical.clone();
+    let (Some(map), Some(resolution)) = (&segmentation.polar, segmentation.resolution) else {
+        return Err(BeatError::NoVentricle.into());
+    };
+    let density = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML;
+    let beat_parameters = BeatParameters {
+        muscle_ml: order.choice.stated_muscle_g().map(|mass| mass / density),
+        ..BeatParameters::default()
+    };
+    let fitted = beat::fit(
+        &study,
+        &wall.wall,
+        resolution.value,
+        &beat_parameters,
+        monitor,
+    )?;
+    let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
+    let beat = Beat::of(fitted, &study, map, rr_ms);
+    reading.gates = study.gates;
+    let judged = |limits| {
+        let figures = beat_figures(&segmentation, &beat);
+        let scan = reading.provenance();
+        judged_by_normals(&segmentation, &figures, scan, &parameters, limits)
+    };
+    let perfusion = order.normals.map(judged).transpose()?;
+    Ok(GatedHeart {
+        meshes: beat.fit.carried(&wall.mesh, &wall.wall),
+        perfusion,
+        sum: study.sum,
+        reading,
+        wall,
+        beat,
+        parameters,
+        choice: order.choice,
+        rr_ms,
+        segmentation,
+    })
+}
+
+/// Figures of the heart that limits may have: those of the wall of the gates' sum, and of the beat if the gates are
+/// one.
+pub fn beat_figures(segmentation: &Segmentation, beat: &Beat) -> Vec<HeartFigure> {
+    let whole = HeartFigure::whole;
+    let mut figures = heart_figures(segmentation);
+    let Some(ef_percent) = beat.ef_percent else {
+        return figures;
+    };
+    figures.extend([
+        whole("ef_percent", ef_percent),
+        whole("edv_ml", beat.end_diastole.cavity_ml),
+        whole("esv_ml", beat.end_systole.cavity_ml),
+    ]);
+    if beat.has_phases() {
+        figures.extend([
+            whole("phase_sd_degrees", beat.phases.sd_degrees),
+            whole("phase_bandwidth_degrees", beat.phases.bandwidth_degrees),
+        ]);
+    }
+    for segment in &beat.segments {
+        let own = |figure, value| HeartFigure::of_segment(figure, segment.segment, value);
+        figures.extend([
+            own("motion_mm", segment.motion_mm),
+            own("thickening_percent", segment.thickening_percent),
+        ]);
+    }
+    figures
+}
+
+impl GatedHeart {
+    /// Reasons to look closer by what the file says of the beats, and by what the caller says of the wall.
+    fn stated_flags(&self) -> Vec<BeatFlag> {
+        let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * self.beat.mean_wall_ml();
+        let given = self.choice.stated_muscle_g();
+        let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
+        let mass = given.and_then(|given_g| BeatFlag::of_mass(given_g, found_g));
+        rejected.into_iter().chain(mass).collect()
+    }
+
+    /// Reasons to look closer at the beat.
+    pub fn flags(&self) -> Vec<BeatFlag> {
+        let mut flags = self.stated_flags();
+        flags.extend(self.beat.flags.iter().cloned());
+        flags
+    }
+
+    /// The report.
+    pub fn report(&self) -> BeatReport {
+        let segmentation = &self.segmentation;
+        let names = match &segmentation.polar {
+            Some(map) => (1..=17).map(|segment| map.name_of(segment)).collect(),
+            None => SEGMENT_NAMES.map(str::to_owned).to_vec(),
+        };
+        let parameters = GatedParameters {
+            fit: self.parameters.clone(),
+            choice: self.choice,
+        };
+        let stated = self.stated_flags();
+        let parts = BeatParts {
+            segment_names: names,
+            frames: self.reading.frames.clone(),
+            rr_ms: self.rr_ms,
+            timing: self.reading.timing.clone(),
+            long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),
+            posture: (segmentation.fit.model.patient_orientation)
+                .as_ref()
+                .map(Posture::of),
+            resolution: segmentation
+                .resolution
+                .map(|r| Resolution::new(r.value, r.given)),
+            template: segmentation.candidates[segmentation.chosen].name.clone(),
+            confidence: segmentation.fit.judgement.confidence,
+            flags: (segmentation.fit.judgement.flags.iter())
+                .map(|flag| RaisedFlag::new(flag.code(), flag))
+                .chain(stated.iter().map(|flag| RaisedFlag::new(flag.code(), flag)))
+                .collect(),
+            parameters: parameters.to_json(),
+            input: FileFacts::of(&self.reading.facts),
+            warnings: self.reading.facts.warnings.clone(),
+            perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
+                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
+        };
+        BeatReport::new(&self.beat, parts)
+    }
+}

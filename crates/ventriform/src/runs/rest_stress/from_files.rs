@@ -1,0 +1,137 @@
+//! A comparison from files: read, fit both hearts by one model, compare.
+
+use super::checks;
+use super::error::ComparisonError;
+use super::hearts::{ComparedHeart, ComparedHearts};
+use super::order::ComparisonOrder;
+use crate::base::progress::Monitor;
+use crate::heart::comparison::WhichScan;
+use crate::heart::comparison::{Change, Sides};
+use crate::heart::normals::ScanKind;
+use crate::image::volume::{HeldGates, ReadLimits, VolumeFile, hold_gates};
+use crate::parameters::{BeatChoice, FitParameters};
+use crate::runs::gated::GatedOrder;
+use crate::runs::segmentation::{self, RankedTemplate, SegmentationOrder};
+
+/// Compares the scans of `order`. Both are fitted as beats if both are gated, as images otherwise.
+///
+/// # Errors
+/// [`ComparisonError`].
+pub fn from_files(
+    order: &ComparisonOrder<'_>,
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<ComparedHearts, ComparisonError> {
+    let scans = [
+        (WhichScan::Stress, order.stress),
+        (WhichScan::Rest, order.rest),
+    ];
+    let is_gated = |(scan, files): (WhichScan, &[VolumeFile])| {
+        let choice = &order.parameters.choice;
+        hold_gates(files, choice.gated, limits, monitor)
+            .map_err(|error| ComparisonError::of_gated(scan, error.into()))
+    };
+    checks::refuse(order, limits, monitor)?;
+    let gates = [is_gated(scans[0])?, is_gated(scans[1])?];
+    let gated = gates == [HeldGates::Beat; 2];
+    let fit = |kept: Option<&str>, which: usize| {
+        let monitor = monitor.part(which, scans.len());
+        fitted(order, scans[which], (gated, kept), limits, &monitor)
+    };
+    let (mut stress, mut rest) = (fit(None, 0)?, fit(None, 1)?);
+    checks::refuse_fits(&stress, &rest)?;
+    if let Some(common) = common_template(&stress, &rest) {
+        let again = |heart: ComparedHeart, which: usize| {
+            if heart.template() == common {
+                return Ok(heart);
+            }
+            fit(Some(&common), which)
+        };
+        stress = again(stress, 0)?;
+        rest = again(rest, 1)?;
+    }
+    let none = |scan: WhichScan| ComparisonError::NoVentricle { scan };
+    let sides = Sides {
+        stress: stress.map().ok_or(none(WhichScan::Stress))?,
+        rest: rest.map().ok_or(none(WhichScan::Rest))?,
+    };
+    let change = Change::between(&sides).ok_or(ComparisonError::NothingInCommon)?;
+    Ok(ComparedHearts {
+        flags: checks::flags(&stress, &rest, &change),
+        stress,
+        rest,
+        gates,
+        change,
+        parameters: order.parameters.fit.clone(),
+        choice: order.parameters.choice.clone(),
+    })
+}
+
+/// The model in which both fits together have the greatest confidence, if they chose different ones and both can have
+/// it.
+fn common_template(stress: &ComparedHeart, rest: &ComparedHeart) -> Option<String> {
+    if stress.template() == rest.template() {
+        return None;
+    }
+    let other = &rest.segmentation().candidates;
+    let together = stress.segmentation().candidates.iter().filter_map(|own| {
+        let same = |candidate: &&RankedTemplate| candidate.name == own.name;
+        let at_rest = other.iter().find(same)?;
+        Some((own.confidence + at_rest.confidence, own.name.clone()))
+    });
+    let best = together.max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, name)| name)
+}
+
+/// The heart of a scan, a beat if it is `gated`, by the model `kept` or else that with the greatest confidence.
+fn fitted(
+    order: &ComparisonOrder<'_>,
+    (scan, files): (WhichScan, &[VolumeFile]),
+    (gated, kept): (bool, Option<&str>),
+    limits: &ReadLimits,
+    monitor: &Monitor<'_>,
+) -> Result<ComparedHeart, ComparisonError> {
+    let own = order.parameters.fit.clone();
+    let mut parameters = FitParameters {
+        kept_model: kept.map(str::to_owned).or(own.kept_model),
+        scan: ScanKind {
+            protocol: order.protocol(scan),
+            ..own.scan
+        },
+        ..own
+    };
+    order
+        .parameters
+        .choice
+        .correction(scan)
+        .correct(&mut parameters);
+    let (auto, models) = (order.auto, order.models.clone());
+    if gated {
+        let own = GatedOrder {
+            gates: files,
+            auto,
+            models,
+            normals: order.normals,
+            parameters: &parameters,
+            choice: BeatChoice {
+                gated: order.parameters.choice.gated,
+                ..BeatChoice::default()
+            },
+        };
+        let made = crate::runs::gated::from_files(&own, limits, monitor)
+            .map_err(|error| ComparisonError::of_gated(scan, error))?;
+        return Ok(ComparedHeart::Beating(Box::new(made)));
+    }
+    let own = SegmentationOrder {
+        volume: files,
+        expert: None,
+        auto,
+        models,
+        reader: None,
+        normals: order.normals,
+        parameters: &parameters,
+    };
+    let made = segmentation::from_files(&own, limits, monitor)
+        .map_err(|error| ComparisonError::of_segmentation(scan, error))?;
+    Ok(ComparedHeart::Still(Box::new(made)))
+}

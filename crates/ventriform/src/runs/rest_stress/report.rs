@@ -1,0 +1,146 @@
+//! The report of a comparison.
+
+use super::hearts::{ComparedHeart, ComparedHearts};
+use crate::base::numeric::decimals::round;
+use crate::heart::comparison::{REVERSIBLE_POINTS, WhichScan};
+use crate::heart::normals::{Perfusion, summed_percent};
+use crate::heart::polar::{PolarMap, PolarSummary};
+use crate::image::volume::{HeldGates, Provenance};
+use crate::results::report::{
+    BeatChange, BeatReport, ComparedScan, ComparedSegmentReport, ComparedTerritoryReport,
+    ComparisonReport, FileFacts, LongAxis, NoBeat, PerfusionReport, Posture, RaisedFlag,
+    Resolution, UptakeChange,
+};
+use serde_json::{Map, Value};
+
+fn score(perfusion: Option<&Perfusion>, segment: usize) -> Option<u8> {
+    perfusion?.segments[segment - 1].score
+}
+
+/// The report's part about one of both scans.
+fn scan_report(heart: &ComparedHeart) -> ComparedScan {
+    let segmentation = heart.segmentation();
+    let model = &segmentation.fit.model;
+    let scan = heart.provenance();
+    let facts = heart.facts();
+    ComparedScan {
+        template: heart.template().to_owned(),
+        confidence: round(segmentation.fit.judgement.confidence),
+        cavity_ml: round(heart.cavity_ml()),
+        muscle_ml: round(heart.muscle_ml()),
+        resolution_mm: segmentation
+            .resolution
+            .map(|r| Resolution::new(r.value, r.given)),
+        long_axis: model.cup.as_ref().map(LongAxis::of),
+        posture: model.patient_orientation.as_ref().map(Posture::of),
+        series_description: scan.and_then(|scan| scan.series_description.clone()),
+        attenuation_corrected: scan.and_then(|scan| scan.attenuation_corrected()),
+        radiopharmaceutical: scan.and_then(|scan| scan.radiopharmaceutical.clone()),
+        injected_dose: scan.and_then(Provenance::injected_dose_mbq),
+        polar: heart.map().map(PolarSummary::of),
+        perfusion: (heart.perfusion().zip(heart.map()))
+            .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
+        input: FileFacts::of(facts),
+        warnings: facts.warnings.clone(),
+    }
+}
+
+/// Why no beats were compared, or no ejection fractions.
+fn no_beat(hearts: &ComparedHearts) -> Vec<NoBeat> {
+    let scans = [
+        (WhichScan::Stress, &hearts.stress),
+        (WhichScan::Rest, &hearts.rest),
+    ];
+    let reasons = scans.into_iter().zip(hearts.gates);
+    let reasons = reasons.filter_map(|((scan, heart), held)| match held {
+        HeldGates::NotGated => Some(NoBeat::of_files(scan, None)),
+        HeldGates::OtherNumber { gates } => Some(NoBeat::of_files(scan, Some(gates))),
+        HeldGates::Beat => {
+            let still = heart
+                .beat()
+                .is_some_and(|own| own.beat.ef_percent.is_none());
+            still.then(|| NoBeat::of_gates(scan))
+        }
+    });
+    reasons.collect()
+}
+
+/// The report of `hearts`.
+pub(super) fn of(hearts: &ComparedHearts, parameters: Map<String, Value>) -> ComparisonReport {
+    let change = &hearts.change;
+    let beats = hearts.stress.beat().zip(hearts.rest.beat());
+    let beats = beats.map(|(stress, rest)| [stress.report(), rest.report()]);
+    let map = hearts.rest.map();
+    let motion = |segment: usize| {
+        let [stress, rest] = beats.as_ref()?;
+        let of = |report: &BeatReport| {
+            let mut own = report.segments.iter();
+            let found = own.find(|own| own.segment == segment)?;
+            Some((found.motion_mm, found.thickening_percent))
+        };
+        let (stress, rest) = (of(stress)?, of(rest)?);
+        Some((stress.0 - rest.0, stress.1 - rest.1))
+    };
+    let segments = change.segments.iter().map(|own| ComparedSegmentReport {
+        segment: own.segment,
+        name: map.map_or_else(String::new, |map| map.name_of(own.segment)),
+        uptake: UptakeChange::of(&own.figures),
+        stress_score: score(hearts.stress.perfusion(), own.segment),
+        rest_score: score(hearts.rest.perfusion(), own.segment),
+        motion_change_mm: motion(own.segment).map(|change| round(change.0)),
+        thickening_change_points: motion(own.segment).map(|change| round(change.1)),
+    });
+    let summed = (hearts.stress.perfusion().zip(hearts.rest.perfusion())).map(|(stress, rest)| {
+        let scores = |perfusion: &Perfusion| perfusion.segments.map(|own| own.score);
+        let pairs = scores(stress).into_iter().zip(scores(rest));
+        let more = pairs.filter_map(|(stress, rest)| Some(stress?.saturating_sub(rest?)));
+        [
+            stress.summed_score,
+            rest.summed_score,
+            more.map(u32::from).sum(),
+        ]
+    });
+    let oriented = map.is_some_and(PolarMap::is_oriented);
+    let territories = change.territories.iter().filter(|_| oriented);
+    ComparisonReport {
+        tid: round(hearts.tid()),
+        sss: summed.map(|[sss, _, _]| sss),
+        srs: summed.map(|[_, srs, _]| srs),
+        sds: summed.map(|[_, _, sds]| sds),
+        summed_percent: summed.map(|sums| sums.map(|sum| round(summed_percent(sum)))),
+        reversible_percent: round(change.reversible_percent),
+        reversible_points: REVERSIBLE_POINTS,
+        fixed_percent: round(change.fixed_percent),
+        scale: round(change.scale),
+        matched_percent: round(change.matched_percent),
+        compared_percent: round(change.compared_percent),
+        turn_degrees: round(change.turn.degrees),
+        correlation: round(change.turn.correlation),
+        segments: segments.collect(),
+        territories: territories
+            .map(|own| ComparedTerritoryReport {
+                name: own.name.to_owned(),
+                uptake: UptakeChange::of(&own.figures),
+            })
+            .collect(),
+        beat: beats.as_ref().map(|[stress, rest]| BeatChange {
+            stress_ef_percent: stress.ef_percent,
+            rest_ef_percent: rest.ef_percent,
+            ef_change_points: stress
+                .ef_percent
+                .zip(rest.ef_percent)
+                .map(|(stress, rest)| round(stress - rest)),
+            stress_edv_ml: stress.edv_ml,
+            rest_edv_ml: rest.edv_ml,
+            stress_esv_ml: stress.esv_ml,
+            rest_esv_ml: rest.esv_ml,
+        }),
+        no_beat: no_beat(hearts),
+        stress: scan_report(&hearts.stress),
+        rest: scan_report(&hearts.rest),
+        flags: (hearts.flags.iter())
+            .map(|flag| RaisedFlag::new(flag.code(), flag))
+            .collect(),
+        parameters,
+    }
+}
