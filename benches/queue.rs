@@ -93,7 +93,8 @@ impl Bench {
             ..self.settings.clone()
         };
         let real = Engine::new(ReadLimits::default());
-        let sleepy = |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(Sleepy::of(work.clone())) };
+        let sleepy =
+            |work: &Arc<dyn Work>| -> Arc<dyn Work> { Arc::new(Sleepy::new(work.clone())) };
         let engine = Engine {
             works: real.works.iter().map(sleepy).collect(),
             ..real
@@ -237,7 +238,7 @@ struct Sleepy {
 }
 
 impl Sleepy {
-    fn of(real: Arc<dyn Work>) -> Self {
+    fn new(real: Arc<dyn Work>) -> Self {
         Self {
             real,
             made: OnceLock::new(),

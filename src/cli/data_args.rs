@@ -69,7 +69,7 @@ impl DataArgs {
     /// # Errors
     /// If a setting is invalid.
     pub fn settings(&self) -> Result<Resolved> {
-        Resolved::of(&self.flags())
+        Resolved::from_flags(&self.flags())
     }
 
     /// Opens the database of a store.
@@ -90,7 +90,7 @@ impl StoreArgs {
     /// # Errors
     /// If a setting is invalid.
     pub fn settings(&self) -> Result<Resolved> {
-        Resolved::of(&Flags {
+        Resolved::from_flags(&Flags {
             blobs: self.blobs.clone(),
             ..self.data.flags()
         })
@@ -98,7 +98,7 @@ impl StoreArgs {
 }
 
 impl Resolved {
-    fn of(flags: &Flags) -> Result<Self> {
+    fn from_flags(flags: &Flags) -> Result<Self> {
         let (mut settings, origins) = Settings::load(flags, variable)?;
         settings.read_aws(variable);
         Ok(Self { settings, origins })
@@ -114,7 +114,7 @@ impl Resolved {
             Some(url) => Err(anyhow!(
                 "the records of the service are in {url} ({}), and this command works on those in a data folder: \
                  {instead}. For a folder whose records are in its file, give --database sqlite",
-                self.origins.of("database").of("database")
+                self.origins.origin("database").described("database")
             )),
         }
     }
@@ -138,7 +138,7 @@ impl Resolved {
             "{error}. That comes from the {}; give what the service has, such as --data-dir /var/lib/ventriform, \
              or the file of its settings by --config. Before its first start, make an empty folder for it (mkdir): \
              then `keys create` makes the store",
-            self.origins.of(of).of(of)
+            self.origins.origin(of).described(of)
         )
     }
 }

@@ -38,7 +38,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let first = ReadOptions { frame: Some(0) };
     let from = volume::provenance(&files, &first, &limits, &monitor)
         .map_err(|error| anyhow::anyhow!(error.with_advice()))?;
-    let mut shown = report::object(&FileFacts::of(&facts));
+    let mut shown = report::object(&FileFacts::from_facts(&facts));
     shown.insert("gates".into(), serde_json::to_value(facts.gates)?);
     if let Some(from) = from {
         shown.insert("dicom".into(), serde_json::to_value(from)?);

@@ -57,7 +57,7 @@ fn given<T: FromStr>(flag: Option<T>, setting: &str, permitted: &str) -> Result<
         return Ok(None);
     };
     let value = text.parse().map_err(|_| {
-        let from = origin.of(setting);
+        let from = origin.described(setting);
         anyhow!("{setting} = `{text}` ({from}): give {permitted}")
     })?;
     Ok(Some(value))

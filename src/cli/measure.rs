@@ -97,9 +97,9 @@ pub fn run(args: &MeasureArgs) -> Result<()> {
     if resampled {
         note!("{}: resampled to the grid of A", args.b.display());
     }
-    json(&serde_json::to_string_pretty(&AgreementReport::of(
-        &agreement,
-    ))?);
+    json(&serde_json::to_string_pretty(
+        &AgreementReport::from_agreement(&agreement),
+    )?);
     Ok(())
 }
 

@@ -130,7 +130,7 @@ pub fn run(args: &SegmentArgs) -> Result<()> {
     }
     files.push(made.page(&files, whose.as_ref()));
     if let Some(order) = dicom {
-        let scan = order.of(&made);
+        let scan = order.source_scan(&made);
         let objects = made.dicom_files(&scan);
         files.extend(objects.map_err(|error| anyhow!(error.with_advice()))?);
     }

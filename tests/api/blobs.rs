@@ -148,7 +148,7 @@ impl BlobStore for MemoryBlobs {
 
     async fn ids(&self, kind: Resource) -> Result<Vec<Shelved>, BlobError> {
         let items = self.items.lock().unwrap();
-        let of_kind = |id: &&String| Resource::of(id) == Some(kind);
+        let of_kind = |id: &&String| Resource::from_id(id) == Some(kind);
         let ids = items.keys().filter(of_kind).cloned();
         Ok(ids.map(|id| Shelved { id, places: 1 }).collect())
     }

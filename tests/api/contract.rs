@@ -2252,7 +2252,7 @@ async fn work_items_change_once(on: &Stores) {
         state: WorkitemState::Scheduled,
         transaction: None,
         performer: Performer::None,
-        attributes: DataSetJson::of(object(json!({
+        attributes: DataSetJson::from_object(object(json!({
             "00741000": {"vr": "CS", "Value": ["SCHEDULED"]}
         })))
         .unwrap(),
@@ -2441,7 +2441,7 @@ async fn changes_and_their_rows_are_one(on: &Stores) {
         state: WorkitemState::Scheduled,
         transaction: None,
         performer: Performer::None,
-        attributes: DataSetJson::of(object(json!({}))).unwrap(),
+        attributes: DataSetJson::from_object(object(json!({}))).unwrap(),
         changed_at: now(),
     };
     store.add_workitem(&item("1.1"), 9).await.unwrap();
@@ -3236,7 +3236,7 @@ fn workitem(uid: &str, label: &str) -> Workitem {
         state: WorkitemState::Scheduled,
         transaction: None,
         performer: Performer::None,
-        attributes: DataSetJson::of(object(json!({
+        attributes: DataSetJson::from_object(object(json!({
             "00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
             "00741204": {"vr": "LO", "Value": [label]},
         })))

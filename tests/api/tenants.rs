@@ -117,7 +117,7 @@ struct Belongings {
 
 impl Belongings {
     /// Stores one thing of each kind, and tells `receiver` about the job.
-    async fn of(a: &TestApp, receiver: &Receiver) -> Self {
+    async fn make(a: &TestApp, receiver: &Receiver) -> Self {
         let sent = async |request: RequestBuilder| -> Value {
             let answer = request.send().await.unwrap();
             assert!(answer.status().is_success(), "{}", answer.status());
@@ -235,7 +235,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
     let app = TestApp::with(local).await;
     let receiver = Receiver::willing().await;
     let [a, b] = two_tenants(&app).await;
-    let theirs = Belongings::of(&a, &receiver).await;
+    let theirs = Belongings::make(&a, &receiver).await;
     let request = |who: &TestApp, method: &Method, path: &str| {
         let request = who
             .client

@@ -53,7 +53,7 @@ pub fn true_shifts(
     truth: &TriMesh,
     stride: usize,
 ) -> Result<Vec<(RayTerms, [f64; 2])>> {
-    let mut region = Aabb::of(&apparent.mesh.vertices);
+    let mut region = Aabb::around(&apparent.mesh.vertices);
     region.min -= Vec3::repeat(BORDER_MM);
     region.max += Vec3::repeat(BORDER_MM);
     let image = Field::new(scan, Some(&region), FitParameters::default().deform.blur);

@@ -105,7 +105,7 @@ where
     install_cryptography();
     check_role(&settings)?;
     let dicom = dicom_listener(&settings)?;
-    let tls = Tls::of(&settings)?;
+    let tls = Tls::from_settings(&settings)?;
     let dicom_tls = Tls::of_dicom(&settings)?;
     let stores = stores.await;
     let stores = stores.map_err(|error| ServeError::Store(error.into()))?;

@@ -135,7 +135,7 @@ pub fn segment<'py>(
         }
         files.push(made.page(&files, whose.as_ref()));
         if let Some(order) = objects {
-            let objects = made.dicom_files(&order.of(&made));
+            let objects = made.dicom_files(&order.source_scan(&made));
             files.extend(objects.map_err(|error| stopped(&error))?);
         }
         Ok((made, named(files)))

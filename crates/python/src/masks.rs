@@ -44,7 +44,7 @@ pub fn measure(
                 MaskAgreementError::Unplaced { error, .. } => stopped(&error),
                 error => Stopped::Failed(broken(error)),
             })?;
-        let figures = serde_json::to_string(&AgreementReport::of(&made.agreement));
+        let figures = serde_json::to_string(&AgreementReport::from_agreement(&made.agreement));
         let figures = figures.map_err(|error| Stopped::Failed(broken(error)))?;
         Ok((figures, structures, made.resampled))
     })

@@ -126,7 +126,7 @@ impl NativeVolume {
 
     /// Format, values and place, as JSON.
     fn facts(&self, py: Python<'_>) -> PyResult<String> {
-        let facts = FileFacts::of(self.known(py)?);
+        let facts = FileFacts::from_facts(self.known(py)?);
         Ok(serde_json::to_string(&facts).unwrap_or_default())
     }
 

@@ -129,13 +129,13 @@ const NOT_A_FOLDER: i32 = 20;
 
 /// The path of an item below the data folder.
 pub(super) fn shelf_path(id: &str) -> String {
-    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    let kind = Resource::from_id(id).unwrap_or(Resource::Volume);
     format!("{}/{id}", kind.plural())
 }
 
 /// Whether `id` is a name that cannot leave its folder.
 pub(super) fn is_plain(id: &str) -> bool {
-    Resource::of(id).is_some() && id.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    Resource::from_id(id).is_some() && id.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 /// Forces a folder's entries, or a file's content, to disk.
@@ -258,7 +258,7 @@ impl StagingFolder {
         let shelf = shelf_path(record.id());
         let mut stamps = Vec::new();
         for file in record.files() {
-            let stamp = Stamp::of(&fs::metadata(self.folder.join(&file.name))?);
+            let stamp = Stamp::from_file(&fs::metadata(self.folder.join(&file.name))?);
             stamps.push((format!("{shelf}/{}", file.name), stamp, file.sha256));
         }
         let place = self.root.join(shelf);

@@ -321,7 +321,8 @@ impl LocalCache {
         let facts = fs::metadata(&to)?;
         copies.add(&path, facts.len());
         let in_use = self.in_use(&path, &mut copies);
-        self.verified.remember(path, Stamp::of(&facts), sha256);
+        self.verified
+            .remember(path, Stamp::from_file(&facts), sha256);
         self.shrink(&mut copies);
         drop(copies);
         Ok(in_use)

@@ -36,7 +36,7 @@ pub(super) struct Stamp {
 
 impl Stamp {
     #[cfg(unix)]
-    pub fn of(file: &Metadata) -> Self {
+    pub fn from_file(file: &Metadata) -> Self {
         use std::os::unix::fs::MetadataExt;
         Self {
             bytes: file.len(),
@@ -52,7 +52,7 @@ impl Stamp {
     }
 
     #[cfg(not(unix))]
-    pub fn of(file: &Metadata) -> Self {
+    pub fn from_file(file: &Metadata) -> Self {
         let modified = file.modified().ok();
         let since = modified.and_then(|at| at.duration_since(std::time::UNIX_EPOCH).ok());
         let nanoseconds = since.map_or(0, |since| since.as_nanos() as i64);
@@ -65,7 +65,7 @@ impl Stamp {
     /// Whether the open file with this stamp still holds the same: nothing of it has changed, or it was erased. That
     /// changes the time of its inode alone, and whoever has it open reads on.
     fn still_holds(&self, now: &Metadata) -> bool {
-        let mut found = Self::of(now);
+        let mut found = Self::from_file(now);
         if is_erased(now) {
             found.identity[CHANGED..=CHANGED_NANOSECONDS]
                 .copy_from_slice(&self.identity[CHANGED..=CHANGED_NANOSECONDS]);
@@ -122,7 +122,7 @@ impl Verified {
     /// # Errors
     /// [`StoreFault::DamagedFile`], or that of reading.
     pub fn check(&self, path: &str, file: &File, record: &FileRecord) -> Result<Stamp, BlobError> {
-        let stamp = Stamp::of(&file.metadata()?);
+        let stamp = Stamp::from_file(&file.metadata()?);
         if stamp.bytes != record.bytes {
             return Err(damaged(
                 path,
@@ -232,7 +232,7 @@ mod tests {
         let content: Vec<u8> = (0..3 * SENT_CHUNK / 2).map(|at| at as u8).collect();
         fs::write(&path, &content).unwrap();
         let file = File::open(&path).unwrap();
-        let stamp = Stamp::of(&file.metadata().unwrap());
+        let stamp = Stamp::from_file(&file.metadata().unwrap());
         let all = 0..content.len() as u64;
         let (first, rest) = Reading::begin(file, stamp, "volume.nii".into(), all).unwrap();
         act(&path);

@@ -98,7 +98,7 @@ fn one(folder: &Path, parameters: &BeatParameters, resolution_more_mm: f64) -> R
     let fitted = beat::fit(&study, &surfaces.anatomical.wall, width, parameters, &quiet)?;
     let text = std::fs::read(folder.join("params.json"))?;
     Ok(Row {
-        beat: Beat::of(fitted, &study, map, None),
+        beat: Beat::new(fitted, &study, map, None),
         truth: serde_json::from_slice::<Value>(&text)?["result"].take(),
     })
 }

@@ -35,7 +35,7 @@ fn main() -> Result<()> {
             read(&folder.join("spect.nii.gz"))?,
             read(&folder.join("lv_truth.nii.gz"))?,
         );
-        let heart = Heart::of(&scan, &truth);
+        let heart = Heart::new(&scan, &truth);
         let name = folder.display();
         let line = |kind: &str, volume: &Volume, centre: &Vec3| {
             if let Some([sides, depth]) = scores(volume, centre, heart.uptake) {
@@ -87,7 +87,7 @@ struct Heart {
 
 impl Heart {
     /// By the true wall: its centroid, and the mean of its brightest quarter.
-    fn of(scan: &Volume, truth: &Volume) -> Self {
+    fn new(scan: &Volume, truth: &Volume) -> Self {
         let [nx, ny, _] = scan.shape;
         let wall: Vec<usize> = (0..scan.voxels.len())
             .filter(|v| truth.voxels[*v] > 0.5)

@@ -147,7 +147,7 @@ pub async fn create_key(
     request: Request,
 ) -> Answer {
     let now = app.service.now();
-    let ends = Ends::of(&app, &caller, now);
+    let ends = Ends::from_caller(&app, &caller, now);
     let wanted = read(&json_object(&app, request).await?, &caller, ends)?;
     let (key, text) = ApiKey::make(wanted, now).map_err(unusable)?;
     let event = caller.by.event(Activity::KeyCreated, now).on(&key.id);
@@ -156,7 +156,7 @@ pub async fn create_key(
     let location = public_path(&format!("/v1/keys/{}", key.id));
     let body = KeyBody {
         key: Some(text),
-        ..KeyBody::of(key, now)
+        ..KeyBody::from_key(key, now)
     };
     let headers = [
         (header::LOCATION, location),
@@ -186,7 +186,10 @@ pub async fn list_keys(
     let now = app.service.now();
     let page = app.service.access.keys(Some(&caller.tenant), page).await?;
     let next_cursor = next_cursor(&page);
-    let keys = page.items.into_iter().map(|key| KeyBody::of(key, now));
+    let keys = page
+        .items
+        .into_iter()
+        .map(|key| KeyBody::from_key(key, now));
     Ok(Json(KeyList {
         keys: keys.collect(),
         next_cursor,
@@ -231,7 +234,7 @@ struct Ends {
 }
 
 impl Ends {
-    fn of(app: &App, caller: &Caller, now: Timestamp) -> Self {
+    fn from_caller(app: &App, caller: &Caller, now: Timestamp) -> Self {
         let (_, unasked) = caller.own;
         let is_token = caller.key.is_none() && caller.owner.is_some();
         let life = app.service.settings.oidc_key_life.0;
@@ -389,7 +392,7 @@ fn unusable(error: KeyError) -> Problem {
 }
 
 impl KeyBody {
-    fn of(key: ApiKey, now: Timestamp) -> Self {
+    fn from_key(key: ApiKey, now: Timestamp) -> Self {
         use ventriform_service::callers::KeyState;
         Self {
             state: match key.state(now) {

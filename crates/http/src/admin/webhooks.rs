@@ -57,7 +57,7 @@ pub struct WebhookBody {
 }
 
 impl WebhookBody {
-    fn of(endpoint: HookEndpoint, secret: Option<String>) -> Self {
+    fn new(endpoint: HookEndpoint, secret: Option<String>) -> Self {
         let events = endpoint
             .events
             .iter()
@@ -135,7 +135,7 @@ pub async fn create_webhook(
         .fix("Remove one first, or ask the operator to raise `webhook_endpoint_limit`."));
     }
     let location = public_path(&format!("/v1/webhooks/{}", endpoint.id));
-    let body = WebhookBody::of(endpoint, Some(secret.reveal()));
+    let body = WebhookBody::new(endpoint, Some(secret.reveal()));
     let headers = [
         (header::LOCATION, location),
         (header::CACHE_CONTROL, "no-store".to_owned()),
@@ -152,7 +152,7 @@ pub async fn list_webhooks(
     _: NoQuery,
 ) -> Answer<Json<WebhookList>> {
     let endpoints = app.service.hooks.store.endpoints(&caller.tenant).await?;
-    let webhooks = endpoints.into_iter().map(|e| WebhookBody::of(e, None));
+    let webhooks = endpoints.into_iter().map(|e| WebhookBody::new(e, None));
     Ok(Json(WebhookList {
         webhooks: webhooks.collect(),
     }))

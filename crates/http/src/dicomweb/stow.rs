@@ -224,7 +224,7 @@ impl Storing<'_> {
 
     /// Receives the objects of a `multipart/related` body.
     async fn parts(&mut self, request: Request, boundary: String) -> Answer<()> {
-        let limit = BodyLimits::of(&request)?.size;
+        let limit = BodyLimits::from_request(&request)?.size;
         let unparsed = Unparsed::default();
         let pieces = unparsed.pieces(request.into_body().into_data_stream());
         let mut parts = Multipart::new(pieces, boundary);
@@ -256,7 +256,7 @@ impl Storing<'_> {
 async fn store(app: &App, caller: &Caller, study: Option<String>, request: Request) -> Answer {
     require_offer(request.headers(), &ANSWER_TYPES)?;
     refuse_content_encoding(request.headers())?;
-    let limits = BodyLimits::of(&request)?;
+    let limits = BodyLimits::from_request(&request)?;
     let boundary = boundary(request.headers())?;
     charge(REQUEST_MEMORY).await?;
     let mut storing = Storing {

@@ -599,7 +599,7 @@ fn parse(bytes: &[u8]) -> Answer<DataSetJson> {
     };
     let object: Map<String, Value> =
         object.ok_or_else(|| malformed("DICOM JSON is an array with one data set"))?;
-    DataSetJson::of(object).map_err(|error| {
+    DataSetJson::from_object(object).map_err(|error| {
         Problem::bad_request("malformed-dicom-json", format!("{error}."))
             .at(&error.tag)
             .fix("Send DICOM JSON (PS3.18 annex F), such as [{\"00741000\": {\"vr\": \"CS\", \"Value\": \

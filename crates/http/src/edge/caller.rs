@@ -65,7 +65,7 @@ impl Caller {
 
 impl Caller {
     /// The caller of that identity, with the limits that apply to it.
-    pub fn of(identity: &Identity, quota: Quota, by: Agent, watch: CredentialWatch) -> Self {
+    pub fn new(identity: &Identity, quota: Quota, by: Agent, watch: CredentialWatch) -> Self {
         Self {
             by,
             tenant: identity.tenant.clone(),

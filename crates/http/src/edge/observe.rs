@@ -73,7 +73,7 @@ fn by_chance() -> [u8; 10] {
 /// Continues the client's trace with a span of our own, and names both in the answer. If spans are
 /// sent to a collector, a request without a trace begins one.
 async fn continue_trace(app: &App, mut request: Request, next: Next) -> AxumResponse {
-    let given = Trace::of(request.headers());
+    let given = Trace::from_headers(request.headers());
     let route = request.extensions().get::<MatchedPath>();
     let span = app.service.spans.request(
         method_of(&request),
@@ -125,7 +125,7 @@ impl Trace {
     }
 
     /// The client's trace, if the header is valid.
-    fn of(headers: &HeaderMap) -> Option<Self> {
+    fn from_headers(headers: &HeaderMap) -> Option<Self> {
         let text = headers.get(TRACE_PARENT)?.to_str().ok()?;
         let [version, id, parent, flags] = text.split('-').collect::<Vec<_>>()[..] else {
             return None;

@@ -88,7 +88,7 @@ struct BeatLinks {
 }
 
 impl BeatLinks {
-    fn of(beat: &Product) -> Self {
+    fn from_product(beat: &Product) -> Self {
         let itself = path_of(&beat.id);
         Self {
             mesh: format!("{itself}/mesh"),

@@ -142,7 +142,7 @@ pub fn routes<C: Collection>() -> [UtoipaMethodRouter<App>; 3] {
 /// The tenant's row of that id, for which the request is charged, or the 404 or 410 that says why there is none.
 pub async fn find<C: Collection>(app: &App, tenant: &Tenant, id: &str) -> Answer<Owned<C::Row>> {
     let catalogue = app.service.items().catalogue();
-    let found = if Resource::of(id) == Some(C::RESOURCE_KIND) {
+    let found = if Resource::from_id(id) == Some(C::RESOURCE_KIND) {
         read_row(|bytes| C::row(catalogue, tenant, id, bytes)).await?
     } else {
         None
@@ -198,7 +198,7 @@ async fn show<C: Collection>(
 ) -> Answer {
     let read = async || {
         let row = find::<C>(&app, &caller.tenant, &id).await?;
-        Ok(ControlFlow::Continue(ValidatedJson::of(&C::body(
+        Ok(ControlFlow::Continue(ValidatedJson::from_body(&C::body(
             &app,
             caller.scope,
             row,

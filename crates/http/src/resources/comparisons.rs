@@ -85,7 +85,7 @@ struct ComparisonLinks {
 }
 
 impl ComparisonLinks {
-    fn of(comparison: &Product) -> Self {
+    fn from_product(comparison: &Product) -> Self {
         let itself = path_of(&comparison.id);
         let rest = comparison.parameters.get("rest").and_then(Value::as_str);
         Self {
@@ -250,7 +250,7 @@ async fn scan_of(
         return Err(Problem::invalid_field(field, missing)
             .fix("Give the id of a stored volume, segmentation or beat."));
     };
-    match Resource::of(id) {
+    match Resource::from_id(id) {
         Some(Resource::Segmentation | Resource::Beat) => {
             let product = products::stored(app, tenant, id).await?;
             let fit = product.map(|product| (product.item.volume, product.item.parameters));

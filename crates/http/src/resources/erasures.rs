@@ -198,7 +198,7 @@ pub async fn erase(
         by: caller.by.of_erasure(),
         reason: ErasureReason::Request,
     };
-    let erased = if Resource::of(&id) == Some(kind) {
+    let erased = if Resource::from_id(&id) == Some(kind) {
         app.service.items().erase(order).await?
     } else {
         Erased::Unknown

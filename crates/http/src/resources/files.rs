@@ -44,7 +44,7 @@ pub struct Download<'a> {
 }
 
 impl<'a> Download<'a> {
-    fn of(product: &'a Product, file: &'a ProductFile) -> Self {
+    fn new(product: &'a Product, file: &'a ProductFile) -> Self {
         Self {
             id: &product.id,
             record: file.record(),
@@ -57,7 +57,7 @@ impl<'a> Download<'a> {
 
 /// Answers with a product's file, or the part of it that `Range` asks for, or 304.
 pub async fn send(app: &App, product: &Product, file: &ProductFile, headers: &HeaderMap) -> Answer {
-    send_file(app, &Download::of(product, file), headers).await
+    send_file(app, &Download::new(product, file), headers).await
 }
 
 /// Answers with a stored file, or the part of it that `Range` asks for, or 304.
@@ -114,7 +114,7 @@ async fn send_made(
         async |span: Range<u64>| Ok(content.slice(span.start as usize..span.end as usize).into());
     let download = Download {
         attached,
-        ..Download::of(product, &file)
+        ..Download::new(product, &file)
     };
     respond(&download, headers, cache_control, read).await
 }

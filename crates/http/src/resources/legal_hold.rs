@@ -43,7 +43,7 @@ pub async fn hold_volume(
         by: caller.name.clone(),
     };
     set(&app, &caller, &id, Some(hold.clone())).await?;
-    Ok(Json(LegalHoldBody::of(hold, caller.scope)))
+    Ok(Json(LegalHoldBody::new(hold, caller.scope)))
 }
 
 /// Lift the legal hold of a volume

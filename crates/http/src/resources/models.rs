@@ -64,7 +64,7 @@ struct ModelLinks {
 }
 
 impl ModelLinks {
-    fn of(model: &Product) -> Self {
+    fn from_product(model: &Product) -> Self {
         let itself = path_of(&model.id);
         Self {
             mesh: format!("{itself}/mesh"),

@@ -87,7 +87,7 @@ impl From<Presented> for NormalsBody {
             created_at: rfc3339(product.created_at),
             name: name.unwrap_or_default().to_owned(),
             files: DownloadBody::all(&product),
-            software: SoftwareBody::of(&product),
+            software: SoftwareBody::from_product(&product),
             links: NormalsLinks {
                 limits: format!("{itself}/{NORMALS_FILE}"),
                 itself,
@@ -171,7 +171,7 @@ pub async fn create_normals(
         let added_normals =
             service.add_normals(&caller.by, tenant, name, bytes, caller.quota, &counting);
         let (stored, new) = added_normals.await?;
-        let body = NormalsBody::from(Presented::of(&app, stored));
+        let body = NormalsBody::from(Presented::from_held(&app, stored));
         return Ok(added(new, &body.id, &body));
     };
     drop(counting);

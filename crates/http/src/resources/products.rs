@@ -104,7 +104,7 @@ impl<P: ProductCollection> Collection for P {
     }
 
     fn body(app: &App, _: Scope, product: Owned<Product>) -> Result<P::Body, StoreError> {
-        Ok(Presented::of(app, product).into())
+        Ok(Presented::from_held(app, product).into())
     }
 
     async fn rows(
@@ -133,10 +133,10 @@ pub struct Presented {
 
 impl Presented {
     /// A product as its tenant has it.
-    pub fn of(app: &App, held: Owned<Product>) -> Self {
+    pub fn from_held(app: &App, held: Owned<Product>) -> Self {
         Self {
             expires_at: app.expires_at(held.item.resource(), &held.ownership),
-            scan: ScanUidsBody::of(&held.ownership.scan),
+            scan: ScanUidsBody::from_scan(&held.ownership.scan),
             library: held.ownership.library,
             product: held.item,
         }
@@ -245,7 +245,7 @@ pub struct DownloadBody {
 
 impl SoftwareBody {
     /// The program that made `product`.
-    pub fn of(product: &Product) -> Self {
+    pub fn from_product(product: &Product) -> Self {
         Self {
             name: "ventriform".into(),
             version: product.software.clone(),
@@ -314,9 +314,9 @@ macro_rules! body_of_product {
                     dicom: presented.scan,
                     created_at: $crate::wire::links::rfc3339(product.created_at),
                     volume: product.volume.clone().unwrap_or_default(),
-                    software: $crate::resources::products::SoftwareBody::of(&product),
+                    software: $crate::resources::products::SoftwareBody::from_product(&product),
                     files: $crate::resources::products::DownloadBody::all(&product),
-                    links: $links::of(&product),
+                    links: $links::from_product(&product),
                     id: product.id,
                     parameters: product.parameters,
                     summary: product.summary,
@@ -383,7 +383,7 @@ pub async fn find_any(app: &App, tenant: &Tenant, id: &str) -> Answer<Product> {
     match stored(app, tenant, id).await? {
         Some(product) => Ok(product.item),
         None => {
-            let resource = Resource::of(id).unwrap_or(Resource::Model);
+            let resource = Resource::from_id(id).unwrap_or(Resource::Model);
             Err(missing(catalogue, tenant, resource, id).await)
         }
     }
@@ -536,7 +536,7 @@ async fn get_offered<P: ProductCollection>(
     offers: &[Offer],
 ) -> Answer {
     let product = kept::<P>(app, &caller.tenant, id).await?;
-    let asker = Asker::of(caller);
+    let asker = Asker::new(caller);
     let mut response = send(app, asker, &product, choose(headers, offers)?, headers).await?;
     response
         .headers_mut()
@@ -571,7 +571,7 @@ async fn get_file<P: ProductCollection>(
     let Some(object) = object else {
         let asker = Asker {
             deidentify,
-            ..Asker::of(&caller)
+            ..Asker::new(&caller)
         };
         return send_named(&app, asker, &product, &name, &headers).await;
     };
@@ -611,7 +611,7 @@ async fn send_object(
     } else {
         None
     };
-    let memory = dicom::object_memory(UploadFacts::of(&result.source.volume)?.shape);
+    let memory = dicom::object_memory(UploadFacts::from_volume(&result.source.volume)?.shape);
     let (bytes, limits) = (result.bytes(), app.service.engine.limits);
     let make = move |_: &Monitor<'_>| dicom::object(&result, object, secret.as_deref(), &limits);
     let made = app
@@ -664,7 +664,7 @@ pub struct Asker<'a> {
 
 impl<'a> Asker<'a> {
     /// `caller`, who sees of a scan what its scope allows.
-    pub fn of(caller: &'a Caller) -> Self {
+    pub fn new(caller: &'a Caller) -> Self {
         Self {
             tenant: &caller.tenant,
             scope: caller.scope,

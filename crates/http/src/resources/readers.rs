@@ -80,7 +80,7 @@ impl From<Presented> for ReaderBody {
             created_at: rfc3339(product.created_at),
             name: name.unwrap_or_default().to_owned(),
             files: DownloadBody::all(&product),
-            software: SoftwareBody::of(&product),
+            software: SoftwareBody::from_product(&product),
             links: ReaderLinks {
                 profile: format!("{itself}/{PROFILE_FILE}"),
                 itself,
@@ -135,6 +135,6 @@ pub async fn create_reader(
     let added_reader =
         service.add_reader(&caller.by, tenant, name, profile, caller.quota, &counting);
     let (stored, new) = added_reader.await?;
-    let body = ReaderBody::from(Presented::of(&app, stored));
+    let body = ReaderBody::from(Presented::from_held(&app, stored));
     Ok(added(new, &body.id, &body))
 }

@@ -99,7 +99,7 @@ pub struct ScanUidsBody {
 
 impl ScanUidsBody {
     /// Those that are known; `None` if nothing is.
-    pub fn of(scan: &ScanIdentity) -> Option<Self> {
+    pub fn from_scan(scan: &ScanIdentity) -> Option<Self> {
         let text = |name| {
             scan.text(name)
                 .filter(|uid| is_formed(uid))

@@ -95,7 +95,7 @@ struct SegmentationLinks {
 }
 
 impl SegmentationLinks {
-    fn of(segmentation: &Product) -> Self {
+    fn from_product(segmentation: &Product) -> Self {
         let itself = path_of(&segmentation.id);
         let polar = segmentation.file("polar.svg");
         Self {

@@ -98,7 +98,7 @@ impl From<Presented> for TemplateBody {
             organ: text("organ"),
             library: presented.library,
             files: DownloadBody::all(&product),
-            software: SoftwareBody::of(&product),
+            software: SoftwareBody::from_product(&product),
             links: TemplateLinks {
                 mesh: format!("{itself}/mesh"),
                 itself,
@@ -187,7 +187,7 @@ pub async fn create_template(
     };
     let added_template = service.add_template(&caller.by, source, mesh, caller.quota, &counting);
     let (template, new) = added_template.await?;
-    let body = TemplateBody::from(Presented::of(&app, template));
+    let body = TemplateBody::from(Presented::from_held(&app, template));
     Ok(added(new, &body.id, &body))
 }
 
@@ -234,7 +234,7 @@ pub async fn update_template(
         caller.by.change(set).await?;
     }
     let template = find::<Templates>(&app, tenant, &id).await?;
-    Ok(Json(Presented::of(&app, template).into()))
+    Ok(Json(Presented::from_held(&app, template).into()))
 }
 
 /// The setting that [`TemplateBody`] shows.
@@ -261,7 +261,7 @@ async fn given_mesh(
 
 /// The JSON mesh of a stored model or segmentation, with the id of its volume.
 async fn stored_mesh(app: &App, tenant: &Tenant, id: &str) -> Answer<(Bytes, Option<String>)> {
-    let product = match Resource::of(id) {
+    let product = match Resource::from_id(id) {
         Some(Resource::Model | Resource::Segmentation) => stored(app, tenant, id).await?,
         _ => None,
     };

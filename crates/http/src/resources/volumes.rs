@@ -58,7 +58,7 @@ impl Collection for Volumes {
         scope: Scope,
         volume: Owned<StoredVolume>,
     ) -> Result<VolumeBody, StoreError> {
-        VolumeBody::of(app, scope, volume)
+        VolumeBody::new(app, scope, volume)
     }
 
     async fn rows(
@@ -166,7 +166,7 @@ pub struct LegalHoldBody {
 
 impl LegalHoldBody {
     /// The JSON of a legal hold for a caller of that scope.
-    pub fn of(hold: LegalHold, scope: Scope) -> Self {
+    pub fn new(hold: LegalHold, scope: Scope) -> Self {
         Self {
             reason: Some(hold.reason).filter(|_| scans::sees_patients(scope)),
             since: rfc3339(hold.since),
@@ -239,14 +239,14 @@ impl VolumeBody {
     ///
     /// # Errors
     /// If its record is damaged.
-    pub fn of(app: &App, scope: Scope, volume: Owned<StoredVolume>) -> Result<Self, StoreError> {
+    pub fn new(app: &App, scope: Scope, volume: Owned<StoredVolume>) -> Result<Self, StoreError> {
         let expires_at = app.expires_at(Resource::Volume, &volume.ownership);
         let Owned {
             item: volume,
             ownership,
         } = volume;
         let itself = path_of(&volume.id);
-        let facts = UploadFacts::of(&volume)?;
+        let facts = UploadFacts::from_volume(&volume)?;
         let tags = tags::shown(ownership.tags, scope);
         Ok(Self {
             created_at: rfc3339(ownership.created_at),
@@ -255,7 +255,7 @@ impl VolumeBody {
             expires_at,
             legal_hold: ownership
                 .legal_hold
-                .map(|hold| LegalHoldBody::of(hold, scope)),
+                .map(|hold| LegalHoldBody::new(hold, scope)),
             originals: OriginalBody::all(&volume),
             bytes: volume.bytes,
             files: volume.files.len(),
@@ -329,7 +329,7 @@ pub async fn create_volume(
         .store_volume(&caller.by, &caller.tenant, upload.volume, &tags);
     let stored = stored.await.map_err(ServiceError::for_sender)?;
     let volume = stored.volume;
-    let body = VolumeBody::of(&app, caller.scope, volume)?;
+    let body = VolumeBody::new(&app, caller.scope, volume)?;
     Ok(added(stored.new, &body.id, &body))
 }
 
@@ -357,7 +357,7 @@ pub async fn update_volume(
     };
     tags::change(&app, &caller, &id, request, tags_of).await?;
     let volume = find::<Volumes>(&app, &caller.tenant, &id).await?;
-    Ok(Json(VolumeBody::of(&app, caller.scope, volume)?))
+    Ok(Json(VolumeBody::new(&app, caller.scope, volume)?))
 }
 
 /// Preview a volume
@@ -384,7 +384,7 @@ pub async fn preview_volume(
     }
     let files = files_of(&app, &volume).await?;
     let reader = app.service.engine.reader.clone();
-    let memory = preview_memory(UploadFacts::of(&volume)?.shape);
+    let memory = preview_memory(UploadFacts::from_volume(&volume)?.shape);
     let draw = move |monitor: &Monitor<'_>| reader.preview(&files, monitor);
     let decoding = &app.service.decoding;
     let preview = decoding.run_on(volume.bytes, memory, draw).await?;

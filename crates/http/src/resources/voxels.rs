@@ -110,7 +110,7 @@ pub async fn download_voxels(
     }
     let files = files_of(&app, &volume).await?;
     let reader = app.service.engine.reader.clone();
-    let memory = voxels_memory(UploadFacts::of(&volume)?.shape);
+    let memory = voxels_memory(UploadFacts::from_volume(&volume)?.shape);
     let mask = query.mask.unwrap_or(false).then(|| of_mask.choice());
     let read = move |monitor: &Monitor<'_>| match &mask {
         Some(choice) => reader.mask(&files, choice, monitor),

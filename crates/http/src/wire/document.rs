@@ -51,10 +51,10 @@ impl PublishedDocuments {
         if prefix.is_empty() {
             return self.plain.answer(request);
         }
-        self.of(prefix).answer(request)
+        self.with_prefix(prefix).answer(request)
     }
 
-    fn of(&self, prefix: &str) -> Arc<PublishedDocument> {
+    fn with_prefix(&self, prefix: &str) -> Arc<PublishedDocument> {
         // A panic cannot leave the pair half changed: it is one assignment.
         let mut kept = self.prefixed.lock().unwrap_or_else(PoisonError::into_inner);
         match &*kept {

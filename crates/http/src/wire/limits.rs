@@ -55,7 +55,7 @@ impl BodyLimits {
     ///
     /// # Errors
     /// 500 if the route has no such layers.
-    pub fn of(request: &Request) -> Answer<Self> {
+    pub fn from_request(request: &Request) -> Answer<Self> {
         let limits = request.extensions().get::<Self>().copied();
         limits.ok_or_else(|| Problem::internal("this route has no limits on its body"))
     }

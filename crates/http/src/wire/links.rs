@@ -10,7 +10,7 @@ pub use ventriform_service::base::records::rfc3339;
 
 /// The path of the thing that has that id.
 pub fn path_of(id: &str) -> String {
-    let resource = Resource::of(id).unwrap_or(Resource::Job);
+    let resource = Resource::from_id(id).unwrap_or(Resource::Job);
     public_path(&format!("/v1/{}/{id}", resource.plural()))
 }
 

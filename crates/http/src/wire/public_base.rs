@@ -54,7 +54,7 @@ pub struct PublicBase {
 
 impl PublicBase {
     /// The address to which a request was sent that arrived from `peer`.
-    pub fn of_request(peer: IpAddr, headers: &HeaderMap, policy: &ProxyPolicy) -> Arc<Self> {
+    pub fn from_request(peer: IpAddr, headers: &HeaderMap, policy: &ProxyPolicy) -> Arc<Self> {
         let own = Self {
             https: policy.tls,
             host: first(headers, &header::HOST).filter(|host| is_host(host)),
@@ -212,7 +212,7 @@ mod tests {
             base_path: "/own".parse().unwrap(),
             tls: false,
         };
-        PublicBase::of_request(peer.parse().unwrap(), &headers, &policy).url()
+        PublicBase::from_request(peer.parse().unwrap(), &headers, &policy).url()
     }
 
     #[test]

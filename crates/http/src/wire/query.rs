@@ -30,7 +30,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Answer<Self> {
-        QueryReader::of(parts.uri.query()).all().map(Self)
+        QueryReader::from_query(parts.uri.query()).all().map(Self)
     }
 }
 
@@ -46,12 +46,12 @@ impl<S: Send + Sync> FromRequestParts<S> for QueryReader {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Infallible> {
-        Ok(Self::of(parts.uri.query()))
+        Ok(Self::from_query(parts.uri.query()))
     }
 }
 
 impl QueryReader {
-    fn of(query: Option<&str>) -> Self {
+    fn from_query(query: Option<&str>) -> Self {
         let pairs = form_urlencoded::parse(query.unwrap_or_default().as_bytes());
         Self::of_pairs(pairs.into_owned().collect())
     }
@@ -299,7 +299,7 @@ pub fn moment<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Times
 
 /// The names of the fields of a struct.
 pub fn fields_of<T: DeserializeOwned>() -> Vec<&'static str> {
-    let mut reader = QueryReader::of(None);
+    let mut reader = QueryReader::from_query(None);
     // All fields of a query may be absent.
     let _ = reader.take::<T>();
     reader.known

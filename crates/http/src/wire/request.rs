@@ -87,7 +87,7 @@ pub async fn bytes_of(request: Request, types: &[&str]) -> Answer<Bytes> {
         Some(known) if types.contains(&known) => {}
         Some(other) => return Err(body::unsupported_type(other, types[0])),
     }
-    let limits = BodyLimits::of(&request)?;
+    let limits = BodyLimits::from_request(&request)?;
     let mut pieces = request.into_body().into_data_stream();
     let (mut bytes, mut charged) = (Vec::new(), UNCHARGED_BYTES);
     while let Some(piece) = pieces.next().await {

@@ -75,7 +75,7 @@ impl<V: Keep> ResponseCache<V> {
         read: impl AsyncFnOnce() -> Answer<ControlFlow<B, V>>,
     ) -> Answer<ControlFlow<B, V>> {
         let version = catalogue.version();
-        if Resource::of(id) == Some(resource)
+        if Resource::from_id(id) == Some(resource)
             && let Some(version) = version
             && let Some(value) = self.find(version, asker, &public_path(id))
         {
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_value_is_used_for_its_tenant_and_version_only() {
         let (a, b): (Tenant, Tenant) = ("a".parse().unwrap(), "b".parse().unwrap());
-        let answer = ValidatedJson::of(&"1").unwrap();
+        let answer = ValidatedJson::from_body(&"1").unwrap();
         let kept = ResponseCache::new(10_000);
         kept.keep(2, (&a, true), "vol_1", &answer);
         assert!(kept.find(2, (&a, true), "vol_1").is_some());
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn memory_is_limited() {
         let tenant = Tenant::default();
-        let answer = ValidatedJson::of(&"x".repeat(1000)).unwrap();
+        let answer = ValidatedJson::from_body(&"x".repeat(1000)).unwrap();
         let kept = ResponseCache::new(10_000);
         for number in 0..1000 {
             kept.keep(0, (&tenant, true), &number.to_string(), &answer);

@@ -25,7 +25,7 @@ impl ValidatedJson {
     ///
     /// # Errors
     /// 500 if it cannot be written as JSON.
-    pub fn of(body: &impl Serialize) -> Answer<Self> {
+    pub fn from_body(body: &impl Serialize) -> Answer<Self> {
         let bytes = serde_json::to_vec(body).map_err(Problem::internal)?;
         Ok(Self {
             etag: format!("\"{}\"", hex(&Sha256::digest(&bytes))),
@@ -58,7 +58,7 @@ impl Keep for ValidatedJson {
 /// # Errors
 /// 500 if `body` cannot be written as JSON.
 pub fn json(headers: &HeaderMap, body: &impl Serialize) -> Answer {
-    Ok(ValidatedJson::of(body)?.answer(headers))
+    Ok(ValidatedJson::from_body(body)?.answer(headers))
 }
 
 /// 304 if `If-None-Match` names that validator.

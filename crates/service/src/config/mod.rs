@@ -83,7 +83,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// A value is not valid for its setting.
-    #[error("{setting} = `{value}` ({origin}): {reason}", origin = origin.of(setting))]
+    #[error("{setting} = `{value}` ({origin}): {reason}", origin = origin.described(setting))]
     BadValue {
         /// The setting's name.
         setting: &'static str,
@@ -118,7 +118,7 @@ pub enum Origin {
 
 impl Origin {
     /// In words, where the value of that setting came from.
-    pub fn of(self, setting: &str) -> String {
+    pub fn described(self, setting: &str) -> String {
         match self {
             Origin::Flag => format!("flag --{}", setting.replace('_', "-")),
             Origin::Variable => format!("variable {}", variable_name(setting)),
@@ -576,7 +576,7 @@ pub struct Origins(Vec<Origin>);
 
 impl Origins {
     /// Where the value of the setting with that name came from.
-    pub fn of(&self, setting: &str) -> Origin {
+    pub fn origin(&self, setting: &str) -> Origin {
         let place = Settings::NAMES.iter().position(|name| *name == setting);
         let origin = place.and_then(|place| self.0.get(place));
         origin.copied().unwrap_or(Origin::Default)

@@ -43,12 +43,12 @@ impl RetentionAges {
     /// When an item of that kind will be erased that was renewed at the moment `renewed`; `None`
     /// if it is kept.
     pub fn expires_at(&self, kind: Resource, renewed: Timestamp) -> Option<Timestamp> {
-        let age = self.of(kind);
+        let age = self.age(kind);
         age.map(|age| renewed.saturating_add(milliseconds(age)))
     }
 
     /// The age at which what is of that kind is erased.
-    pub(crate) fn of(&self, kind: Resource) -> Option<Duration> {
+    pub(crate) fn age(&self, kind: Resource) -> Option<Duration> {
         match kind {
             Resource::Volume => self.volumes,
             Resource::Model | Resource::Segmentation | Resource::Beat | Resource::Comparison => {
@@ -200,7 +200,7 @@ impl Items {
     /// If the database fails.
     pub async fn erase_expired(&self, ages: &RetentionAges) -> Result<(), StoreError> {
         for kind in Resource::WITH_FILES {
-            let Some((age, now)) = ages.of(kind).zip(self.clock.trusted()) else {
+            let Some((age, now)) = ages.age(kind).zip(self.clock.trusted()) else {
                 continue;
             };
             let before = now.older_than(age);

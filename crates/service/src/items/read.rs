@@ -33,7 +33,7 @@ impl Items {
         id: &str,
         wanted: &[&str],
     ) -> Result<Option<StoredItem>, StoreError> {
-        if Resource::of(id) != Some(Resource::Volume) {
+        if Resource::from_id(id) != Some(Resource::Volume) {
             return Ok(match self.catalogue.product(tenant, id).await? {
                 Some(product) => Some(self.with_files(product.item, wanted).await?),
                 None => None,

@@ -255,7 +255,7 @@ impl Service {
     ) -> Result<(), ServiceError> {
         let catalogue = self.items().catalogue();
         for (field, id) in needs {
-            let there = match Resource::of(id) {
+            let there = match Resource::from_id(id) {
                 Some(Resource::Volume) => catalogue.volume(tenant, id).await?.is_some(),
                 _ => catalogue.product(tenant, id).await?.is_some(),
             };
@@ -301,7 +301,7 @@ impl Service {
         field: &str,
         id: &str,
     ) -> Result<ServiceError, ServiceError> {
-        let resource = Resource::of(id).unwrap_or(match field {
+        let resource = Resource::from_id(id).unwrap_or(match field {
             "model" => Resource::Model,
             "normals" => Resource::Normals,
             _ => Resource::Volume,

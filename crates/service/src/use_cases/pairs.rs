@@ -96,7 +96,7 @@ struct Injection {
 
 impl Injection {
     /// That of `scan`; `None` where the header does not say when it was.
-    fn of(scan: &ScanIdentity) -> Option<Self> {
+    fn from_scan(scan: &ScanIdentity) -> Option<Self> {
         let scan = provenance_of(scan)?;
         let dose = scan.injected_dose_mbq();
         Some(Self {
@@ -146,7 +146,10 @@ fn other_than(role: WhichScan) -> WhichScan {
 /// its injection.
 fn roles_of(scans: &[&ScanIdentity], rule: &Rule) -> Vec<Option<WhichScan>> {
     let told: Vec<Option<WhichScan>> = scans.iter().map(|scan| role_of(scan, rule)).collect();
-    let injections: Vec<Option<Injection>> = scans.iter().map(|scan| Injection::of(scan)).collect();
+    let injections: Vec<Option<Injection>> = scans
+        .iter()
+        .map(|scan| Injection::from_scan(scan))
+        .collect();
     let mut order: Vec<&Injection> = injections.iter().flatten().collect();
     order.sort_by(|a, b| (a.day.cmp(&b.day)).then(a.seconds.total_cmp(&b.seconds)));
     let groups: Vec<&[&Injection]> = order.chunk_by(|a, b| a.is_same_as(b)).collect();
@@ -228,10 +231,10 @@ pub async fn pair_of(
     let Some(role) = roles[0] else {
         let injections: Vec<Injection> = scans
             .iter()
-            .filter_map(|scan| Injection::of(scan))
+            .filter_map(|scan| Injection::from_scan(scan))
             .collect();
         // The other injection may yet come, and tell.
-        let waits = Injection::of(scans[0]).is_some_and(|own| {
+        let waits = Injection::from_scan(scans[0]).is_some_and(|own| {
             injections
                 .iter()
                 .all(|injection| injection.is_same_as(&own))
@@ -251,7 +254,8 @@ pub async fn pair_of(
         };
         *of_other == Some(other_than(role)) && alike
     };
-    let frames = |volume: &StoredVolume| UploadFacts::of(volume).map_or(1, |facts| facts.frames);
+    let frames =
+        |volume: &StoredVolume| UploadFacts::from_volume(volume).map_or(1, |facts| facts.frames);
     let own_frames = frames(&own.item);
     // Newest first, of equals the first: those with as many volumes go first.
     let found = (others.iter().copied())

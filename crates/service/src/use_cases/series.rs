@@ -157,7 +157,7 @@ impl Service {
     }
 
     fn known_archives(&self, tenant: &Tenant) -> String {
-        let archives = self.settings.archives.of(tenant);
+        let archives = self.settings.archives.of_tenant(tenant);
         let names: Vec<&str> = archives.map(|archive| archive.name.as_str()).collect();
         if names.is_empty() {
             "No archive is configured: ask the operator for an entry in `[[archives]]`.".into()

@@ -64,7 +64,7 @@ impl Work for BeatWork {
         let files = made.files(&Format::ALL, monitor);
         let files = files.map_err(unwritten)?;
         Ok(WorkOutput {
-            summary: object(&BeatSummary::of(made.report())),
+            summary: object(&BeatSummary::from_report(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
     }

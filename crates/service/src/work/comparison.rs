@@ -89,7 +89,7 @@ impl Work for ComparisonWork {
         let files = made.files(&Format::ALL, monitor);
         let files = files.map_err(unwritten)?;
         Ok(WorkOutput {
-            summary: object(&ComparisonSummary::of(made.report())),
+            summary: object(&ComparisonSummary::from_report(made.report())),
             files: files.into_iter().map(OutputFile::from).collect(),
         })
     }

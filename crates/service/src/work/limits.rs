@@ -26,7 +26,7 @@ pub(super) fn make(text: &[u8]) -> Result<WorkOutput, Failure> {
 /// The content and the file of `limits`.
 pub(super) fn output(limits: &NormalLimits) -> WorkOutput {
     WorkOutput {
-        summary: object(&NormalsSummary::of(limits)),
+        summary: object(&NormalsSummary::from_limits(limits)),
         files: vec![OutputFile {
             name: NORMALS_FILE.into(),
             media_type: "application/json".into(),

@@ -41,7 +41,7 @@ struct Parameters {
 }
 
 impl Parameters {
-    fn of(object: &Map<String, Value>) -> Result<Self, Failure> {
+    fn from_object(object: &Map<String, Value>) -> Result<Self, Failure> {
         let mut object = object.clone();
         let name = match object.remove(NAME_FIELD) {
             None => "normals".to_owned(),
@@ -99,7 +99,7 @@ fn table(rows: Vec<Value>) -> Result<Vec<CohortCase>, Failure> {
                 return Err(wrong(&place(field), detail));
             }
         }
-        if Resource::of(&case.volume) != Some(Resource::Volume) {
+        if Resource::from_id(&case.volume) != Some(Resource::Volume) {
             return Err(wrong(&place(".volume"), "It is no id of a volume."));
         }
         if !names.insert(case.case.clone()) {
@@ -158,7 +158,7 @@ impl Work for NormalsWork {
 
     fn check_parameters(&self, given: GivenParameters<'_>) -> Result<Map<String, Value>, Failure> {
         match given {
-            GivenParameters::Json(object) => Ok(Parameters::of(object)?.to_json()),
+            GivenParameters::Json(object) => Ok(Parameters::from_object(object)?.to_json()),
             GivenParameters::Text(_) => {
                 Err(wrong(CASES_FIELD, "The table is part of a JSON body."))
             }
@@ -183,7 +183,7 @@ impl Work for NormalsWork {
     }
 
     fn run(&self, input: &WorkInput, monitor: &Monitor<'_>) -> Result<WorkOutput, WorkError> {
-        let Parameters { cases, fits, .. } = Parameters::of(&input.parameters)?;
+        let Parameters { cases, fits, .. } = Parameters::from_object(&input.parameters)?;
         let scan = |(number, case): (usize, CohortCase)| {
             let place = place_of(number);
             let volume = input.items.get(&place);

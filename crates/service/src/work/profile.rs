@@ -15,7 +15,7 @@ use ventriform::runs::advice::Explain;
 pub(super) fn make(text: &[u8]) -> Result<WorkOutput, Failure> {
     let profile = ReaderProfile::from_json(text).map_err(|error| error.explain())?;
     Ok(WorkOutput {
-        summary: object(&ReaderSummary::of(&profile)),
+        summary: object(&ReaderSummary::from_profile(&profile)),
         files: vec![OutputFile {
             name: PROFILE_FILE.into(),
             media_type: "application/json".into(),

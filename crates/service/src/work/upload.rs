@@ -166,7 +166,7 @@ impl UploadFacts {
     ///
     /// # Errors
     /// If the record is damaged.
-    pub fn of(volume: &StoredVolume) -> Result<Self, StoreError> {
+    pub fn from_volume(volume: &StoredVolume) -> Result<Self, StoreError> {
         Self::deserialize(&volume.facts).map_err(|error| {
             StoreError::database(format!("volume {}: damaged facts: {error}", volume.id))
         })

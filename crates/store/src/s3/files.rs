@@ -402,7 +402,7 @@ impl BlobStore for S3Blobs {
                 return false;
             };
             let there = items.get(id).is_some_and(|places| places.contains(place));
-            Resource::of(id) == Some(kind) && !there
+            Resource::from_id(id) == Some(kind) && !there
         })?;
         let items = items.into_iter().map(|(id, places)| Shelved {
             id,

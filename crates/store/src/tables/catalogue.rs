@@ -58,7 +58,7 @@ const HELD_SIZE: &str = "octet_length(h.labels) + coalesce(octet_length(c.found)
     + coalesce(octet_length(c.stated), 0)";
 
 impl Select {
-    fn of(kind: Resource) -> &'static Self {
+    fn for_kind(kind: Resource) -> &'static Self {
         match kind {
             Resource::Volume => &HELD_VOLUME,
             _ => &HELD_PRODUCT,
@@ -260,7 +260,7 @@ impl Catalogue for SqlStore {
         before: &Tags,
         after: &Tags,
     ) -> StoreResult<bool> {
-        let (table, revised) = match Resource::of(id) {
+        let (table, revised) = match Resource::from_id(id) {
             Some(Resource::Job) => ("jobs", ", revision = revision + 1"),
             _ => ("holdings", ""),
         };
@@ -462,7 +462,7 @@ pub(super) fn listed(
     filter: &ItemFilter,
     page: ListRequest,
 ) -> QueryBuilder {
-    let mut query = Select::of(kind).query(columns);
+    let mut query = Select::for_kind(kind).query(columns);
     query
         .push(" WHERE h.tenant = ")
         .push_bind(tenant.to_string());
@@ -597,7 +597,7 @@ async fn hold(
     tags: &Tags,
     now: Timestamp,
 ) -> StoreResult<bool> {
-    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    let kind = Resource::from_id(id).unwrap_or(Resource::Volume);
     let known = query("SELECT 1 FROM holdings WHERE tenant = $1 AND id = $2")
         .bind(tenant.as_str())
         .bind(id)
@@ -660,7 +660,7 @@ pub(super) async fn insert_product(
     let new = hold(to, tenant, &product.id, &tags, product.created_at).await?;
     let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
     let others = others.into_iter().flatten();
-    let others = others.filter(|id| Resource::of(id) == Some(Resource::Volume));
+    let others = others.filter(|id| Resource::from_id(id) == Some(Resource::Volume));
     for volume in product.volume.as_deref().into_iter().chain(others) {
         add_source(to, tenant, &product.id, volume).await?;
     }

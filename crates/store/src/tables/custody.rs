@@ -41,7 +41,7 @@ const QUICK_CHECK: &str = "PRAGMA quick_check(20)";
 #[async_trait]
 impl Custody for SqlStore {
     async fn record(&self, id: &str) -> StoreResult<Option<ItemRecord>> {
-        let volume = Resource::of(id) == Some(Resource::Volume);
+        let volume = Resource::from_id(id) == Some(Resource::Volume);
         let row = query(if volume {
             "SELECT * FROM volumes WHERE id = $1"
         } else {

@@ -213,7 +213,7 @@ pub(super) async fn release(
         .bind(id)
         .execute(&mut *to)
         .await?;
-    let delete = match Resource::of(id) {
+    let delete = match Resource::from_id(id) {
         Some(Resource::Volume) => {
             "DELETE FROM volumes WHERE id = $1
                  AND NOT EXISTS (SELECT 1 FROM holdings WHERE id = $1)"

@@ -147,7 +147,7 @@ struct JobTexts {
 }
 
 impl JobTexts {
-    fn of(job: &NewJob) -> StoreResult<Self> {
+    fn from_job(job: &NewJob) -> StoreResult<Self> {
         Ok(Self {
             parameters: to_json(&job.parameters)?,
             needs: to_json(&job.needs)?,
@@ -174,7 +174,7 @@ impl JobStore for SqlStore {
         }
         self.require_room()?;
         let id = random_id(Resource::Job.prefix());
-        let texts = JobTexts::of(job)?;
+        let texts = JobTexts::from_job(job)?;
         let key = job.idempotency.as_ref();
         let mut transaction = self.writer.begin().await?;
         let inserted = query(format!(
@@ -229,7 +229,7 @@ impl JobStore for SqlStore {
 
     fn text_bytes(&self, job: &NewJob) -> StoreResult<u64> {
         let external_id = job.tags.external_id.as_ref().map_or(0, String::len);
-        Ok((JobTexts::of(job)?.bytes() + external_id) as u64)
+        Ok((JobTexts::from_job(job)?.bytes() + external_id) as u64)
     }
 
     async fn has_room(&self, tenant: &Tenant, queue_limit: usize) -> StoreResult<bool> {

@@ -245,7 +245,7 @@ pub(crate) fn repaired(id: &str, tenant: Option<&Tenant>, now: Timestamp) -> Aud
 
 /// Gives an item that was set aside back to those who had it.
 async fn give_held(to: &mut Transaction<'_>, id: &str, holdings: &[Holding]) -> StoreResult<()> {
-    let kind = Resource::of(id).unwrap_or(Resource::Volume);
+    let kind = Resource::from_id(id).unwrap_or(Resource::Volume);
     for held in holdings {
         query(
             "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, external_id, labels, hold_reason,
@@ -285,7 +285,7 @@ async fn is_held(from: &mut Transaction<'_>, id: &str) -> StoreResult<bool> {
 }
 
 async fn give(to: &mut Transaction<'_>, holder: &Holder, now: Timestamp) -> StoreResult<()> {
-    let kind = Resource::of(&holder.id).unwrap_or(Resource::Volume);
+    let kind = Resource::from_id(&holder.id).unwrap_or(Resource::Volume);
     let on_hold = kind == Resource::Volume;
     query(
         "INSERT INTO holdings (tenant, id, kind, created_at, renewed_at, hold_reason, held_at, held_by)
@@ -322,7 +322,7 @@ async fn insert_volume(to: &mut Transaction<'_>, volume: &StoredVolume) -> Store
 async fn note_sources(to: &mut Transaction<'_>, product: &Product) -> StoreResult<()> {
     let others = OTHER_VOLUMES.map(|name| product.parameters.get(name)?.as_str());
     let others = others.into_iter().flatten();
-    let others = others.filter(|id| Resource::of(id) == Some(Resource::Volume));
+    let others = others.filter(|id| Resource::from_id(id) == Some(Resource::Volume));
     for volume in product.volume.as_deref().into_iter().chain(others) {
         query(
             "INSERT INTO sources (tenant, id, volume)

@@ -239,7 +239,7 @@ fn most_bytes() -> i64 {
 fn item_of(row: DbRow) -> StoreResult<Workitem> {
     let damaged = |what: String| StoreError::database(format!("damaged row: {what}"));
     let state: &str = row.try_get("state")?;
-    let attributes = DataSetJson::of(rows::json(&row, "attributes")?);
+    let attributes = DataSetJson::from_object(rows::json(&row, "attributes")?);
     Ok(Workitem {
         tenant: rows::tenant(&row)?,
         uid: row.try_get("uid")?,

@@ -179,7 +179,7 @@ impl KnownPosition {
         }
         let corners = self.region.map(|ends| {
             let corner = |c: usize| position([0, 1, 2].map(|a| ends[c >> a & 1][a]));
-            Aabb::of(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
+            Aabb::around(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
         });
         Ok(Hints {
             centre: self.centre.or(self.seed_point.map(position)),

@@ -171,7 +171,7 @@ pub fn whose_either(
 
 impl ObjectOrder {
     /// The scan that the objects of `made` belong to.
-    pub fn of(self, made: &SegmentedVolume) -> SourceScan {
+    pub fn source_scan(self, made: &SegmentedVolume) -> SourceScan {
         let scan = made.scan(self.identity, self.choice.made.clone());
         anonymous(scan, &self.choice)
     }

@@ -94,7 +94,7 @@ fn find_ventricle(
         Err(_) => None,
     };
     let Some(cavity) = found.filter(|c| c.score >= PLAUSIBLE_SCORE) else {
-        let size = OddSize::of(volume).map_or_else(String::new, |size| size.to_string());
+        let size = OddSize::from_volume(volume).map_or_else(String::new, |size| size.to_string());
         facts.warnings.push(format!(
             "no left ventricle was recognised; the largest connected part was taken instead{size}"
         ));

@@ -1124,7 +1124,7 @@ fn a_beat_beside_normal_limits_is_written_as_dicom() {
     let scans = heart.scans(heart.reading.provenance().unwrap(), &made);
     let of = |report: &BeatReport| -> Vec<u8> {
         let text = serde_json::to_string(report).unwrap();
-        let structure = Structure::of("left_ventricle");
+        let structure = Structure::from_organ("left_ventricle");
         let beat = DicomBeat::new(structure, &scans, report, &text);
         beat.measurements().unwrap()
     };

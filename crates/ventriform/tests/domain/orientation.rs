@@ -46,7 +46,7 @@ struct ShortAxis {
 }
 
 impl ShortAxis {
-    fn of(patient: &Phantom, apex_first: bool) -> Self {
+    fn new(patient: &Phantom, apex_first: bool) -> Self {
         let axis = patient.pose.axis;
         let up = (Vec3::z() - axis * axis.z).normalize();
         // Anterior on top: rows run down, towards inferior.
@@ -95,7 +95,7 @@ fn is_right(map: &PolarMap) -> bool {
 fn short_axis_slices_are_oriented_by_their_header_or_by_what_is_stated_or_not_at_all() {
     let patient = patient();
     for apex_first in [false, true] {
-        let slices = ShortAxis::of(&patient, apex_first);
+        let slices = ShortAxis::new(&patient, apex_first);
         let usual = DeformParameters::default();
         let (_, map) = fitted(&slices.volume, &usual);
         assert_eq!(map.orientation, OrientationSource::Frame, "{apex_first}");

@@ -78,7 +78,7 @@ fn report(model: &TriMesh) -> ModelReport {
     ModelReport::new(ReportInput {
         input: FileFacts {
             data_type: HOSTILE_TEXT.to_owned(),
-            ..FileFacts::of(&describe(&volume()).unwrap())
+            ..FileFacts::from_facts(&describe(&volume()).unwrap())
         },
         parameters: object(&json!({ "points": model.vertices.len(), "seed": 1 })),
         surface: &surface,
@@ -96,7 +96,7 @@ fn report(model: &TriMesh) -> ModelReport {
 
 /// Distances of `model` from the surface.
 fn closeness(model: &TriMesh) -> Closeness {
-    Closeness::of(model, &surface().mesh, &Monitor::silent()).unwrap()
+    Closeness::new(model, &surface().mesh, &Monitor::silent()).unwrap()
 }
 
 fn model() -> TriMesh {

@@ -222,7 +222,7 @@ impl Server {
         let Some(stream) = handshake.map_err(|_| Refused::SlowHandshake)?? else {
             return Err(Refused::PlainHttp.into());
         };
-        let certificate = ClientCertificate::of(stream.get_ref().1);
+        let certificate = ClientCertificate::from_connection(stream.get_ref().1);
         if let Some(certificate) = &certificate {
             let ClientCertificate {
                 subject,

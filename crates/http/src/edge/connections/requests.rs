@@ -54,7 +54,7 @@ impl Service<Request<Incoming>> for RequestService {
         self.connection.begin(request.body().is_end_stream());
         let trusted = &self.proxies.trusted;
         let client = client_of(self.peer, request.headers(), trusted);
-        let base = PublicBase::of_request(self.peer, request.headers(), &self.proxies);
+        let base = PublicBase::from_request(self.peer, request.headers(), &self.proxies);
         if let Some(rest) = self.proxies.base_path.rest_of(request.uri().path()) {
             let rest = with_path(request.uri(), rest);
             *request.uri_mut() = rest;

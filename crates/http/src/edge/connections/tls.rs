@@ -105,7 +105,7 @@ impl Tls {
     ///
     /// # Errors
     /// If a setting is missing, or a file cannot be used.
-    pub fn of(settings: &Settings) -> Result<Option<Arc<Self>>, TlsError> {
+    pub fn from_settings(settings: &Settings) -> Result<Option<Arc<Self>>, TlsError> {
         let names = TlsNames {
             certificate: "tls_cert",
             key: "tls_key",
@@ -309,7 +309,7 @@ pub struct ClientCertificate {
 
 impl ClientCertificate {
     /// The certificate of the other end of a connection.
-    pub fn of(connection: &ServerConnection) -> Option<Arc<Self>> {
+    pub fn from_connection(connection: &ServerConnection) -> Option<Arc<Self>> {
         let certificate = connection.peer_certificates()?.first()?;
         let (_, parsed) = x509_parser::parse_x509_certificate(certificate).ok()?;
         let subject = parsed.subject();

@@ -18,7 +18,7 @@ pub async fn settled(app: &App, tenant: &Tenant, id: Option<&str>, response: Res
     if response.status() != StatusCode::INTERNAL_SERVER_ERROR {
         return response;
     }
-    let Some((id, kind)) = id.and_then(|id| Some((id, Resource::of(id)?))) else {
+    let Some((id, kind)) = id.and_then(|id| Some((id, Resource::from_id(id)?))) else {
         return response;
     };
     match instead(app, tenant, id, kind).await {
@@ -49,7 +49,7 @@ async fn instead(
     };
     let given = product.parameters.values().filter_map(Value::as_str);
     let volumes = product.volume.as_deref().into_iter().chain(given);
-    for volume in volumes.filter(|id| Resource::of(id) == Some(Resource::Volume)) {
+    for volume in volumes.filter(|id| Resource::from_id(id) == Some(Resource::Volume)) {
         if catalogue.erased_at(tenant, volume).await?.is_some() {
             return Ok(Some(volume_erased(id)));
         }

@@ -199,9 +199,9 @@ async fn admit(
     request: &mut Parts,
 ) -> Answer<trail::Act> {
     let quota = identity.limits(app.service.quotas.general);
-    let act = trail::Act::of(app, request, identity, address.to_owned());
+    let act = trail::Act::new(app, request, identity, address.to_owned());
     let watch = CredentialWatch::new(app, identity);
-    let caller = Caller::of(identity, quota, act.agent(), watch);
+    let caller = Caller::new(identity, quota, act.agent(), watch);
     if identity.account.is_none() {
         app.guard.hosts.check_site(request)?;
     }

@@ -38,12 +38,12 @@ pub struct Act {
 
 impl Act {
     /// The act of this request.
-    pub fn of(app: &App, request: &Parts, identity: &Identity, address: String) -> Self {
+    pub fn new(app: &App, request: &Parts, identity: &Identity, address: String) -> Self {
         let route = request.extensions.get::<MatchedPath>();
         let event = event(request, identity, address, Activity::Read);
         let (recorder, clock) = (app.service.recorder.clone(), app.service.clock().clone());
         Self {
-            agent: Agent::of(recorder, clock, event),
+            agent: Agent::from_recorder(recorder, clock, event),
             method: request.method.clone(),
             route: route.map_or_else(String::new, |route| route.as_str().to_owned()),
             object: item_of(request.uri.path()),

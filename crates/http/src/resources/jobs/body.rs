@@ -194,7 +194,7 @@ fn deliveries(
 }
 
 impl SourceBody {
-    fn of(source: SeriesSource, pull: Option<&Pull>) -> Self {
+    fn new(source: SeriesSource, pull: Option<&Pull>) -> Self {
         Self {
             state: pull.map_or("failed", |pull| match pull.state {
                 DeliveryState::Pending => "pending",
@@ -251,7 +251,7 @@ struct JobLinks {
 
 /// The JSON of a job for a caller of that scope, with its place in the queue if it waits.
 pub async fn describe(app: &App, scope: Scope, job: Job) -> Answer<JobBody> {
-    let context = Context::of(app, std::slice::from_ref(&job)).await?;
+    let context = Context::for_jobs(app, std::slice::from_ref(&job)).await?;
     Ok(body(job, scope, &context))
 }
 
@@ -264,7 +264,7 @@ struct Context {
 }
 
 impl Context {
-    async fn of(app: &App, jobs: &[Job]) -> Answer<Self> {
+    async fn for_jobs(app: &App, jobs: &[Job]) -> Answer<Self> {
         let ids = |with: fn(&Job) -> bool| -> Vec<&str> {
             let those = jobs.iter().filter(|job| with(job));
             those.map(|job| job.id.as_str()).collect()
@@ -291,7 +291,7 @@ impl Context {
 
 /// The JSON of each job for a caller of that scope, with the places in the queue of those that wait.
 pub async fn describe_all(app: &App, scope: Scope, jobs: Vec<Job>) -> Answer<Vec<JobBody>> {
-    let context = Context::of(app, &jobs).await?;
+    let context = Context::for_jobs(app, &jobs).await?;
     let bodies = jobs.into_iter().map(|job| body(job, scope, &context));
     Ok(bodies.collect())
 }
@@ -301,7 +301,7 @@ fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
     let standing = context.positions.get(&job.sequence);
     let made = |resource: Resource| {
         let id = job.result.clone();
-        id.filter(|id| Resource::of(id) == Some(resource))
+        id.filter(|id| Resource::from_id(id) == Some(resource))
     };
     let (model, segmentation) = (made(Resource::Model), made(Resource::Segmentation));
     let (beat, comparison) = (made(Resource::Beat), made(Resource::Comparison));
@@ -313,7 +313,7 @@ fn body(job: Job, scope: Scope, context: &Context) -> JobBody {
     let itself = path_of(&job.id);
     let source = job.source.map(|source| {
         let pull = context.pulls.get(&job.id);
-        SourceBody::of(source, pull)
+        SourceBody::new(source, pull)
     });
     let deliveries = job.send.map(|order| {
         let made = context.deliveries.get(&job.id);

@@ -68,7 +68,7 @@ pub async fn file_upload(
         None => None,
     };
     let mut given = query.rest();
-    let mut stated = Stated::of(app, given.clone())?;
+    let mut stated = Stated::from_pairs(app, given.clone())?;
     let mut order = JobOrder {
         tags: stated.tags,
         priority: stated.priority,
@@ -87,7 +87,7 @@ pub async fn file_upload(
     let fields = !upload.fields.is_empty();
     if fields {
         given.append(&mut upload.fields);
-        stated = Stated::of(app, given)?;
+        stated = Stated::from_pairs(app, given)?;
         (order.tags, order.priority) = (stated.tags, stated.priority);
     }
     let mut pairs = stated.parameters;
@@ -126,7 +126,7 @@ struct Stated {
 }
 
 impl Stated {
-    fn of(app: &App, pairs: Vec<(String, String)>) -> Answer<Self> {
+    fn from_pairs(app: &App, pairs: Vec<(String, String)>) -> Answer<Self> {
         let mut reader = QueryReader::of_pairs(pairs);
         Ok(Self {
             priority: reader.take::<PriorityQuery>()?.priority()?,

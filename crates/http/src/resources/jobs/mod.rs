@@ -216,7 +216,7 @@ pub async fn get_job(
         let ended = job.state.is_final();
         let body = describe(&app, caller.scope, job).await?;
         Ok(if ended {
-            ControlFlow::Continue(ValidatedJson::of(&body)?)
+            ControlFlow::Continue(ValidatedJson::from_body(&body)?)
         } else {
             let ask_again = [
                 (header::CACHE_CONTROL, "no-store"),

@@ -14,7 +14,7 @@ pub async fn missing(
     id: &str,
 ) -> Problem {
     match catalogue.erased_at(tenant, id).await {
-        Ok(Some(at)) if Resource::of(id) == Some(resource) => erased(resource, id, at),
+        Ok(Some(at)) if Resource::from_id(id) == Some(resource) => erased(resource, id, at),
         Ok(_) => unknown_id(resource, id),
         Err(error) => error.into(),
     }

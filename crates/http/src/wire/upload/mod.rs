@@ -51,7 +51,7 @@ pub async fn receive(
     apart: &[&'static str],
 ) -> Answer<Upload> {
     refuse_content_encoding(request.headers())?;
-    let limits = BodyLimits::of(&request)?;
+    let limits = BodyLimits::from_request(&request)?;
     app.service
         .items()
         .blobs()

@@ -58,7 +58,7 @@ impl ProductFile {
 impl Product {
     /// Its kind.
     pub fn resource(&self) -> Resource {
-        Resource::of(&self.id).unwrap_or(Resource::Model)
+        Resource::from_id(&self.id).unwrap_or(Resource::Model)
     }
 
     /// The file with that name.

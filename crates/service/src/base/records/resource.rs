@@ -109,7 +109,7 @@ impl Resource {
     }
 
     /// The kind of item that `id` names, by its prefix.
-    pub fn of(id: &str) -> Option<Self> {
+    pub fn from_id(id: &str) -> Option<Self> {
         Self::ALL
             .into_iter()
             .find(|resource| id.starts_with(resource.prefix()))

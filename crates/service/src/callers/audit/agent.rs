@@ -47,7 +47,7 @@ impl Agent {
         tenant: Tenant,
         name: impl Into<String>,
     ) -> Self {
-        Self::of(
+        Self::from_recorder(
             recorder,
             clock,
             AuditEvent::new(0, Activity::Read, tenant, name.into()),
@@ -55,7 +55,7 @@ impl Agent {
     }
 
     /// The agent of that event: its tenant, name, key, address and request.
-    pub fn of(recorder: Arc<Recorder>, clock: Arc<dyn Clock>, who: AuditEvent) -> Self {
+    pub fn from_recorder(recorder: Arc<Recorder>, clock: Arc<dyn Clock>, who: AuditEvent) -> Self {
         Self {
             who: Arc::new(who),
             recorder,

@@ -26,7 +26,7 @@ struct Codes {
 }
 
 impl Codes {
-    fn of(activity: Activity) -> Self {
+    fn from_activity(activity: Activity) -> Self {
         let rest = || coding(EVENT_TYPE_SYSTEM, "rest", "RESTful Operation");
         let interaction = |code, action| Self {
             kind: rest(),
@@ -73,7 +73,7 @@ impl Codes {
 /// The AuditEvent of a row.
 pub fn fhir(record: &AuditRecord) -> Value {
     let event = &record.event;
-    let codes = Codes::of(event.activity);
+    let codes = Codes::from_activity(event.activity);
     let mut who = json!({"display": event.agent});
     if let Some(key) = &event.key {
         who["identifier"] = json!({"system": ID_SYSTEM, "value": key});
@@ -119,7 +119,7 @@ fn entities(record: &AuditRecord) -> Value {
     let event = &record.event;
     let mut entities = Vec::new();
     if let Some(object) = &event.object {
-        let noun = Resource::of(object).map_or("item", Resource::noun);
+        let noun = Resource::from_id(object).map_or("item", Resource::noun);
         entities.push(json!({
             "what": {"identifier": {"system": ID_SYSTEM, "value": object}},
             // 2 stands for a system object.

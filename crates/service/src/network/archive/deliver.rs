@@ -50,7 +50,7 @@ impl Deliverer {
         let host = &exchange.host;
         let object = host.object(&due.tenant, &due.result, &due.name).await?;
         let web = match archive.dicomweb {
-            Some(_) => Some(exchange.web.of(archive, exchange.clock().now()).await?),
+            Some(_) => Some(exchange.web.client(archive, exchange.clock().now()).await?),
             None => None,
         };
         if let Some(web) = &web

@@ -393,7 +393,7 @@ impl Archives {
     }
 
     /// The archives that the tenant may use.
-    pub fn of<'a>(&'a self, tenant: &'a Tenant) -> impl Iterator<Item = &'a Archive> {
+    pub fn of_tenant<'a>(&'a self, tenant: &'a Tenant) -> impl Iterator<Item = &'a Archive> {
         self.0.iter().filter(|archive| archive.serves(tenant))
     }
 }

@@ -21,7 +21,7 @@ pub struct ArchiveObject {
 
 impl ArchiveObject {
     /// The object in a file that this program has made; `None` if it lacks an identifier.
-    pub fn of(bytes: Vec<u8>) -> Option<Self> {
+    pub fn from_bytes(bytes: Vec<u8>) -> Option<Self> {
         let file = OpenFileOptions::new()
             .read_until(tags::STUDY_ID)
             .from_reader(bytes.as_slice())

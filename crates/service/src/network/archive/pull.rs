@@ -48,7 +48,7 @@ impl Puller {
         let web = match (&source.archive, &source.dicomweb) {
             (Some(name), _) => {
                 let archive = exchange.archive(name, &due.tenant)?;
-                exchange.web.of(archive, now).await?
+                exchange.web.client(archive, now).await?
             }
             (None, url) => {
                 let url = url.as_deref().unwrap_or_default();

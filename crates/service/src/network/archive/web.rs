@@ -104,7 +104,7 @@ impl WebClients {
     ///
     /// # Errors
     /// If it has none, or the file of its authorities cannot be read.
-    pub async fn of(&self, archive: &Archive, now: Timestamp) -> Result<DicomWeb, Trouble> {
+    pub async fn client(&self, archive: &Archive, now: Timestamp) -> Result<DicomWeb, Trouble> {
         let base = archive.dicomweb.clone().ok_or_else(|| {
             Trouble::passing("The archive has no `dicomweb` in the settings any more.")
         })?;

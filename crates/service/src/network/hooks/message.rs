@@ -8,8 +8,9 @@ use serde_json::{Map, Value, json};
 /// job's id, kind, state and paths, which begin with `base_path`. It holds no figures and no texts of errors: whoever
 /// may see them reads them from the API.
 pub fn message_body(delivery: &DueDelivery, base_path: &str) -> String {
-    let path =
-        |id: &str| Resource::of(id).map(|kind| format!("{base_path}/v1/{}/{id}", kind.plural()));
+    let path = |id: &str| {
+        Resource::from_id(id).map(|kind| format!("{base_path}/v1/{}/{id}", kind.plural()))
+    };
     let mut links = Map::new();
     let mut data = Map::new();
     data.insert("job".into(), json!(delivery.job));
@@ -18,7 +19,7 @@ pub fn message_body(delivery: &DueDelivery, base_path: &str) -> String {
     data.insert("attempts".into(), json!(delivery.run));
     links.insert("self".into(), json!(path(&delivery.job)));
     if let Some(result) = &delivery.result
-        && let (Some(kind), Some(itself)) = (Resource::of(result), path(result))
+        && let (Some(kind), Some(itself)) = (Resource::from_id(result), path(result))
     {
         data.insert(kind.noun().into(), json!(result));
         links.insert("mesh".into(), json!(format!("{itself}/mesh")));

@@ -38,7 +38,7 @@ impl DataSetJson {
     ///
     /// # Errors
     /// The first element that is none.
-    pub fn of(object: Map<String, Value>) -> Result<Self, Malformed> {
+    pub fn from_object(object: Map<String, Value>) -> Result<Self, Malformed> {
         check(&object, 0)?;
         let elements = object.into_iter().map(|(tag, element)| {
             let tag = tag.to_ascii_uppercase();

@@ -141,7 +141,7 @@ impl Workitem {
             .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE)
             .next()
             .cloned();
-        DataSetJson::of(known.unwrap_or_default()).unwrap_or_default()
+        DataSetJson::from_object(known.unwrap_or_default()).unwrap_or_default()
     }
 
     fn put_progress(&mut self, progress: DataSetJson, now: (Timestamp, &str)) {
@@ -191,7 +191,7 @@ mod tests {
     fn claimed() -> Workitem {
         let set = json!({"00741000": {"vr": "CS", "Value": ["SCHEDULED"]},
             "00404018": {"vr": "SQ", "Value": [{"00080100": {"vr": "SH", "Value": ["LVSEG"]}}]}});
-        let set = DataSetJson::of(set.as_object().unwrap().clone()).unwrap();
+        let set = DataSetJson::from_object(set.as_object().unwrap().clone()).unwrap();
         let (mut item, _) = Workitem::create(&Tenant::default(), "1.2", set, TEST_MOMENT).unwrap();
         item.claim("9.9", TEST_MOMENT).unwrap();
         item
@@ -249,7 +249,7 @@ mod tests {
         // Who asked for it has said why.
         let mut item = claimed();
         let reason = json!({"00741238": {"vr": "LT", "Value": ["wrong patient"]}});
-        let reason = DataSetJson::of(reason.as_object().unwrap().clone()).unwrap();
+        let reason = DataSetJson::from_object(reason.as_object().unwrap().clone()).unwrap();
         item.request_cancel(&reason, TEST_MOMENT).unwrap();
         assert!(item.is_to_be_cancelled());
         item.give_up("The job was cancelled.", TEST_MOMENT).unwrap();

@@ -103,7 +103,7 @@ mod tests {
                              "00404041": {"vr": "CS", "Value": ["READY"]},
                              "00404021": {"vr": "SQ", "Value": [input]}});
         change(&mut set);
-        let set = DataSetJson::of(set.as_object().unwrap().clone()).unwrap();
+        let set = DataSetJson::from_object(set.as_object().unwrap().clone()).unwrap();
         Workitem::create(&Tenant::default(), "1.2", set, (7, "20261123"))
             .unwrap()
             .0

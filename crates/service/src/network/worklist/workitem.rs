@@ -244,7 +244,7 @@ impl Workitem {
             let empty = Map::from_iter([("vr".to_owned(), Value::from("SQ"))]);
             let element =
                 Map::from_iter([(INPUT_INFORMATION_SEQUENCE.to_owned(), Value::from(empty))]);
-            attributes.replace(DataSetJson::of(element).unwrap_or_default());
+            attributes.replace(DataSetJson::from_object(element).unwrap_or_default());
             completed = true;
         }
         attributes.remove(TRANSACTION_UID);
@@ -349,11 +349,11 @@ impl Workitem {
             .items(PROCEDURE_STEP_PROGRESS_INFORMATION_SEQUENCE)
             .next()
             .cloned();
-        let mut progress = DataSetJson::of(known.unwrap_or_default()).unwrap_or_default();
+        let mut progress = DataSetJson::from_object(known.unwrap_or_default()).unwrap_or_default();
         for tag in CANCELLATION_TAGS {
             if let Some(element) = details.object().get(tag) {
                 let element = Map::from_iter([(tag.to_owned(), element.clone())]);
-                progress.replace(DataSetJson::of(element).unwrap_or_default());
+                progress.replace(DataSetJson::from_object(element).unwrap_or_default());
             }
         }
         progress.put(PROCEDURE_STEP_CANCELLATION_DATE_TIME, "DT", now.1);
@@ -431,7 +431,7 @@ mod tests {
         let Value::Object(object) = value else {
             panic!("{value}")
         };
-        DataSetJson::of(object).unwrap()
+        DataSetJson::from_object(object).unwrap()
     }
 
     fn scheduled() -> Workitem {
@@ -583,7 +583,7 @@ mod tests {
         ] {
             let mut object = scheduled().attributes.object().clone();
             object.insert(tag.into(), value);
-            let set = DataSetJson::of(object).unwrap();
+            let set = DataSetJson::from_object(object).unwrap();
             let refused = Workitem::create(&Tenant::default(), "1.2", set, TEST_MOMENT);
             assert!(
                 matches!(refused, Err(Refusal::Attribute { tag: at, .. }) if at == tag),
@@ -597,7 +597,7 @@ mod tests {
             (json!({"00741000": {"vr": "LO", "Value": 1}}), "array"),
             (json!({"00741002": {"vr": "SQ", "Value": [1]}}), "objects"),
         ] {
-            let error = DataSetJson::of(wrong.as_object().unwrap().clone()).unwrap_err();
+            let error = DataSetJson::from_object(wrong.as_object().unwrap().clone()).unwrap_err();
             assert!(error.to_string().contains(part), "{error}");
         }
     }

@@ -135,7 +135,7 @@ impl ExchangeHost for Service {
                 "Start the job again with a stored volume.",
             )
         };
-        let kind = Resource::of(result).unwrap_or(Resource::Model);
+        let kind = Resource::from_id(result).unwrap_or(Resource::Model);
         let object = dicom::object_named(kind, name);
         let object = object.ok_or_else(|| gone("This version makes no such object."))?;
         let result = self
@@ -144,7 +144,7 @@ impl ExchangeHost for Service {
             .result(tenant, result, |product| object.source_files(product))
             .await?;
         let result = result.ok_or_else(|| gone("The result or its volume was erased."))?;
-        let shape = UploadFacts::of(&result.source.volume)?.shape;
+        let shape = UploadFacts::from_volume(&result.source.volume)?.shape;
         let bytes = result.bytes();
         let limits = self.engine.limits;
         let make = move |_: &Monitor<'_>| dicom::object(&result, object, None, &limits);
@@ -153,7 +153,7 @@ impl ExchangeHost for Service {
             .run_on(bytes, dicom::object_memory(shape), make);
         let made = made.await?.map_err(Trouble::Final)?;
         let made = made.ok_or_else(|| gone("The result has no such object."))?;
-        ArchiveObject::of(made.bytes).ok_or_else(|| {
+        ArchiveObject::from_bytes(made.bytes).ok_or_else(|| {
             Trouble::lasting(
                 Fault::Service,
                 "internal",

@@ -23,7 +23,7 @@ pub fn source_files(object: BeatObject, product: &Product) -> Vec<String> {
         names.push(mesh_file(end));
         let summary = serde_json::from_value::<BeatSummary>(product.summary.clone().into());
         names.extend(summary.ok().map(|summary| {
-            gate_labels(end.of([summary.end_diastole_gate, summary.end_systole_gate]))
+            gate_labels(end.pick([summary.end_diastole_gate, summary.end_systole_gate]))
         }));
     }
     names
@@ -43,7 +43,8 @@ pub fn object(
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Vec<u8>, Failure> {
-    let facts = UploadFacts::of(&result.source.volume).map_err(|error| broken_result(&error))?;
+    let facts =
+        UploadFacts::from_volume(&result.source.volume).map_err(|error| broken_result(&error))?;
     let bytes = stored::required(&result.files, REPORT_FILE)?;
     let report: BeatReport = stored::report(&bytes)?;
     let text = stored::report_text(&bytes)?;
@@ -60,7 +61,12 @@ pub fn object(
         )
     };
     let scans = [scan(BeatEnd::Diastole)?, scan(BeatEnd::Systole)?];
-    let beat = DicomBeat::new(Structure::of("left_ventricle"), &scans, &report, &text);
+    let beat = DicomBeat::new(
+        Structure::from_organ("left_ventricle"),
+        &scans,
+        &report,
+        &text,
+    );
     let made = match object {
         BeatObject::Mask(end) => {
             let labels = gate_labels(end.gate(&report));

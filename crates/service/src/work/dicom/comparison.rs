@@ -37,12 +37,13 @@ pub fn object(
     let report: ComparisonReport = stored::report(&bytes)?;
     let text = stored::report_text(&bytes)?;
     let source = |source: &StoredSource| {
-        let facts = UploadFacts::of(&source.volume).map_err(|error| broken_result(&error))?;
+        let facts =
+            UploadFacts::from_volume(&source.volume).map_err(|error| broken_result(&error))?;
         // Gates are added up: the scan is all of them.
         scan::source((source, result.made_at), &facts, None, secret, limits)
     };
     let scans = [source(&result.source)?, source(rest)?];
-    let structure = Structure::of("left_ventricle");
+    let structure = Structure::from_organ("left_ventricle");
     let [stress, rest] = scans.each_ref().map(SourceScan::shown);
     // Objects that are freed of the identity say nothing of the headers.
     let report = match stress.zip(rest) {

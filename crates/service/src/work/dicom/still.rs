@@ -35,7 +35,8 @@ pub fn object(
     secret: Option<&[u8]>,
     limits: &ReadLimits,
 ) -> Result<Option<Vec<u8>>, Failure> {
-    let facts = UploadFacts::of(&result.source.volume).map_err(|error| broken_result(&error))?;
+    let facts =
+        UploadFacts::from_volume(&result.source.volume).map_err(|error| broken_result(&error))?;
     let frame = scan::voxel_to_patient(&facts)?;
     let item = &result.files;
     let number = item.parameters.get("frame").and_then(Value::as_u64);
@@ -53,7 +54,7 @@ pub fn object(
         let mask = voxelise(&mesh, facts.shape, &frame, &Monitor::silent());
         mask.map_err(|error| broken_result(&error))
     };
-    let mask = match Resource::of(&item.id) {
+    let mask = match Resource::from_id(&item.id) {
         // A mask that is stored on another grid than the scan's.
         Some(Resource::Segmentation)
             if item.parameters.get("mask_grid") == Some(&"orthogonal".into()) =>
@@ -68,7 +69,7 @@ pub fn object(
     };
     let report = stored::required(item, REPORT_FILE)?;
     let text = stored::report_text(&report)?;
-    let figures: Option<SegmentationReport> = match Resource::of(&item.id) {
+    let figures: Option<SegmentationReport> = match Resource::from_id(&item.id) {
         Some(Resource::Segmentation) => Some(stored::report(&report)?),
         _ => None,
     };
@@ -99,12 +100,14 @@ pub fn object(
 /// The content of a result, by the parameters it was made with.
 fn structure(item: &StoredItem, facts: &UploadFacts) -> Structure {
     let parameter = |name: &str| item.parameters.get(name).and_then(Value::as_str);
-    match Resource::of(&item.id) {
-        Some(Resource::Segmentation) => Structure::of(parameter("organ").unwrap_or_default()),
+    match Resource::from_id(&item.id) {
+        Some(Resource::Segmentation) => {
+            Structure::from_organ(parameter("organ").unwrap_or_default())
+        }
         // Of a volume of intensities, and without a choice by the caller, it is the left ventricle.
         _ if parameter("isolate") == Some("auto") && facts.labels.is_none() => {
-            Structure::of("left_ventricle")
+            Structure::from_organ("left_ventricle")
         }
-        _ => Structure::of(""),
+        _ => Structure::from_organ(""),
     }
 }

@@ -39,7 +39,7 @@ impl Aabb {
     }
 
     /// The smallest box that contains some points.
-    pub fn of<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
+    pub fn around<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Self {
         let mut aabb = Self::empty();
         for p in points {
             aabb.min = aabb.min.zip_map(p, lesser);
@@ -302,7 +302,7 @@ impl Bvh {
                     continue;
                 }
                 let aabb = if child & IS_TRIANGLE != 0 {
-                    Aabb::of(&self.corners[(child & !IS_TRIANGLE) as usize])
+                    Aabb::around(&self.corners[(child & !IS_TRIANGLE) as usize])
                 } else {
                     self.nodes[child as usize].whole()
                 };
@@ -434,7 +434,7 @@ impl Bvh {
         let mut count = 0;
         let mut aabb = Aabb::empty();
         for slot in self.own_slots(&self.nodes[own as usize]) {
-            let of_slot = Aabb::of(&self.corners[slot]);
+            let of_slot = Aabb::around(&self.corners[slot]);
             aabb = aabb.union(&of_slot);
             triangles[count] = (slot, of_slot);
             count += 1;
@@ -469,7 +469,7 @@ impl Bvh {
                     continue;
                 }
                 let other = (child & !IS_TRIANGLE) as usize;
-                let of_other = Aabb::of(&self.corners[other]);
+                let of_other = Aabb::around(&self.corners[other]);
                 for (slot, of_slot) in triangles {
                     if *slot < other && of_slot.overlaps(&of_other) {
                         let (s, t) = (self.order[*slot], self.order[other]);
@@ -501,7 +501,7 @@ impl Bvh {
             let child = stack[height];
             if child & IS_TRIANGLE != 0 {
                 let slot = (child & !IS_TRIANGLE) as usize;
-                if ray.meets(&Aabb::of(&self.corners[slot])) {
+                if ray.meets(&Aabb::around(&self.corners[slot])) {
                     visit(self.order[slot]);
                 }
                 continue;
@@ -609,7 +609,7 @@ fn build<E: Send>(
         match items {
             [] => {}
             [item] => {
-                let aabb = Aabb::of(&corners[item.triangle as usize]);
+                let aabb = Aabb::around(&corners[item.triangle as usize]);
                 set(nodes, k, first as u32 | IS_TRIANGLE, aabb);
             }
             items => {
@@ -703,7 +703,7 @@ mod tests {
             bvh.for_each_pair_from(leaf, |s, t| found.push((s, t)));
         }
         found.sort_unstable();
-        let aabb = |t: u32| Aabb::of(&mesh.corners(t as usize));
+        let aabb = |t: u32| Aabb::around(&mesh.corners(t as usize));
         let all = 0..mesh.triangles.len() as u32;
         let expected: Vec<(u32, u32)> = (all.clone())
             .flat_map(|s| all.clone().map(move |t| (s, t)))

@@ -74,7 +74,7 @@ pub(super) fn found(
         })
         .collect();
     let reference = hottest(&counts.means(), &rays)?;
-    let mut region = Aabb::of(&places);
+    let mut region = Aabb::around(&places);
     let border = Vec3::repeat(4.0 * BLUR_MM);
     region.min -= border;
     region.max += border;

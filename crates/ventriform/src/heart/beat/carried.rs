@@ -29,7 +29,7 @@ struct CarriedNode {
 
 impl CarriedNodes {
     /// `vertices` lie in `wall`, whose distances at the nodes of the fields are `still`.
-    pub fn of(vertices: &[Vec3], wall: &VentricleWall, still: &StillWall, rows: usize) -> Self {
+    pub fn new(vertices: &[Vec3], wall: &VentricleWall, still: &StillWall, rows: usize) -> Self {
         let [inner, outer]: [Vec<f64>; 2] =
             [0, 1].map(|side| still.walls.iter().map(|ends| ends[side]).collect());
         let node = |point: &Vec3| {

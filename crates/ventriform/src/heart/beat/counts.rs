@@ -37,7 +37,7 @@ pub struct WallCounts {
 
 impl WallCounts {
     /// The counts of `study` on the rays of `fit`.
-    pub fn of(study: &GatedStudy, fit: &BeatFit) -> Self {
+    pub fn new(study: &GatedStudy, fit: &BeatFit) -> Self {
         let width = 1.0 / study.gates.len() as f64;
         let of_gate = |gate: usize| -> Vec<f64> {
             let wall = fit.moment((gate as f64 + 0.5) * width);
@@ -48,7 +48,7 @@ impl WallCounts {
                     [-REACH_MM, REACH_MM].map(|reach| middle + way * reach)
                 })
                 .collect();
-            let mut region = Aabb::of(rays.as_flattened());
+            let mut region = Aabb::around(rays.as_flattened());
             let border = Vec3::repeat(4.0 * BLUR_MM);
             region.min -= border;
             region.max += border;

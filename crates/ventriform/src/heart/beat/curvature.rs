@@ -45,15 +45,15 @@ struct Block {
 
 impl Curvature {
     /// At `unknowns`. `typical` is the size of a usual step of each of them.
-    pub fn of(
+    pub fn new(
         objective: &Objective,
         unknowns: &[f64],
         typical: &[f64],
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
         let layout = &objective.layout;
-        let image = ImageChanges::of(objective, unknowns, monitor)?;
-        let priors = Priors::of(objective);
+        let image = ImageChanges::new(objective, unknowns, monitor)?;
+        let priors = Priors::from_objective(objective);
         let weights = &objective.observed.gate_weights;
         let all: f64 = weights.iter().sum();
         let mean_square = |index: usize| {
@@ -102,7 +102,7 @@ impl Curvature {
         let layout = &objective.layout;
         let unknowns = harmonic_unknowns(layout, 0);
         let mut matrix = self.motion.clone();
-        Priors::of(objective).add(objective, &unknowns, &mut matrix);
+        Priors::from_objective(objective).add(objective, &unknowns, &mut matrix);
         for n in 0..unknowns.len() {
             matrix[(n, n)] += LEAST_CURVATURE;
         }
@@ -171,10 +171,10 @@ struct Priors {
 }
 
 impl Priors {
-    fn of(objective: &Objective) -> Self {
+    fn from_objective(objective: &Objective) -> Self {
         Self {
             roughness: roughness(objective),
-            levels: Levels::of(objective),
+            levels: Levels::from_objective(objective),
         }
     }
 
@@ -198,7 +198,7 @@ struct Levels {
 }
 
 impl Levels {
-    fn of(objective: &Objective) -> Self {
+    fn from_objective(objective: &Objective) -> Self {
         let count = objective.layout.len();
         let mut at_zero = vec![0.0; count];
         objective.add_levels(&vec![0.0; count], &mut at_zero);
@@ -237,13 +237,13 @@ struct ImageChanges {
 }
 
 impl ImageChanges {
-    fn of(objective: &Objective, unknowns: &[f64], monitor: &Monitor) -> Result<Self, Cancelled> {
+    fn new(objective: &Objective, unknowns: &[f64], monitor: &Monitor) -> Result<Self, Cancelled> {
         let layout = &objective.layout;
         let nodes = layout.nodes();
         let still = vec![0.0; 2 * layout.harmonics];
         let state = objective.conservation.state(layout, unknowns, &still);
         let activity = objective.activity(unknowns);
-        let thinning = Thinning::of(objective, &state);
+        let thinning = Thinning::new(objective, &state);
         let mut painted: Vec<Vec<(usize, f32)>> = vec![Vec::new(); 4 * nodes + COLUMNS + 1];
         let mut moved: Vec<Vec<(usize, f32)>> = vec![Vec::new(); nodes + 1];
         let mut add = |voxel: usize, about: &Nodes, change: &Change, by_stretch: f32| {
@@ -292,7 +292,7 @@ impl ImageChanges {
         let products_of = |painted: Vec<Vec<(usize, f32)>>| {
             let blurred = |entries: &Vec<(usize, f32)>| {
                 monitor.check()?;
-                Ok(Blurred::of(
+                Ok(Blurred::new(
                     entries,
                     objective.grid.shape,
                     &objective.blur,
@@ -320,7 +320,7 @@ struct Thinning {
 }
 
 impl Thinning {
-    fn of(objective: &Objective, state: &WallState) -> Self {
+    fn new(objective: &Objective, state: &WallState) -> Self {
         let conservation = &objective.conservation;
         let walls = state.mid_wall.iter().zip(&state.thickness).enumerate();
         let by_node = walls.map(|(node, (mid, thick))| {
@@ -345,7 +345,7 @@ struct Blurred {
 }
 
 impl Blurred {
-    fn of(entries: &[(usize, f32)], shape: [usize; 3], blur: &Blur, weights: &[f32]) -> Self {
+    fn new(entries: &[(usize, f32)], shape: [usize; 3], blur: &Blur, weights: &[f32]) -> Self {
         let index = |voxel: usize| {
             let [_, nx, ny] = shape;
             [voxel / (nx * ny), voxel / ny % nx, voxel % ny]
@@ -481,7 +481,7 @@ mod tests {
         let objective = objective.met_by(&unknowns);
         // Large steps: hardly any damping.
         let typical = vec![1e4; unknowns.len()];
-        let curvature = Curvature::of(&objective, &unknowns, &typical, &monitor).unwrap();
+        let curvature = Curvature::new(&objective, &unknowns, &typical, &monitor).unwrap();
         for block in &curvature.blocks {
             let count = block.unknowns.len();
             let direction = DVector::from_fn(count, |n, _| (n as f64 * 0.7).sin());

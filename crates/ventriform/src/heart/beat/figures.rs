@@ -94,7 +94,7 @@ pub struct Beat {
 
 impl Beat {
     /// The figures of `fit`. `rr_ms` is the R-R interval, ms, where it is known.
-    pub fn of(fit: BeatFit, study: &GatedStudy, map: &PolarMap, rr_ms: Option<f64>) -> Self {
+    pub fn new(fit: BeatFit, study: &GatedStudy, map: &PolarMap, rr_ms: Option<f64>) -> Self {
         let curve = fit.curve(CURVE_MOMENTS);
         let gates = fit.gates();
         let end_diastole = extreme(&curve, &gates, |a, b| a > b);
@@ -103,11 +103,11 @@ impl Beat {
         let after = fit.moment(end_systole.turns);
         let contraction = Contraction::between(&before, &after);
         let phases = phases(&fit, &before);
-        let counts = WallCounts::of(study, &fit);
+        let counts = WallCounts::new(study, &fit);
         let ends = [end_diastole, end_systole].map(|end| counts.at(end.turns));
         let segments = segments(map, &contraction, &phases, &ends);
         let ejected = 100.0 * (1.0 - end_systole.cavity_ml / end_diastole.cavity_ml);
-        let flags = flags::of(&FlagFacts {
+        let flags = flags::raised(&FlagFacts {
             orders_as_smooth: fit.orders_as_smooth,
             ef_percent: ejected,
             losses: &study.losses,
@@ -191,7 +191,7 @@ fn phases(fit: &BeatFit, diastole: &WallMoment) -> Phases {
     let areas: Vec<f64> = (area_vectors(&diastole.inner).iter().zip(&diastole.on))
         .map(|(area, on)| if *on { area.norm() } else { 0.0 })
         .collect();
-    Phases::of(&thickness, &areas)
+    Phases::new(&thickness, &areas)
 }
 
 /// `counts` are those of every ray at end diastole and at end systole.

@@ -129,7 +129,7 @@ pub fn fit(
     let coordinates = wall.coordinates();
     let count = study.gates.len();
     let mut layout = Layout::new(&coordinates, 0, count);
-    let still = StillWall::of(
+    let still = StillWall::new(
         wall,
         &layout,
         &Field::cut_out(&study.sum, None, 0.0, monitor)?,
@@ -307,7 +307,7 @@ fn minimise(
     let stages = STEPS_OF_ONE_CURVATURE.map(Some).into_iter().chain([None]);
     for stage_steps in stages {
         objective.take_motion_off(resolution_mm, &unknowns);
-        let curvature = Curvature::of(&objective, &unknowns, &typical, monitor)?;
+        let curvature = Curvature::new(&objective, &unknowns, &typical, monitor)?;
         let (mut last_ef, mut looks_at_rest) = (ef_at(&objective, &unknowns), 0);
         let found = lbfgs::minimise(
             unknowns,
@@ -479,7 +479,7 @@ impl BeatFit {
     /// `mesh`, whose nodes lie in `wall`, the summed image's, in the mean over each gate.
     pub fn carried(&self, mesh: &TriMesh, wall: &VentricleWall) -> Vec<TriMesh> {
         let layout = &self.objective.layout;
-        let nodes = CarriedNodes::of(&mesh.vertices, wall, &self.still, layout.rows);
+        let nodes = CarriedNodes::new(&mesh.vertices, wall, &self.still, layout.rows);
         let rim = &self.unknowns[layout.rim()];
         let moved = |basis: &Vec<f64>| {
             let state = self
@@ -500,7 +500,7 @@ impl BeatFit {
             .objective
             .conservation
             .state(layout, &self.unknowns, basis);
-        WallMoment::of(
+        WallMoment::new(
             &self.objective.coordinates,
             layout,
             &state,

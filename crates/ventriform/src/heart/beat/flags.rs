@@ -200,7 +200,7 @@ pub(super) struct FlagFacts<'a> {
 }
 
 /// The flags of a beat.
-pub(super) fn of(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
+pub(super) fn raised(facts: &FlagFacts<'_>) -> Vec<BeatFlag> {
     let FlagFacts {
         orders_as_smooth,
         ef_percent,

@@ -18,7 +18,7 @@ pub struct WallMoment {
 }
 
 impl WallMoment {
-    pub(super) fn of(
+    pub(super) fn new(
         coordinates: &RayCoordinates,
         layout: &Layout,
         state: &WallState,

@@ -38,7 +38,7 @@ pub struct Phases {
 
 impl Phases {
     /// From the thickness of every ray at equal steps of the beat, the first at its beginning, and each ray's area.
-    pub fn of(thickness: &[Vec<f64>], areas: &[f64]) -> Self {
+    pub fn new(thickness: &[Vec<f64>], areas: &[f64]) -> Self {
         let steps = thickness.len() as f64;
         let harmonic = |ray: usize| -> (Complex<f64>, f64) {
             let (mut sum, mut mean) = (Complex::new(0.0, 0.0), 0.0);
@@ -179,7 +179,7 @@ mod tests {
     fn the_phase_of_a_cosine_is_where_it_is_largest() {
         let late = [0.0, 20.0, 135.0, 250.0, 359.0];
         let rays = late.map(|late| cosine(late, 2.0, 24));
-        let phases = Phases::of(&wall(&rays), &[1.0; 5]);
+        let phases = Phases::new(&wall(&rays), &[1.0; 5]);
         for (found, late) in phases.degrees.iter().zip(late) {
             assert!(behind(found.unwrap(), late).abs() < 1e-9);
         }
@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn statistics_are_those_of_the_circle() {
         let rays = [cosine(340.0, 2.0, 24), cosine(20.0, 2.0, 24)];
-        let phases = Phases::of(&wall(&rays), &[1.0, 1.0]);
+        let phases = Phases::new(&wall(&rays), &[1.0, 1.0]);
         assert!(behind(phases.mean_degrees, 0.0).abs() < 1e-6);
         assert!((phases.sd_degrees - 20.0).abs() < 1e-6);
         assert!((phases.bandwidth_degrees - 40.0).abs() < 1e-6);
@@ -200,7 +200,7 @@ mod tests {
         let rays: Vec<Vec<f64>> = (0..40)
             .map(|n| cosine(if n < 38 { n as f64 } else { 180.0 }, 2.0, 24))
             .collect();
-        let phases = Phases::of(&wall(&rays), &[1.0; 40]);
+        let phases = Phases::new(&wall(&rays), &[1.0; 40]);
         assert!((phases.bandwidth_degrees - 37.0).abs() < 1e-6);
     }
 
@@ -211,7 +211,7 @@ mod tests {
             cosine(0.0, 2.0, 24),
             cosine(90.0, 0.1, 24),
         ];
-        let phases = Phases::of(&wall(&rays), &[1.0, 1.0, 2.0]);
+        let phases = Phases::new(&wall(&rays), &[1.0, 1.0, 2.0]);
         assert_eq!(phases.degrees[2], None);
         assert!((phases.moving_share - 0.5).abs() < 1e-9);
     }

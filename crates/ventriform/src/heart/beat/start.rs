@@ -26,7 +26,7 @@ pub(super) struct StillWall {
 }
 
 impl StillWall {
-    pub fn of(wall: &VentricleWall, layout: &Layout, image: &Field) -> Self {
+    pub fn new(wall: &VentricleWall, layout: &Layout, image: &Field) -> Self {
         let coordinates = wall.coordinates();
         let rim: Vec<f64> = (0..COLUMNS).map(|column| rim_of(wall, column)).collect();
         let mut walls: Vec<[f64; 2]> = Vec::with_capacity(layout.nodes());

@@ -110,8 +110,8 @@ impl Sums {
 impl Change {
     /// The change between two maps; `None` where no wall can be compared, or one of them has no uptake.
     pub fn between(sides: &Sides<'_>) -> Option<Self> {
-        let turn = Turn::of(sides);
-        let rest = ScanPlaces::of(sides.rest);
+        let turn = Turn::from_sides(sides);
+        let rest = ScanPlaces::from_map(sides.rest);
         let stress = ScanPlaces {
             uptake: turn::turned(sides.stress, turn.degrees),
             ..rest.clone()

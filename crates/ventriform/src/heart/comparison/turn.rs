@@ -30,8 +30,8 @@ pub struct Turn {
 
 impl Turn {
     /// The turn of the stress map against the rest map.
-    pub(super) fn of(sides: &Sides<'_>) -> Self {
-        let rest = ScanPlaces::of(sides.rest);
+    pub(super) fn from_sides(sides: &Sides<'_>) -> Self {
+        let rest = ScanPlaces::from_map(sides.rest);
         let squares = |degrees: f64| mean_square(sides, &rest, degrees);
         let posture = squares(0.0);
         let steps = (MOST_DEGREES / STEP_DEGREES) as i32;
@@ -146,7 +146,7 @@ mod tests {
         let rest = map_of(uptake(0.0));
         for degrees in [-12.0, -6.0, 0.0, 9.0] {
             let stress = map_of(uptake(degrees));
-            let found = Turn::of(&Sides {
+            let found = Turn::from_sides(&Sides {
                 stress: &stress,
                 rest: &rest,
             });
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn a_defect_in_one_map_turns_nothing() {
         let (stress, rest) = (map_of(uptake(0.0)), map_of(|_, _| 100.0));
-        let found = Turn::of(&Sides {
+        let found = Turn::from_sides(&Sides {
             stress: &stress,
             rest: &rest,
         });

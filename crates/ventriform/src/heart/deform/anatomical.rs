@@ -59,7 +59,7 @@ pub struct BlurredImage<'a> {
 /// ([`blur_correction::excess`]); otherwise it comes from the calibration. Where a direction has no
 /// wall at all, the mesh stays.
 pub fn anatomical_mesh(mesh: &TriMesh, wall: &VentricleWall, image: &BlurredImage<'_>) -> TriMesh {
-    let Some(shifts) = WallShifts::of(wall, image) else {
+    let Some(shifts) = WallShifts::new(wall, image) else {
         return mesh.clone();
     };
     let moved = |share: f64| {
@@ -86,11 +86,11 @@ struct WallShifts {
 }
 
 impl WallShifts {
-    fn of(wall: &VentricleWall, image: &BlurredImage<'_>) -> Option<Self> {
+    fn new(wall: &VentricleWall, image: &BlurredImage<'_>) -> Option<Self> {
         let [inner, outer] = sides(wall)?;
         let rays = describe(&inner, &outer, &uptake(wall, [&inner, &outer], image.field));
         let shift =
-            |coefficients: &RayTerms| RayMap::from_fn(|index| coefficients.of(&rays[index]));
+            |coefficients: &RayTerms| RayMap::from_fn(|index| coefficients.dot(&rays[index]));
         let (mut inner_shift, mut outer_shift) = (shift(&INNER_SHIFT_MM), shift(&OUTER_SHIFT_MM));
         let of_size = shifts_of_size(wall.cavity_ml);
         let of_smoothness = image.smoothness_mm.map_or([0.0; 2], shifts_of_smoothness);
@@ -430,7 +430,7 @@ mod tests {
         let level = |value: f64| RayMap::from_fn(|_| value);
         let shifts = |inner: &RayMap, outer: &RayMap, uptake: &RayMap, index: usize| {
             let numbers = describe(inner, outer, uptake)[index];
-            [INNER_SHIFT_MM, OUTER_SHIFT_MM].map(|coefficients| coefficients.of(&numbers))
+            [INNER_SHIFT_MM, OUTER_SHIFT_MM].map(|coefficients| coefficients.dot(&numbers))
         };
         for (inner, outer) in [(15.0, 30.0), (20.0, 34.0), (26.0, 42.0)] {
             let of = |row| shifts(&level(inner), &level(outer), &level(1.0), row * RAY_COLUMNS);
@@ -507,7 +507,7 @@ mod tests {
                 smoothness_mm: None,
                 resolution_mm,
             };
-            WallShifts::of(&wall, &image).unwrap()
+            WallShifts::new(&wall, &image).unwrap()
         };
         for resolution in [8.0, 12.0] {
             let shifts = of(16.0, Some(resolution));

@@ -150,7 +150,7 @@ impl Attempt {
                     resolution_mm: parameters.resolution,
                 };
                 let both = WallSurfaces::new(apparent, cup, &orientation, &image, monitor)?;
-                let shown = both.of(parameters.edge).clone();
+                let shown = both.at_edge(parameters.edge).clone();
                 ((shown.mesh, Some(shown.wall), shown.wall_ml), Some(both))
             }
             _ => ((mesh, None, wall_ml), None),

@@ -51,7 +51,7 @@ pub fn settled(
     superior: &Vec3,
     evidence: Option<&RimEvidence>,
 ) -> Option<TriMesh> {
-    let rim = Rim::of(mesh, cup, superior)?;
+    let rim = Rim::new(mesh, cup, superior)?;
     let shifts = match evidence {
         Some(evidence) => RIM_REGRESSION.shifts(evidence),
         None => rim.shifts_by_shape()?,
@@ -69,13 +69,13 @@ pub fn rim_evidence(
     wall: &VentricleWall,
     field: &Field,
 ) -> Option<RimEvidence> {
-    let rim = Rim::of(mesh, cup, superior)?;
+    let rim = Rim::new(mesh, cup, superior)?;
     rim.evidence(&rim.shifts_by_shape()?, wall, field)
 }
 
 /// Standard deviation of the height of the rim that this `evidence` puts, mm.
 pub fn rim_deviation_mm(evidence: &RimEvidence) -> f64 {
-    RIM_DEVIATION.of(evidence)
+    RIM_DEVIATION.predicted(evidence)
 }
 
 /// The rim of a mesh.
@@ -88,8 +88,8 @@ struct Rim {
 }
 
 impl Rim {
-    fn of(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<Self> {
-        let frame = RimFrame::of(cup, superior);
+    fn new(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<Self> {
+        let frame = RimFrame::new(cup, superior);
         let heights = frame.heights(mesh)?;
         let apex = mesh.vertices.iter().map(|p| frame.along(p));
         let length = apex.fold(f64::MIN, f64::max) - median(&heights);
@@ -104,7 +104,7 @@ impl Rim {
     fn shifts_by_shape(&self) -> Option<Vec<f64>> {
         let shape = expected(&self.heights, self.length)?;
         let off = self.heights.iter().zip(&shape).map(|(h, e)| h - e);
-        Some(off.map(|distance| RIM_CORRECTION.of(distance)).collect())
+        Some(off.map(|distance| RIM_CORRECTION.at(distance)).collect())
     }
 
     fn evidence(
@@ -113,7 +113,7 @@ impl Rim {
         wall: &VentricleWall,
         field: &Field,
     ) -> Option<RimEvidence> {
-        let ends = SignalEnds::of(&self.frame, &self.heights, wall, field)?;
+        let ends = SignalEnds::new(&self.frame, &self.heights, wall, field)?;
         Some(RimEvidence {
             length_mm: self.length,
             by_shape_mm: by_shape.to_vec(),
@@ -125,13 +125,13 @@ impl Rim {
 /// The height at which `mesh` begins in each of [`RIM_DIRECTIONS`] directions about the axis, mm from the cup's
 /// centre towards the apex; `None` without a rim in every direction.
 pub fn rim_heights(mesh: &TriMesh, cup: &Cup, superior: &Vec3) -> Option<Vec<f64>> {
-    RimFrame::of(cup, superior).heights(mesh)
+    RimFrame::new(cup, superior).heights(mesh)
 }
 
 /// `mesh` with its whole rim moved towards the base by `distance` mm. It stays as it is without a rim in
 /// every direction.
 pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> TriMesh {
-    let frame = RimFrame::of(cup, superior);
+    let frame = RimFrame::new(cup, superior);
     match frame.heights(mesh) {
         Some(rim) => frame.stretched(mesh, &rim, &[distance; RIM_DIRECTIONS]),
         None => mesh.clone(),
@@ -142,7 +142,7 @@ pub fn extended(mesh: &TriMesh, cup: &Cup, superior: &Vec3, distance: f64) -> Tr
 /// where the whole way is longer than [`RIM_SHIFT_RANGE_MM`] or would make the surface intersect itself; `None`
 /// without a rim in every direction, and where it cannot be moved at all.
 pub fn put(mesh: &TriMesh, cup: &Cup, superior: &Vec3, base: &Vec3) -> Option<TriMesh> {
-    let frame = RimFrame::of(cup, superior);
+    let frame = RimFrame::new(cup, superior);
     let rim = frame.heights(mesh)?;
     let distance =
         (median(&rim) - frame.along(base)).clamp(RIM_SHIFT_RANGE_MM[0], RIM_SHIFT_RANGE_MM[1]);
@@ -217,7 +217,7 @@ mod tests {
             length: 70.0,
             breadth: 1.0,
         };
-        let frame = RimFrame::of(&cup, &Vec3::y());
+        let frame = RimFrame::new(&cup, &Vec3::y());
         let mut mesh = shapes::cup(70.0, 31.0, 12.0, 24);
         let least = mesh.vertices.iter().map(|p| frame.along(p));
         let base = least.fold(f64::MAX, f64::min);
@@ -240,7 +240,7 @@ mod tests {
     }
 
     fn rim(mesh: &TriMesh, cup: &Cup) -> Vec<f64> {
-        RimFrame::of(cup, &Vec3::y()).heights(mesh).unwrap()
+        RimFrame::new(cup, &Vec3::y()).heights(mesh).unwrap()
     }
 
     #[test]
@@ -360,12 +360,12 @@ mod tests {
     #[test]
     fn the_correction_grows_steadily_to_its_limits() {
         let steps: Vec<f64> = (-300..=300)
-            .map(|n| RIM_CORRECTION.of(f64::from(n) / 10.0))
+            .map(|n| RIM_CORRECTION.at(f64::from(n) / 10.0))
             .collect();
         assert!(steps.windows(2).all(|s| s[1] >= s[0] && s[1] - s[0] < 0.25));
         assert_eq!((steps[0], steps[600]), (-12.0, 16.0));
-        let slope = |d: f64| (RIM_CORRECTION.of(d + 0.5) - RIM_CORRECTION.of(d - 0.5)).abs();
-        assert!(RIM_CORRECTION.of(0.0).abs() < 1.0);
+        let slope = |d: f64| (RIM_CORRECTION.at(d + 0.5) - RIM_CORRECTION.at(d - 0.5)).abs();
+        assert!(RIM_CORRECTION.at(0.0).abs() < 1.0);
         for within in [-3.0, 0.0, 3.0] {
             assert!((slope(within) - 0.95).abs() < 1e-9);
         }

@@ -60,7 +60,7 @@ impl WallSurfaces {
     }
 
     /// The wall with this `edge`.
-    pub fn of(&self, edge: WallEdge) -> &WallSurface {
+    pub fn at_edge(&self, edge: WallEdge) -> &WallSurface {
         match edge {
             WallEdge::Apparent => &self.apparent,
             WallEdge::Anatomical => &self.anatomical,
@@ -171,7 +171,7 @@ impl FittedModel {
     /// The wall of a ventricle that a fit with this `edge` does not show.
     pub fn other_surface(&self, edge: WallEdge) -> Option<&WallSurface> {
         let surfaces = self.surfaces.as_ref();
-        surfaces.map(|surfaces| surfaces.of(edge.other()))
+        surfaces.map(|surfaces| surfaces.at_edge(edge.other()))
     }
 
     /// The logarithm of the ratio of two distances of the apex from the base plane that was

@@ -113,7 +113,7 @@ fn smoothness_about(
     monitor: &Monitor,
 ) -> Result<Option<f64>, Cancelled> {
     let reach = Vec3::repeat(SMOOTHNESS_REACH_MM);
-    let region = Aabb::of(&[found.cup.centre - reach, found.cup.centre + reach]);
+    let region = Aabb::around(&[found.cup.centre - reach, found.cup.centre + reach]);
     let cube = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
     let ceiling = (SMOOTHNESS_CEILING * found.wall) as f32;
     let clipped = cube.values().iter().map(|value| value.min(ceiling));

@@ -49,7 +49,7 @@ impl RayTerms {
     }
 
     /// The linear function with these coefficients of the values `ray`.
-    pub fn of(&self, ray: &Self) -> f64 {
+    pub fn dot(&self, ray: &Self) -> f64 {
         let terms = self.values().into_iter().zip(ray.values());
         terms.map(|(coefficient, value)| coefficient * value).sum()
     }

@@ -31,7 +31,7 @@ pub(super) struct RimFrame {
 }
 
 impl RimFrame {
-    pub(super) fn of(cup: &Cup, superior: &Vec3) -> Self {
+    pub(super) fn new(cup: &Cup, superior: &Vec3) -> Self {
         let anterior = anterior(&cup.axis, superior);
         Self {
             centre: cup.centre,

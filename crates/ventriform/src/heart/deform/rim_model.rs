@@ -72,7 +72,7 @@ pub struct RimCorrection {
 
 impl RimCorrection {
     /// Distance towards the base by which a rim is moved that lies `distance` mm too near to the apex, mm.
-    pub fn of(&self, distance: f64) -> f64 {
+    pub fn at(&self, distance: f64) -> f64 {
         let beyond = (distance - self.bend_mm).max(0.0) * self.short_slope
             + (-distance - self.bend_mm).max(0.0) * self.long_slope;
         let [least, greatest] = self.range_mm;
@@ -102,7 +102,7 @@ pub struct RimDeviation {
 
 impl RimDeviation {
     /// Standard deviation of the height of a rim settled by this `evidence`, mm.
-    pub fn of(&self, evidence: &RimEvidence) -> f64 {
+    pub fn predicted(&self, evidence: &RimEvidence) -> f64 {
         let ends = &evidence.ends.of_direction;
         let mean = ends.iter().sum::<f64>() / RIM_DIRECTIONS as f64;
         let squares: f64 = ends.iter().map(|end| (end - mean).powi(2)).sum();
@@ -307,10 +307,10 @@ mod tests {
     /// Ends that scatter by 5 mm make the rim less certain; where they all are does not matter.
     #[test]
     fn a_rim_is_as_sure_as_its_ends_agree() {
-        let level = |end: f64| RIM_DEVIATION.of(&evidence(|_| end));
+        let level = |end: f64| RIM_DEVIATION.predicted(&evidence(|_| end));
         assert!((level(0.0) - RIM_DEVIATION.least_mm).abs() < 1e-9);
         assert!((level(9.0) - level(0.0)).abs() < 1e-9);
-        let apart = RIM_DEVIATION.of(&evidence(|d| if d % 2 == 0 { 5.0 } else { -5.0 }));
+        let apart = RIM_DEVIATION.predicted(&evidence(|d| if d % 2 == 0 { 5.0 } else { -5.0 }));
         assert!((1.5..3.0).contains(&(apart / level(0.0))), "{apart}");
     }
 

@@ -96,7 +96,7 @@ impl FitSetup {
         };
         let mut posed = template.mesh.clone();
         posed.vertices.iter_mut().for_each(|p| *p = pose.apply(p));
-        let mut region = Aabb::of(&posed.vertices);
+        let mut region = Aabb::around(&posed.vertices);
         let border = Vec3::repeat(parameters.reach + 4.0 * parameters.blur + 15.0);
         region.min -= border;
         region.max += border;

@@ -48,7 +48,7 @@ pub struct SignalEnds {
 impl SignalEnds {
     /// The ends in the image `field` of a `wall` whose rim has these heights in `frame`. `None` where the wall has no
     /// signal, or a direction no ray that meets it.
-    pub(super) fn of(
+    pub(super) fn new(
         frame: &RimFrame,
         rim: &[f64],
         wall: &VentricleWall,
@@ -186,7 +186,7 @@ mod tests {
             breadth: 1.0,
         };
         let mesh = shapes::cup(70.0, 31.0, 12.0, 48);
-        let frame = RimFrame::of(&cup, &Vec3::y());
+        let frame = RimFrame::new(&cup, &Vec3::y());
         let rim: Vec<f64> = (0..RIM_DIRECTIONS)
             .map(|direction| {
                 let outward = frame.outward(direction);
@@ -214,7 +214,7 @@ mod tests {
         let centre = cup.axis * rim[0];
         let grid = VoxelToPatient::centred([48, 48, 48], [2.5; 3], centre).unwrap();
         let field = Field::new(&Volume::sampled([48; 3], grid, at), None, 0.0);
-        SignalEnds::of(&frame, &rim, &wall, &field)
+        SignalEnds::new(&frame, &rim, &wall, &field)
     }
 
     #[test]

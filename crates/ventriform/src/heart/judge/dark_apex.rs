@@ -41,7 +41,7 @@ pub(super) struct DarkApex {
 
 /// The apical third, where it is dark all round or in part.
 pub(super) fn dark_apex(mesh: &TriMesh, wall: &VentricleWall, volume: &Volume) -> Option<DarkApex> {
-    let field = Field::new(volume, Some(&Aabb::of(&mesh.vertices)), 0.0);
+    let field = Field::new(volume, Some(&Aabb::around(&mesh.vertices)), 0.0);
     let largest = |ray: usize| {
         let ray = &wall.rays[ray];
         let [enters, leaves] = ray.wall?;

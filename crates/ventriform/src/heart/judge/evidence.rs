@@ -72,14 +72,14 @@ impl Evidence {
     /// The figures of a fit whose apparent wall, before its rim was moved, is `wall`, in a heart that is hollow by
     /// `hollowness`, in this blurred `image` and its projections, the `views`; `None` for models whose wall no ray
     /// meets.
-    pub(super) fn of(
+    pub(super) fn new(
         wall: &VentricleWall,
         edges: &Edges,
         hollowness: f64,
         image: &Field,
         views: Option<Views>,
     ) -> Option<Self> {
-        let uptake = WallUptake::of(wall, image)?;
+        let uptake = WallUptake::new(wall, image)?;
         let middle: Vec<f64> = (0..RAY_COLUMNS)
             .map(|column| mean(&middles(wall, column..column + 1)))
             .collect::<Option<_>>()?;
@@ -124,7 +124,7 @@ const BRIGHT_WALL_QUANTILE: f64 = 0.85;
 const NEIGHBOUR_DISTANCE_MM: [i32; 2] = [12, 18];
 
 impl WallUptake {
-    fn of(wall: &VentricleWall, image: &Field) -> Option<Self> {
+    fn new(wall: &VentricleWall, image: &Field) -> Option<Self> {
         let greatest = |ray: &WallRay, from: f64, to: f64| {
             let steps = (to - from).max(0.0).round() as usize;
             let at = |n: usize| image.at(&(ray.start + ray.direction * (from + n as f64)));
@@ -290,20 +290,20 @@ mod tests {
         Field::new(&Volume::sampled([60; 3], frame, value), None, 0.0)
     }
 
-    fn of(mesh: &TriMesh) -> Evidence {
+    fn evidence_of(mesh: &TriMesh) -> Evidence {
         let edges = Edges {
             active: 0.6,
             residual: 0.8,
             strain: 0.2,
         };
-        Evidence::of(&wall(mesh), &edges, 0.5, &image(|_| 1.0), None).unwrap()
+        Evidence::new(&wall(mesh), &edges, 0.5, &image(|_| 1.0), None).unwrap()
     }
 
     /// A cup turned about its axis is round and lies about it; moved aside by 3 mm it lies 3 mm off the axis,
     /// and one whose septum (the columns about 180 degrees, at the patient's right) is moved out has a bulge there.
     #[test]
     fn a_round_heart_is_round_and_a_bulge_is_seen() {
-        let still = of(&cup());
+        let still = evidence_of(&cup());
         assert!(
             (still.active, still.residual, still.strain, still.hollowness) == (0.6, 0.8, 0.2, 0.5)
         );
@@ -321,7 +321,7 @@ mod tests {
 
         let mut moved = cup();
         moved.vertices.iter_mut().for_each(|p| p.y += 3.0);
-        let moved = of(&moved);
+        let moved = evidence_of(&moved);
         let radius = 24.0;
         assert!(
             (moved.offset - 3.0 / radius).abs() < 0.02,
@@ -365,7 +365,7 @@ mod tests {
         };
         assert_eq!((seen(19, 16), seen(36, 7)), (0.0, 0.0));
         assert!(seen(20, 16) > 0.05 && seen(36, 8) > 0.05);
-        let bulged = of(&bulged);
+        let bulged = evidence_of(&bulged);
         assert!(
             (1.08..1.16).contains(&bulged.septal_bulge),
             "{}",
@@ -379,7 +379,7 @@ mod tests {
         // Moved as a whole towards the septum it has no bulge but by the axis.
         let mut aside = cup();
         aside.vertices.iter_mut().for_each(|p| *p -= lateral * 3.0);
-        let aside = of(&aside);
+        let aside = evidence_of(&aside);
         assert!(
             aside.septal_bulge > 1.15 && aside.septal_overshoot.abs() < 0.02,
             "{aside:?}"
@@ -389,7 +389,7 @@ mod tests {
     #[test]
     fn dark_wall_and_bright_neighbours_are_shares_of_the_area() {
         let wall = wall(&cup());
-        let uptake = |value: &dyn Fn(&Vec3) -> f64| WallUptake::of(&wall, &image(value)).unwrap();
+        let uptake = |value: &dyn Fn(&Vec3) -> f64| WallUptake::new(&wall, &image(value)).unwrap();
         let uniform = uptake(&|_| 3.0);
         assert!((uniform.dark, uniform.beside) == (0.0, 1.0));
         let half = uptake(&|p| if p.y > 0.0 { 3.0 } else { 1.0 });
@@ -418,6 +418,6 @@ mod tests {
             assert_eq!(found.beside > 0.05, seen, "{from}: {}", found.beside);
             assert!(found.beside < 0.4);
         }
-        assert!(WallUptake::of(&wall, &image(|_| 0.0)).is_some());
+        assert!(WallUptake::new(&wall, &image(|_| 0.0)).is_some());
     }
 }

@@ -131,7 +131,7 @@ impl Part {
         let nodes: Vec<Vec3> = (mesh.vertices.iter())
             .map(|node| volume.frame.to_voxel(node))
             .collect();
-        let bounds = Aabb::of(&nodes);
+        let bounds = Aabb::around(&nodes);
         let spacing = volume.frame.spacing();
         let reach = [0, 1, 2].map(|a| REACH_MM / spacing[a] + 1.0);
         let first = [0, 1, 2].map(|a| ((bounds.min[a] - reach[a]).floor() as i64).max(-1));

@@ -16,7 +16,7 @@ impl Fit {
     /// Standard deviation of each node's distance from the wall with this `edge`, mm; ventricles only.
     pub fn uncertainty(&self, edge: WallEdge) -> Option<&[f64]> {
         let uncertainty = self.judgement.uncertainty.as_ref();
-        uncertainty.map(|uncertainty| uncertainty.of(edge))
+        uncertainty.map(|uncertainty| uncertainty.at_edge(edge))
     }
 
     /// A figure to rank templates by: the share of area with edges, less strain, misfit and

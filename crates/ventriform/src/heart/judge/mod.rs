@@ -141,7 +141,7 @@ fn evidence_of(
     let orientation = &setup.patient_orientation;
     let views = match orientation.source {
         OrientationSource::Unknown => None,
-        _ => Views::of(
+        _ => Views::new(
             model.apparent_mesh(),
             &orientation.superior,
             volume,
@@ -149,5 +149,5 @@ fn evidence_of(
         )?,
     };
     let hollowness = found.hollowness;
-    Ok(Evidence::of(wall, &edges, hollowness, &setup.field, views))
+    Ok(Evidence::new(wall, &edges, hollowness, &setup.field, views))
 }

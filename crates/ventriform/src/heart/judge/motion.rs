@@ -83,7 +83,7 @@ impl Views {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub(super) fn of(
+    pub(super) fn new(
         mesh: &TriMesh,
         superior: &Vec3,
         volume: &Volume,
@@ -139,7 +139,7 @@ fn sampled(
             frame.to_patient(&Vec3::new(at(0), at(1), at(2)))
         })
         .collect();
-    let mut region = Aabb::of(&corners);
+    let mut region = Aabb::around(&corners);
     region.min -= Vec3::repeat(3.0 * IMAGE_BLUR_MM);
     region.max += Vec3::repeat(3.0 * IMAGE_BLUR_MM);
     let field = Field::cut_out(volume, Some(&region), IMAGE_BLUR_MM, monitor)?;
@@ -418,7 +418,7 @@ mod tests {
         let ball = shapes::icosphere(34.0, 3);
         let ramp = |p: &Vec3| 1.0 / (1.0 + ((p.norm() - 34.0) / 2.0).exp());
         let volume = Volume::sampled([48; 3], frame.unwrap(), ramp);
-        let views = Views::of(&ball, &Vec3::z(), &volume, &Monitor::silent()).unwrap();
+        let views = Views::new(&ball, &Vec3::z(), &volume, &Monitor::silent()).unwrap();
         let views = views.unwrap();
         assert!(views.agreement > 0.95 && views.gain < 0.02, "{views:?}");
     }

@@ -33,7 +33,7 @@ impl NodeTerms {
     }
 
     /// The linear function with these coefficients of the values `node`.
-    pub fn of(&self, node: &Self) -> f64 {
+    pub fn dot(&self, node: &Self) -> f64 {
         let terms = self.values().into_iter().zip(node.values());
         terms.map(|(coefficient, value)| coefficient * value).sum()
     }

@@ -71,7 +71,7 @@ impl WallUncertainty {
     }
 
     /// That of the wall with this `edge`.
-    pub fn of(&self, edge: WallEdge) -> &[f64] {
+    pub fn at_edge(&self, edge: WallEdge) -> &[f64] {
         match edge {
             WallEdge::Apparent => &self.apparent,
             WallEdge::Anatomical => &self.anatomical,
@@ -127,7 +127,7 @@ pub fn of_nodes(nodes: &[NodeEvidence], chance: f64, edge: WallEdge) -> Vec<f64>
             way,
             way_squared: way * way,
         };
-        (terms.of(&values).exp()).clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
+        (terms.dot(&values).exp()).clamp(UNCERTAINTY_RANGE_MM[0], UNCERTAINTY_RANGE_MM[1])
     };
     nodes.iter().map(of).collect()
 }

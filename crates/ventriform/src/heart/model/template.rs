@@ -145,7 +145,7 @@ fn check(mesh: &TriMesh) -> Result<(), TemplateError> {
 /// [`TemplateError`], as [`Template::new`].
 pub fn cup_about_middle(mesh: &TriMesh, monitor: &Monitor) -> Result<Cup, TemplateError> {
     check(mesh)?;
-    let bounds = Aabb::of(&mesh.vertices);
+    let bounds = Aabb::around(&mesh.vertices);
     let middle = (bounds.min + bounds.max) / 2.0;
     let found = |picture: &Volume| localisation::of_model_about(picture, middle, monitor);
     cup_of(mesh, found, monitor)
@@ -159,7 +159,7 @@ fn cup_of(
     monitor: &Monitor,
 ) -> Result<Cup, TemplateError> {
     const NODE_SPACING_MM: f64 = 3.25;
-    let bounds = Aabb::of(&mesh.vertices);
+    let bounds = Aabb::around(&mesh.vertices);
     let size = bounds.max - bounds.min;
     let too_long = size.iter().any(|x| *x > 400.0);
     let none = TemplateError::NoCup { correlation: 0.0 };

@@ -352,7 +352,7 @@ pub fn apply(
     if !map.is_oriented() {
         return Err(NormalsError::Unoriented);
     }
-    let found = figures(&ScanPlaces::of(map), &PlaceLimits::from(&group.map))
+    let found = figures(&ScanPlaces::from_map(map), &PlaceLimits::from(&group.map))
         .ok_or(NormalsError::TooLittleWall { percent: 0.0 })?;
     let percent = found.compared_percent;
     if percent < LEAST_COMPARED_PERCENT {

@@ -64,7 +64,7 @@ impl PlaceLimits {
 
 impl ScanPlaces {
     /// The places of a map.
-    pub fn of(map: &PolarMap) -> Self {
+    pub fn from_map(map: &PolarMap) -> Self {
         Self {
             uptake: map
                 .pixels

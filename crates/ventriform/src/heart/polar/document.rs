@@ -135,7 +135,7 @@ fn round(x: f64) -> f64 {
 
 impl PolarSummary {
     /// Segments and extents. Without orientation no territories, and `None` for what depends on sides.
-    pub fn of(map: &PolarMap) -> Self {
+    pub fn from_map(map: &PolarMap) -> Self {
         let oriented = map.is_oriented();
         let segment = |s: &Segment| PolarSegment {
             number: s.number,
@@ -172,7 +172,7 @@ impl PolarSummary {
 impl PolarDocument {
     /// The summary, the pixels in per cent of the reference (`None` where there is no muscle), and where the
     /// picture has them.
-    pub fn of(map: &PolarMap) -> Self {
+    pub fn from_map(map: &PolarMap) -> Self {
         let percent = |x: f64| {
             if map.reference > 0.0 {
                 round(100.0 * x / map.reference)
@@ -186,7 +186,7 @@ impl PolarDocument {
             row.iter().map(muscle).collect()
         });
         Self {
-            summary: PolarSummary::of(map),
+            summary: PolarSummary::from_map(map),
             values_percent: pixels.collect(),
             states: states(map),
             segment_of: segment_numbers(map),
@@ -198,7 +198,7 @@ impl PolarDocument {
 
 impl FigureDocument {
     /// The figure with where the picture has it.
-    pub fn of(figure: &FigureMap<'_>) -> Self {
+    pub fn from_figure(figure: &FigureMap<'_>) -> Self {
         let map = figure.map;
         let segment = |(index, mean): (usize, &Option<f64>)| FigureSegment {
             number: index + 1,

@@ -44,7 +44,7 @@ impl Levels {
     }
 
     /// The levels of a wall with this middle, by rim and cavity of the `anatomical` wall.
-    pub(super) fn of(middle: &MiddleSurface, anatomical: &VentricleWall) -> Self {
+    pub(super) fn new(middle: &MiddleSurface, anatomical: &VentricleWall) -> Self {
         let [rim, _] = anatomical.extent;
         let length = (anatomical.cavity_end() - rim).max(1e-6);
         let ends = (0..RAY_COLUMNS).map(|column| {
@@ -111,7 +111,7 @@ pub(super) struct MiddleSurface(Vec<Vec3>);
 
 impl MiddleSurface {
     /// A ray that misses the wall gets the distance of the nearest ray of its column that does not.
-    pub fn of(wall: &VentricleWall) -> Self {
+    pub fn from_wall(wall: &VentricleWall) -> Self {
         let distance = |row: usize, column: usize| {
             let [enters, leaves] = wall.rays[row * RAY_COLUMNS + column].wall?;
             Some(f64::midpoint(enters, leaves))

@@ -374,13 +374,13 @@ pub fn map(
         Some(r.start + r.direction * reach)
     });
     let points: Vec<Vec3> = ends.chain(wall.rays.iter().map(|r| r.start)).collect();
-    let mut region = Aabb::of(&points);
+    let mut region = Aabb::around(&points);
     let border = Vec3::repeat(4.0 * parameters.blur);
     region.min -= border;
     region.max += border;
     let field = Field::new(volume, Some(&region), parameters.blur);
-    let middle = MiddleSurface::of(wall);
-    let levels = Levels::of(&middle, anatomical);
+    let middle = MiddleSurface::from_wall(wall);
+    let levels = Levels::new(&middle, anatomical);
     let reaches = reaches(wall);
     let largest: Vec<f64> = (wall.rays.iter().zip(&reaches))
         .map(|(ray, reach)| {
@@ -590,10 +590,10 @@ pub(crate) mod tests {
     fn a_map_without_orientation_names_no_side() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &wall, &PolarParameters::default());
-        assert_eq!(PolarSummary::of(&map).orientation, "frame");
+        assert_eq!(PolarSummary::from_map(&map).orientation, "frame");
         assert!(svg(&map).contains(">A</text>"));
         let map = map.counted_by(OrientationSource::Unknown);
-        let summary = PolarSummary::of(&map);
+        let summary = PolarSummary::from_map(&map);
         assert_eq!(summary.orientation, "unknown");
         assert_eq!(summary.territories, []);
         assert_eq!(summary.first_column, None);
@@ -681,7 +681,7 @@ pub(crate) mod tests {
     fn a_document_is_read_as_it_was_written() {
         let (volume, wall) = scene();
         let map = map(&volume, &wall, &wall, &PolarParameters::default());
-        let document = PolarDocument::of(&map);
+        let document = PolarDocument::from_map(&map);
         let text = serde_json::to_string(&document).unwrap();
         assert_eq!(
             serde_json::from_str::<PolarDocument>(&text).unwrap(),
@@ -719,10 +719,13 @@ pub(crate) mod tests {
             fills(&svg(WallFigure::Motion, -2.0)),
             fills(&svg(WallFigure::Motion, 0.0))
         );
-        let document = FigureDocument::of(&of(WallFigure::Thickening, 37.123));
+        let document = FigureDocument::from_figure(&of(WallFigure::Thickening, 37.123));
         assert_eq!(document.segments[0].mean, None);
         assert_eq!(document.segments[16].mean, Some(37.12));
-        assert_eq!(document.segment_of, PolarDocument::of(&map).segment_of);
+        assert_eq!(
+            document.segment_of,
+            PolarDocument::from_map(&map).segment_of
+        );
         let text = serde_json::to_string(&document).unwrap();
         assert_eq!(
             serde_json::from_str::<FigureDocument>(&text).unwrap(),
@@ -757,7 +760,7 @@ pub(crate) mod tests {
         assert_eq!((width, height), (760, 640));
         let text = svg(&map);
         assert!(text.starts_with("<svg") && text.ends_with("</svg>\n"));
-        let segments = PolarSummary::of(&map).segments;
+        let segments = PolarSummary::from_map(&map).segments;
         assert_eq!(segments.len(), 17);
         assert_eq!(segments[16].name, "apex");
     }

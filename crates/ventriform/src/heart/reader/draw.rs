@@ -158,7 +158,7 @@ fn nodes_about(mesh: &TriMesh, triangles: impl Iterator<Item = FaceId>) -> Vec<u
 
 /// `mesh`, whose wall is `wall`, with its inner and outer surface moved by `offsets`.
 fn with_surfaces_moved(mesh: &TriMesh, wall: &VentricleWall, offsets: &ReaderOffsets) -> TriMesh {
-    let edges = WallEdges::of(wall);
+    let edges = WallEdges::from_wall(wall);
     let mut moved = mesh.clone();
     for p in &mut moved.vertices {
         *p += edges.shift(wall, p, offsets);

@@ -62,7 +62,7 @@ impl WallImage {
         reference: f64,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let mut region = Aabb::of(&fit.mesh.vertices);
+        let mut region = Aabb::around(&fit.mesh.vertices);
         let margin = Vec3::repeat(2.0 * BAND_MM);
         region.min -= margin;
         region.max += margin;
@@ -106,7 +106,7 @@ pub(super) fn displacements(
     image: &WallImage,
     level: f64,
 ) -> Vec<Vec3> {
-    let edges = WallEdges::of(wall);
+    let edges = WallEdges::from_wall(wall);
     let normals = mesh.vertex_normals();
     let read: Vec<[[f64; 2]; 3]> = (0..mesh.triangles.len())
         .into_par_iter()

@@ -12,7 +12,7 @@ pub(super) const MIN_THICKNESS_MM: f64 = 3.0;
 pub(super) struct WallEdges(Vec<[f64; 2]>);
 
 impl WallEdges {
-    pub(super) fn of(wall: &VentricleWall) -> Self {
+    pub(super) fn from_wall(wall: &VentricleWall) -> Self {
         let mut edges = vec![[0.0, 0.0]; RAY_ROWS * RAY_COLUMNS];
         for column in 0..RAY_COLUMNS {
             let mut last = None;

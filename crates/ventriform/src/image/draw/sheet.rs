@@ -337,9 +337,9 @@ impl Pen {
     fn table(&mut self, [left, top]: [usize; 2], table: &Table, width: usize) -> usize {
         let normal = Tone::Plain.line();
         let small = Line::new(SMALL_SIZE_PX, INK_RGB);
-        let fits = ColumnWidths::of(table).least_all() <= normal.characters(width);
+        let fits = ColumnWidths::from_table(table).least_all() <= normal.characters(width);
         let line = if fits { normal } else { small };
-        let widths = ColumnWidths::of(table).within(line.characters(width));
+        let widths = ColumnWidths::from_table(table).within(line.characters(width));
         let head = Line {
             ink: SOFT_INK_RGB,
             ..line
@@ -430,7 +430,7 @@ struct ColumnWidths {
 }
 
 impl ColumnWidths {
-    fn of(table: &Table) -> Self {
+    fn from_table(table: &Table) -> Self {
         let least = |column: usize| {
             let cells = table.rows.iter().filter_map(|row| row.get(column));
             let title = table.columns[column].title.split_whitespace();
@@ -691,7 +691,7 @@ mod tests {
             ],
             rows: vec![vec!["1".into(), "basal anterior".repeat(4), "+3".into()]],
         };
-        let widths = ColumnWidths::of(&table);
+        let widths = ColumnWidths::from_table(&table);
         assert_eq!(widths.least, [3, 56, 7]);
         assert_eq!(widths.within(200), [3, 56, 14]);
         assert_eq!(widths.within(75), [3, 56, 12]);

@@ -67,7 +67,7 @@ fn colour_of(uncertainty: f64) -> Colour {
 
 /// `facets`, triangles of `mesh` or parts of them, from three sides; `ambient` as in [`Style`].
 pub fn pictures(facets: &[Facet], mesh: &TriMesh, ambient: f64) -> Pictures {
-    let aabb = Aabb::of(&mesh.vertices);
+    let aabb = Aabb::around(&mesh.vertices);
     let reach = (aabb.max - aabb.min).amax() / 2.0;
     // Full-width lines about many small triangles would make the picture black.
     let edge = (4.0 * mesh.area() / 3f64.sqrt() / mesh.triangles.len() as f64).sqrt();

@@ -23,7 +23,7 @@ pub struct OddSize {
 
 impl OddSize {
     /// The size of `volume` if it is an odd one.
-    pub fn of(volume: &Volume) -> Option<Self> {
+    pub fn from_volume(volume: &Volume) -> Option<Self> {
         let size = Self {
             shape: volume.shape,
             spacing_mm: volume.frame.spacing(),
@@ -64,7 +64,7 @@ mod tests {
     fn voxels_of_one_millimetre_and_narrow_fields_are_odd() {
         let of = |size: usize, mm: f64| {
             let shape = [size, size, 2];
-            OddSize::of(&Volume {
+            OddSize::from_volume(&Volume {
                 shape,
                 voxels: vec![0.0; size * size * 2],
                 frame: VoxelToPatient::centred(shape, [mm; 3], Vec3::zeros()).unwrap(),

@@ -44,7 +44,7 @@ impl LocateError {
     #[must_use]
     pub(crate) fn about(mut self, volume: &Volume) -> Self {
         if let Self::NoHeart { size, .. } = &mut self {
-            *size = OddSize::of(volume).map(Box::new);
+            *size = OddSize::from_volume(volume).map(Box::new);
         }
         self
     }

@@ -188,7 +188,7 @@ impl PatientOrientation {
             return Ok(Self::unknown(&cup.axis));
         }
         let body = Self::of_body(volume, &cup.centre, monitor)?;
-        let across_heart = ShortAxisSlices::of(&volume.frame, &cup.axis);
+        let across_heart = ShortAxisSlices::new(&volume.frame, &cup.axis);
         let believed = body.source == OrientationSource::Body
             || across_heart.is_none_or(|slices| !slices.frame_is_plain);
         Ok(if believed {
@@ -226,7 +226,7 @@ impl PatientOrientation {
         monitor.check()?;
         let mut mask = field.with_values(body.mask);
         mask.blur(OUTLINE_BLUR_MM, monitor)?;
-        let outline = Outline::of(&mask);
+        let outline = Outline::from_mask(&mask);
         let superior = outline.axis();
         let disorder = outline.disorder(&superior);
         let within = superior.z > MAX_TILT_DEG.to_radians().cos();
@@ -308,7 +308,7 @@ struct Outline {
 
 impl Outline {
     /// Of the blurred mask, without the volume's border: what lies beyond it is unknown.
-    fn of(mask: &Field) -> Self {
+    fn from_mask(mask: &Field) -> Self {
         let [nx, ny, nz] = mask.shape();
         let f = mask.values();
         let [x, y, z] = [0, 1, 2].map(|a| mask.step(&Vec3::ith(a, 1.0)));

@@ -34,7 +34,7 @@ pub struct ShortAxisSlices {
 impl ShortAxisSlices {
     /// Whether a volume with this `frame`, whose heart has this `axis` (base to apex, unit vector), has
     /// slices across the heart.
-    pub fn of(frame: &VoxelToPatient, axis: &Vec3) -> Option<Self> {
+    pub fn new(frame: &VoxelToPatient, axis: &Vec3) -> Option<Self> {
         let grid = [0, 1, 2].map(|a| frame.linear().column(a).normalize());
         let along = |a: &usize| axis.dot(&grid[*a]).abs();
         let limit = |a: usize| {
@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn an_axis_along_the_grid_is_told_with_the_end_of_its_apex() {
         let plain = VoxelToPatient::centred([64; 3], [4.0; 3], Vec3::zeros()).unwrap();
-        let found = |axis: Vec3| ShortAxisSlices::of(&plain, &axis.normalize());
+        let found = |axis: Vec3| ShortAxisSlices::new(&plain, &axis.normalize());
         let up = found(Vec3::new(0.2, 0.1, 1.0)).unwrap();
         assert_eq!((up.grid_axis, up.apex_first), (2, false));
         assert!(up.frame_is_plain);
@@ -79,7 +79,7 @@ mod tests {
         let turn = Rotation3::rotation_between(&Vec3::z(), &axis).unwrap();
         let linear: Matrix3<f64> = turn.matrix() * 4.0;
         let frame = VoxelToPatient::new(linear, Vec3::zeros()).unwrap();
-        let found = ShortAxisSlices::of(&frame, &axis).unwrap();
+        let found = ShortAxisSlices::new(&frame, &axis).unwrap();
         assert!(!found.frame_is_plain && found.grid_axis == 2);
     }
 }

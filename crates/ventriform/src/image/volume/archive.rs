@@ -454,7 +454,7 @@ mod tests {
     }
 
     impl Made {
-        fn of(entries: u64) -> Self {
+        fn with_entries(entries: u64) -> Self {
             Self {
                 counts: [entries; 3],
                 zip64: true,
@@ -528,16 +528,18 @@ mod tests {
 
     #[test]
     fn too_large_a_directory_is_refused_wherever_that_is_stated() {
-        assert_eq!(files(&Made::of(3).bytes()).unwrap().len(), 3);
+        assert_eq!(files(&Made::with_entries(3).bytes()).unwrap().len(), 3);
         assert_eq!(
-            files(&Made::of(MOST_FILES).bytes()).unwrap().len() as u64,
+            files(&Made::with_entries(MOST_FILES).bytes())
+                .unwrap()
+                .len() as u64,
             MOST_FILES
         );
         for entries in [MOST_FILES + 1, 70_000, 200_000] {
             for (zip64, extension) in [(false, 0), (true, 0), (true, 30)] {
                 for comment in [0, 1, 0xffff] {
                     for before in [0, 40] {
-                        let mut made = Made::of(entries);
+                        let mut made = Made::with_entries(entries);
                         made.zip64 = zip64;
                         made.extension = extension;
                         made.comment = vec![b'.'; comment];
@@ -557,7 +559,7 @@ mod tests {
     #[test]
     fn end_records_that_contradict_each_other_are_refused() {
         for (plain, wide) in [(1, 3), (3, 1), (3, 70_000), (1, 1 << 40), (0, 3)] {
-            let mut made = Made::of(3);
+            let mut made = Made::with_entries(3);
             made.counts = [3, plain, wide];
             let found = files(&made.bytes());
             assert!(
@@ -566,12 +568,12 @@ mod tests {
             );
         }
         // What the plain record leaves to the other.
-        let mut made = Made::of(3);
+        let mut made = Made::with_entries(3);
         made.counts = [3, 0xffff, 3];
         assert_eq!(files(&made.bytes()).unwrap().len(), 3);
         // More entries than there are.
         for zip64 in [false, true] {
-            let mut made = Made::of(3);
+            let mut made = Made::with_entries(3);
             made.counts = [3, 4, 4];
             made.zip64 = zip64;
             assert!(is_corrupt(&files(&made.bytes())));
@@ -591,7 +593,7 @@ mod tests {
     fn no_damage_is_a_panic_or_takes_more_memory_than_the_file() {
         let whole = Made {
             comment: b"PK\x05\x06 and so on".to_vec(),
-            ..Made::of(2)
+            ..Made::with_entries(2)
         };
         let whole = whole.bytes();
         for at in 4..whole.len() {

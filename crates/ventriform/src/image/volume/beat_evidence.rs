@@ -100,7 +100,10 @@ impl Course {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub(super) fn of(blocks: &Blocks<'_>, monitor: &Monitor) -> Result<Option<Self>, Cancelled> {
+    pub(super) fn from_blocks(
+        blocks: &Blocks<'_>,
+        monitor: &Monitor,
+    ) -> Result<Option<Self>, Cancelled> {
         let contrasts = contrasts(blocks, monitor)?;
         Ok(products(&contrasts, blocks).and_then(|products| Self::of_products(&products)))
     }

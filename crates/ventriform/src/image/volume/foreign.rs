@@ -305,7 +305,7 @@ const EXAMINED_BYTES: usize = 0x9001 + 5;
 
 impl Foreign {
     /// The format of the file that begins with `start`; `None` if it is not known.
-    fn of(start: &[u8]) -> Option<Self> {
+    fn from_start(start: &[u8]) -> Option<Self> {
         let small = start[..start.len().min(1024)].to_ascii_lowercase();
         let text = trimmed(&small);
         let found = |sign: &Sign| match sign {
@@ -415,7 +415,7 @@ fn beginning(file: &VolumeFile, start: &[u8], limits: &ReadLimits) -> Vec<u8> {
 /// The error for a file that is not supported, with the name of its format if its content, of which `start` is the
 /// beginning, shows it.
 pub(super) fn refuse(file: &VolumeFile, start: &[u8], limits: &ReadLimits) -> VolumeError {
-    match Foreign::of(&beginning(file, start, limits)) {
+    match Foreign::from_start(&beginning(file, start, limits)) {
         Some(foreign) => foreign.refuse(file),
         None => VolumeError::Unrecognised {
             file: file.name().to_owned(),
@@ -432,7 +432,7 @@ pub(super) fn refuse_all(
     limits: &ReadLimits,
 ) -> Option<VolumeError> {
     let each = others.iter().map(|(file, start)| {
-        let foreign = Foreign::of(&beginning(file, start, limits))?;
+        let foreign = Foreign::from_start(&beginning(file, start, limits))?;
         Some((foreign, *file))
     });
     let known = each.flatten();
@@ -514,14 +514,14 @@ mod tests {
                 "XML",
             ),
         ] {
-            let found = Foreign::of(&bytes);
+            let found = Foreign::from_start(&bytes);
             assert!(
                 found.is_some_and(|f| f.name.contains(word)),
                 "{word}: {found:?}"
             );
         }
         for unknown in [&b"plain text"[..], b"", b"BM", &[0; 400], b"<svg", b"8BPS"] {
-            assert_eq!(Foreign::of(unknown), None, "{unknown:?}");
+            assert_eq!(Foreign::from_start(unknown), None, "{unknown:?}");
         }
     }
 

@@ -127,7 +127,7 @@ pub(super) fn look(
         return Ok(GateLook::default());
     }
     let fine = *called == CalledBy::Number;
-    let images = Images::of(file, fine, monitor)?;
+    let images = Images::new(file, fine, monitor)?;
     Ok(images.judged(stated, monitor)?)
 }
 
@@ -192,7 +192,7 @@ struct Raster {
 
 impl Raster {
     /// Blocks of about `block_mm`, at most `most` along an axis.
-    fn of(grid: Grid, block_mm: f64, most: usize) -> Self {
+    fn new(grid: Grid, block_mm: f64, most: usize) -> Self {
         let Grid { shape, spacing_mm } = grid;
         let edge = |axis: usize| {
             let edge = (block_mm / spacing_mm[axis]).round();
@@ -240,7 +240,7 @@ struct Images {
 
 impl Images {
     /// The volumes of `file`, in finer blocks too if `fine`.
-    fn of(file: &mut dyn OpenVolume, fine: bool, monitor: &Monitor) -> Result<Self, VolumeError> {
+    fn new(file: &mut dyn OpenVolume, fine: bool, monitor: &Monitor) -> Result<Self, VolumeError> {
         let header = file.header();
         let frames = header.frames;
         let grid = Grid {
@@ -258,10 +258,10 @@ impl Images {
     /// No volumes yet of so many on that grid.
     fn empty(grid: Grid, frames: usize, fine: bool) -> Self {
         Self {
-            raster: Raster::of(grid, BLOCK_MM, MOST_BLOCKS),
+            raster: Raster::new(grid, BLOCK_MM, MOST_BLOCKS),
             blocks: Vec::with_capacity(frames),
             fine: fine.then(|| {
-                let raster = Raster::of(grid, FINE_BLOCK_MM, MOST_FINE_BLOCKS);
+                let raster = Raster::new(grid, FINE_BLOCK_MM, MOST_FINE_BLOCKS);
                 let edge_mm = |axis: usize| grid.spacing_mm[axis] * raster.edges[axis] as f64;
                 Fine {
                     spacing_mm: [0, 1, 2].map(edge_mm),
@@ -358,7 +358,7 @@ impl Images {
             shape: fine.raster.along,
             spacing_mm: fine.spacing_mm,
         };
-        let course = Course::of(&blocks, monitor)?;
+        let course = Course::from_blocks(&blocks, monitor)?;
         Ok(match course {
             Some(course) if course.is_beat() => None,
             Some(course) => Some(format!(

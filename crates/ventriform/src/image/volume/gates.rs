@@ -57,7 +57,7 @@ impl GatedReading {
     ///
     /// # Errors
     /// [`VolumeError::OtherGate`] if their headers are of several scans.
-    pub(super) fn of(
+    pub(super) fn new(
         readings: Vec<Reading>,
         mut frames: Vec<usize>,
         left_out: &LeftOut,

@@ -88,7 +88,7 @@ impl MiddlePlanes {
 
     /// Draws the planes of a volume with that position in the patient.
     pub(super) fn draw(&self, frame: &VoxelToPatient) -> Image<1> {
-        let axes = PatientAxes::of(self.shape, frame);
+        let axes = PatientAxes::new(self.shape, frame);
         // Columns run to the patient's left or back, rows to the back or feet.
         let views = [
             (axes.x, axes.y),
@@ -183,7 +183,7 @@ struct PatientAxes {
 }
 
 impl PatientAxes {
-    fn of(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
+    fn new(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
         const AXIS_ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],
             [0, 2, 1],

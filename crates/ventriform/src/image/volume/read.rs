@@ -116,7 +116,8 @@ pub fn read_gates(
                 let kept: Vec<usize> = kept.collect();
                 let mut file = 0..;
                 readings.retain(|_| file.next().is_some_and(|file| kept.contains(&file)));
-                let mut gated = GatedReading::of(readings, kept, &look.left_out, &[timing], &said)?;
+                let mut gated =
+                    GatedReading::new(readings, kept, &look.left_out, &[timing], &said)?;
                 gated.facts.warnings.append(&mut look.warnings);
                 gated.facts.warnings.push(taken_for_gates(&order));
                 Ok(gated)
@@ -161,7 +162,7 @@ pub fn read_gates(
         number: gates.number - (frames - kept.len()).min(gates.number),
         ..gates
     });
-    GatedReading::of(readings, kept, &look.left_out, &timings, &[])
+    GatedReading::new(readings, kept, &look.left_out, &timings, &[])
 }
 
 /// What files hold of a heart beat.

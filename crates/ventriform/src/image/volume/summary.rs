@@ -82,16 +82,16 @@ impl Default for Tally {
 impl Tally {
     /// Adds the voxels of the next portion.
     pub(super) fn add_portion(&mut self, portion: &[f32]) {
-        self.merge(&Tally::of(portion, Lanes::add_block));
+        self.merge(&Tally::new(portion, Lanes::add_block));
     }
 
     /// As [`Tally::add_portion`], for voxels that are known to be whole and not missing.
     pub(super) fn add_whole_portion(&mut self, portion: &[f32]) {
-        self.merge(&Tally::of(portion, Lanes::add_figures));
+        self.merge(&Tally::new(portion, Lanes::add_figures));
     }
 
     /// Figures over one portion, computed in lanes for the vector unit, block by block.
-    fn of(portion: &[f32], add: impl Fn(&mut Lanes, &[f32; VALUES_PER_CHECK])) -> Self {
+    fn new(portion: &[f32], add: impl Fn(&mut Lanes, &[f32; VALUES_PER_CHECK])) -> Self {
         let mut lanes = Lanes::new();
         let (blocks, rest) = portion.as_chunks::<VALUES_PER_CHECK>();
         for block in blocks {

@@ -154,7 +154,7 @@ impl SurfaceFile {
 
 /// Shape and frame of the grid about `mesh`.
 fn grid(mesh: &TriMesh) -> Option<([usize; 3], VoxelToPatient)> {
-    let bounds = Aabb::of(&mesh.vertices);
+    let bounds = Aabb::around(&mesh.vertices);
     let size = bounds.max - bounds.min;
     let centre = bounds.min + size / 2.0;
     let mut spacing = SPACING_MM.min(size.amax() / LEAST_ACROSS);

@@ -45,7 +45,7 @@ impl UnlikelySize {
 
 /// Why the size of `mesh` (mm), whose unit was assumed to be `unit`, is not that of an organ.
 pub(super) fn unlikely(mesh: &TriMesh, unit: MeshUnit) -> Option<UnlikelySize> {
-    let bounds = Aabb::of(&mesh.vertices);
+    let bounds = Aabb::around(&mesh.vertices);
     let extent = (bounds.max - bounds.min).amax() / unit.in_millimetres();
     let organ = |unit: MeshUnit| {
         let millimetres = extent * unit.in_millimetres();

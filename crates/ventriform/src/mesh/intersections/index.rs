@@ -45,7 +45,7 @@ impl IntersectionIndex {
     /// Positions must be finite. Triangles set later may lie outside the bounding box of the
     /// first ones: queries stay correct but take longer.
     pub fn new(vertices: &[Vec3], triangles: &[[u32; 3]], cell: f64) -> Self {
-        let bounds = Aabb::of(triangles.iter().flatten().map(|v| &vertices[*v as usize]));
+        let bounds = Aabb::around(triangles.iter().flatten().map(|v| &vertices[*v as usize]));
         let extent = bounds.max - bounds.min;
         let cell = cell
             .max(extent.max() / MOST_CELLS)
@@ -67,7 +67,7 @@ impl IntersectionIndex {
     /// Adds triangle `t`, or replaces it, with these vertices at these positions.
     pub fn set(&mut self, t: FaceId, ids: [VertexId; 3], corners: [Vec3; 3]) {
         self.remove(t);
-        let aabb = Aabb::of(&corners);
+        let aabb = Aabb::around(&corners);
         for cell in self.covered(&corners, &aabb) {
             self.cells[cell].push(t);
         }
@@ -100,7 +100,7 @@ impl IntersectionIndex {
         corners: &[Vec3; 3],
         except: &[FaceId],
     ) -> Option<FaceId> {
-        let aabb = Aabb::of(corners);
+        let aabb = Aabb::around(corners);
         let mut near: Vec<FaceId> = Vec::with_capacity(64);
         for cell in self.covered(corners, &aabb) {
             near.extend(self.cells[cell].iter().filter(|t| {

@@ -121,7 +121,11 @@ fn meet_beyond_edge(u: &Vec3, v: &Vec3, a: &Vec3, b: &Vec3) -> bool {
     if !is_collinear(&[*u, *a, *b]) {
         return false;
     }
-    let (s, t, edge) = (Aabb::of([u, v, a]), Aabb::of([u, v, b]), Aabb::of([u, v]));
+    let (s, t, edge) = (
+        Aabb::around([u, v, a]),
+        Aabb::around([u, v, b]),
+        Aabb::around([u, v]),
+    );
     s.min.sup(&t.min) != edge.min || s.max.inf(&t.max) != edge.max
 }
 
@@ -193,7 +197,7 @@ fn coplanar_segments_meet(axis: usize, p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -
 
 /// Whether two collinear segments meet.
 fn boxes_meet(p: &Vec3, q: &Vec3, r: &Vec3, s: &Vec3) -> bool {
-    Aabb::of([p, q]).overlaps(&Aabb::of([r, s]))
+    Aabb::around([p, q]).overlaps(&Aabb::around([r, s]))
 }
 
 fn is_collinear([a, b, c]: &[Vec3; 3]) -> bool {

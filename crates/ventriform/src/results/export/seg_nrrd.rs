@@ -118,7 +118,7 @@ mod tests {
         let linear = Matrix3::new(2.0, 0.0, 0.5, 0.0, -3.0, 0.0, 0.0, 0.25, 4.0);
         let frame = VoxelToPatient::new(linear, Vec3::new(-1.5, 0.1, 7.0)).unwrap();
         let labels: Vec<u8> = (0..24).map(|n| n % 3).collect();
-        let segments = Structure::of("left_ventricle").segments(true);
+        let segments = Structure::from_organ("left_ventricle").segments(true);
         let bytes = encode(&labels, &segments, (shape, &frame), &Monitor::silent()).unwrap();
         let end = bytes.windows(2).position(|pair| pair == b"\n\n").unwrap();
         let header = std::str::from_utf8(&bytes[..end]).unwrap();
@@ -158,6 +158,6 @@ mod tests {
             assert_eq!(fields.get(field), Some(&value), "{field}");
         }
         assert_ne!(fields["Segment0_ID"], fields["Segment1_ID"]);
-        assert_eq!(Structure::of("liver").segments(false).len(), 1);
+        assert_eq!(Structure::from_organ("liver").segments(false).len(), 1);
     }
 }

@@ -286,7 +286,7 @@ impl BeatReport {
             mass_g: round(SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * mean),
             wall_swing_percent: round(100.0 * swing / mean),
             segments: (beat.segments.iter())
-                .map(|segment| SegmentMotionReport::of(segment, &names[segment.segment - 1]))
+                .map(|segment| SegmentMotionReport::new(segment, &names[segment.segment - 1]))
                 .collect(),
             phase: PhaseReport {
                 mean_degrees: round(beat.phases.mean_degrees),
@@ -323,7 +323,7 @@ impl BeatReport {
 }
 
 impl SegmentMotionReport {
-    fn of(segment: &SegmentMotion, name: &str) -> Self {
+    fn new(segment: &SegmentMotion, name: &str) -> Self {
         Self {
             segment: segment.segment,
             name: name.to_owned(),

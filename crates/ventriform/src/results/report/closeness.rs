@@ -84,7 +84,7 @@ impl Closeness {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn of(mesh: &TriMesh, reference: &TriMesh, monitor: &Monitor) -> Result<Self, Cancelled> {
+    pub fn new(mesh: &TriMesh, reference: &TriMesh, monitor: &Monitor) -> Result<Self, Cancelled> {
         MeasuredSurface::new(reference).closeness(mesh, monitor)
     }
 
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn distances_come_back_from_a_file_as_they_were() {
         let (small, large) = (shapes::icosphere(29.0, 1), shapes::icosphere(30.0, 4));
-        let closeness = Closeness::of(&small, &large, &Monitor::silent()).unwrap();
+        let closeness = Closeness::new(&small, &large, &Monitor::silent()).unwrap();
         assert!(closeness.suits(small.triangles.len()));
         assert!(!closeness.suits(small.triangles.len() + 1));
         assert!(

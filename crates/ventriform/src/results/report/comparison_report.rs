@@ -230,7 +230,7 @@ pub struct ComparedScan {
 
 impl UptakeChange {
     /// The figures, rounded.
-    pub fn of(figures: &PartFigures) -> Self {
+    pub fn from_figures(figures: &PartFigures) -> Self {
         Self {
             stress_percent: figures.stress_percent.map(round),
             rest_percent: figures.rest_percent.map(round),

@@ -54,7 +54,7 @@ pub fn comparison_sheet(sheet: &ComparisonSheet<'_>) -> DrawnPage {
         blocks.extend(sheet_parts::notes(warnings.collect()));
     }
     let scans = scans.as_ref().map_or(&[][..], |scans| &scans[..]);
-    DrawnPage::of(TITLE, scans, blocks, Program::this().footer())
+    DrawnPage::new(TITLE, scans, blocks, Program::this().footer())
 }
 
 /// One line on what both scans are.

@@ -140,13 +140,13 @@ impl Direction {
         samples: usize,
         monitor: &Monitor,
     ) -> Result<Self, Cancelled> {
-        let even = Summary::of(&distances(&even_samples(from, samples), tree, monitor)?);
+        let even = Summary::from_values(&distances(&even_samples(from, samples), tree, monitor)?);
         let budget = MOST_REFINED * samples;
         let (max_mm, max_at_most_mm) = if from.vertices.len() <= budget {
             farthest(from, (to, tree), even.max, budget, monitor)?
         } else {
             let some = distances(&some_vertices(from, samples), tree, monitor)?;
-            (Summary::of(&some).max.max(even.max), None)
+            (Summary::from_values(&some).max.max(even.max), None)
         };
         Ok(Self {
             samples,
@@ -457,7 +457,7 @@ mod tests {
         let model = shapes::cup(80.0, 32.0, 10.0, 9);
         let tree = Bvh::new(&surface.vertices, &surface.triangles);
         let dense = distances(&even_samples(&model, 300_000), &tree, &Monitor::silent()).unwrap();
-        let dense = Summary::of(&dense).max;
+        let dense = Summary::from_values(&dense).max;
         let d = distance(&model, &reference(surface), 2000, &Monitor::silent()).unwrap();
         let (found, at_most) = (d.model_to_surface.max_mm, d.model_to_surface.max_at_most_mm);
         assert!(

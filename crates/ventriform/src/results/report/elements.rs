@@ -58,7 +58,7 @@ pub struct Elements {
 
 impl Elements {
     /// Measures every element of `mesh`.
-    pub fn of(mesh: &TriMesh) -> Self {
+    pub fn measure(mesh: &TriMesh) -> Self {
         Self::from_edges(mesh, &edges(&mesh.triangles))
     }
 
@@ -199,20 +199,20 @@ pub struct Smoothness {
 
 impl Shape {
     /// The summaries of `elements`.
-    pub fn of(elements: &Elements) -> Self {
+    pub fn from_elements(elements: &Elements) -> Self {
         Self {
-            radius_ratio: Summary::of(&elements.radius_ratio),
-            min_angle_deg: Summary::of(&elements.min_angle_deg),
-            max_angle_deg: Summary::of(&elements.max_angle_deg),
-            edge_length_mm: Summary::of(&elements.edge_length_mm),
-            area_mm2: Summary::of(&elements.area_mm2),
-            valence: Valence::of(&elements.valence),
+            radius_ratio: Summary::from_values(&elements.radius_ratio),
+            min_angle_deg: Summary::from_values(&elements.min_angle_deg),
+            max_angle_deg: Summary::from_values(&elements.max_angle_deg),
+            edge_length_mm: Summary::from_values(&elements.edge_length_mm),
+            area_mm2: Summary::from_values(&elements.area_mm2),
+            valence: Valence::from_valence(&elements.valence),
         }
     }
 }
 
 impl Valence {
-    fn of(valence: &[f64]) -> Self {
+    fn from_valence(valence: &[f64]) -> Self {
         let mut counts = BTreeMap::new();
         for &v in valence {
             *counts.entry(v as u32).or_insert(0) += 1;
@@ -231,9 +231,9 @@ impl Valence {
 
 impl Smoothness {
     /// The summaries of `elements`.
-    pub fn of(elements: &Elements) -> Self {
+    pub fn from_elements(elements: &Elements) -> Self {
         Self {
-            dihedral_deg: Summary::of(&elements.dihedral_deg),
+            dihedral_deg: Summary::from_values(&elements.dihedral_deg),
         }
     }
 }
@@ -256,7 +256,7 @@ pub struct Histograms {
 
 impl Histograms {
     /// Counts the elements of both meshes over the same bins.
-    pub fn of(retiled: &Elements, optimised: &Elements) -> Self {
+    pub fn new(retiled: &Elements, optimised: &Elements) -> Self {
         let continuous = |pick: fn(&Elements) -> &Vec<f64>| {
             Histogram::continuous(pick(retiled), pick(optimised))
         };
@@ -280,7 +280,7 @@ pub(super) fn facts(mesh: &TriMesh, self_intersections: usize) -> (Elements, Mes
     let euler = used as i64 - edges.len() as i64 + mesh.triangles.len() as i64;
     let components = topology::components(mesh.vertices.len(), &mesh.triangles);
     let volume = mesh.volume();
-    let aabb = crate::base::geometry::bvh::Aabb::of(&mesh.vertices);
+    let aabb = crate::base::geometry::bvh::Aabb::around(&mesh.vertices);
     let genus = census.as_ref().ok().map(topology::Census::genus);
     let manifold = ManifoldFacts {
         closed: edges.iter().all(|e| e.triangles.len() >= 2),

@@ -222,7 +222,7 @@ pub struct EvidenceReport {
 }
 
 impl LocalisationReport {
-    pub(super) fn of(found: &Localisation) -> Self {
+    pub(super) fn from_found(found: &Localisation) -> Self {
         Self {
             centre: point(&found.cup.centre),
             axis: point(&found.cup.axis),
@@ -236,7 +236,7 @@ impl LocalisationReport {
 }
 
 impl Posture {
-    pub(crate) fn of(orientation: &PatientOrientation) -> Self {
+    pub(crate) fn from_orientation(orientation: &PatientOrientation) -> Self {
         Self {
             superior: point(&orientation.superior),
             source: orientation.source.as_str().to_owned(),
@@ -247,7 +247,7 @@ impl Posture {
 }
 
 impl FitReport {
-    pub(super) fn of(fit: &FittedModel, judgement: &Judgement) -> Self {
+    pub(super) fn new(fit: &FittedModel, judgement: &Judgement) -> Self {
         let turn = fit.rotation.matrix();
         let row = |r: usize| [0, 1, 2].map(|c| round(turn[(r, c)]));
         Self {
@@ -261,7 +261,7 @@ impl FitReport {
             energy: fit.energy.iter().map(|e| round(*e)).collect(),
             self_intersections: fit.self_intersections,
             turned_triangles: fit.turned_triangles,
-            long_axis: fit.cup.as_ref().map(LongAxis::of),
+            long_axis: fit.cup.as_ref().map(LongAxis::from_cup),
             rim_uncertainty_mm: fit
                 .rim_evidence
                 .as_ref()
@@ -275,7 +275,7 @@ impl FitReport {
 
 impl LongAxis {
     /// The axis of a ventricle's `cup`, rounded as in reports, LPS mm.
-    pub fn of(cup: &Cup) -> Self {
+    pub fn from_cup(cup: &Cup) -> Self {
         Self {
             base: point(&cup.base()),
             apex: point(&cup.apex()),
@@ -289,7 +289,7 @@ impl LongAxis {
 }
 
 impl FittedVolumes {
-    pub(super) fn of(fit: &FittedModel, judgement: &Judgement) -> Self {
+    pub(super) fn new(fit: &FittedModel, judgement: &Judgement) -> Self {
         let [apparent, anatomical] = match &fit.surfaces {
             Some(both) => [&both.apparent, &both.anatomical].map(|surface| {
                 Some(WallVolumes {
@@ -314,7 +314,7 @@ impl FittedVolumes {
 
 impl Thicknesses {
     /// Those of a ventricle.
-    pub(super) fn of(fit: &FittedModel) -> Option<Self> {
+    pub(super) fn from_fit(fit: &FittedModel) -> Option<Self> {
         let both = fit.surfaces.as_ref()?;
         let of = |wall: &VentricleWall| Thickness {
             mean: round(wall.thickness),
@@ -329,7 +329,7 @@ impl Thicknesses {
 
 impl Uncertainties {
     /// Those of a ventricle.
-    pub(super) fn of(judgement: &Judgement) -> Option<Self> {
+    pub(super) fn from_judgement(judgement: &Judgement) -> Option<Self> {
         let both = judgement.uncertainty.as_ref()?;
         Some(Self {
             apparent: Uncertainty::over(&both.apparent)?,
@@ -353,7 +353,7 @@ impl Uncertainty {
 
 impl EvidenceReport {
     /// The evidence of a ventricle.
-    pub(super) fn of(judgement: &Judgement) -> Option<Self> {
+    pub(super) fn from_judgement(judgement: &Judgement) -> Option<Self> {
         let e: &Evidence = judgement.evidence.as_ref()?;
         Some(Self {
             active_sensors: round(e.active),

@@ -76,7 +76,7 @@ pub struct IntensityFacts {
 
 impl FileFacts {
     /// Format, grid, frame, intensities and warnings of the volume's file.
-    pub fn of(facts: &VolumeFacts) -> Self {
+    pub fn from_facts(facts: &VolumeFacts) -> Self {
         Self {
             format: facts.format.as_str().to_owned(),
             byte_order: facts.byte_order.as_str().to_owned(),
@@ -92,14 +92,14 @@ impl FileFacts {
             affine_ras: rows(&facts.affine_ras),
             affine_source: facts.affine_source.as_str().to_owned(),
             unit: facts.unit.as_str().to_owned(),
-            intensity: IntensityFacts::of(&facts.intensity),
+            intensity: IntensityFacts::from_summary(&facts.intensity),
             warnings: facts.warnings.clone(),
         }
     }
 }
 
 impl IntensityFacts {
-    fn of(summary: &IntensitySummary) -> Self {
+    fn from_summary(summary: &IntensitySummary) -> Self {
         Self {
             minimum: summary.minimum.into(),
             maximum: summary.maximum.into(),

@@ -54,8 +54,8 @@ pub fn measure(
     let distance = distance(mesh, reference, parameters.samples, monitor)?;
     monitor.report(Stage::Report, 0.9)?;
     Ok(Measures {
-        shape: Shape::of(&elements),
-        smoothness: Smoothness::of(&elements),
+        shape: Shape::from_elements(&elements),
+        smoothness: Smoothness::from_elements(&elements),
         mesh: facts,
         distance,
         elements,

@@ -79,7 +79,7 @@ pub struct ReportInput<'a> {
 impl ModelReport {
     /// Joins the stages' facts and the model's measures.
     pub fn new(input: ReportInput) -> Self {
-        let retiled = Elements::of(&input.tiled.mesh);
+        let retiled = Elements::measure(&input.tiled.mesh);
         let measures = input.measures;
         let surface = stage_facts::surface(input.surface);
         let mut warnings = stage_facts::warnings(input.surface, input.tiled, input.optimised);
@@ -93,7 +93,7 @@ impl ModelReport {
             surface,
             retile: stage_facts::retile(input.tiled, &retiled, input.starts),
             optimise: stage_facts::optimise(&input.optimised.facts),
-            histograms: Histograms::of(&retiled, &measures.elements),
+            histograms: Histograms::new(&retiled, &measures.elements),
             mesh: measures.mesh,
             shape: measures.shape,
             smoothness: measures.smoothness,

@@ -76,7 +76,7 @@ pub struct TerritoryScore {
 
 impl PerfusionReport {
     /// The figures of `perfusion`, whose segments `map` names.
-    pub fn of(perfusion: &Perfusion, map: &PolarMap) -> Self {
+    pub fn new(perfusion: &Perfusion, map: &PolarMap) -> Self {
         let flag = |flag: &NormalsFlag| RaisedFlag::new(flag.code(), flag);
         Self {
             normals: perfusion.group.clone(),

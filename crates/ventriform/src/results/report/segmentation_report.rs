@@ -209,16 +209,22 @@ impl SegmentationReport {
             choice: parts.choice,
             candidates: parts.candidates,
             refused: parts.refused,
-            localisation: fit.localisation.as_ref().map(LocalisationReport::of),
-            posture: fit.patient_orientation.as_ref().map(Posture::of),
-            fit: FitReport::of(fit, judgement),
-            evidence: EvidenceReport::of(judgement),
-            volumes_ml: FittedVolumes::of(fit, judgement),
+            localisation: fit
+                .localisation
+                .as_ref()
+                .map(LocalisationReport::from_found),
+            posture: fit
+                .patient_orientation
+                .as_ref()
+                .map(Posture::from_orientation),
+            fit: FitReport::new(fit, judgement),
+            evidence: EvidenceReport::from_judgement(judgement),
+            volumes_ml: FittedVolumes::new(fit, judgement),
             mass_g: anatomical
                 .map(|surface| round(Self::MYOCARDIAL_DENSITY_G_PER_ML * surface.wall_ml)),
             wall_thickness_mm: fit.wall.as_ref().map(|wall| round(wall.thickness)),
-            thickness_mm: Thicknesses::of(fit),
-            uncertainty_mm: Uncertainties::of(judgement),
+            thickness_mm: Thicknesses::from_fit(fit),
+            uncertainty_mm: Uncertainties::from_judgement(judgement),
             resolution_mm: parts.resolution,
             reader: parts.reader,
             measures: parts.measures,
@@ -304,7 +310,7 @@ impl AppliedReaderReport {
 
 impl AgreementReport {
     /// The measures of two masks; distances are `None` where a mask is empty.
-    pub fn of(agreement: &Agreement) -> Self {
+    pub fn from_agreement(agreement: &Agreement) -> Self {
         let contours = agreement.contours;
         let [volume, expert] = agreement.volumes_ml;
         Self {

@@ -45,7 +45,7 @@ pub fn segmentation_sheet(sheet: &SegmentationSheet<'_>) -> DrawnPage {
     }
     let scans = sheet.scan.map(|scan| [("", scan)]);
     let scans = scans.as_ref().map_or(&[][..], |scans| &scans[..]);
-    DrawnPage::of(&title(report), scans, blocks, Program::this().footer())
+    DrawnPage::new(&title(report), scans, blocks, Program::this().footer())
 }
 
 /// What the file says of how the scan was made.

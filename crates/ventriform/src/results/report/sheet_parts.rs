@@ -18,7 +18,7 @@ pub struct DrawnPage {
 
 impl DrawnPage {
     /// The page with that title, of `scans`, each with its name; below who they are of stand the `blocks`.
-    pub(super) fn of(
+    pub(super) fn new(
         title: &str,
         scans: &[(&str, &Provenance)],
         blocks: Vec<Block>,

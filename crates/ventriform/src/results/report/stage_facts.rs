@@ -79,8 +79,8 @@ pub(super) fn retile(
         relaxation_rounds: facts.relaxation_rounds,
         attempts: facts.attempts,
         starts,
-        shape: Shape::of(elements),
-        smoothness: Smoothness::of(elements),
+        shape: Shape::from_elements(elements),
+        smoothness: Smoothness::from_elements(elements),
     }
 }
 

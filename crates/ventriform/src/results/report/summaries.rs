@@ -189,7 +189,7 @@ pub struct NormalGroupSummary {
 
 impl ComparisonSummary {
     /// The main figures of `report`.
-    pub fn of(report: ComparisonReport) -> Self {
+    pub fn from_report(report: ComparisonReport) -> Self {
         Self {
             tid: report.tid,
             sss: report.sss,
@@ -206,7 +206,7 @@ impl ComparisonSummary {
 
 impl NormalsSummary {
     /// The content of `limits`.
-    pub fn of(limits: &NormalLimits) -> Self {
+    pub fn from_limits(limits: &NormalLimits) -> Self {
         let group = |group: &NormalGroup| NormalGroupSummary {
             sex: group.sex,
             protocol: group.protocol.clone(),
@@ -228,7 +228,7 @@ impl NormalsSummary {
 
 impl SegmentationSummary {
     /// The main figures of `report`, whose mesh has that many vertices.
-    pub fn of(report: SegmentationReport, vertices: usize) -> Self {
+    pub fn new(report: SegmentationReport, vertices: usize) -> Self {
         Self {
             template: report.template,
             choice: report.choice,
@@ -245,7 +245,7 @@ impl SegmentationSummary {
 
 impl BeatSummary {
     /// The main figures of `report`.
-    pub fn of(report: BeatReport) -> Self {
+    pub fn from_report(report: BeatReport) -> Self {
         Self {
             template: report.template,
             confidence: report.confidence,
@@ -266,7 +266,7 @@ impl BeatSummary {
 
 impl ReaderSummary {
     /// The main figures of `profile`.
-    pub fn of(profile: &ReaderProfile) -> Self {
+    pub fn from_profile(profile: &ReaderProfile) -> Self {
         let drawing = profile.drawing();
         Self {
             kind: profile.learnt.kind().as_str().to_owned(),

@@ -29,7 +29,7 @@ pub struct Summary {
 
 impl Summary {
     /// The summary of `values`. Sums run in their order.
-    pub fn of(values: &[f64]) -> Self {
+    pub fn from_values(values: &[f64]) -> Self {
         if values.is_empty() {
             return Self::default();
         }
@@ -123,13 +123,13 @@ mod tests {
 
     #[test]
     fn percentiles_are_linear_between_neighbours() {
-        let summary = Summary::of(&[4.0, 1.0, 3.0, 2.0, 5.0]);
+        let summary = Summary::from_values(&[4.0, 1.0, 3.0, 2.0, 5.0]);
         assert_eq!((summary.min, summary.median, summary.max), (1.0, 3.0, 5.0));
         assert!((summary.p5 - 1.2).abs() < 1e-12);
         assert!((summary.p95 - 4.8).abs() < 1e-12);
         assert!((summary.rms - 11f64.sqrt()).abs() < 1e-12);
         assert!((summary.cv - 2f64.sqrt() / 3.0).abs() < 1e-12);
-        assert_eq!(Summary::of(&[]), Summary::default());
+        assert_eq!(Summary::from_values(&[]), Summary::default());
     }
 
     #[test]

@@ -154,12 +154,12 @@ impl Calibration {
         let gains: Vec<f64> = (self.rows.iter())
             .filter_map(|row| Some(self.figures(row, sample)?.jaccard - row.without.jaccard))
             .collect();
-        PairedDifference::of(&gains)
+        PairedDifference::from_differences(&gains)
     }
 
     /// Mean E_J of the cases without a profile, and held-out by each kind.
     pub fn mean_jaccards(&self) -> MeanJaccards {
-        MeanJaccards::of(&self.rows)
+        MeanJaccards::from_rows(&self.rows)
     }
 }
 
@@ -175,7 +175,7 @@ pub struct MeanJaccards {
 }
 
 impl MeanJaccards {
-    fn of(rows: &[CalibrationRow]) -> Self {
+    fn from_rows(rows: &[CalibrationRow]) -> Self {
         let mean = |of: fn(&CalibrationRow) -> CaseFigures| {
             rows.iter().map(|row| of(row).jaccard).sum::<f64>() / rows.len().max(1) as f64
         };
@@ -235,7 +235,7 @@ pub fn calibrate(
         .par_iter()
         .with_max_len(1)
         .map(|case| {
-            let read = ReadCase::of(case, parameters, monitor);
+            let read = ReadCase::new(case, parameters, monitor);
             // A case that ended because of the caller is no problem of the case.
             monitor.check()?;
             let count = 1 + done.fetch_add(1, Ordering::Relaxed);
@@ -288,7 +288,7 @@ pub fn calibrate(
             })
         })
         .collect::<Result<_, Cancelled>>()?;
-    let learnt = match MeanJaccards::of(&rows).kind() {
+    let learnt = match MeanJaccards::from_rows(&rows).kind() {
         ReaderKind::Edge => by_edge,
         ReaderKind::Level => by_level,
     };
@@ -328,7 +328,7 @@ struct ReadCase {
 }
 
 impl ReadCase {
-    fn of(
+    fn new(
         case: &CalibrationCase,
         parameters: &FitParameters,
         monitor: &Monitor<'_>,

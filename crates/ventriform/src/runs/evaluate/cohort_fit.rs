@@ -46,7 +46,7 @@ impl CohortFit {
     }
 
     /// The figures of `fit`, and its agreement with each gold standard.
-    pub fn of(fit: &Fit, agreements: [Option<Agreement>; 2]) -> Self {
+    pub fn new(fit: &Fit, agreements: [Option<Agreement>; 2]) -> Self {
         let Fit { model, judgement } = fit;
         let agreed = agreements.map(|agreement| {
             let a = agreement?;

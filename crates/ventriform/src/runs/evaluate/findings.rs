@@ -25,7 +25,7 @@ impl FindingVerdict {
         }
     }
 
-    fn of(holds: Option<bool>) -> Self {
+    fn from_holds(holds: Option<bool>) -> Self {
         match holds {
             Some(true) => FindingVerdict::Confirmed,
             Some(false) => FindingVerdict::Refuted,
@@ -60,17 +60,17 @@ pub fn findings(rows: &[FitRow], models: &[ModelRow]) -> Vec<Finding> {
 
 /// The paper's flips alone: its finding is about them, not about the fit.
 fn flips_raise_fitness(models: &[ModelRow]) -> Finding {
-    let flips = Gains::of(models, Variant::Flipped);
+    let flips = Gains::new(models, Variant::Flipped);
     let worst = models.iter().filter(|m| m.kind.variant == Variant::Flipped);
     let worst = worst.map(|m| m.worst_shape).fold(1.0, f64::min);
     Finding {
         claim: "Flips raise the mean fitness of every model (raw form, without the fit).",
-        verdict: FindingVerdict::of((flips.models > 0).then_some(flips.least > 0.0)),
+        verdict: FindingVerdict::from_holds((flips.models > 0).then_some(flips.least > 0.0)),
         figures: format!(
             "gain in the raw form over the re-tiled models: flips alone {flips} (the worst triangle then \
              has a 2r/R of {worst:.2}), the fit alone {}, both {}",
-            Gains::of(models, Variant::Fitted),
-            Gains::of(models, Variant::Optimised),
+            Gains::new(models, Variant::Fitted),
+            Gains::new(models, Variant::Optimised),
         ),
         // Each model is measured against the surface that it was made of.
         sample: Sample::InSample,
@@ -85,7 +85,7 @@ struct Gains {
 }
 
 impl Gains {
-    fn of(models: &[ModelRow], variant: Variant) -> Self {
+    fn new(models: &[ModelRow], variant: Variant) -> Self {
         let mut gains = Gains {
             models: 0,
             least: f64::INFINITY,
@@ -162,7 +162,8 @@ fn best_number(rows: &[FitRow]) -> Finding {
     let top = best(&curve);
     let alike: Vec<usize> = top.map_or_else(Vec::new, |top| {
         let cannot_be_told = |points: &usize| {
-            let found = PairedDifference::of(&differences(rows, kind(top.0), kind(*points)));
+            let found =
+                PairedDifference::from_differences(&differences(rows, kind(top.0), kind(*points)));
             found.is_none_or(|d| d.count < LEAST_PATIENTS || d.may_be_none())
         };
         curve.iter().map(|c| c.0).filter(cannot_be_told).collect()
@@ -176,7 +177,7 @@ fn best_number(rows: &[FitRow]) -> Finding {
     };
     Finding {
         claim: "The best number of points lies between 110 and 200.",
-        verdict: FindingVerdict::of(holds),
+        verdict: FindingVerdict::from_holds(holds),
         figures: top.map_or_else(String::new, |top| {
             let alike: Vec<String> = alike.iter().map(usize::to_string).collect();
             format!(
@@ -204,7 +205,7 @@ fn more_points_hurt(rows: &[FitRow]) -> Finding {
     };
     let found = most.zip(best(&fewer)).and_then(|(most, best)| {
         let lost = differences(rows, kind(best.0), kind(most.0));
-        Some((most, best, PairedDifference::of(&lost)?))
+        Some((most, best, PairedDifference::from_differences(&lost)?))
     });
     let holds = found.and_then(|(_, _, lost)| {
         let told = lost.count >= LEAST_PATIENTS;
@@ -216,7 +217,7 @@ fn more_points_hurt(rows: &[FitRow]) -> Finding {
     });
     Finding {
         claim: "More than 200 points hurt.",
-        verdict: FindingVerdict::of(holds),
+        verdict: FindingVerdict::from_holds(holds),
         figures: found.map_or_else(String::new, |(most, best, lost)| {
             format!(
                 "mean E_J {:.4} at {} points, {:.4} at the best number up to 200, {}: lost {}",
@@ -269,7 +270,7 @@ fn compare(rows: &[FitRow], claim: &'static str, old: Variant, least: f64) -> Fi
             variant: old,
             ..new
         };
-        let Some(found) = PairedDifference::of(&differences(rows, new, old)) else {
+        let Some(found) = PairedDifference::from_differences(&differences(rows, new, old)) else {
             continue;
         };
         let told = found.count >= LEAST_PATIENTS;
@@ -289,7 +290,7 @@ fn compare(rows: &[FitRow], claim: &'static str, old: Variant, least: f64) -> Fi
     };
     Finding {
         claim,
-        verdict: FindingVerdict::of(holds),
+        verdict: FindingVerdict::from_holds(holds),
         figures: figures.join("; "),
         sample: sample_of(rows),
     }

@@ -383,6 +383,6 @@ impl PatientImages {
         let agreements = (self.golds.each_ref())
             .map(|gold| compare(&mask, gold.as_ref()?.as_ref().ok()?, spacing, monitor).ok());
         monitor.check()?;
-        Ok(CohortFit::of(&fit, agreements))
+        Ok(CohortFit::new(&fit, agreements))
     }
 }

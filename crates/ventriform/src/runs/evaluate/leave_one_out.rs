@@ -45,7 +45,7 @@ pub struct LeaveOneOut {
 
 impl LeaveOneOut {
     /// The choices by agreement with `gold`; `None` with fewer than two cases.
-    pub fn of(rows: &[FitRow], gold: Gold) -> Option<Self> {
+    pub fn new(rows: &[FitRow], gold: Gold) -> Option<Self> {
         let judged: Vec<FitRow> = rows
             .iter()
             .filter(|r| r.jaccard(gold).is_some())
@@ -74,7 +74,7 @@ impl LeaveOneOut {
             .filter_map(|c| Some(c.in_sample? - c.held_out))
             .collect();
         (choices.len() > 1).then(|| Self {
-            optimism: PairedDifference::of(&differences),
+            optimism: PairedDifference::from_differences(&differences),
             choices,
             best,
         })
@@ -129,14 +129,14 @@ mod tests {
                 rows.push(row(case, Variant::Optimised, points, Some(jaccard)));
             }
         }
-        let found = LeaveOneOut::of(&rows, Gold::Expert).unwrap();
+        let found = LeaveOneOut::new(&rows, Gold::Expert).unwrap();
         assert!(found.choices.iter().all(|c| c.held_out == 0.8), "{found:?}");
         let [held_out, in_sample] = found.means().map(Option::unwrap);
         assert!(
             (held_out - 0.8).abs() < 1e-12 && in_sample > 0.83,
             "{found:?}"
         );
-        assert_eq!(LeaveOneOut::of(&rows[..3], Gold::Expert), None);
+        assert_eq!(LeaveOneOut::new(&rows[..3], Gold::Expert), None);
     }
 
     #[test]
@@ -153,7 +153,7 @@ mod tests {
                 rows.push(row);
             }
         }
-        let found = LeaveOneOut::of(&rows, Gold::Expert).unwrap();
+        let found = LeaveOneOut::new(&rows, Gold::Expert).unwrap();
         assert!(
             found.choices.iter().all(|c| c.chosen.template != c.case),
             "{found:?}"

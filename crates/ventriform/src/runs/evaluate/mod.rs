@@ -101,7 +101,7 @@ pub fn evaluate(
     observer.progress(EvaluationStep::Pictures, 1.0);
     let mut evaluation = summarise(cohort, &models, &patients, problems, parameters, monitor)?;
     if parameters.leave_one_out {
-        evaluation.leave_one_out = LeaveOneOut::of(&evaluation.rows, Gold::Expert);
+        evaluation.leave_one_out = LeaveOneOut::new(&evaluation.rows, Gold::Expert);
         evaluation.reader = reader(cohort, parameters, monitor)?;
     }
     evaluation.settings = parameters.settings(cohort);
@@ -121,7 +121,7 @@ fn summarise(
     let in_sample = &parameters.in_sample;
     let rows: Vec<FitRow> = patients
         .iter()
-        .flat_map(|p| p.rows(models, in_sample.of(&p.case)))
+        .flat_map(|p| p.rows(models, in_sample.sample(&p.case)))
         .collect();
     let of_patients = patients
         .iter()

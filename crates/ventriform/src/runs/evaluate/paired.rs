@@ -30,7 +30,7 @@ pub struct PairedDifference {
 
 impl PairedDifference {
     /// The figures of `differences`; `None` without any.
-    pub fn of(differences: &[f64]) -> Option<Self> {
+    pub fn from_differences(differences: &[f64]) -> Option<Self> {
         let count = differences.len();
         let mean = super::rows::average(differences)?;
         let mut random = stream(count as u64, Purpose::Measure);
@@ -91,10 +91,10 @@ mod tests {
     #[test]
     fn the_interval_holds_zero_where_signs_are_mixed_and_not_where_all_agree() {
         let mixed: Vec<f64> = (0..20).map(|n| f64::from(n % 2 * 2 - 1)).collect();
-        let mixed = PairedDifference::of(&mixed).unwrap();
+        let mixed = PairedDifference::from_differences(&mixed).unwrap();
         assert!(mixed.may_be_none() && mixed.signs == [10, 10], "{mixed:?}");
         let all: Vec<f64> = (1..=20).map(|n| 0.01 * f64::from(n)).collect();
-        let found = PairedDifference::of(&all).unwrap();
+        let found = PairedDifference::from_differences(&all).unwrap();
         assert!(!found.may_be_none() && found.p < 1e-5, "{found:?}");
         // Normal theory: 1.96 times the standard error.
         let (mean, half) = (0.105, 1.96 * 0.0577 / 20f64.sqrt());
@@ -103,7 +103,7 @@ mod tests {
             found.interval[1] - (mean + half),
         ];
         assert!(off.iter().all(|o| o.abs() < 0.004), "{found:?}");
-        assert_eq!(PairedDifference::of(&all), Some(found));
-        assert_eq!(PairedDifference::of(&[]), None);
+        assert_eq!(PairedDifference::from_differences(&all), Some(found));
+        assert_eq!(PairedDifference::from_differences(&[]), None);
     }
 }

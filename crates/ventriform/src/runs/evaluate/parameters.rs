@@ -38,7 +38,7 @@ pub enum InSample {
 
 impl InSample {
     /// The label of figures of that case.
-    pub fn of(&self, case: &str) -> Sample {
+    pub fn sample(&self, case: &str) -> Sample {
         match self {
             InSample::Named(names) if !names.iter().any(|name| name == case) => Sample::HeldOut,
             _ => Sample::InSample,

@@ -45,7 +45,9 @@ pub fn draw(
             let png = png(cohort, &patient.case, model, fit, monitor)?;
             Ok(png.map(|png| Picture {
                 case: patient.case.clone(),
-                caption: caption(patient, model, fit) + ", " + in_sample.of(&patient.case).as_str(),
+                caption: caption(patient, model, fit)
+                    + ", "
+                    + in_sample.sample(&patient.case).as_str(),
                 png,
             }))
         })

@@ -103,7 +103,10 @@ impl GatedHeart {
         ] {
             monitor.check()?;
             files.push(svg_file(&format!("{name}.svg"), polar::svg(&map)));
-            files.push(json_file(&format!("{name}.json"), &PolarDocument::of(&map)));
+            files.push(json_file(
+                &format!("{name}.json"),
+                &PolarDocument::from_map(&map),
+            ));
         }
         for figure in WallFigure::OF_BEAT {
             monitor.check()?;
@@ -112,7 +115,7 @@ impl GatedHeart {
             files.push(svg_file(&format!("{name}.svg"), polar::figure_svg(&figure)));
             files.push(json_file(
                 &format!("{name}.json"),
-                &FigureDocument::of(&figure),
+                &FigureDocument::from_figure(&figure),
             ));
         }
         if let Some(perfusion) = &self.perfusion {
@@ -253,7 +256,7 @@ impl GatedHeart {
 
     /// The gate at that end, from 0.
     fn gate_at(&self, end: BeatEnd) -> usize {
-        end.of([self.beat.end_diastole.gate, self.beat.end_systole.gate])
+        end.pick([self.beat.end_diastole.gate, self.beat.end_systole.gate])
     }
 
     /// The wall as 1 and the cavity as 2 in a gate.
@@ -278,7 +281,7 @@ impl GatedHeart {
     }
 
     fn structure(&self) -> Structure {
-        Structure::of(self.parameters.organ.as_str())
+        Structure::from_organ(self.parameters.organ.as_str())
     }
 
     /// Wall and cavity of a gate on the grid of the gates.

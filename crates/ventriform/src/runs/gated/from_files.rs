@@ -98,7 +98,7 @@ pub fn from_files(
         monitor,
     )?;
     let rr_ms = (order.choice.rr_ms).or_else(|| reading.timing.rr_of(study.gates.len()));
-    let beat = Beat::of(fitted, &study, map, rr_ms);
+    let beat = Beat::new(fitted, &study, map, rr_ms);
     reading.gates = study.gates;
     let judged = |limits| {
         let figures = beat_figures(&segmentation, &beat);
@@ -183,10 +183,10 @@ impl GatedHeart {
             frames: self.reading.frames.clone(),
             rr_ms: self.rr_ms,
             timing: self.reading.timing.clone(),
-            long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::of),
+            long_axis: segmentation.fit.model.cup.as_ref().map(LongAxis::from_cup),
             posture: (segmentation.fit.model.patient_orientation)
                 .as_ref()
-                .map(Posture::of),
+                .map(Posture::from_orientation),
             resolution: segmentation
                 .resolution
                 .map(|r| Resolution::new(r.value, r.given)),
@@ -197,10 +197,10 @@ impl GatedHeart {
                 .chain(stated.iter().map(|flag| RaisedFlag::new(flag.code(), flag)))
                 .collect(),
             parameters: parameters.to_json(),
-            input: FileFacts::of(&self.reading.facts),
+            input: FileFacts::from_facts(&self.reading.facts),
             warnings: self.reading.facts.warnings.clone(),
             perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
-                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
+                .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
         };
         BeatReport::new(&self.beat, parts)
     }

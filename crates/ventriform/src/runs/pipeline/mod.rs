@@ -279,7 +279,7 @@ fn from_volume(
         })
         .map_err(PipelineError::Optimise)?;
         let mut report = ModelReport::new(ReportInput {
-            input: FileFacts::of(facts),
+            input: FileFacts::from_facts(facts),
             parameters: parameters.to_json(),
             surface: &surface,
             tiled: &made.tiled,

@@ -25,7 +25,7 @@ impl ComparedHearts {
             fit: self.parameters.clone(),
             choice: self.choice.clone(),
         };
-        written::of(self, parameters.to_json())
+        written::comparison_report(self, parameters.to_json())
     }
 
     /// `comparison.json`, `segments.csv`; polar maps as pictures and numbers: `polar_stress` and `polar_rest`, each by
@@ -109,7 +109,7 @@ impl ComparedHearts {
     ) -> Result<Vec<NamedFile>, DicomError> {
         let report = self.report();
         let text = json_line(&report);
-        let structure = Structure::of("left_ventricle");
+        let structure = Structure::from_organ("left_ventricle");
         let results = DicomComparison::new(structure, scans, &report, &text);
         let mut objects = Vec::new();
         for object in ComparisonObject::ALL {

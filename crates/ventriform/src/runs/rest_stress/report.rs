@@ -31,16 +31,19 @@ fn scan_report(heart: &ComparedHeart) -> ComparedScan {
         resolution_mm: segmentation
             .resolution
             .map(|r| Resolution::new(r.value, r.given)),
-        long_axis: model.cup.as_ref().map(LongAxis::of),
-        posture: model.patient_orientation.as_ref().map(Posture::of),
+        long_axis: model.cup.as_ref().map(LongAxis::from_cup),
+        posture: model
+            .patient_orientation
+            .as_ref()
+            .map(Posture::from_orientation),
         series_description: scan.and_then(|scan| scan.series_description.clone()),
         attenuation_corrected: scan.and_then(|scan| scan.attenuation_corrected()),
         radiopharmaceutical: scan.and_then(|scan| scan.radiopharmaceutical.clone()),
         injected_dose: scan.and_then(Provenance::injected_dose_mbq),
-        polar: heart.map().map(PolarSummary::of),
+        polar: heart.map().map(PolarSummary::from_map),
         perfusion: (heart.perfusion().zip(heart.map()))
-            .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
-        input: FileFacts::of(facts),
+            .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
+        input: FileFacts::from_facts(facts),
         warnings: facts.warnings.clone(),
     }
 }
@@ -66,7 +69,10 @@ fn no_beat(hearts: &ComparedHearts) -> Vec<NoBeat> {
 }
 
 /// The report of `hearts`.
-pub(super) fn of(hearts: &ComparedHearts, parameters: Map<String, Value>) -> ComparisonReport {
+pub(super) fn comparison_report(
+    hearts: &ComparedHearts,
+    parameters: Map<String, Value>,
+) -> ComparisonReport {
     let change = &hearts.change;
     let beats = hearts.stress.beat().zip(hearts.rest.beat());
     let beats = beats.map(|(stress, rest)| [stress.report(), rest.report()]);
@@ -84,7 +90,7 @@ pub(super) fn of(hearts: &ComparedHearts, parameters: Map<String, Value>) -> Com
     let segments = change.segments.iter().map(|own| ComparedSegmentReport {
         segment: own.segment,
         name: map.map_or_else(String::new, |map| map.name_of(own.segment)),
-        uptake: UptakeChange::of(&own.figures),
+        uptake: UptakeChange::from_figures(&own.figures),
         stress_score: score(hearts.stress.perfusion(), own.segment),
         rest_score: score(hearts.rest.perfusion(), own.segment),
         motion_change_mm: motion(own.segment).map(|change| round(change.0)),
@@ -120,7 +126,7 @@ pub(super) fn of(hearts: &ComparedHearts, parameters: Map<String, Value>) -> Com
         territories: territories
             .map(|own| ComparedTerritoryReport {
                 name: own.name.to_owned(),
-                uptake: UptakeChange::of(&own.figures),
+                uptake: UptakeChange::from_figures(&own.figures),
             })
             .collect(),
         beat: beats.as_ref().map(|[stress, rest]| BeatChange {

@@ -65,12 +65,12 @@ fn anterior_at(axis: &Vec3, superior: &Vec3, turn_degrees: f64) -> Vec3 {
 
 impl HeartFrame {
     /// The frame of `heart`, turned about its long axis as its polar map is.
-    fn of(heart: &ComparedHeart, turn_degrees: f64) -> Option<Self> {
+    fn new(heart: &ComparedHeart, turn_degrees: f64) -> Option<Self> {
         let model = &heart.segmentation().fit.model;
         let cup: &Cup = model.cup.as_ref()?;
         let orientation = model.patient_orientation.as_ref();
         let superior = orientation.map_or_else(Vec3::z, |orientation| orientation.superior);
-        let ends = LongAxis::of(cup);
+        let ends = LongAxis::from_cup(cup);
         let up = anterior_at(&cup.axis, &superior, turn_degrees);
         Some(Self {
             apex: ends.apex.into(),
@@ -141,7 +141,7 @@ pub(super) fn png(
     let height = 6 * CELL_PX + 2 * GAP_PX;
     let mut picture = Image::filled(width, height, [0; 3]);
     for (row, (scan, heart, turn)) in scans.into_iter().enumerate() {
-        let (Some(frame), Some(map)) = (HeartFrame::of(heart, turn), heart.map()) else {
+        let (Some(frame), Some(map)) = (HeartFrame::new(heart, turn), heart.map()) else {
             return Ok(None);
         };
         if map.reference <= 0.0 {

@@ -83,7 +83,7 @@ impl SegmentedVolume {
         monitor.report(Stage::Export, 0.0)?;
         let segmentation = &self.segmentation;
         let edge = self.parameters.deform.edge;
-        let place = MaskPlace::of(&self.reading, self.parameters.mask_grid).ok_or_else(|| {
+        let place = MaskPlace::new(&self.reading, self.parameters.mask_grid).ok_or_else(|| {
             SegmentationFilesError::Other {
                 what: MASK_FILE,
                 reason: "a grid at right angles that covers so skewed a scan has too many voxels; \
@@ -217,7 +217,11 @@ impl SegmentedVolume {
         };
         let edge = self.parameters.deform.edge;
         let fit = &self.segmentation.fit;
-        let map = self.segmentation.polar.as_ref().map(PolarDocument::of);
+        let map = self
+            .segmentation
+            .polar
+            .as_ref()
+            .map(PolarDocument::from_map);
         let map = map.map(|map| report::object(&map).into());
         let page = report::segmentation_page(&SegmentationPage {
             report: &self.report(),
@@ -244,7 +248,7 @@ impl SegmentedVolume {
 
     /// The main figures, for lists and mesh files.
     pub fn summary(&self) -> SegmentationSummary {
-        SegmentationSummary::of(
+        SegmentationSummary::new(
             self.report(),
             self.segmentation.fit.model.mesh.vertices.len(),
         )
@@ -263,7 +267,7 @@ impl SegmentedVolume {
     /// See [`DicomError`].
     pub fn dicom_files(&self, scan: &SourceScan) -> Result<Vec<NamedFile>, DicomError> {
         let made = &self.segmentation;
-        let structure = Structure::of(self.parameters.organ.as_str());
+        let structure = Structure::from_organ(self.parameters.organ.as_str());
         let report = self.report();
         let polar = made.polar.as_ref().map(polar::png);
         let placed = (&made.mask, &self.reading.volume.frame);
@@ -334,7 +338,7 @@ impl SegmentedVolume {
                 .filter(|(_, inside)| **inside)
                 .for_each(|(label, _)| *label = 2);
         }
-        let structure = Structure::of(self.parameters.organ.as_str());
+        let structure = Structure::from_organ(self.parameters.organ.as_str());
         let segments = structure.segments(cavity.is_some());
         let entries: Vec<LabelEntry> = segments.iter().map(|segment| segment.entry).collect();
         let grid = (place.shape, &place.frame);
@@ -363,7 +367,7 @@ impl SegmentedVolume {
 /// A map of uptake as JSON, SVG and PNG.
 pub(crate) fn uptake_files(name: &str, map: &PolarMap) -> Vec<NamedFile> {
     vec![
-        json_file(&format!("{name}.json"), &PolarDocument::of(map)),
+        json_file(&format!("{name}.json"), &PolarDocument::from_map(map)),
         svg_file(&format!("{name}.svg"), polar::svg(map)),
         png_file(&format!("{name}.png"), polar::png(map)),
     ]
@@ -401,7 +405,7 @@ pub(crate) fn perfusion_files(
 /// A polar map of another figure than uptake, as numbers and pictures.
 pub(crate) fn figure_files(name: &str, map: &FigureMap<'_>) -> [NamedFile; 3] {
     [
-        json_file(&format!("{name}.json"), &FigureDocument::of(map)),
+        json_file(&format!("{name}.json"), &FigureDocument::from_figure(map)),
         svg_file(&format!("{name}.svg"), polar::figure_svg(map)),
         png_file(&format!("{name}.png"), polar::figure_png(map)),
     ]

@@ -39,7 +39,7 @@ pub struct ExpertFacts {
 }
 
 impl ExpertFacts {
-    fn of(given: &GivenMask, placed: &PlacedMask) -> Self {
+    fn new(given: &GivenMask, placed: &PlacedMask) -> Self {
         Self {
             structure: given.structure.clone(),
             resampled: placed.resampled,
@@ -91,7 +91,7 @@ pub fn from_files(
             let given = read_mask(files, choice, limits, &monitor.part(1, parts))?;
             let grid = (reading.volume.shape, &reading.volume.frame);
             let placed = given.on(grid, choice.resample, monitor)?;
-            Ok::<_, SegmentationError>((ExpertFacts::of(&given, &placed), placed.mask))
+            Ok::<_, SegmentationError>((ExpertFacts::new(&given, &placed), placed.mask))
         })
         .transpose()?;
     let fit = SegmentationParameters {

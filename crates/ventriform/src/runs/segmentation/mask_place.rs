@@ -31,7 +31,7 @@ pub(super) struct MaskPlace<'a> {
 
 impl<'a> MaskPlace<'a> {
     /// The grid for masks of the scan `reading`; `None` if one at right angles would have too many voxels.
-    pub fn of(reading: &'a Reading, wanted: MaskGrid) -> Option<Self> {
+    pub fn new(reading: &'a Reading, wanted: MaskGrid) -> Option<Self> {
         let volume = &reading.volume;
         if wanted == MaskGrid::Orthogonal && is_sheared(&volume.frame) {
             let most = MOST_VOXELS.saturating_mul(volume.voxels.len());

@@ -24,7 +24,7 @@ pub(super) fn region(
     organ: &TriMesh,
     monitor: &Monitor,
 ) -> Result<Volume, Cancelled> {
-    let organ = Aabb::of(&organ.vertices);
+    let organ = Aabb::around(&organ.vertices);
     let margin = Vec3::repeat(REGION_MARGIN_MM);
     let about = Aabb {
         min: organ.min - margin,
@@ -56,7 +56,7 @@ mod tests {
     #[test]
     fn the_part_reaches_about_the_organ_and_every_value_keeps_its_place() {
         let organ = shapes::tetrahedron(20.0);
-        let bounds = Aabb::of(&organ.vertices);
+        let bounds = Aabb::around(&organ.vertices);
         // Voxels as they are, blocks of two, and an organ larger than the scan.
         for (size, spacing, block) in [(60, 4.0, 4.0), (140, 1.4, 2.8), (8, 4.0, 4.0)] {
             let volume = ramp(size, spacing);

@@ -30,12 +30,15 @@ impl SegmentedVolume {
                 let reader = &applied.reader;
                 AppliedReaderReport::new(&reader.name, &reader.profile, applied.share)
             }),
-            measures: segmentation.agreement.as_ref().map(AgreementReport::of),
-            polar: segmentation.polar.as_ref().map(PolarSummary::of),
+            measures: segmentation
+                .agreement
+                .as_ref()
+                .map(AgreementReport::from_agreement),
+            polar: segmentation.polar.as_ref().map(PolarSummary::from_map),
             perfusion: (self.perfusion.as_ref().zip(segmentation.polar.as_ref()))
-                .map(|(perfusion, map)| PerfusionReport::of(perfusion, map)),
+                .map(|(perfusion, map)| PerfusionReport::new(perfusion, map)),
             parameters: self.parameters.to_json(),
-            input: FileFacts::of(&self.reading.facts),
+            input: FileFacts::from_facts(&self.reading.facts),
             warnings: self.warnings(),
         };
         SegmentationReport::new(&segmentation.fit, parts)

@@ -80,7 +80,7 @@ pub struct ImageResolution {
 }
 
 impl ImageResolution {
-    fn of(model: &FittedModel, given: Option<f64>) -> Option<Self> {
+    fn new(model: &FittedModel, given: Option<f64>) -> Option<Self> {
         let surfaces = model.surfaces.as_ref()?;
         let estimated = || {
             let [thickness, apparent] =
@@ -170,13 +170,13 @@ pub fn segment(
     let slices = slices::png(
         volume,
         &fit.model.mesh,
-        &Cut::of(&fit.model),
+        &Cut::from_fit(&fit.model),
         expert,
         monitor,
     )?;
     monitor.report(Stage::Report, 1.0)?;
     Ok(Segmentation {
-        resolution: ImageResolution::of(&fit.model, parameters.deform.resolution),
+        resolution: ImageResolution::new(&fit.model, parameters.deform.resolution),
         fit,
         mask,
         other_mask,

@@ -66,7 +66,7 @@ pub struct Cut {
 
 impl Cut {
     /// Through the organ that `fit` shows.
-    pub fn of(fit: &FittedModel) -> Self {
+    pub fn from_fit(fit: &FittedModel) -> Self {
         match (&fit.cup, &fit.patient_orientation) {
             (Some(cup), Some(orientation)) => Self::heart(cup, &orientation.superior),
             _ => Self::body(&fit.mesh),
@@ -83,7 +83,7 @@ impl Cut {
 
     /// Through the middle of any organ.
     pub fn body(mesh: &TriMesh) -> Self {
-        let bounds = Aabb::of(&mesh.vertices);
+        let bounds = Aabb::around(&mesh.vertices);
         let longest = (bounds.max - bounds.min).amax();
         let (x, y, z) = (Vec3::x(), Vec3::y(), Vec3::z());
         let step = (longest / (ORGAN_SHARE * SLICE_SIDE_PX as f64)).max(0.1);
@@ -122,7 +122,7 @@ fn slice(
         SLICE_SIDE_PX * SLICE_SIDE_PX - 1,
     ]
     .map(place);
-    let region = Aabb::of(&corners);
+    let region = Aabb::around(&corners);
     let field = Field::cut_out(volume, Some(&region), 0.0, monitor)?;
     let values: Vec<f64> = (0..SLICE_SIDE_PX * SLICE_SIDE_PX)
         .map(|p| field.at(&place(p)))

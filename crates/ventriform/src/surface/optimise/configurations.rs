@@ -114,7 +114,7 @@ impl<'a> Configurations<'a> {
     /// Mean fitness over all edges.
     pub fn mean(&self, fitness: &FitnessFunction) -> f64 {
         let edges = self.half_edges.edges();
-        let sum: f64 = edges.map(|h| fitness.of(&self.terms(h))).sum();
+        let sum: f64 = edges.map(|h| fitness.value(&self.terms(h))).sum();
         sum / self.edge_count()
     }
 
@@ -155,14 +155,14 @@ impl<'a> Configurations<'a> {
         let new = replacement(self.vertices, &quad, guard)?;
         let flipped = FlippedTerms::new(self, h, &new);
         let before = match gain {
-            Gain::Local => fitness.of(&self.terms(h)),
+            Gain::Local => fitness.value(&self.terms(h)),
             Gain::Total => flipped.around_before(fitness),
         };
         let sides = match gain {
             Gain::Local => 0.0,
             Gain::Total => flipped.around_after(fitness),
         };
-        let gained = |d: f64| fitness.of(&flipped.terms(d)) + sides - before;
+        let gained = |d: f64| fitness.value(&flipped.terms(d)) + sides - before;
         // The closest-point query is the costly part. It is skipped if the flip would not gain
         // even with the new edge's midpoint on S.
         if !(gained(0.0) > least) {
@@ -317,15 +317,15 @@ impl<'a, 'b> FlippedTerms<'a, 'b> {
 
     /// Sum of F over the flipped edge, its sides and the outer edges before the flip.
     fn around_before(&self, fitness: &FitnessFunction) -> f64 {
-        let rate = |h: HalfEdgeId| fitness.of(&self.now.terms(h));
+        let rate = |h: HalfEdgeId| fitness.value(&self.now.terms(h));
         let sides: f64 = self.sides.iter().map(|&s| rate(s)).sum();
         rate(self.h) + sides + self.outer_edges().map(rate).sum::<f64>()
     }
 
     /// Sum of F over the sides and the outer edges after the flip.
     fn around_after(&self, fitness: &FitnessFunction) -> f64 {
-        let sides: f64 = (0..4).map(|k| fitness.of(&self.side(k))).sum();
-        let outer = self.outer_edges().map(|o| fitness.of(&self.outer(o)));
+        let sides: f64 = (0..4).map(|k| fitness.value(&self.side(k))).sum();
+        let outer = self.outer_edges().map(|o| fitness.value(&self.outer(o)));
         sides + outer.sum::<f64>()
     }
 }

@@ -122,7 +122,7 @@ impl FitnessFunction {
     }
 
     /// F of one configuration.
-    pub fn of(&self, terms: &FitnessTerms) -> f64 {
+    pub fn value(&self, terms: &FitnessTerms) -> f64 {
         let x = [terms.a, terms.b, terms.c, terms.d];
         (0..4)
             .map(|i| self.weighted[i] / x[i].max(self.floor[i]))
@@ -147,10 +147,10 @@ mod tests {
             c: 1.0,
             ..FitnessTerms::default()
         };
-        assert!((fitness.of(&perfect) - 1.0).abs() < 1e-15);
+        assert!((fitness.value(&perfect) - 1.0).abs() < 1e-15);
         // Twice as far as a hundredth of an edge of 12 mm.
         let worse = FitnessTerms { d: 0.24, ..perfect };
-        assert!((fitness.of(&worse) - (0.6 + 0.4 / 2.0)).abs() < 1e-15);
+        assert!((fitness.value(&worse) - (0.6 + 0.4 / 2.0)).abs() < 1e-15);
     }
 
     #[test]
@@ -161,16 +161,17 @@ mod tests {
             c: 1.25,
             d: 0.5,
         };
-        let raw = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).of(&terms);
+        let raw = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).value(&terms);
         assert!((raw - (5.0 + 2.0 + 0.8 + 4.0) / 4.0).abs() < 1e-12);
-        let robust = FitnessFunction::new(FitnessForm::Robust, [1.0; 4], MESH_LENGTHS).of(&terms);
+        let robust =
+            FitnessFunction::new(FitnessForm::Robust, [1.0; 4], MESH_LENGTHS).value(&terms);
         let expected = 1.0 / 0.2f64.to_degrees() + 1.0 / 0.5f64.to_degrees() + 0.8 + 2.0;
         assert!((robust - expected / 4.0).abs() < 1e-12);
         let flat = FitnessTerms {
             c: 1.0,
             ..FitnessTerms::default()
         };
-        let capped = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).of(&flat);
+        let capped = FitnessFunction::new(FitnessForm::Raw, [1.0; 4], MESH_LENGTHS).value(&flat);
         assert!((capped - (20.0 + 20.0 + 1.0 + 20.0) / 4.0).abs() < 1e-12);
     }
 }

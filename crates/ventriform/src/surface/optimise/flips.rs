@@ -403,7 +403,8 @@ mod tests {
                 after.flip(h, candidate.distance);
                 // The new edge is the last half-edge of the first triangle.
                 let new_edge = h.face().half_edge(2);
-                let expected = fitness.of(&after.terms(new_edge)) - fitness.of(&state.terms(h));
+                let expected =
+                    fitness.value(&after.terms(new_edge)) - fitness.value(&state.terms(h));
                 assert!((candidate.gain - expected).abs() < 1e-12);
                 judged += 1;
             }

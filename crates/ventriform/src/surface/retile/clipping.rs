@@ -39,7 +39,7 @@ impl Moment {
         }
     }
 
-    fn of(centroid: Vec3, mass: f64) -> Self {
+    fn new(centroid: Vec3, mass: f64) -> Self {
         Self {
             first: centroid * mass,
             mass,
@@ -70,7 +70,7 @@ impl<'a> Patches<'a> {
                 let [a, b, c] = t.map(|v| samples.working[v as usize]);
                 let mass =
                     area_normal(&a, &b, &c).norm() * (t.iter().map(|v| density(*v)).sum::<f64>());
-                Moment::of((a + b + c) / 3.0, mass)
+                Moment::new((a + b + c) / 3.0, mass)
             })
             .collect();
         Self { samples, moments }
@@ -128,7 +128,7 @@ impl<'a> Patches<'a> {
         let plane = Bisector::new(&sites[lone as usize], &sites[rest as usize]);
         let (s, u) = (plane.crossing(&p, &q), plane.crossing(&p, &r));
         let way = (q - p) * (s * ONE_THIRD) + (r - p) * (u * ONE_THIRD);
-        let piece = Moment::of(p + way, whole.mass * s * u);
+        let piece = Moment::new(p + way, whole.mass * s * u);
         sums[lone as usize].add(&piece);
         sums[rest as usize].add(&Moment {
             first: whole.first - piece.first,
@@ -235,7 +235,7 @@ impl Polygon {
         for k in 1..self.count.max(1) - 1 {
             let [a, b, c] = [self.corners[0], self.corners[k], self.corners[k + 1]];
             let mass = area_normal(&a, &b, &c).norm() * density;
-            sum.add(&Moment::of((a + b + c) / 3.0, mass));
+            sum.add(&Moment::new((a + b + c) / 3.0, mass));
         }
     }
 }

@@ -32,7 +32,8 @@ impl WeightedSamples {
     /// Samples of the surface with at least `wanted` vertices: from [`PARTLY_SPLIT_FROM_SAMPLES`] on no more than that
     /// but for edges of one length, below as many as splitting every edge makes.
     pub fn new(surface: &[Vec3], working: &[Vec3], triangles: &[[u32; 3]], wanted: usize) -> Self {
-        let mut samples = Self::of(surface.to_vec(), working.to_vec(), triangles.to_vec());
+        let mut samples =
+            Self::from_surface(surface.to_vec(), working.to_vec(), triangles.to_vec());
         while samples.len() < wanted {
             let missing = wanted - samples.len();
             let all = wanted < PARTLY_SPLIT_FROM_SAMPLES;
@@ -41,7 +42,7 @@ impl WeightedSamples {
         samples
     }
 
-    fn of(surface: Vec<Vec3>, working: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+    fn from_surface(surface: Vec<Vec3>, working: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
         let (first, neighbours) = neighbours(working.len(), &triangles);
         let mut area = vec![0.0; working.len()];
         for t in &triangles {
@@ -120,7 +121,7 @@ impl WeightedSamples {
                 parts.into_iter().take(count)
             })
             .collect();
-        Self::of(surface, working, triangles)
+        Self::from_surface(surface, working, triangles)
     }
 }
 

@@ -549,7 +549,7 @@ impl Attributes {
         }
         let representation = standard(attribute.tag);
         let sets = self.character_sets(attribute.path);
-        let text = sets.decode(bytes, Division::of(representation))?;
+        let text = sets.decode(bytes, Division::from_representation(representation))?;
         Ok((!text.is_empty()).then_some(text))
     }
 
@@ -563,7 +563,7 @@ impl Attributes {
         let text = String::from_utf8_lossy(stated.map_or(&[][..], Vec::as_slice));
         let terms = text.split('\\').map(|term| term.trim_matches(['\0', ' ']));
         let terms: Vec<String> = terms.map(str::to_owned).collect();
-        CharacterSets::of(&terms)
+        CharacterSets::from_terms(&terms)
     }
 
     /// The `N` decimal numbers (DS, IS) of an attribute, `None` if it is absent or empty.

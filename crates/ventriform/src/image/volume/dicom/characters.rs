@@ -136,7 +136,7 @@ pub(super) enum Division {
 }
 
 impl Division {
-    pub(super) fn of(representation: VR) -> Self {
+    pub(super) fn from_representation(representation: VR) -> Self {
         match representation {
             VR::PN => Self::Names,
             VR::LO | VR::SH | VR::UC => Self::Values,
@@ -170,7 +170,7 @@ pub(super) struct CharacterSets {
 
 impl CharacterSets {
     /// The sets that the values of Specific Character Set name; none of them: ASCII.
-    pub(super) fn of(terms: &[String]) -> Self {
+    pub(super) fn from_terms(terms: &[String]) -> Self {
         let mut sets = Self {
             whole: None,
             first: (Set::Ascii, None),
@@ -226,7 +226,7 @@ impl CharacterSets {
         let padding = |b: &&u8| matches!(**b, 0 | b' ');
         let bytes = &bytes[..bytes.len() - bytes.iter().rev().take_while(padding).count()];
         let text = match (self.whole, division) {
-            (_, Division::Codes) => Self::of(&[]).extended(bytes, division)?,
+            (_, Division::Codes) => Self::from_terms(&[]).extended(bytes, division)?,
             (Some(whole), _) => decode_whole(whole, bytes)?,
             (None, _) => self.extended(bytes, division)?,
         };
@@ -394,7 +394,7 @@ mod tests {
     /// The text of `bytes` in the sets that `terms` name, separated by backslashes.
     fn read(terms: &str, bytes: &[u8], division: Division) -> Result<String, String> {
         let terms: Vec<String> = terms.split('\\').map(str::to_owned).collect();
-        CharacterSets::of(&terms).decode(bytes, division)
+        CharacterSets::from_terms(&terms).decode(bytes, division)
     }
 
     fn name(terms: &str, bytes: &[u8]) -> Result<String, String> {
@@ -623,7 +623,9 @@ mod tests {
         }
         let stated = |terms: &[&str]| {
             let terms: Vec<String> = terms.iter().map(|t| (*t).to_owned()).collect();
-            CharacterSets::of(&terms).unknown().map(str::to_owned)
+            CharacterSets::from_terms(&terms)
+                .unknown()
+                .map(str::to_owned)
         };
         assert_eq!(stated(&["", "ISO 2022 IR 87"]), None);
         assert_eq!(

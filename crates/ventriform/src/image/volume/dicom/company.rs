@@ -88,7 +88,7 @@ fn check_kind(
             Some(class) => {
                 let mut attributes = Attributes::new(file.name(), ByteOrder::Little);
                 attributes.media_class = Some(class);
-                Kind::of(&attributes).map(|_| ())
+                Kind::from_attributes(&attributes).map(|_| ())
             }
             None => Err(error),
         },

@@ -42,7 +42,7 @@ impl FrameOrder {
     ///
     /// # Errors
     /// [`VolumeError::Field`] unless every slice of every gate occurs exactly once.
-    pub(super) fn of(
+    pub(super) fn new(
         attributes: &Attributes,
         frames: usize,
         gated: bool,

@@ -45,7 +45,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    pub(super) fn of(a: &Attributes) -> Self {
+    pub(super) fn from_attributes(a: &Attributes) -> Self {
         let number = |attribute| {
             let stated = a.decimals::<1>(attribute).ok().flatten();
             stated.map(|[number]| number)
@@ -125,8 +125,8 @@ pub(super) fn open(
         if !whole || !timing::is_one_gate(a, kind) {
             return Ok(Joined::No);
         }
-        places.push(Place::of(a));
-        said.push(ScanStatement::of(a));
+        places.push(Place::from_attributes(a));
+        said.push(ScanStatement::from_attributes(a));
         let gate = DicomFile::of_scan(file, scanned, limits)?;
         if gate.volumes != 1 {
             return Ok(Joined::No);

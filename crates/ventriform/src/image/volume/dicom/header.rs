@@ -76,7 +76,7 @@ pub fn read_header(
     let mut source = syntax.open(file, longest)?;
     let a = guarded(file, || scan::attributes(&mut source, &syntax, monitor))?;
     let sop_class = uid(&a, SOP_CLASS)?;
-    let kind = Kind::of(&a).ok();
+    let kind = Kind::from_attributes(&a).ok();
     let is_gate = kind.is_some_and(|kind| {
         timing::is_one_gate(&a, kind) || kind.is_single_slice() && timing::is_slice_of_a_gate(&a)
     });
@@ -110,7 +110,7 @@ fn gates_key(a: &Attributes) -> String {
         hash.update((text.len() as u64).to_le_bytes());
         hash.update(text);
     };
-    for (attribute, value) in ScanStatement::of(a).stated() {
+    for (attribute, value) in ScanStatement::from_attributes(a).stated() {
         add(Some(attribute.to_owned()));
         add(value.map(|value| match attribute == ACQUISITION_TIME.name {
             true => value

@@ -124,7 +124,7 @@ impl Kind {
     /// # Errors
     /// [`VolumeError::NotVolume`] for objects that hold no slices, [`VolumeError::NotSlices`] for
     /// images whose Image Type says so.
-    pub(super) fn of(attributes: &Attributes) -> Result<Self, VolumeError> {
+    pub(super) fn from_attributes(attributes: &Attributes) -> Result<Self, VolumeError> {
         let class = attributes.text(SOP_CLASS);
         let class = class.or_else(|| attributes.media_class.clone());
         let image_type = attributes.texts(IMAGE_TYPE);

@@ -162,7 +162,7 @@ impl ScannedFile {
         let syntax = syntax::find(file, limits)?;
         let mut source = syntax.open(file, limits.unpacked_bytes)?;
         let scan = guarded(file, || scan::scan(&mut source, &syntax, monitor))?;
-        let pixels = Pixels::of(&scan, file, syntax, limits)?;
+        let pixels = Pixels::new(&scan, file, syntax, limits)?;
         Ok(Self { scan, pixels })
     }
 
@@ -216,7 +216,7 @@ impl DicomFile {
         let [columns, rows] = pixels.extent;
         let (content, volumes, slices, placement) = match scan.kind {
             Kind::Nuclear { gated } => {
-                let order = FrameOrder::of(a, pixels.frames, gated, &mut warnings)?;
+                let order = FrameOrder::new(a, pixels.frames, gated, &mut warnings)?;
                 let (slices, volumes) = (order.slices(), order.gates());
                 check_numbers(a, &order, &mut warnings)?;
                 if slices == 1 {
@@ -236,14 +236,14 @@ impl DicomFile {
                 (Content::Slices(stored), volumes, slices, placement)
             }
             Kind::Segmentation => {
-                let (segments, placement) = Segments::of(a, &pixels, limits.voxels)?;
+                let (segments, placement) = Segments::new(a, &pixels, limits.voxels)?;
                 let slices = segments.slices;
                 (Content::Labels(segments), 1, slices, placement)
             }
             Kind::Enhanced | Kind::Slice => {
                 check_groups(a, pixels.frames)?;
                 let located = (0..pixels.frames).map(|frame| {
-                    let mut located = Located::of(a, 0, frame)?;
+                    let mut located = Located::new(a, 0, frame)?;
                     located.marks = Marks::of_frame(a, frame);
                     Ok(located)
                 });
@@ -260,7 +260,7 @@ impl DicomFile {
                     return Err(a.missing(SLICE_THICKNESS));
                 }
                 let name = |frame| format!("frame {}", frame + 1);
-                let stack = Stack::of(&located, pixels.extent, gap, &name);
+                let stack = Stack::new(&located, pixels.extent, gap, &name);
                 let stack = stack.map_err(|reason| {
                     a.wrong(
                         "Image Position (Patient) (0020,0032)",
@@ -284,7 +284,7 @@ impl DicomFile {
         let timings = if enhanced_gates {
             vec![timing::of_frames(a)?]
         } else {
-            timing::of(a)?
+            timing::gate_timings(a)?
         };
         let voxels = (columns * rows) as u64 * slices as u64;
         if voxels > limits.voxels {
@@ -304,11 +304,11 @@ impl DicomFile {
             timings,
             shape: [columns, rows, slices],
             placement,
-            provenance: Provenance::of(a),
+            provenance: Provenance::from_attributes(a),
             parts: vec![pixels],
             instances: Vec::new(),
             gate_scans: Vec::new(),
-            statement: ScanStatement::of(a),
+            statement: ScanStatement::from_attributes(a),
             warnings,
         })
     }
@@ -324,7 +324,7 @@ impl DicomFile {
         for file in files {
             monitor.check()?;
             let scanned = ScannedFile::open(file, limits, monitor)?;
-            let statement = ScanStatement::of(&scanned.scan.attributes);
+            let statement = ScanStatement::from_attributes(&scanned.scan.attributes);
             let whole = !scanned.scan.kind.is_single_slice() && !scanned.is_one_slice();
             scans.add(&scanned, &statement, whole);
             if !whole {
@@ -548,7 +548,7 @@ impl Series {
         statement: ScanStatement,
     ) -> Result<(), VolumeError> {
         let instance = a.text(SOP_INSTANCE).unwrap_or_default();
-        let mut located = Located::of(a, self.parts.len(), 0)?;
+        let mut located = Located::new(a, self.parts.len(), 0)?;
         located.marks = Marks::of_file(a);
         if let Some(known) = self.known.get(&instance) {
             if located.is_same_place(&self.located[*known])
@@ -576,7 +576,7 @@ impl Series {
         if self.first.as_ref().is_none_or(|first| key < first.key) {
             self.first = Some(First {
                 key,
-                provenance: Provenance::of(a),
+                provenance: Provenance::from_attributes(a),
                 warnings: Provenance::warnings(a),
                 gap: stated_gap(a)?,
             });
@@ -599,7 +599,7 @@ impl Series {
         self.instances.push(instance);
         self.timings.push(timing::of_slice(a));
         self.statements.push(statement);
-        self.places.push(Place::of(a));
+        self.places.push(Place::from_attributes(a));
         self.parts.push(pixels);
         Ok(())
     }
@@ -673,7 +673,7 @@ impl Series {
         };
         let extent = self.parts[0].extent;
         let name = |part: usize| self.parts[part].name().to_owned();
-        let stack = match Stack::of(&self.located, extent, first.gap, &name) {
+        let stack = match Stack::new(&self.located, extent, first.gap, &name) {
             Ok(stack) => stack,
             Err(reason) => return refuse(reason),
         };

@@ -169,7 +169,7 @@ pub(crate) struct ScanStatement {
 
 impl ScanStatement {
     /// What the file with attributes `a` says.
-    pub(super) fn of(a: &Attributes) -> Self {
+    pub(super) fn from_attributes(a: &Attributes) -> Self {
         let stated = |row: &Row| {
             if row.name() == REST_OR_STRESS.name() {
                 return rest_or_stress(a);

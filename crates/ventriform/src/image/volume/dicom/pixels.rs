@@ -61,7 +61,7 @@ impl Pixels {
     /// # Errors
     /// [`VolumeError`] for unsupported pixel formats, more voxels than `limits` allow, and
     /// elements too short for the stated frames.
-    pub(super) fn of(
+    pub(super) fn new(
         scan: &Scan,
         file: &VolumeFile,
         syntax: Syntax,

@@ -186,7 +186,7 @@ struct Position {
 }
 
 impl Position {
-    fn of(a: &Attributes) -> Self {
+    fn from_attributes(a: &Attributes) -> Self {
         let position = position(a);
         let modifier = coded(
             a,
@@ -349,7 +349,7 @@ pub(super) fn assumed(a: &Attributes) -> Result<Assumed, VolumeError> {
             ),
         });
     }
-    let position = Position::of(a);
+    let position = Position::from_attributes(a);
     if let Some(reason) = position.contradictions.first() {
         return Err(a.wrong(
             "Image Orientation (Patient) (0020,0037)",
@@ -405,7 +405,7 @@ pub(super) fn contradictions(a: &Attributes, [x, y]: [Vec3; 2], step: Vec3) -> V
         .map(|c| format!("{}", (c * 1e4).round() / 1e4 + 0.0))
         .collect();
     let cosines = cosines.join("\\");
-    let mut found: Vec<String> = Position::of(a)
+    let mut found: Vec<String> = Position::from_attributes(a)
         .contradictions
         .into_iter()
         .map(|reason| format!("{reason}. {STATED}, {cosines}, decides how the slices lie."))

@@ -18,7 +18,7 @@ macro_rules! attributes_of_fields {
         impl Provenance {
             /// The provenance that the data set states, without the frames of the slices and without what is no value
             /// of its representation.
-            pub(super) fn of(a: &Attributes) -> Self {
+            pub(super) fn from_attributes(a: &Attributes) -> Self {
                 let mut stated = Self::as_stated(a);
                 stated.put_right();
                 stated

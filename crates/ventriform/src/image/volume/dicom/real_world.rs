@@ -102,7 +102,7 @@ pub(super) enum Stated {
 
 impl Stated {
     /// What the bytes of `value` state, of the representation `vr`; `None` if they are no value of it.
-    pub(super) fn of(value: &[u8], vr: VR, order: ByteOrder) -> Option<Self> {
+    pub(super) fn new(value: &[u8], vr: VR, order: ByteOrder) -> Option<Self> {
         let mut bytes = value.to_vec();
         let word = match vr {
             VR::US | VR::SS => 2,

@@ -25,7 +25,7 @@ enum Form {
 }
 
 impl Form {
-    fn of(vr: VR) -> Self {
+    fn from_representation(vr: VR) -> Self {
         match vr {
             VR::US => Self::Whole(2, false),
             VR::SS => Self::Whole(2, true),
@@ -134,7 +134,10 @@ pub(super) fn settled(
     little: bool,
 ) -> Result<(Vec<u8>, bool), VR> {
     let own = standard(tag);
-    let (from, to) = (Form::of(stated), Form::of(own));
+    let (from, to) = (
+        Form::from_representation(stated),
+        Form::from_representation(own),
+    );
     let swap = |bytes: &mut [u8], form: Form| {
         for word in bytes.chunks_exact_mut(form.word()) {
             word.reverse();
@@ -176,7 +179,7 @@ mod tests {
     const SLOPE: Tag = Tag(0x40, 0x9225);
 
     fn in_both_orders(tag: Tag, stated: VR, little: &[u8]) -> Result<(Vec<u8>, bool), VR> {
-        let word = Form::of(stated).word();
+        let word = Form::from_representation(stated).word();
         let mut big = little.to_vec();
         for word in big.chunks_exact_mut(word) {
             word.reverse();
@@ -184,7 +187,7 @@ mod tests {
         let found = settled(tag, stated, little.to_vec(), ByteOrder::Little, false);
         let mut other = settled(tag, stated, big, ByteOrder::Big, false);
         if let Ok((bytes, _)) = &mut other {
-            for word in bytes.chunks_exact_mut(Form::of(standard(tag)).word()) {
+            for word in bytes.chunks_exact_mut(Form::from_representation(standard(tag)).word()) {
                 word.reverse();
             }
         }

@@ -99,18 +99,18 @@ pub(super) fn scan(
     syntax: &Syntax,
     monitor: &Monitor,
 ) -> Result<Scan, VolumeError> {
-    let mut walk = Walk::of(source, syntax);
+    let mut walk = Walk::new(source, syntax);
     let found = find_pixels(source, syntax, &mut walk, monitor);
     // For another class of object, the class is the more useful error. What else a damaged data set
     // says of itself may be part of the damage.
     let kind = match &found {
         Err(VolumeError::Cancelled(_)) => None,
         Err(_) if !walk.attributes.names_a_class() => None,
-        Err(_) | Ok(None) => match Kind::of(&walk.attributes) {
+        Err(_) | Ok(None) => match Kind::from_attributes(&walk.attributes) {
             Err(other @ VolumeError::NotVolume { .. }) => return Err(other),
             _ => None,
         },
-        Ok(Some(_)) => Some(Kind::of(&walk.attributes)?),
+        Ok(Some(_)) => Some(Kind::from_attributes(&walk.attributes)?),
     };
     let (Some(found), Some(kind)) = (found?, kind) else {
         return Err(walk.attributes.wrong(
@@ -133,16 +133,16 @@ pub(super) fn scan(
 /// slices, as far as it tells.
 ///
 /// # Errors
-/// As [`Kind::of`]; for one that names no class, as [`attributes`].
+/// As [`Kind::from_attributes`]; for one that names no class, as [`attributes`].
 pub(super) fn check_kind(
     source: &mut Source,
     syntax: &Syntax,
     monitor: &Monitor,
 ) -> Result<(), VolumeError> {
-    let mut walk = Walk::of(source, syntax);
+    let mut walk = Walk::new(source, syntax);
     match find_pixels(source, syntax, &mut walk, monitor) {
         Err(error @ VolumeError::Cancelled(_)) => Err(error),
-        _ if walk.attributes.names_a_class() => Kind::of(&walk.attributes).map(|_| ()),
+        _ if walk.attributes.names_a_class() => Kind::from_attributes(&walk.attributes).map(|_| ()),
         found => found.map(|_| ()),
     }
 }
@@ -156,7 +156,7 @@ pub(super) fn attributes(
     syntax: &Syntax,
     monitor: &Monitor,
 ) -> Result<Attributes, VolumeError> {
-    let mut walk = Walk::of(source, syntax);
+    let mut walk = Walk::new(source, syntax);
     find_pixels(source, syntax, &mut walk, monitor)?;
     Ok(walk.attributes)
 }
@@ -387,7 +387,7 @@ struct Walk {
 
 impl Walk {
     /// At the start of the data set of `source`.
-    fn of(source: &Source, syntax: &Syntax) -> Self {
+    fn new(source: &Source, syntax: &Syntax) -> Self {
         let byte_order = match syntax.transfer_syntax.endianness() {
             Endianness::Little => ByteOrder::Little,
             Endianness::Big => ByteOrder::Big,
@@ -536,7 +536,7 @@ impl Walk {
             (VR::US, VR::SS) => VR::SS,
             (own, _) => own,
         };
-        if let Some(stated) = Stated::of(&value, vr, self.attributes.byte_order) {
+        if let Some(stated) = Stated::new(&value, vr, self.attributes.byte_order) {
             self.attributes.mappings.insert(item, part, stated);
         }
         Ok(read)

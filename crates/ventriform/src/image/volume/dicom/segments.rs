@@ -51,7 +51,7 @@ impl Segments {
     ///
     /// # Errors
     /// [`VolumeError`] if the frames do not lie on one grid, or the grid is too large.
-    pub(super) fn of(
+    pub(super) fn new(
         a: &Attributes,
         pixels: &Pixels,
         most: u64,
@@ -74,7 +74,7 @@ impl Segments {
                 return Err(a.wrong(SEGMENTATION_TYPE.name, value, reason));
             }
         };
-        let located = (0..pixels.frames).map(|frame| Located::of(a, 0, frame));
+        let located = (0..pixels.frames).map(|frame| Located::new(a, 0, frame));
         let located: Vec<Located> = located.collect::<Result<_, _>>()?;
         let heights = heights(&located).map_err(contradiction)?;
         let lowest = (0..heights.len()).min_by(|a, b| heights[*a].total_cmp(&heights[*b]));

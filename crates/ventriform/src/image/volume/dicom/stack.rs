@@ -75,7 +75,7 @@ impl Located {
     ///
     /// # Errors
     /// [`VolumeError::Field`] for invalid or missing spacings and directions.
-    pub(super) fn of(a: &Attributes, part: usize, frame: usize) -> Result<Self, VolumeError> {
+    pub(super) fn new(a: &Attributes, part: usize, frame: usize) -> Result<Self, VolumeError> {
         let of = Some(frame);
         let first = |attributes: [Attribute; 3]| {
             let stated = attributes.into_iter();
@@ -203,7 +203,7 @@ impl Stack {
     ///
     /// # Errors
     /// The contradiction to one volume.
-    pub(super) fn of(
+    pub(super) fn new(
         frames: &[Located],
         [columns, rows]: [usize; 2],
         gap: Option<f64>,
@@ -390,7 +390,7 @@ mod tests {
     #[test]
     fn positions_order_slices_and_ranks_order_volumes() {
         let frames = [at(8.0, 2.0), at(4.0, 1.0), at(4.0, 2.0), at(8.0, 1.0)];
-        let stack = Stack::of(&frames, [5, 5], None, &name).unwrap();
+        let stack = Stack::new(&frames, [5, 5], None, &name).unwrap();
         assert_eq!((stack.slices, &*stack.order), (2, &[1, 3, 2, 0][..]));
         let frame = &stack.placement.frame;
         assert_eq!(frame.spacing(), [3.0, 2.0, 4.0]);
@@ -400,7 +400,8 @@ mod tests {
 
     #[test]
     fn gaps_and_strangers_are_named() {
-        let of = |frames: &[Located]| Stack::of(frames, [5, 5], Some(4.0), &name).map(|s| s.slices);
+        let of =
+            |frames: &[Located]| Stack::new(frames, [5, 5], Some(4.0), &name).map(|s| s.slices);
         let gap = of(&[at(0.0, 0.0), at(4.0, 0.0), at(12.0, 0.0)]).unwrap_err();
         assert!(gap.contains("4.000 to 8.000 mm"), "{gap}");
         let twice = of(&[at(0.0, 0.0), at(0.0, 1.0), at(4.0, 0.0)]).unwrap_err();

@@ -26,7 +26,7 @@ const MINUTE_MS: f64 = 60_000.0;
 ///
 /// # Errors
 /// [`VolumeError::Field`] if a part is not a number, or is negative.
-pub(super) fn of(a: &Attributes) -> Result<Vec<GateTiming>, VolumeError> {
+pub(super) fn gate_timings(a: &Attributes) -> Result<Vec<GateTiming>, VolumeError> {
     let slots = counted(a, TIME_SLOT_VECTOR).into_iter().max();
     let stated = a.shorts(TIME_SLOTS).first().copied();
     let intervals = counted(a, RR_INTERVAL_VECTOR).into_iter().max();

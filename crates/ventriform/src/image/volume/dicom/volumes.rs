@@ -228,15 +228,15 @@ impl<const N: usize> From<[Mark; N]> for Marks {
 impl Marks {
     /// The marks of the file with attributes `a`.
     pub(super) fn of_file(a: &Attributes) -> Self {
-        Self::of(a, None, OF_FILES)
+        Self::new(a, None, OF_FILES)
     }
 
     /// The marks of stored frame number `frame`, from 0. What holds for all frames is none.
     pub(super) fn of_frame(a: &Attributes, frame: usize) -> Self {
-        Self::of(a, Some(frame), OF_FRAMES)
+        Self::new(a, Some(frame), OF_FRAMES)
     }
 
-    fn of(a: &Attributes, frame: Option<usize>, criteria: &[Criterion]) -> Self {
+    fn new(a: &Attributes, frame: Option<usize>, criteria: &[Criterion]) -> Self {
         let mut marks = Vec::new();
         for (number, criterion) in criteria.iter().enumerate() {
             if !a.states(criterion.attribute, frame) {

@@ -17,7 +17,7 @@ pub struct GridGeometry {
 }
 
 impl GridGeometry {
-    pub(super) fn of(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
+    pub(super) fn new(shape: [usize; 3], frame: &VoxelToPatient) -> Self {
         let axis = |a: usize| frame.linear().column(a).normalize().into();
         Self {
             shape,

@@ -71,7 +71,7 @@ impl GivenMask {
             }
         }
         let [own, other] = [(self.mask.shape, &self.frame), (shape, frame)]
-            .map(|(shape, frame)| Box::new(GridGeometry::of(shape, frame)));
+            .map(|(shape, frame)| Box::new(GridGeometry::new(shape, frame)));
         if inside * 100 < all * 99 {
             return Err(GivenMaskError::Elsewhere {
                 inside,

@@ -44,7 +44,7 @@ fn named(label: &str) -> MaskChoice {
     }
 }
 
-fn of(volume: &Volume, choice: &MaskChoice) -> Result<GivenMask, GivenMaskError> {
+fn read(volume: &Volume, choice: &MaskChoice) -> Result<GivenMask, GivenMaskError> {
     GivenMask::of_volume(volume, choice, &Monitor::silent())
 }
 
@@ -63,7 +63,7 @@ fn a_mask_that_is_cancelled_is_refused_as_that() {
 #[test]
 fn the_same_mask_in_any_numbers_is_the_same() {
     let any = MaskChoice::default();
-    let one = of(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
+    let one = read(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
     assert_eq!(one.structure, None);
     type Values = (f32, f32);
     let pairs: [Values; 12] = [
@@ -82,7 +82,7 @@ fn the_same_mask_in_any_numbers_is_the_same() {
     ];
     for (inside, outside) in pairs {
         let stored = volume(|p| if wall(p) { inside } else { outside });
-        let mask = of(&stored, &any).unwrap();
+        let mask = read(&stored, &any).unwrap();
         assert_eq!(mask.mask, one.mask, "{inside} in {outside}");
     }
     let soft = volume(|p| match (wall(p), cavity(p)) {
@@ -90,7 +90,7 @@ fn the_same_mask_in_any_numbers_is_the_same() {
         (_, true) => 0.45,
         _ => 0.02,
     });
-    assert_eq!(of(&soft, &any).unwrap().mask, one.mask);
+    assert_eq!(read(&soft, &any).unwrap().mask, one.mask);
 }
 
 #[test]
@@ -106,10 +106,10 @@ fn of_several_labels_one_must_be_named_and_only_it_counts() {
         .iter()
         .map(|v| *v > 0.0)
         .collect();
-    let mask = of(&map, &named("2")).unwrap();
+    let mask = read(&map, &named("2")).unwrap();
     assert_eq!(mask.mask.voxels, wanted);
     assert_eq!(mask.structure.as_deref(), Some("label 2"));
-    let refused = of(&map, &MaskChoice::default()).unwrap_err();
+    let refused = read(&map, &MaskChoice::default()).unwrap_err();
     let GivenMaskError::SeveralStructures { present } = &refused else {
         panic!("{refused}");
     };
@@ -119,14 +119,14 @@ fn of_several_labels_one_must_be_named_and_only_it_counts() {
         assert!(refused.to_string().contains(text), "{refused}");
     }
     for absent in ["4", "-1", "wall"] {
-        let refused = of(&map, &named(absent)).unwrap_err();
+        let refused = read(&map, &named(absent)).unwrap_err();
         assert!(
             matches!(refused, GivenMaskError::NoSuchStructure { .. }),
             "{refused}"
         );
     }
     // The background is a label like any other if it is named.
-    let rest = of(&map, &named("0")).unwrap();
+    let rest = read(&map, &named("0")).unwrap();
     let both = rest
         .mask
         .voxels
@@ -141,12 +141,12 @@ fn what_is_no_mask_is_refused() {
     let any = MaskChoice::default();
     let scan = volume(|p| p.iter().sum::<usize>() as f32 * 1.7 - 3.0);
     assert!(matches!(
-        of(&scan, &any),
+        read(&scan, &any),
         Err(GivenMaskError::NotMask { .. })
     ));
-    assert_eq!(of(&volume(|_| 0.0), &any), Err(GivenMaskError::Empty));
+    assert_eq!(read(&volume(|_| 0.0), &any), Err(GivenMaskError::Empty));
     assert!(
-        of(&volume(|_| 1.0), &any)
+        read(&volume(|_| 1.0), &any)
             .unwrap()
             .mask
             .voxels
@@ -154,7 +154,7 @@ fn what_is_no_mask_is_refused() {
             .all(|v| *v)
     );
     let faint = volume(|p| p[0] as f32 * 0.01);
-    assert_eq!(of(&faint, &any), Err(GivenMaskError::Empty));
+    assert_eq!(read(&faint, &any), Err(GivenMaskError::Empty));
 }
 
 /// The voxel centres of a mask in the patient, in hundredths of a millimetre.
@@ -178,7 +178,7 @@ fn centres(given: &GivenMask) -> BTreeSet<[i64; 3]> {
 #[test]
 fn one_lattice_in_any_storage_gives_the_same_voxels() {
     let any = MaskChoice::default();
-    let original = of(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
+    let original = read(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
     let silent = Monitor::silent();
     let grid = (GRID_SHAPE, &original.frame);
     let mut stored = 0;
@@ -242,7 +242,7 @@ fn one_lattice_in_any_storage_gives_the_same_voxels() {
 #[test]
 fn other_lattices_are_refused_with_both_geometries_or_resampled() {
     let any = MaskChoice::default();
-    let original = of(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
+    let original = read(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
     let silent = Monitor::silent();
     let with = |linear: Matrix3<f64>, origin: Vec3| GivenMask {
         frame: VoxelToPatient::new(linear, origin).unwrap(),
@@ -346,7 +346,7 @@ fn a_swapped_cube_is_compared_by_its_voxels() {
 #[test]
 fn voxels_beyond_the_border_are_lost_only_if_few_and_held_otherwise() {
     let any = MaskChoice::default();
-    let mask = of(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
+    let mask = read(&volume(|p| f32::from(u8::from(wall(p)))), &any).unwrap();
     let silent = Monitor::silent();
     let moved = |steps: f64| {
         let origin = mask.frame.to_patient(&Vec3::new(0.0, steps, 0.0));

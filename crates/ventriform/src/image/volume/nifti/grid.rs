@@ -23,7 +23,7 @@ pub struct StatedGrid {
 }
 
 impl StatedGrid {
-    pub(super) fn of(header: &Header) -> Self {
+    pub(super) fn from_header(header: &Header) -> Self {
         Self {
             rank: match header.frames {
                 1 => header.dim.len(),

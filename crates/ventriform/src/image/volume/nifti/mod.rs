@@ -97,7 +97,7 @@ impl OpenVolume for NiftiFile {
     }
 
     fn stated_grid(&self) -> Option<StatedGrid> {
-        Some(StatedGrid::of(&self.header))
+        Some(StatedGrid::from_header(&self.header))
     }
 
     fn header(&self) -> HeaderFacts<'_> {

@@ -37,7 +37,7 @@ impl BeatEnd {
     pub const ALL: [Self; 2] = [Self::Diastole, Self::Systole];
 
     /// That of this end, of what both ends have: end diastole first.
-    pub fn of<T>(self, [diastole, systole]: [T; 2]) -> T {
+    pub fn pick<T>(self, [diastole, systole]: [T; 2]) -> T {
         match self {
             Self::Diastole => diastole,
             Self::Systole => systole,
@@ -46,11 +46,11 @@ impl BeatEnd {
 
     /// The number of the gate at this end of the beat of `report`, counted from 1.
     pub fn gate(self, report: &BeatReport) -> usize {
-        self.of([report.end_diastole_gate, report.end_systole_gate])
+        self.pick([report.end_diastole_gate, report.end_systole_gate])
     }
 
     fn code(self) -> Code {
-        self.of([
+        self.pick([
             sct("416190007", "End diastole"),
             sct("416430001", "End Systole"),
         ])
@@ -58,7 +58,7 @@ impl BeatEnd {
 
     /// Its name, for people.
     pub(super) fn name(self) -> &'static str {
-        self.of(["end diastole", "end systole"])
+        self.pick(["end diastole", "end systole"])
     }
 }
 
@@ -132,7 +132,7 @@ impl<'a> DicomBeat<'a> {
     /// # Errors
     /// See [`DicomError`].
     pub fn mask(&self, end: BeatEnd, of: &EndWall) -> Result<Vec<u8>, DicomError> {
-        let scan = end.of(self.scans.each_ref());
+        let scan = end.pick(self.scans.each_ref());
         DicomResults::new(scan, self.structure, &of.wall, &of.mesh, self.text)
             .with_cavity(Some(&of.cavity))
             .at(end)

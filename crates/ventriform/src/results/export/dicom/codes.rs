@@ -102,7 +102,7 @@ pub struct Structure {
 impl Structure {
     /// The structure that a segmentation of `organ` shows (the parameter `organ`); tissue for
     /// names that are not known here.
-    pub fn of(organ: &str) -> Self {
+    pub fn from_organ(organ: &str) -> Self {
         match organ {
             "left_ventricle" => Self {
                 kind: sct("49848007", "Left Ventricle Myocardium"),

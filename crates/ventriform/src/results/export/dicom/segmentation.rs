@@ -34,7 +34,7 @@ impl SlicePlanes {
     ///
     /// # Errors
     /// [`DicomError::Oblique`] if rows and columns are not at right angles.
-    pub(super) fn of(frame: &VoxelToPatient, slices: usize) -> Result<Self, DicomError> {
+    pub(super) fn new(frame: &VoxelToPatient, slices: usize) -> Result<Self, DicomError> {
         let [columns, rows, next] = [0, 1, 2].map(|axis| frame.linear().column(axis).into_owned());
         let directions = [columns.normalize(), rows.normalize()];
         // The tolerance of readers for direction cosines.
@@ -62,7 +62,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
     let (Ok(rows), Ok(columns)) = (u16::try_from(rows), u16::try_from(columns)) else {
         return Err(DicomError::TooLarge);
     };
-    let planes = SlicePlanes::of(&scan.frame, slices)?;
+    let planes = SlicePlanes::new(&scan.frame, slices)?;
     scan.put_frame_of_reference(set);
     results.put_content(set);
     results.put_referenced_series(set);

@@ -76,7 +76,7 @@ fn contours(results: &DicomResults<'_>) -> Result<Vec<DataSet>, DicomError> {
     /// Longest value of an element with a 16-bit length.
     const MAX_SHORT_VALUE_BYTES: usize = 65_534;
     let scan = results.scan;
-    let planes = SlicePlanes::of(&scan.frame, scan.shape[2])?;
+    let planes = SlicePlanes::new(&scan.frame, scan.shape[2])?;
     let mut items = Vec::new();
     for &slice in &planes.order {
         let origin = scan.frame.to_patient(&Vec3::new(0.0, 0.0, slice as f64));

@@ -122,7 +122,7 @@ impl Scene {
     }
 
     fn results(&self) -> DicomResults<'_> {
-        let structure = Structure::of("left_ventricle");
+        let structure = Structure::from_organ("left_ventricle");
         let text = serde_json::to_string(&self.report).unwrap();
         DicomResults::new(&self.scan, structure, &self.mask, &self.mesh, &text)
             .with_figures(&self.report)
@@ -1088,7 +1088,7 @@ fn a_page_holds_pictures_and_figures() {
 #[test]
 fn a_page_of_a_comparison_names_both_studies_unless_one_is_freed_of_the_identity() {
     let report = first_comparison();
-    let structure = Structure::of("left_ventricle");
+    let structure = Structure::from_organ("left_ventricle");
     let scan = |change: fn(&mut Provenance)| {
         let mut provenance = provenance();
         change(&mut provenance);

@@ -321,7 +321,10 @@ fn usable(segmentation: &Segmentation) -> Result<(ScanPlaces, f64), String> {
     let map = map.ok_or("the orientation of the heart is unknown")?;
     let surfaces = segmentation.fit.model.surfaces.as_ref();
     let surfaces = surfaces.ok_or("the fit has no anatomical wall")?;
-    Ok((ScanPlaces::of(map), surfaces.anatomical.wall.cavity_ml))
+    Ok((
+        ScanPlaces::from_map(map),
+        surfaces.anatomical.wall.cavity_ml,
+    ))
 }
 
 #[cfg(test)]
