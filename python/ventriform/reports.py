@@ -48,7 +48,7 @@ class AppliedReader(Document):
 
     edge: str
     """The wall that was drawn from."""
-    kind: str | None = None
+    kind: str
     """`edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
     reference."""
     level: float | None = None
@@ -289,7 +289,7 @@ class ComparisonReport(Document):
     """Reasons to look closer."""
     matched_percent: float
     """Share of the wall by which stress was scaled."""
-    no_beat: list[NoBeat] | None = None
+    no_beat: list[NoBeat]
     """Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one
     entry for each scan that is a reason. Empty where they were."""
     parameters: dict[str, Any]
@@ -1196,8 +1196,8 @@ class NormalsUsed(Document):
     """Number of people."""
     people: str
     """What the people are."""
-    program_version: str | None = None
-    """Version of the program that built them; null in reports of versions that did not say."""
+    program_version: str
+    """Version of the program that built them."""
     protocol: str
     """The protocol."""
     sex: str
@@ -1344,16 +1344,15 @@ class PolarMap(Document):
     """The walls of the three arteries; none if the orientation is unknown."""
     threshold_percent: float
     """Share of it below which wall counts as a defect."""
-    level_ends: list[list[float]] | None = None
+    level_ends: list[list[float]]
     """For every column, the distances from the apex in rows at which apex, apical, mid and basal level end; row n
-    reaches from n to n + 1. Absent from maps of older versions."""
-    rings: list[float] | None = None
-    """The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of older versions."""
+    reaches from n to n + 1."""
+    rings: list[float]
+    """The radii at which these levels end on the drawn map, as shares of its own."""
     segment_of: list[list[int]]
     """The number of the segment to which each pixel belongs."""
-    states: list[list[str]] | None = None
-    """What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. Absent from maps of
-    older versions, which have no valve plane."""
+    states: list[list[str]]
+    """What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`."""
     values_percent: list[list[float | None]]
     """The pixels in per cent of the reference; null where there is no muscle."""
 

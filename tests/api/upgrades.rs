@@ -1,14 +1,15 @@
-//! Data that released versions have left: a copy is opened by the current program, every item is read back, and work goes on.
+//! Data that released versions have left: a copy is opened by the current program, every item is read back, and work
+//! goes on.
 //!
 //! `tests/data/VERSION/` holds what a service of that version had stored, written once, at its release, by
 //! [`data_of_this_version_is_written`]:
 //!
 //! - `folder.zip`: a backup of its data folder, records in SQLite;
 //! - `database.sql.gz`: the same records in PostgreSQL, as `pg_dump` writes them;
-//! - `seen.json.gz`: the items of each list, the SHA-256 of each stored file, and what was answered on every other path.
+//! - `seen.json.gz`: the items of each list, the SHA-256 of each stored file, and the status of every other path.
 //!
-//! Scans are small, and what no version reads again (pictures, tables, meshes in other formats than JSON, all of single gates)
-//! is exchanged for a few bytes.
+//! Scans are small, and what no version reads again (pictures, tables, meshes in other formats than JSON, all of single
+//! gates) is exchanged for a few bytes.
 
 use crate::comparisons::person;
 use crate::dicom::{JANE, Patient, nm_of};

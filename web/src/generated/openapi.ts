@@ -65,7 +65,7 @@ export interface components {
              * @description `edge`: by distances from the edge that the image shows. `level`: where the image has a share of the polar map's
              *     reference.
              */
-            kind?: string;
+            kind: string;
             /**
              * Format: double
              * @description The level, a share of the polar map's reference; `null` for a reader of kind `edge`.
@@ -1110,7 +1110,7 @@ export interface components {
              * @description Why no beats were compared (`beat` is `null`), or no ejection fractions (`beat.ef_change_points` is `null`): one entry for each scan
              *     that is a reason. Empty where they were.
              */
-            no_beat?: components["schemas"]["NoBeat"][];
+            no_beat: components["schemas"]["NoBeat"][];
             /** @description Every parameter, defaults written out. */
             parameters: {
                 [key: string]: unknown;
@@ -1511,8 +1511,8 @@ export interface components {
             unfinished_jobs: string[];
             /**
              * Format: int64
-             * @description Volumes that an older version has stored and of which it is not known yet whose scan they are, so that they may be
-             *     missing here.
+             * @description Volumes whose scan a repair of the database has lost and that were not read again yet, so that they may be missing
+             *     here.
              */
             unread_volumes: number;
             /** @description The volumes that are selected. */
@@ -3482,8 +3482,8 @@ export interface components {
             cases: number;
             /** @description What the people are. */
             people: string;
-            /** @description Version of the program that built them; null in reports of versions that did not say. */
-            program_version?: string | null;
+            /** @description Version of the program that built them. */
+            program_version: string;
             /** @description The protocol. */
             protocol: string;
             /** @description `M`, `F` or `mixed`. */
@@ -3762,21 +3762,15 @@ export interface components {
             threshold_percent: number;
             /**
              * @description For every column, the distances from the apex in rows at which apex, apical, mid and basal level
-             *     end; row n reaches from n to n + 1. Absent from maps of older versions.
+             *     end; row n reaches from n to n + 1.
              */
-            level_ends?: number[][] | null;
-            /**
-             * @description The radii at which these levels end on the drawn map, as shares of its own. Absent from maps of
-             *     older versions.
-             */
-            rings?: number[] | null;
+            level_ends: number[][];
+            /** @description The radii at which these levels end on the drawn map, as shares of its own. */
+            rings: number[];
             /** @description The number of the segment to which each pixel belongs. */
             segment_of: number[][];
-            /**
-             * @description What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. Absent from maps of older
-             *     versions, which have no valve plane.
-             */
-            states?: components["schemas"]["PlaceState"][][] | null;
+            /** @description What lies at each pixel: `muscle`, `valve_plane` (hatched, and in no figure) or `no_wall`. */
+            states: components["schemas"]["PlaceState"][][];
             /** @description The pixels in per cent of the reference; null where there is no muscle. */
             values_percent: (number | null)[][];
         };
@@ -4002,7 +3996,7 @@ export interface components {
              * @description `edge`: the reader draws the edge that the image shows, by the distances `offsets_mm` off. `level`: where the image
              *     has a share of the polar map's reference.
              */
-            kind?: string | null;
+            kind: string;
             /** @description The masks it was learnt on. */
             learnt_on: components["schemas"]["LearntOn"][];
             level?: components["schemas"]["LearntLevel"] | null;
@@ -4014,7 +4008,7 @@ export interface components {
             offsets_mm?: components["schemas"]["LearntOffsets"] | null;
             /**
              * Format: int64
-             * @description 2, or 1, which has no `kind`.
+             * @description 2.
              */
             version: number;
         };
@@ -4026,7 +4020,7 @@ export interface components {
              * @description `edge`: the reader draws by distances from the edge that the image shows. `level`: where the image has a share of the
              *     polar map's reference.
              */
-            kind?: string;
+            kind: string;
             /**
              * Format: double
              * @description The level that is applied, a share of the polar map's reference; `null` for a reader of kind `edge`.

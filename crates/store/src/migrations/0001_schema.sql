@@ -1,5 +1,5 @@
--- The tables on SQLite. Those on PostgreSQL stand in ../migrations_postgres/0001_schema.sql, in the same order and with the
--- same columns, which tests/api/contract.rs compares.
+-- The tables on SQLite. Those on PostgreSQL stand in ../migrations_postgres/0001_schema.sql, in the same order and with
+-- the same columns, which tests/api/contract.rs compares.
 --
 -- A landed file is never changed: a later version adds a file with the next number, and the same on PostgreSQL.
 --
@@ -326,12 +326,12 @@ CREATE INDEX deliveries_by_age ON deliveries (since) WHERE state = 'pending';
 CREATE INDEX deliveries_by_end ON deliveries (ended_at) WHERE state != 'pending';
 CREATE INDEX deliveries_by_job ON deliveries (job, sequence);
 CREATE INDEX deliveries_dead ON deliveries (sequence) WHERE state = 'dead';
--- What is due is looked for by destination and tenant, one after the other (store/tables/errands.rs). No index begins with
--- the state, since the planner would prefer it.
+-- What is due is looked for by destination and tenant, one after the other (store/tables/errands.rs). No index begins
+-- with the state, since the planner would prefer it.
 CREATE INDEX deliveries_due ON deliveries (destination, tenant, next_attempt_at) WHERE state = 'pending';
 
--- Writes deliveries within the very transaction that changes the state of a job, whichever statement that is: no end of a
--- job is without its deliveries, and no delivery without its end.
+-- Writes deliveries within the very transaction that changes the state of a job, whichever statement that is: no end of
+-- a job is without its deliveries, and no delivery without its end.
 CREATE TRIGGER job_told AFTER UPDATE OF state ON jobs
 WHEN NEW.state != OLD.state AND NEW.state != 'queued' BEGIN
     INSERT INTO deliveries (id, tenant, job, endpoint, url, destination, secret, event, kind,
@@ -424,8 +424,8 @@ CREATE INDEX sends_by_result ON sends (result) WHERE state = 'pending';
 CREATE INDEX sends_dead ON sends (sequence) WHERE state = 'dead';
 CREATE INDEX sends_due ON sends (destination, tenant, next_attempt_at) WHERE state = 'pending';
 
--- Writes them within the very transaction in which the job succeeds: no success is without them, and none is without its
--- success.
+-- Writes them within the very transaction in which the job succeeds: no success is without them, and none is without
+-- its success.
 CREATE TRIGGER job_to_send AFTER UPDATE OF state ON jobs
 WHEN NEW.state = 'succeeded' AND OLD.state != 'succeeded' AND NEW.send IS NOT NULL BEGIN
     INSERT INTO sends (id, tenant, job, result, name, destination, since, next_attempt_at)
@@ -545,7 +545,8 @@ CREATE TABLE api_keys (
     digest     BLOB NOT NULL,
     -- The key that made this one over HTTP, '' if its maker had none; NULL if the operator made it.
     maker      TEXT,
-    -- The subject of the OpenID Connect issuer whose key it is: who made it with a token, or with a key of that subject.
+    -- The subject of the OpenID Connect issuer whose key it is: who made it with a token, or with a key of that
+    -- subject.
     owner      TEXT
 ) STRICT;
 
@@ -604,15 +605,16 @@ INSERT INTO probe VALUES (1, 0);
 
 -- What the store must not forget with one of its other tables, by name:
 --   store      identity of this database, which the note beside it repeats
---   access     'open': callers without credentials were never refused; 'closed'; 'opened TIME': by the operator, on purpose
+--   access     'open': callers without credentials were never refused; 'closed'; 'opened TIME': by the operator, on
+--              purpose
 --   kept_head  'SEQUENCE:HASH' of an audit row that another place names and the trail lacked
 CREATE TABLE store_marks (
     name  TEXT PRIMARY KEY,
     value TEXT NOT NULL
 ) STRICT, WITHOUT ROWID;
 
--- The last time at which a run of the service trusted its clock: a start at quite another time is in doubt, and nothing is
--- erased by age then.
+-- The last time at which a run of the service trusted its clock: a start at quite another time is in doubt, and nothing
+-- is erased by age then.
 CREATE TABLE trusted_time (
     id INTEGER PRIMARY KEY CHECK (id = 1),
     at INTEGER NOT NULL

@@ -1,8 +1,8 @@
--- The tables on PostgreSQL: those of ../migrations/0001_schema.sql in the same order, where it is said what tables, columns,
--- indexes and triggers are for. Said here is what is different; the last part, about several processes on one database, is
--- of PostgreSQL alone.
+-- The tables on PostgreSQL: those of ../migrations/0001_schema.sql in the same order. What tables, columns, indexes and
+-- triggers are for is said there; here is what is different. The last part, about several processes on one database, is
+-- for PostgreSQL alone.
 --
--- Texts that are compared are compared byte by byte, as SQLite does. What SQLite computes when it is read is stored here.
+-- Texts that are compared are compared byte by byte, as SQLite does. What SQLite computes when it reads is stored here.
 
 -- JSON without the character NUL, which PostgreSQL has in no text.
 CREATE FUNCTION readable_json(document TEXT) RETURNS JSON
