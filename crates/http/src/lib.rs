@@ -60,6 +60,7 @@ mod negotiate;
 mod normals;
 mod observe;
 mod openapi;
+mod packed;
 mod pagination;
 mod problem;
 mod products;
