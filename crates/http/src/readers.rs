@@ -3,7 +3,7 @@
 use super::app::App;
 use super::caller::Caller;
 use super::links::{added, path_of, rfc3339};
-use super::openapi::{self, UploadProblems};
+use super::openapi::UploadProblems;
 use super::problem::{Answer, ProblemBody};
 use super::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use super::query::Query;
@@ -35,7 +35,6 @@ impl ProductCollection for Readers {
     const FILE_NAMES: &'static [&'static str] = &[PROFILE_FILE];
     const FILE_SCHEMA: &'static str = "ReaderFileName";
     const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
-    type FileAnswer = openapi::ReaderFileAnswer;
 }
 
 /// A reader: a profile by which segmentations are drawn.
