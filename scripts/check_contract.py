@@ -163,7 +163,9 @@ class Walk:
         for key, value in parameters.items():
             path = path.replace("{%s}" % key, value)
             part = template.index("{%s}" % key) + len(key) + 2
-            self.recorded["parameters"][template[:part]] = value
+            # The names of files are in the document.
+            if key != "file":
+                self.recorded["parameters"][template[:part]] = value
         headers = {**self.credentials, **(headers or {})}
         data = body
         if isinstance(body, (dict, list)):
