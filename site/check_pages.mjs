@@ -57,7 +57,11 @@ async function search(page, index, place) {
 const served = await tab(address);
 for (const path of pages) {
   await served.goto(address + path, { waitUntil: "load" });
-  if (path.endsWith("http-api.html")) await served.frameLocator("iframe").locator(".opblock").first().waitFor({ timeout: 60_000 });
+  if (path.endsWith("http-api.html")) {
+    const operation = served.locator("details", { hasText: "Download one of a model's files" });
+    await operation.locator("summary").click();
+    await operation.getByText("distance.json").first().waitFor({ timeout: 20_000 });
+  }
 }
 await search(served, `${address}index.html`, "from a server");
 
