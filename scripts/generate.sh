@@ -43,7 +43,7 @@ wanted() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 
 # The document and the pages of docs/ of the code as it is.
 write_documents() {
-  GENERATED_FOLDER=$out cargo test "${cargo_flags[@]}" --test api -- --quiet \
+  GENERATED_FOLDER=$out cargo test "${cargo_flags[@]}" --test api -- \
     the_committed_document_matches_the_code the_page_for_operators_lists_every_setting >"$out/log" || { cat "$out/log"; exit 1; }
   rm "$out/log"
 }

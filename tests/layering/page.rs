@@ -31,15 +31,16 @@ pub fn arrows(folder: &Path) -> BTreeMap<ModulePath, BTreeSet<ModulePath>> {
 
 /// The relative paths that a source imports.
 fn imported(text: &str) -> impl Iterator<Item = &str> {
-    let mut parts = text.split('"');
-    let mut before = parts.next().unwrap_or_default();
-    parts.filter_map(move |part| {
+    let parts = text.split('"');
+    let pairs = parts.clone().zip(parts.skip(1));
+    let imports = |before: &str| {
         let words = before.trim_end();
-        let imports = ["from", "import", "import("].iter();
-        let imports = part.starts_with('.') && imports.clone().any(|word| words.ends_with(word));
-        before = part;
-        imports.then_some(part)
-    })
+        ["from", "import", "import("]
+            .iter()
+            .any(|word| words.ends_with(word))
+    };
+    let named = pairs.filter(move |(before, part)| part.starts_with('.') && imports(before));
+    named.map(|(_, part)| part)
 }
 
 /// The module to which `path` leads from the file `from`.
