@@ -5,12 +5,13 @@
 #   scripts/test.sh            everything
 #   scripts/test.sh --quick    without the demo and the external checks (trimesh, vtk, glTF validator,
 #                              pygeodesic, schemathesis, the page in a browser, the Python package, generated clients, kills, DICOM, Orthanc,
-#                              commands of the docs, licences and SBOM, the site of the docs)
+#                              commands of the docs, generated files, licences, the site of the docs)
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
 quick=${1:-}
-tools=$PWD/target/test-tools
+. scripts/lib/tools.sh
+tools=$test_tools
 log=$PWD/target/test-log.txt
 mkdir -p "$tools"
 : >"$log"
@@ -91,11 +92,8 @@ install_external_tools() {
   [ -x /usr/sbin/pgbouncer ] || need pgbouncer pgbouncer
   need promtool prometheus
   need kubectl kubernetes-client
-  if ! cmp -s scripts/requirements.txt "$tools/python.done"; then
-    python3 -m venv "$tools/python" &&
-      "$tools/python/bin/pip" install -q -r scripts/requirements.txt &&
-      cp scripts/requirements.txt "$tools/python.done"
-  fi
+  python3 -c 'import ensurepip, venv' 2>/dev/null || need no-such-command python3 python3-venv python3-pip
+  python_tools || return
   scripts/check/python.sh --install || return
   if ! cmp -s scripts/package.json "$tools/node.done"; then
     cp scripts/package.json "$tools/package.json" &&
@@ -168,14 +166,14 @@ if wait "${running[install]}"; then
   # Build once before the checks run in parallel. Naming a test gives the libraries the same features as
   # `cargo test` does. The Python package has features of its own, and its wheel is built before the checks, which
   # would wait for cargo's lock.
-  cargo build --quiet --workspace --exclude ventriform-python --bins --examples --test layering
+  cargo build --quiet --workspace --exclude ventriform-python --bins --examples --test layering --test api
   check "wheel of the Python package" scripts/check/python.sh --build
   start python scripts/check/python.sh --test
   start formats scripts/check/formats.sh
   start geodesics scripts/check/geodesics.sh
   start codecs scripts/check/dicom_codecs.sh
   start api scripts/check/api.sh
-  start contract env SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m' scripts/with_service.sh "$PYTHON" scripts/check/contract.py
+  start generated env WHEEL_BUILT=1 scripts/generate.sh --check
   start clients scripts/check/clients.sh
   start crashes "$PYTHON" scripts/check/crash_rounds.py --program target/debug/ventriform --rounds 10
   start dicom scripts/check/dicom.sh
@@ -185,7 +183,7 @@ if wait "${running[install]}"; then
   start chaos "$PYTHON" scripts/check/chaos.py --program target/debug/ventriform --rounds 10
   start kubernetes scripts/check/kubernetes.sh
   start proxy scripts/check/proxy.sh
-  start pgbouncer scripts/check/pgbouncer.sh
+  start pgbouncer scripts/check_pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start commands "$PYTHON" scripts/check/commands.py target/debug/ventriform
   start dependencies "$PYTHON" scripts/release/dependencies.py check
@@ -194,7 +192,7 @@ if wait "${running[install]}"; then
   collect geodesics "geodesics against pygeodesic"
   collect codecs "codecs of compressed DICOM against libjpeg-turbo, GDCM, CharLS and OpenJPEG"
   collect api "service tested by schemathesis"
-  collect contract "service answers as its document says"
+  collect generated "generated files; service answers as its document says"
   collect clients "generated Python and TypeScript clients"
   collect crashes "ten kills at random moments"
   collect dicom "DICOM objects read by dciodvfy, highdicom and dcmqi"
@@ -207,7 +205,7 @@ if wait "${running[install]}"; then
   collect pgbouncer "service on PostgreSQL behind PgBouncer"
   collect alerts "alerts of Prometheus"
   collect commands "commands of the README and the docs"
-  collect dependencies "licences, sources and bill of materials"
+  collect dependencies "licences and sources"
 else
   cat "$tools/install.log"
   echo "could not install the tools for the external checks"
@@ -216,7 +214,7 @@ fi
 # Alone, since they measure how long a request takes, and a browser on busy processors is slow.
 [ -n "${PYTHON:-}" ] && check "attacks of one client under a limit of memory" \
   "$PYTHON" scripts/check/limits.py --program target/debug/ventriform --patience 3
-check "page in a browser" scripts/check/page.sh --bundle
+check "page in a browser" scripts/check/page.sh
 check "site of the docs: links, search, nothing from elsewhere" scripts/release/site.sh --check
 check "demo" scripts/check/demo.sh
 finish

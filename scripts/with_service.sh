@@ -3,15 +3,15 @@
 #
 #   scripts/with_service.sh COMMAND...      SERVICE_URL and SERVICE_DATA (its folder) are set for the command
 #
-# SERVICE_FLAGS: further flags of `ventriform serve`.
+# SERVICE_FLAGS: further flags of `ventriform serve`. PROGRAM: a program that is built already.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 SERVICE_DATA=$(mktemp -d)
 # Naming a test gives the libraries the same features as `cargo test` does. Without it cargo would
 # compile them and the program a second time.
-cargo build --quiet --bins --test layering
+[ -n "${PROGRAM:-}" ] || cargo build --quiet --bins --test layering
 # shellcheck disable=SC2086 # several flags
-target/debug/ventriform serve --listen 127.0.0.1:0 --data-dir "$SERVICE_DATA/data" ${SERVICE_FLAGS:-} \
+"${PROGRAM:-target/debug/ventriform}" serve --listen 127.0.0.1:0 --data-dir "$SERVICE_DATA/data" ${SERVICE_FLAGS:-} \
   >"$SERVICE_DATA/log" 2>&1 &
 service=$!
 trap 'kill $service 2>/dev/null; wait $service 2>/dev/null; rm -rf "$SERVICE_DATA"' EXIT

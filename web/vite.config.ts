@@ -1,7 +1,4 @@
-import { readFileSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
 import { type BuildOptions, defineConfig } from "vite";
-import { brotliCompressSync, constants, gzipSync } from "node:zlib";
 
 // While developing: `SERVICE=http://127.0.0.1:8080 npm run dev`.
 const service = process.env["SERVICE"] ?? "http://127.0.0.1:8080";
@@ -29,21 +26,7 @@ export default defineConfig(({ mode }) => (mode === "report" ? { build: report, 
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     reportCompressedSize: false,
+    // Names without a hash: the service shows the files under a path with a hash of them all.
+    rollupOptions: { output: { entryFileNames: "assets/[name].js", chunkFileNames: "assets/[name].js", assetFileNames: "assets/[name][extname]" } },
   },
-  plugins: [
-    {
-      // Every file is committed beside its compressed forms, so the service compresses nothing. They are made of the files as
-      // they were written: other plugins still change the bundle while it is generated.
-      name: "compress",
-      writeBundle({ dir }, bundle) {
-        for (const name of Object.keys(bundle)) {
-          const path = join(dir ?? "dist", name);
-          const source = readFileSync(path);
-          const level = { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } };
-          writeFileSync(`${path}.br`, brotliCompressSync(source, level));
-          writeFileSync(`${path}.gz`, gzipSync(source, { level: 9 }));
-        }
-      },
-    },
-  ],
 }));

@@ -2,12 +2,15 @@
 
     export SERVICE_FLAGS='--webhook-allow 127.0.0.1 --wait-limit 10m'
     scripts/with_service.sh python scripts/check/contract.py            checks
-    scripts/with_service.sh python scripts/check/contract.py --record   writes the examples anew
+    scripts/with_service.sh python scripts/check/contract.py --record FILE     writes the examples (scripts/generate.sh)
 
 1. The document is valid OpenAPI 3.1, and every operationId is unique.
 2. Every example in it satisfies its schema, and every operation has an example of its request and answer.
 3. A walk through the whole API: every JSON answer satisfies its schema, and has no field that the schema
-   does not name.
+   does not name. Every file of a result has the media type and the schema that `x-files` states.
+
+The examples are recorded in the walk: one of every document, by its schema. A committed example stays if it still has
+all fields that the recorded one has: it would only have other values.
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
@@ -38,7 +41,6 @@ from lib.nifti import nifti
 
 URL = os.environ["SERVICE_URL"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-DOCUMENT = os.path.join(ROOT, "openapi", "ventriform.json")
 EXAMPLES = os.path.join(ROOT, "crates", "http", "src", "openapi", "examples.json")
 PROGRAM = os.path.join(ROOT, "target", "debug", "ventriform")
 PROBLEM = "application/problem+json"
@@ -76,7 +78,7 @@ class Contract:
     """The document, and validators of its schemas: as they are, and closed against unknown fields."""
 
     def __init__(self, document):
-        self.document = document
+        self.document = resolved(document)
         absolute = json.loads(json.dumps(document).replace('"#/components/', '"urn:document#/components/'))
         self.registries = []
         for exact in (False, True):
@@ -94,6 +96,25 @@ class Contract:
             for method, operation in item.items():
                 if isinstance(operation, dict) and "operationId" in operation:
                     yield path, method, operation
+
+
+def resolved(document):
+    """The document with parameters, answers and headers in place of references to them."""
+    document = copy.deepcopy(document)
+
+    def target(value):
+        if "$ref" not in value:
+            return value
+        group, name = value["$ref"].split("/")[-2:]
+        return {**document["components"][group][name], **{key: own for key, own in value.items() if key != "$ref"}}
+
+    for item in document["paths"].values():
+        for operation in item.values():
+            operation["parameters"] = [target(one) for one in operation.get("parameters", [])]
+            operation["responses"] = {status: target(one) for status, one in operation["responses"].items()}
+            for answer in operation["responses"].values():
+                answer["headers"] = {name: target(one) for name, one in answer.get("headers", {}).items()}
+    return document
 
 
 def close(schema, document):
@@ -121,12 +142,14 @@ def merge(schema, document):
         schema.update({name: value for name, value in part.items() if name not in schema})
 
 
-def short(value, most=6, keep=4):
-    """The value with long lists cut."""
+def short(value):
+    """The value with long lists cut: of objects one is enough, and of more than a box's six numbers two."""
     if isinstance(value, dict):
-        return {key: short(v, most, keep) for key, v in value.items()}
+        return {key: short(part) for key, part in value.items()}
     if isinstance(value, list):
-        return [short(v, most, keep) for v in (value if len(value) <= most else value[:keep])]
+        objects = all(isinstance(part, dict) for part in value)
+        most = 1 if objects else len(value) if len(value) <= 6 else 2
+        return [short(part) for part in value[:most]]
     return value
 
 
@@ -145,7 +168,7 @@ class Walk:
 
     def __init__(self, contract):
         self.contract, self.failures, self.seen = contract, [], set()
-        self.recorded = {"problems": {}, "operations": {}}
+        self.recorded = {"problems": {}, "parameters": {}, "documents": {}, "operations": {}}
         self.credentials = {}
 
     def call(self, method, template, *, expect, query="", body=None, headers=None, cut=True, **parameters):
@@ -153,17 +176,20 @@ class Walk:
         name = operation["operationId"]
         path = template
         for key, value in parameters.items():
-            path = path.replace("{" + key + "}", value)
+            path = path.replace("{%s}" % key, value)
+            part = template.index("{%s}" % key) + len(key) + 2
+            # The names of files are in the document.
+            if key != "file":
+                self.recorded["parameters"][template[:part]] = value
         headers = {**self.credentials, **(headers or {})}
-        own = self.recorded["operations"].setdefault(name, {})
-        if parameters:
-            own["parameters"] = parameters
         data = body
         if isinstance(body, (dict, list)):
             headers["content-type"] = "application/json"
             data = json.dumps(body).encode()
             if expect < 300:
-                own["request"] = {kind: body for kind in operation["requestBody"]["content"] if kind.endswith("json")}
+                for kind, content in operation["requestBody"]["content"].items():
+                    if kind.endswith("json"):
+                        self.record(name, "request", kind, content["schema"], short(body))
         request = urllib.request.Request(URL + path + query, data=data, method=method.upper(), headers=headers)
         try:
             answer = urllib.request.urlopen(request, timeout=ANSWER_SECONDS)
@@ -172,7 +198,8 @@ class Walk:
         content, media_type = answer.read(), (answer.headers.get("content-type") or "").split(";")[0]
         status = str(answer.status)
         self.seen.add(name)
-        what = f"{method.upper()} {template} {status}"
+        file = operation.get("x-files", {}).get(parameters.get("file", ""))
+        what = f"{method.upper()} {template} {status} {parameters.get('file', '')}"
         if answer.status != expect:
             self.failures.append(f"{what}: expected {expect}: {content[:300]!r}")
             return answer, content
@@ -181,20 +208,34 @@ class Walk:
             self.failures.append(f"{what}: the status is not documented")
             return answer, content
         media = documented.get("content", {})
-        if content and media_type not in media:
+        if file and answer.status == 200 and media_type != file["mediaType"]:
+            self.failures.append(f"{what}: {media_type} is not documented")
+        elif content and media_type not in media:
             self.failures.append(f"{what}: {media_type} is not documented")
         elif media_type.endswith("json"):
             value = json.loads(content)
-            for error in self.contract.errors(media[media_type]["schema"], value, exact=True):
+            schema = file["schema"] if file and answer.status == 200 else media[media_type]["schema"]
+            for error in self.contract.errors(schema, value, exact=True):
                 self.failures.append(f"{what}: {error}")
             if media_type == PROBLEM:
                 self.recorded["problems"].setdefault(status, value)
             elif media_type in ("application/json", "application/dicom+json"):
-                own[status] = {media_type: short(value) if cut else value}
+                self.record(name, status, media_type, schema, short(value) if cut else value)
             return answer, value
         elif media_type == "text/plain":
-            own[status] = {media_type: "\n".join(content.decode().split("\n")[:6]) + "\n"}
+            self.record(name, status, media_type, {}, "\n".join(content.decode().split("\n")[:6]) + "\n")
         return answer, content
+
+    def record(self, operation, status, media_type, schema, value):
+        """Keeps the first example of a schema's documents, and of an operation's whose schema has no name."""
+        schemas = [schema, *schema.get("oneOf", []), *schema.get("anyOf", [])]
+        named = [one for one in schemas if "$ref" in one]
+        for one in named:
+            if not self.contract.errors(one, value, exact=True):
+                self.recorded["documents"].setdefault(one["$ref"].split("/")[-1], value)
+                return
+        if not named:
+            self.recorded["operations"].setdefault(operation, {}).setdefault(status, {})[media_type] = value
 
 
 def wait(walk, job):
@@ -202,6 +243,8 @@ def wait(walk, job):
         time.sleep(0.05)
         _, job = walk.call("get", "/v1/jobs/{id}", expect=200, id=job["id"])
     assert job["state"] == "succeeded", job
+    # A finished job has most to say.
+    walk.recorded["documents"]["Job"] = short(job)
     return job
 
 
@@ -209,8 +252,7 @@ def event(walk, job):
     """The last event of a finished job, as an example."""
     text = urllib.request.urlopen(f"{URL}/v1/jobs/{job['id']}/events", timeout=30).read().decode()
     fields = dict(line.split(": ", 1) if ": " in line else line.split(":", 1) for line in text.strip().split("\n"))
-    walk.recorded["operations"]["follow_job"] = {
-        "parameters": {"id": job["id"]}, "200": {"text/event-stream": fields}}
+    walk.recorded["operations"]["follow_job"] = {"200": {"text/event-stream": fields}}
     walk.seen.add("follow_job")
 
 
@@ -228,15 +270,11 @@ def limits(walk, folder):
                       "healthy": row["healthy"] == "yes"})
     order = {"name": "simulated", "cases": cases, "parameters": {"mixed": True}}
     _, job = call("post", "/v1/normals", expect=202, body=order)
-    order["cases"] = cases[:2]
-    walk.recorded["operations"]["create_normals"]["request"]["application/json"] = order
     normals = wait(walk, job)["normals"]
     file = json.loads(urllib.request.urlopen(f"{URL}/v1/normals/{normals}/normals.json").read())
-    request = walk.recorded["operations"]["create_normals"]["request"]
     # As a file of its own the limits have another id.
     _, added = call("post", "/v1/normals", expect=201, query="?name=copy", body=file)
     call("post", "/v1/normals", expect=200, query="?name=copy", body=file)
-    walk.recorded["operations"]["create_normals"]["request"] = request
     call("delete", "/v1/normals/{id}", expect=204, id=added["id"])
     call("get", "/v1/normals", expect=200)
     return normals
@@ -375,8 +413,6 @@ def everything(walk, folder):
     call("put", "/v1/volumes/{id}/identity", expect=200, id=job["volume"], body=stated)
     call("post", "/v1/beats", expect=200, query="?mass_g=130", body=gated,
          headers={**octets, "prefer": UNTIL_DONE, "accept": "application/json"})
-    for file in ("mesh_gate01.json", "labels_gate01.nii.gz"):
-        call("get", "/v1/beats/{id}/{file}", expect=200, id=beat, file=file)
     normals = limits(walk, folder)
     scored = f"?normals={normals}&sex=F"
     body, kind = form({"volume": scan, "expert": truth})
@@ -388,7 +424,6 @@ def everything(walk, folder):
     comparison = rest_and_stress(walk, folder, volume["id"], normals)
     mesh = urllib.request.urlopen(f"{URL}/v1/models/{template_model}/mesh.json").read()
     _, added = call("post", "/v1/templates", expect=201, query="?name=healthy", body=json.loads(mesh))
-    walk.recorded["operations"]["create_template"].pop("request")
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
     call("patch", "/v1/templates/{id}", expect=200, id=added["id"], body={"library": True})
     call("get", "/v1/templates", expect=200)
@@ -406,12 +441,12 @@ def everything(walk, folder):
         found = re.match(r"/v1/(models|segmentations|beats|comparisons|normals|templates|readers|volumes)/\{id\}(/.*)?$", template)
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
-            cut = "mesh" not in template or "models" not in template
-            # The files of the other wall than the one that `edge` asks for are named by it.
-            made = anatomical if "_apparent" in template else of_kind[found[1]]
-            call("get", template, expect=200, headers=accept, cut=cut, id=made)
-    meshes = walk.recorded["operations"]
-    meshes["create_template"]["request"] = meshes["get_model_mesh_json"]["200"]
+            made = of_kind[found[1]]
+            if found[2] != "/{file}":
+                call("get", template, expect=200, headers=accept, id=made)
+            for name in item["get"].get("x-files", {}):
+                # The files of the other wall than the one that `edge` asks for are named by it.
+                call("get", template, expect=200, id=anatomical if "_apparent" in name else made, file=name.replace("NN", "01"))
 
     webhooks(walk, order)
     received(walk)
@@ -421,7 +456,7 @@ def everything(walk, folder):
     call("get", "/v1/models/{id}", expect=400, query="?verbose=1", id=model)
     call("get", "/v1/models", expect=421, headers={"host": "elsewhere.example"})
     call("get", "/v1/models/{id}/mesh", expect=406, headers={"accept": "image/gif"}, id=model)
-    call("get", "/v1/models/{id}/mesh.glb", expect=416, headers={"range": "bytes=999999999-"}, id=model)
+    call("get", "/v1/models/{id}/{file}", expect=416, headers={"range": "bytes=999999999-"}, id=model, file="mesh.glb")
     call("post", "/v1/jobs", expect=422, body={"kind": "model", "volume": volume["id"], "parameters": {"points": 3}})
     call("post", "/v1/jobs", expect=413, body={"volume": "x" * 300_000})
     call("post", "/v1/volumes", expect=415, body=b"x", headers={"content-type": "image/gif"})
@@ -439,7 +474,7 @@ def everything(walk, folder):
     while any(state_of(name) in ("queued", "running") for name in jobs):
         time.sleep(0.05)
     call("delete", "/v1/volumes/{id}/identity", expect=204, id=volume["id"])
-    call("get", "/v1/models/{id}/mesh.dcm", expect=409, id=model)
+    call("get", "/v1/models/{id}/{file}", expect=409, id=model, file="mesh.dcm")
     for kind, name in of_kind.items():
         call("delete", f"/v1/{kind}/{{id}}", expect=200, headers={"prefer": "return=representation"}, id=name)
     _, receipts = call("get", "/v1/erasures", expect=200)
@@ -447,9 +482,8 @@ def everything(walk, folder):
     call("get", "/v1/models/{id}", expect=410, id=model)
     call("get", "/v1/models/{id}", expect=404, id="mdl_" + "0" * 32)
     # What the documented examples name was there when it was asked for.
-    for kind, noun in (("models", "model"), ("volumes", "volume")):
-        walk.recorded["operations"][f"get_{noun}"]["parameters"] = {"id": of_kind[kind]}
-    walk.recorded["operations"]["get_job"]["parameters"] = {"id": job["id"]}
+    walk.recorded["parameters"].update({f"/v1/{kind}/{{id}}": name for kind, name in of_kind.items()})
+    walk.recorded["parameters"]["/v1/jobs/{id}"] = job["id"]
     access(walk)
 
 
@@ -527,11 +561,11 @@ def access(walk):
     call("delete", "/v1/keys", expect=422)
     call("delete", "/v1/keys", expect=200, query="?owner=contractor-7")
     # Without an issuer of tokens no key has an owner.
-    walk.recorded["operations"]["revoke_keys_of_owner"]["200"]["application/json"] = {"revoked": [second["id"]]}
+    walk.recorded["documents"]["RevokedKeys"] = {"revoked": [second["id"]]}
     walk.credentials = {"authorization": "Bearer " + second["key"]}
     call("get", "/v1/volumes", expect=401)
     # No key stands in a document that everybody reads.
-    hide(walk.recorded["operations"])
+    hide(walk.recorded)
 
 
 def hide(value):
@@ -579,12 +613,35 @@ def example_failures(contract):
                 for example in examples:
                     for error in contract.errors(content["schema"], example, exact=False):
                         failures.append(f"{what} {status}: example: {error}")
+        for name, file in operation.get("x-files", {}).items():
+            schema = file["schema"].get("$ref", "").split("/")[-1]
+            if schema and schema not in contract.document["components"]["examples"]:
+                failures.append(f"{what} {name}: no example")
     return failures
 
 
+def shape(value, path=""):
+    """The paths of all fields of a document."""
+    if isinstance(value, dict):
+        return {path}.union(*(shape(part, f"{path}/{name}") for name, part in value.items()))
+    if isinstance(value, list):
+        return {path}.union(*(shape(part, path + "/-") for part in value))
+    return {path}
+
+
+def steady(recorded, committed):
+    """What was recorded, or what is committed where that says as much."""
+    kept = {}
+    for name, value in recorded.items():
+        old = committed.get(name)
+        kept[name] = value if old is None or not shape(value) <= shape(old) else old
+    return dict(sorted(kept.items()))
+
+
 def main():
-    record = "--record" in sys.argv[1:]
-    document = json.load(open(DOCUMENT))
+    target = sys.argv[2] if sys.argv[1:2] == ["--record"] else None
+    # That it is the committed document is tested in tests/api.
+    document = json.load(urllib.request.urlopen(f"{URL}/openapi.json"))
     validate(document)
     contract = Contract(document)
     names = [operation["operationId"] for _, _, operation in contract.operations()]
@@ -596,19 +653,22 @@ def main():
     everything(walk, folder)
     failures += walk.failures
     failures += [f"operation {name} was not tried" for name in names if name not in walk.seen]
-    if record:
+    if target:
         for status, (code, detail, fix) in RARE.items():
             title = code.replace("-", " ").capitalize()
             problem = {"type": f"urn:ventriform:problem:{code}", "title": title, "status": int(status), "detail": detail}
             walk.recorded["problems"].setdefault(status, {**problem, **({"fix": fix} if fix else {})})
         problem = {**walk.recorded["problems"]["503"], "detail": NOT_READY[0]["detail"], "checks": NOT_READY}
-        walk.recorded["operations"]["ready"]["503"] = {PROBLEM: problem}
-        walk.recorded["problems"] = dict(sorted(walk.recorded["problems"].items()))
-        walk.recorded["operations"] = dict(sorted(walk.recorded["operations"].items()))
-        with open(EXAMPLES, "w") as file:
-            json.dump(walk.recorded, file, indent=1, ensure_ascii=False)
+        walk.recorded["operations"]["ready"] = {"503": {PROBLEM: problem}}
+        committed = json.load(open(EXAMPLES))
+        schemas = document["components"]["schemas"]
+        committed["documents"] = {
+            name: value for name, value in committed["documents"].items()
+            if name in schemas and not contract.errors({"$ref": f"#/components/schemas/{name}"}, value, exact=True)}
+        kept = {group: steady(values, committed.get(group, {})) for group, values in walk.recorded.items()}
+        with open(target, "w") as file:
+            json.dump(kept, file, indent=1, ensure_ascii=False)
             file.write("\n")
-        print(f"wrote {EXAMPLES}; now write the document: UPDATE_OPENAPI=1 cargo test --test api openapi")
     else:
         failures += example_failures(contract)
     print(*failures, sep="\n")

@@ -6,7 +6,6 @@
 #   scripts/check/python.sh --build    only the wheel in it, which scripts/test.sh does beforehand: it needs cargo's lock
 #   scripts/check/python.sh --test     only the tests: pytest, mypy, stubtest, notebooks
 #   scripts/check/python.sh --notebooks    only the notebooks, whose copies with outputs scripts/release/site.sh shows
-#   scripts/check/python.sh --write    writes the generated stubs anew
 #
 # The wheel has the dev profile, in which the library is optimised. VENTRIFORM_WHEEL: a wheel to test instead.
 # CARGO_CONFIG: a file of further settings for cargo.
@@ -59,11 +58,6 @@ case ${1:-} in
   --build) build ;;
   --test) run_tests ;;
   --notebooks) run_notebooks ;;
-  --write)
-    python3 scripts/release/python_types.py write reports
-    build
-    "$venv/bin/python" scripts/release/python_types.py write
-    ;;
   *)
     build
     run_tests

@@ -1,17 +1,18 @@
 """Writes what the Python package knows of the library's tables and documents.
 
-    python scripts/release/python_types.py check     the committed files are those that would be written
-    python scripts/release/python_types.py write     writes them anew
-    python scripts/release/python_types.py reference FILE     writes signatures and docstrings as JSON, for the site
+    python scripts/release/python_types.py reports             prints reports.py
+    python scripts/release/python_types.py functions           prints _functions.pyi
+    python scripts/release/python_types.py reference FILE      writes signatures and docstrings as JSON, for the site
 
-`python/ventriform/reports.py` has the reports' classes, from openapi/ventriform.json; `_functions.pyi` the signatures
-of the functions that take parameters, from the tables of the installed package (so install it first, or run
-scripts/check/python.sh --write, which does).
+`python/ventriform/reports.py` has the reports' classes, from the OpenAPI document (DOCUMENT, or openapi/ventriform.json);
+`_functions.pyi` the signatures of the functions that take parameters, from the tables of the installed package.
+scripts/generate.sh writes both.
 """
 import ast
 import inspect
 import json
 import keyword
+import os
 import pathlib
 import sys
 import textwrap
@@ -193,25 +194,16 @@ def reference():
     }
 
 
-SCHEMAS = json.loads((ROOT / "openapi/ventriform.json").read_text())["components"]["schemas"]
+DOCUMENT = pathlib.Path(os.environ.get("DOCUMENT", ROOT / "openapi/ventriform.json"))
+SCHEMAS = json.loads(DOCUMENT.read_text())["components"]["schemas"]
 
 
 def main():
-    if sys.argv[1:2] == ["reference"]:
+    command = sys.argv[1]
+    if command == "reference":
         pathlib.Path(sys.argv[2]).write_text(json.dumps(reference()))
-        return
-    made = {PACKAGE / "reports.py": reports}
-    if sys.argv[2:] != ["reports"]:
-        made[PACKAGE / "_functions.pyi"] = stub
-    stale = []
-    for path, make in made.items():
-        text = make()
-        if sys.argv[1:2] == ["write"]:
-            path.write_text(text)
-        elif not path.exists() or path.read_text() != text:
-            stale.append(path.relative_to(ROOT))
-    if stale:
-        sys.exit(f"out of date: {', '.join(map(str, stale))}; write anew: scripts/check/python.sh --write")
+    else:
+        print({"reports": reports, "functions": stub}[command](), end="")
 
 
 if __name__ == "__main__":

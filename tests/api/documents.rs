@@ -1,14 +1,11 @@
 //! Pages of `docs/` that are written from the code.
 
+use crate::helpers::generated;
 use std::fmt::Write as _;
 use std::path::Path;
 use ventriform_service::config::Settings;
 
-/// If set, the test writes the page instead of comparing it.
-const UPDATE_VARIABLE: &str = "UPDATE_DOCS";
-
-const SETTINGS_BEGIN: &str =
-    "<!-- settings: written by UPDATE_DOCS=1 cargo test --test api operators -->\n";
+const SETTINGS_BEGIN: &str = "<!-- settings: written by scripts/generate.sh -->\n";
 const SETTINGS_END: &str = "<!-- end of settings -->\n";
 
 /// Every setting as tables, one for each group.
@@ -38,18 +35,11 @@ fn tables() -> String {
 #[test]
 fn the_page_for_operators_lists_every_setting() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/operations.md");
-    let page = std::fs::read_to_string(&path).unwrap();
+    let page = std::fs::read_to_string(path).unwrap();
     let (before, rest) = page.split_once(SETTINGS_BEGIN).unwrap();
     let (_, after) = rest.split_once(SETTINGS_END).unwrap();
     let expected = format!("{before}{SETTINGS_BEGIN}{}{SETTINGS_END}{after}", tables());
-    if std::env::var_os(UPDATE_VARIABLE).is_some() {
-        std::fs::write(&path, expected).unwrap();
-        return;
-    }
-    assert!(
-        page == expected,
-        "docs/operations.md is out of date; write it anew with {UPDATE_VARIABLE}=1 cargo test --test api operators"
-    );
+    generated("docs/operations.md", &expected);
 }
 
 /// Every flag that the code can raise has a line on the page of flags.

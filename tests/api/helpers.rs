@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::ops::Deref;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -874,4 +874,23 @@ impl Drop for Service {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// If set, the folder below which generated files are written instead of being compared.
+const GENERATED_FOLDER_VARIABLE: &str = "GENERATED_FOLDER";
+
+/// Checks that the committed file `name` is `content`; scripts/generate.sh has it written instead.
+pub fn generated(name: &str, content: &str) {
+    if let Some(folder) = std::env::var_os(GENERATED_FOLDER_VARIABLE) {
+        let path = PathBuf::from(folder).join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, content).unwrap();
+        return;
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+    let committed = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        committed == content,
+        "{name} is out of date; write it anew with scripts/generate.sh"
+    );
 }

@@ -68,30 +68,43 @@ async fn the_documentation_needs_no_network() {
     let page = page.text().await.unwrap();
     assert!(!page.contains("http://") && !page.contains("https://"));
     let mut scripts = page.split('"').filter(|word| word.ends_with(".js"));
-    // Relative to the page.
+    // Relative to the page, under a hash of all its files.
     let script = scripts.next().unwrap().strip_prefix('.').unwrap();
+    let parts: Vec<&str> = script.split('/').collect();
+    let [_, "assets", version, name] = parts[..] else {
+        panic!("{script}");
+    };
+    assert!(version.len() == 16 && version.bytes().all(|digit| digit.is_ascii_hexdigit()));
     let plain = app.get(script).send().await.unwrap();
     assert_eq!(plain.headers()["content-type"], "text/javascript");
     let kept = plain.headers()["cache-control"].to_str().unwrap();
     assert!(kept.contains("immutable"));
+    let etag = plain.headers()["etag"].clone();
     let plain = plain.bytes().await.unwrap();
-    for (accepted, coding) in [
-        ("gzip, br", Some("br")),
-        ("gzip", Some("gzip")),
-        ("br;q=0", None),
-    ] {
+    let known = app.get(script).header("if-none-match", &etag);
+    let known = known.send().await.unwrap();
+    assert_eq!(known.status(), StatusCode::NOT_MODIFIED);
+    for (accepted, coding) in [("gzip, br", Some("gzip")), ("br", None), ("gzip;q=0", None)] {
         let packed = app.get(script).header("accept-encoding", accepted);
         let packed = packed.send().await.unwrap();
         let stated = packed.headers().get("content-encoding");
         assert_eq!(stated.map(|value| value.to_str().unwrap()), coding);
         assert_eq!(packed.headers()["vary"], "accept-encoding");
+        assert_eq!(packed.headers()["etag"] != etag, coding.is_some());
         let length = packed.bytes().await.unwrap().len();
         assert_eq!(length < plain.len(), coding.is_some(), "{accepted}");
     }
+    // A page of another version gets none of this version's files.
+    let of_another = format!("/assets/{}/{name}", "0".repeat(16));
+    let of_page = format!("/assets/{version}/index.html");
+    let outside = format!("/assets/{version}/..%2findex.html");
+    let nothing = format!("/assets/{version}/nothing.js");
     for path in [
+        &*of_another,
+        &of_page,
+        &outside,
+        &nothing,
         "/assets/nothing.js",
-        "/assets/index.html",
-        "/assets/..%2findex.html",
     ] {
         problem(app.get(path).send().await.unwrap(), 404, "no-such-path").await;
     }

@@ -4,6 +4,7 @@
 mod ages;
 mod changes;
 mod imports;
+mod page;
 
 use imports::{ModulePath, Sources, circles, rust_files};
 use std::collections::{BTreeMap, BTreeSet};
@@ -221,6 +222,13 @@ fn no_files_use_each_other_in_a_circle() {
         }
     }
     assert!(told.is_empty(), "{}", told.join("\n"));
+}
+
+#[test]
+fn no_sources_of_the_page_use_each_other_in_a_circle() {
+    let arrows = page::arrows(&root().join("web/src"));
+    assert!(arrows.values().map(BTreeSet::len).sum::<usize>() > 200);
+    assert_eq!(circles(&arrows), Vec::<Vec<ModulePath>>::new());
 }
 
 /// The names under `[dependencies]` of the crate in `folder`, for every platform, without those of features.

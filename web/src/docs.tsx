@@ -36,10 +36,24 @@ interface Parameter {
   schema?: Schema;
 }
 
+interface Example {
+  $ref?: string;
+  summary?: string;
+  value?: unknown;
+}
+
 interface Media {
   schema?: Schema;
   example?: unknown;
-  examples?: Record<string, { summary?: string; value?: unknown }>;
+  examples?: Record<string, Example>;
+}
+
+/** A file of a result: what it is, and when the result has it. */
+interface FileFacts {
+  description: string;
+  exists: string;
+  mediaType: string;
+  schema: Schema;
 }
 
 interface Answer {
@@ -57,13 +71,19 @@ interface Operation {
   requestBody?: { description?: string; required?: boolean; content: Record<string, Media> };
   responses: Record<string, Answer>;
   security?: unknown[];
+  "x-files"?: Record<string, FileFacts>;
 }
 
 interface Document {
   info: { title: string; version: string; description?: string };
   tags?: { name: string; description?: string }[];
   paths: Record<string, Record<string, Operation>>;
-  components: { schemas: Record<string, Schema>; parameters?: Record<string, Parameter>; responses?: Record<string, Answer> };
+  components: {
+    schemas: Record<string, Schema>;
+    parameters?: Record<string, Parameter>;
+    responses?: Record<string, Answer>;
+    examples?: Record<string, Example>;
+  };
 }
 
 interface Entry {
@@ -85,7 +105,7 @@ export function Docs() {
   const groups = useMemo(() => (document_ ? grouped(document_) : []), [document_]);
   if (!document_) return <p class={problem ? "error pad" : "quiet pad"}>{problem || "Reading the document …"}</p>;
   const text = search.trim().toLowerCase();
-  const shown = groups.map(({ tag, about, entries }) => ({ tag, about, entries: entries.filter(entry => matches(entry, text)) })).filter(group => group.entries.length);
+  const shown = groups.map(({ tag, about, entries }) => ({ tag, about, entries: entries.filter(entry => matches(entry, text, document_)) })).filter(group => group.entries.length);
   return (
     <div class="docs">
       <nav aria-label="Parts of the API">
@@ -118,9 +138,18 @@ function grouped(all: Document) {
   return [...tags].map(([tag, about]) => ({ tag, about, entries: entries.filter(entry => (entry.operation.tags ?? ["other"]).includes(tag)) })).filter(group => group.entries.length);
 }
 
-function matches({ id, operation }: Entry, text: string): boolean {
-  const names = (operation.parameters ?? []).map(parameter => parameter.name ?? "");
+function matches({ id, operation }: Entry, text: string, all: Document): boolean {
+  const names = [...parametersOf(operation, all).map(parameter => parameter.name), ...Object.keys(operation["x-files"] ?? {})];
   return [id, operation.summary ?? "", operation.description ?? "", ...names].some(part => part.toLowerCase().includes(text));
+}
+
+function parametersOf(operation: Operation, all: Document): Parameter[] {
+  return (operation.parameters ?? []).map(parameter => (parameter.$ref ? (all.components.parameters?.[last(parameter.$ref)] ?? parameter) : parameter));
+}
+
+/** An answer; what stands beside a reference says more than what it refers to. */
+function answerOf(given: Answer, all: Document): Answer {
+  return given.$ref ? { ...all.components.responses?.[last(given.$ref)], ...given } : given;
 }
 
 /** Paragraphs with code between backticks. */
@@ -146,7 +175,8 @@ function Details({ entry: { method, path, operation }, all }: { entry: Entry; al
 }
 
 function Body({ method, path, operation, all }: { method: string; path: string; operation: Operation; all: Document }) {
-  const parameters = (operation.parameters ?? []).map(parameter => (parameter.$ref ? (all.components.parameters?.[last(parameter.$ref)] ?? parameter) : parameter));
+  const parameters = parametersOf(operation, all);
+  const files = Object.entries(operation["x-files"] ?? {});
   const [values, setValues] = useState<Record<string, string>>({});
   const body = operation.requestBody;
   return (
@@ -173,6 +203,22 @@ function Body({ method, path, operation, all }: { method: string; path: string; 
           </tbody>
         </table>
       )}
+      {files.length > 0 && (
+        <table>
+          <caption>Files</caption>
+          <thead><tr><th scope="col">Name</th><th scope="col">Type</th><th scope="col">What it is</th><th scope="col">Exists</th></tr></thead>
+          <tbody>
+            {files.map(([name, { mediaType, schema, description, exists }]) => (
+              <tr key={name}>
+                <th scope="row"><code>{name}</code></th>
+                <td><code>{mediaType}</code>{schema.$ref && ` ${last(schema.$ref)}`}</td>
+                <td><Inline text={description} /></td>
+                <td><Inline text={exists} /></td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
       {body && (
         <>
           <h3>Body</h3>
@@ -183,7 +229,7 @@ function Body({ method, path, operation, all }: { method: string; path: string; 
       <h3>Answers</h3>
       <dl class="answers">
         {Object.entries(operation.responses).map(([status, given]) => {
-          const answer = given.$ref ? (all.components.responses?.[last(given.$ref)] ?? given) : given;
+          const answer = answerOf(given, all);
           return (
             <div key={status}>
               <dt><b>{status}</b> <Inline text={answer.description ?? ""} /></dt>
@@ -234,7 +280,8 @@ function pretty(text: string): string {
 }
 
 function MediaShown({ type, media, all }: { type: string; media: Media; all: Document }) {
-  const examples = media.examples ? Object.values(media.examples) : media.example !== undefined ? [{ value: media.example }] : [];
+  const shared = Object.values(media.examples ?? {}).map(one => (one.$ref ? (all.components.examples?.[last(one.$ref)] ?? one) : one));
+  const examples = media.example !== undefined ? [{ value: media.example }, ...shared] : shared;
   const binary = media.schema?.format === "binary" || (!media.schema && !examples.length);
   if (binary && !examples.length) return <p><code>{type}</code></p>;
   return (

@@ -26,8 +26,17 @@ export interface Spec {
   unit: string;
 }
 
-interface Operation {
-  parameters: { in: string; name?: string; description?: string; schema?: Schema }[];
+interface Parameter {
+  $ref?: string;
+  in: string;
+  name?: string;
+  description?: string;
+  schema?: Schema;
+}
+
+interface Document {
+  paths: Record<string, { post?: { parameters: Parameter[] } }>;
+  components: { parameters: Record<string, Parameter> };
 }
 
 /** Of requests, and of both scans of a comparison, which the page has chosen before. */
@@ -37,12 +46,12 @@ let specs: Promise<Record<Kind, Spec[]>> | undefined;
 
 /** The parameters of every kind of work. */
 export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
-  specs ??= get<{ paths: Record<string, { post?: Operation }> }>("/openapi.json").then(
+  specs ??= get<Document>("/openapi.json").then(
     document => ({
-      model: read(document.paths["/v1/models"]?.post),
-      segmentation: read(document.paths["/v1/segmentations"]?.post),
-      beat: read(document.paths["/v1/beats"]?.post),
-      comparison: read(document.paths["/v1/comparisons"]?.post),
+      model: read(document, "/v1/models"),
+      segmentation: read(document, "/v1/segmentations"),
+      beat: read(document, "/v1/beats"),
+      comparison: read(document, "/v1/comparisons"),
     }),
     error => {
       specs = undefined;
@@ -61,8 +70,9 @@ const UNITS: [RegExp, string][] = [
   [/, in voxels/, "voxels"],
 ];
 
-function read(operation?: Operation): Spec[] {
-  return (operation?.parameters ?? []).flatMap(parameter => {
+function read(document: Document, path: string): Spec[] {
+  return (document.paths[path]?.post?.parameters ?? []).flatMap(given => {
+    const parameter = document.components.parameters[given.$ref?.split("/").pop() ?? ""] ?? given;
     const { name, schema } = parameter;
     if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
     const help = parameter.description ?? schema.description ?? "";

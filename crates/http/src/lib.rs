@@ -31,14 +31,26 @@ mod router;
 mod server;
 mod wire;
 
+use serde::Serialize;
+use serde_json::Serializer;
+use serde_json::ser::PrettyFormatter;
+
 pub use app::App;
 pub use edge::connections::tls::TlsError;
 pub use edge::cryptography::install_cryptography;
 pub use server::{Running, ServeError, start};
 
-/// The OpenAPI document, as committed under `openapi/`.
+/// The OpenAPI document, as committed under `openapi/`: a line for each value, so that changes can be read.
+///
+/// # Panics
+/// Never: writing into memory does not fail.
 pub fn document_json() -> String {
-    format!("{:#}\n", router::document())
+    let mut text = Vec::new();
+    let indented = PrettyFormatter::with_indent(b" ");
+    let mut writer = Serializer::with_formatter(&mut text, indented);
+    let written = router::document().serialize(&mut writer);
+    written.expect("memory takes all");
+    String::from_utf8(text).expect("JSON is UTF-8") + "\n"
 }
 
 /// The examples of README.md, compiled as tests.

@@ -158,7 +158,7 @@ fn public(settings: &Settings) -> Router<App> {
         )
         .route("/docs", get(front_page::documentation))
         .route("/docs/", get(front_page::documentation))
-        .route("/assets/{name}", get(front_page::asset))
+        .route("/assets/{version}/{name}", get(front_page::asset))
         .route("/favicon.ico", get(front_page::icon))
 }
 

@@ -11,24 +11,12 @@ import time
 
 import ventriform_client
 from ventriform_client import Client
-from ventriform_client.api.beats import get_beat, get_beat_mesh_glb, get_beat_report, list_beats
+from ventriform_client.api.beats import get_beat, get_beat_file, get_beat_report, list_beats
 from ventriform_client.api.jobs import create_job, get_job
-from ventriform_client.api.models import get_model, get_model_mesh_glb, get_model_report, list_models
+from ventriform_client.api.models import get_model, get_model_file, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import (
-    Beat,
-    BeatJobRequest,
-    BeatParameters,
-    BeatReport,
-    Job,
-    JobState,
-    Model,
-    ModelJobRequest,
-    ModelParameters,
-    ModelReport,
-    Problem,
-    Volume,
-)
+from ventriform_client.models import (Beat, BeatJobRequest, BeatParameters, BeatReport, Job, JobState, Model, ModelFileName, ModelJobRequest,
+                                      ModelParameters, ModelReport, Problem, Volume)
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
@@ -70,7 +58,7 @@ job = made("model", volume, ModelParameters(points=110, seed=3))
 model = get_model.sync(client=client, id=job.model)
 assert isinstance(model, Model) and model.summary.vertices == 110, model
 assert model.parameters.points == 110, model.parameters
-mesh = get_model_mesh_glb.sync(client=client, id=model.id)
+mesh = get_model_file.sync(client=client, id=model.id, file=ModelFileName.MESH_GLB)
 assert mesh.payload.read(4) == b"glTF"
 report = get_model_report.sync(client=client, id=model.id)
 assert isinstance(report, ModelReport) and report.mesh.vertices == 110, report
@@ -85,7 +73,7 @@ assert isinstance(beat, Beat) and beat.summary.gates == 8 and beat.parameters.rr
 report = get_beat_report.sync(client=client, id=beat.id)
 assert isinstance(report, BeatReport) and len(report.gates) == 8 and len(report.segments) == 17, report
 assert report.edv_ml > report.esv_ml and report.ef_percent == beat.summary.ef_percent, report
-assert get_beat_mesh_glb.sync(client=client, id=beat.id).payload.read(4) == b"glTF"
+assert get_beat_file.sync(client=client, id=beat.id, file="mesh_gate01.glb").payload.read(4) == b"glTF"
 assert beat.id in [b.id for b in list_beats.sync(client=client).beats]
 
 problem = get_volume.sync(client=client, id="vol_" + "0" * 32)

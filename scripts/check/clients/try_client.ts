@@ -50,10 +50,10 @@ check(!volume.gates, volume);
 const job = await made({ kind: "model", volume: volume.id, parameters: { points: 110, seed: 4 } });
 check(job.model, job);
 const path = { id: job.model };
-const mesh = await client.GET("/v1/models/{id}/mesh.glb", { params: { path }, parseAs: "arrayBuffer" });
+const mesh = await client.GET("/v1/models/{id}/{file}", { params: { path: { ...path, file: "mesh.glb" } }, parseAs: "arrayBuffer" });
 check(mesh.data && new TextDecoder().decode(mesh.data.slice(0, 4)) === "glTF", mesh.error);
-const report = await client.GET("/v1/models/{id}/report.json", { params: { path } });
-check(report.data && report.data.mesh.vertices === 110, report.error);
+const report = await client.GET("/v1/models/{id}/report", { params: { path } });
+check(report.data && typeof report.data === "object" && report.data.mesh.vertices === 110, report.error);
 check(report.data.shape.radius_ratio.mean > 0.5, report.data.shape);
 
 const gated = await stored(process.argv[3]);

@@ -173,11 +173,7 @@ export interface components {
              */
             stress_esv_ml: number;
         };
-        /**
-         * @description One of the two scans.
-         * @enum {string}
-         */
-        WhichScan: "stress" | "rest";
+        BeatFileName: ("mesh_ed.glb" | "mesh_ed.gltf" | "mesh_ed.stl" | "mesh_ed.ply" | "mesh_ed.obj" | "mesh_ed.vtp" | "mesh_ed.vtk" | "mesh_ed.json" | "mesh_es.glb" | "mesh_es.gltf" | "mesh_es.stl" | "mesh_es.ply" | "mesh_es.obj" | "mesh_es.vtp" | "mesh_es.vtk" | "mesh_es.json" | "beat.json" | "report.html" | "curve.svg" | "phase.svg" | "gates.csv" | "segments.csv" | "polar.svg" | "polar.json" | "polar_ed.svg" | "polar_ed.json" | "polar_es.svg" | "polar_es.json" | "polar_motion.svg" | "polar_motion.json" | "polar_thickening.svg" | "polar_thickening.json" | "polar_phase.svg" | "polar_phase.json" | "polar_z.svg" | "polar_z.png" | "polar_z.json" | "polar_score.svg" | "polar_score.png" | "polar_score.json" | "mesh.glb" | "mask_ed.dcm" | "mask_es.dcm" | "measurements.dcm") | string;
         BeatJobRequest: {
             /**
              * @description The id in the caller's own system
@@ -798,19 +794,8 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        /** @description A signing secret. */
-        WebhookSecret: {
-            /**
-             * Format: date-time
-             * @description Until when the secret before signs too (RFC 3339).
-             */
-            former_until: string;
-            /**
-             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
-             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
-             */
-            secret: string;
-        };
+        /** @enum {string} */
+        ComparisonFileName: "mesh_stress.glb" | "mesh_stress.gltf" | "mesh_stress.stl" | "mesh_stress.ply" | "mesh_stress.obj" | "mesh_stress.vtp" | "mesh_stress.vtk" | "mesh_stress.json" | "mesh_rest.glb" | "mesh_rest.gltf" | "mesh_rest.stl" | "mesh_rest.ply" | "mesh_rest.obj" | "mesh_rest.vtp" | "mesh_rest.vtk" | "mesh_rest.json" | "comparison.json" | "report.html" | "slices.png" | "segments.csv" | "polar_stress.svg" | "polar_stress.png" | "polar_stress.json" | "polar_rest.svg" | "polar_rest.png" | "polar_rest.json" | "polar_difference.svg" | "polar_difference.png" | "polar_difference.json" | "polar_z_stress.svg" | "polar_z_stress.png" | "polar_z_stress.json" | "polar_z_rest.svg" | "polar_z_rest.png" | "polar_z_rest.json" | "polar_score_stress.svg" | "polar_score_stress.png" | "polar_score_stress.json" | "polar_score_rest.svg" | "polar_score_rest.png" | "polar_score_rest.json" | "region_stress.nii.gz" | "region_rest.nii.gz" | "measurements.dcm" | "page.dcm" | "polar_stress.dcm" | "polar_rest.dcm" | "polar_difference.dcm";
         ComparisonForm: {
             /**
              * Format: binary
@@ -1725,21 +1710,6 @@ export interface components {
             /** @description Oddities of the file that do not prevent its use. */
             warnings: string[];
         };
-        WebhookRequest: {
-            /** @description What to tell; the three ends of a job unless given */
-            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
-            /**
-             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
-             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
-             */
-            secret?: string;
-            /**
-             * Format: uri
-             * @description Where to send deliveries: https, and a public host unless the operator allows it
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
-        };
         /** @description Figures of a fit, and the fitted model's pose. */
         Fit: {
             /**
@@ -2653,6 +2623,8 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
+        /** @enum {string} */
+        ModelFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "report.json" | "report.html" | "distance.json" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm";
         ModelJobRequest: {
             /**
              * @description The id in the caller's own system
@@ -3124,11 +3096,8 @@ export interface components {
             /** @description Their content. */
             summary: components["schemas"]["NormalsSummary"];
         };
-        /** @description The registered receivers. */
-        WebhookList: {
-            /** @description The oldest first. */
-            webhooks: components["schemas"]["Webhook"][];
-        };
+        /** @enum {string} */
+        NormalsFileName: "normals.json";
         /** @description The parameters of normal limits */
         NormalsFitParameters: {
             /** @description Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: where segments are counted from if no superior direction is stated, as in short-axis slices (there, often 0,-1,0: the top of the picture) */
@@ -3927,33 +3896,8 @@ export interface components {
             /** @description The content of the profile. */
             summary: components["schemas"]["ReaderSummary"];
         };
-        /** @description A registered receiver. */
-        Webhook: {
-            /**
-             * Format: date-time
-             * @description When it was registered (RFC 3339).
-             */
-            created_at: string;
-            /** @description The events that it is told. */
-            events: string[];
-            /**
-             * Format: date-time
-             * @description Since when it answers 410 and is told nothing (RFC 3339).
-             */
-            gone_at?: string | null;
-            /**
-             * @description Its id.
-             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
-             */
-            id: string;
-            /** @description What signs its deliveries; shown only when it is registered. */
-            secret?: string | null;
-            /**
-             * @description Where it is.
-             * @example https://ris.example.org/hooks/ventriform
-             */
-            url: string;
-        };
+        /** @enum {string} */
+        ReaderFileName: "profile.json";
         /** @description Paths of one reader. */
         ReaderLinks: {
             /** @description Its profile. */
@@ -4457,19 +4401,8 @@ export interface components {
             /** @description The volume it was made of. */
             volume: string;
         };
-        /** @description Volumes of one wall, millilitres. */
-        WallVolumes: {
-            /**
-             * Format: double
-             * @description Of the cavity.
-             */
-            cavity: number;
-            /**
-             * Format: double
-             * @description Of the wall.
-             */
-            wall: number;
-        };
+        /** @enum {string} */
+        SegmentationFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json" | "mesh_anatomical.glb" | "mesh_anatomical.gltf" | "mesh_anatomical.stl" | "mesh_anatomical.ply" | "mesh_anatomical.obj" | "mesh_anatomical.vtp" | "mesh_anatomical.vtk" | "mesh_anatomical.json" | "mesh_apparent.glb" | "mesh_apparent.gltf" | "mesh_apparent.stl" | "mesh_apparent.ply" | "mesh_apparent.obj" | "mesh_apparent.vtp" | "mesh_apparent.vtk" | "mesh_apparent.json" | "mask.nii.gz" | "mask_anatomical.nii.gz" | "mask_apparent.nii.gz" | "labels.nii.gz" | "labels.seg.nrrd" | "report.json" | "report.html" | "slices.png" | "region.nii.gz" | "polar.json" | "polar.svg" | "polar.png" | "polar_z.json" | "polar_z.svg" | "polar_z.png" | "polar_score.json" | "polar_score.svg" | "polar_score.png" | "mask.dcm" | "contours.dcm" | "mesh.dcm" | "surface.dcm" | "measurements.dcm" | "polar.dcm" | "page.dcm";
         SegmentationForm: {
             /**
              * Format: binary
@@ -5237,11 +5170,8 @@ export interface components {
             /** @description Counts and main figures. */
             summary: components["schemas"]["TemplateSummary"];
         };
-        /**
-         * @description A figure of the wall.
-         * @enum {string}
-         */
-        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
+        /** @enum {string} */
+        TemplateFileName: "mesh.glb" | "mesh.gltf" | "mesh.stl" | "mesh.ply" | "mesh.obj" | "mesh.vtp" | "mesh.vtk" | "mesh.json";
         /** @description Paths of one template. */
         TemplateLinks: {
             /** @description Its mesh, in the format that `Accept` asks for. */
@@ -5621,6 +5551,89 @@ export interface components {
             /** @description The volumes, newest first. */
             volumes: components["schemas"]["Volume"][];
         };
+        /**
+         * @description A figure of the wall.
+         * @enum {string}
+         */
+        WallFigure: "motion" | "thickening" | "phase" | "difference" | "z" | "score";
+        /** @description Volumes of one wall, millilitres. */
+        WallVolumes: {
+            /**
+             * Format: double
+             * @description Of the cavity.
+             */
+            cavity: number;
+            /**
+             * Format: double
+             * @description Of the wall.
+             */
+            wall: number;
+        };
+        /** @description A registered receiver. */
+        Webhook: {
+            /**
+             * Format: date-time
+             * @description When it was registered (RFC 3339).
+             */
+            created_at: string;
+            /** @description The events that it is told. */
+            events: string[];
+            /**
+             * Format: date-time
+             * @description Since when it answers 410 and is told nothing (RFC 3339).
+             */
+            gone_at?: string | null;
+            /**
+             * @description Its id.
+             * @example whk_019a8f4e7c2b7c3e9d5f6a7b8c9d0e1f
+             */
+            id: string;
+            /** @description What signs its deliveries; shown only when it is registered. */
+            secret?: string | null;
+            /**
+             * @description Where it is.
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        /** @description The registered receivers. */
+        WebhookList: {
+            /** @description The oldest first. */
+            webhooks: components["schemas"]["Webhook"][];
+        };
+        WebhookRequest: {
+            /** @description What to tell; the three ends of a job unless given */
+            events?: ("started" | "succeeded" | "failed" | "cancelled")[];
+            /**
+             * @description What signs the deliveries (Standard Webhooks): `whsec_` and base64. Made by the service unless given, and never shown again
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret?: string;
+            /**
+             * Format: uri
+             * @description Where to send deliveries: https, and a public host unless the operator allows it
+             * @example https://ris.example.org/hooks/ventriform
+             */
+            url: string;
+        };
+        /** @description A signing secret. */
+        WebhookSecret: {
+            /**
+             * Format: date-time
+             * @description Until when the secret before signs too (RFC 3339).
+             */
+            former_until: string;
+            /**
+             * @description `whsec_` and base64, as the libraries of Standard Webhooks take it.
+             * @example whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw
+             */
+            secret: string;
+        };
+        /**
+         * @description One of the two scans.
+         * @enum {string}
+         */
+        WhichScan: "stress" | "rest";
     };
     responses: never;
     parameters: never;
@@ -5634,7 +5647,7 @@ export type AuditEventName = components['schemas']['AuditEventName'];
 export type AuditPage = components['schemas']['AuditPage'];
 export type Beat = components['schemas']['Beat'];
 export type BeatChange = components['schemas']['BeatChange'];
-export type WhichScan = components['schemas']['WhichScan'];
+export type BeatFileName = components['schemas']['BeatFileName'];
 export type BeatJobRequest = components['schemas']['BeatJobRequest'];
 export type BeatLinks = components['schemas']['BeatLinks'];
 export type BeatList = components['schemas']['BeatList'];
@@ -5649,7 +5662,7 @@ export type ComparedScan = components['schemas']['ComparedScan'];
 export type ComparedSegment = components['schemas']['ComparedSegment'];
 export type ComparedTerritory = components['schemas']['ComparedTerritory'];
 export type Comparison = components['schemas']['Comparison'];
-export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type ComparisonFileName = components['schemas']['ComparisonFileName'];
 export type ComparisonForm = components['schemas']['ComparisonForm'];
 export type ComparisonJobRequest = components['schemas']['ComparisonJobRequest'];
 export type ComparisonLinks = components['schemas']['ComparisonLinks'];
@@ -5675,7 +5688,6 @@ export type ExcludedCase = components['schemas']['ExcludedCase'];
 export type FigureBeside = components['schemas']['FigureBeside'];
 export type FigureSegment = components['schemas']['FigureSegment'];
 export type FileFacts = components['schemas']['FileFacts'];
-export type WebhookRequest = components['schemas']['WebhookRequest'];
 export type Fit = components['schemas']['Fit'];
 export type FitnessFormStages = components['schemas']['FitnessFormStages'];
 export type FitnessForms = components['schemas']['FitnessForms'];
@@ -5718,6 +5730,7 @@ export type LongAxis = components['schemas']['LongAxis'];
 export type MeshDocument = components['schemas']['MeshDocument'];
 export type MeshFacts = components['schemas']['MeshFacts'];
 export type Model = components['schemas']['Model'];
+export type ModelFileName = components['schemas']['ModelFileName'];
 export type ModelJobRequest = components['schemas']['ModelJobRequest'];
 export type ModelLinks = components['schemas']['ModelLinks'];
 export type ModelList = components['schemas']['ModelList'];
@@ -5732,7 +5745,7 @@ export type NormalGroup = components['schemas']['NormalGroup'];
 export type NormalGroupSummary = components['schemas']['NormalGroupSummary'];
 export type NormalLimits = components['schemas']['NormalLimits'];
 export type Normals = components['schemas']['Normals'];
-export type WebhookList = components['schemas']['WebhookList'];
+export type NormalsFileName = components['schemas']['NormalsFileName'];
 export type NormalsFitParameters = components['schemas']['NormalsFitParameters'];
 export type NormalsJobRequest = components['schemas']['NormalsJobRequest'];
 export type NormalsLinks = components['schemas']['NormalsLinks'];
@@ -5757,7 +5770,7 @@ export type Priority = components['schemas']['Priority'];
 export type Problem = components['schemas']['Problem'];
 export type RatesReport = components['schemas']['RatesReport'];
 export type Reader = components['schemas']['Reader'];
-export type Webhook = components['schemas']['Webhook'];
+export type ReaderFileName = components['schemas']['ReaderFileName'];
 export type ReaderLinks = components['schemas']['ReaderLinks'];
 export type ReaderList = components['schemas']['ReaderList'];
 export type ReaderOffsets = components['schemas']['ReaderOffsets'];
@@ -5783,7 +5796,7 @@ export type Scope = components['schemas']['Scope'];
 export type SegmentMotionReport = components['schemas']['SegmentMotionReport'];
 export type SegmentScore = components['schemas']['SegmentScore'];
 export type Segmentation = components['schemas']['Segmentation'];
-export type WallVolumes = components['schemas']['WallVolumes'];
+export type SegmentationFileName = components['schemas']['SegmentationFileName'];
 export type SegmentationForm = components['schemas']['SegmentationForm'];
 export type SegmentationJobRequest = components['schemas']['SegmentationJobRequest'];
 export type SegmentationLinks = components['schemas']['SegmentationLinks'];
@@ -5805,7 +5818,7 @@ export type SurfaceNoise = components['schemas']['SurfaceNoise'];
 export type SurfaceReport = components['schemas']['SurfaceReport'];
 export type TagsPatch = components['schemas']['TagsPatch'];
 export type Template = components['schemas']['Template'];
-export type WallFigure = components['schemas']['WallFigure'];
+export type TemplateFileName = components['schemas']['TemplateFileName'];
 export type TemplateLinks = components['schemas']['TemplateLinks'];
 export type TemplateList = components['schemas']['TemplateList'];
 export type TemplatePatch = components['schemas']['TemplatePatch'];
@@ -5826,5 +5839,12 @@ export type VolumeIntervals = components['schemas']['VolumeIntervals'];
 export type VolumeJobRequest = components['schemas']['VolumeJobRequest'];
 export type VolumeLinks = components['schemas']['VolumeLinks'];
 export type VolumeList = components['schemas']['VolumeList'];
+export type WallFigure = components['schemas']['WallFigure'];
+export type WallVolumes = components['schemas']['WallVolumes'];
+export type Webhook = components['schemas']['Webhook'];
+export type WebhookList = components['schemas']['WebhookList'];
+export type WebhookRequest = components['schemas']['WebhookRequest'];
+export type WebhookSecret = components['schemas']['WebhookSecret'];
+export type WhichScan = components['schemas']['WhichScan'];
 export type $defs = Record<string, never>;
 export type operations = Record<string, never>;

@@ -8,12 +8,11 @@ import { Verdict, headlines } from "./figures";
 import type { LoadedBeat } from "./loaded";
 import { PATIENT, heartPlanes } from "./plane";
 import { drawPolar, uptakeMap } from "./polar";
-import { BesideLimits, Drawn, Foot, Head, type Printed } from "./sheet";
+import { BesideLimits, Drawn, Foot, Head, type Printed, RATIO } from "./sheetparts";
 import { ColourBar } from "./wall";
 
 /** CSS pixels of a map and of a slice on paper before they are brought to the width of their column. */
 const [MAP, SLICE] = [220, 150];
-const RATIO = 3;
 
 export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & { beat: LoadedBeat }) {
   const { report } = beat;

@@ -8,12 +8,11 @@ import { drawMap, endsOf, lutOf } from "./comparedmaps";
 import type { ComparedScene } from "./comparedscene";
 import { drawSlices } from "./comparedslices";
 import { drawWall } from "./heartwall";
-import { Drawn, Foot, Head } from "./sheet";
+import { Drawn, Foot, Head, RATIO } from "./sheetparts";
 import { ColourBar, byMap, coloursOf } from "./wall";
 
 /** CSS pixels of the slices, of a map and of a wall on paper before they are brought to the width of their place. */
 const [WIDTH, HEIGHT, MAP, WALL] = [700, 500, 190, 160];
-const RATIO = 3;
 
 interface Props {
   compared: Compared;

@@ -20,7 +20,7 @@ import { ComparisonSheet } from "./comparisonsheet";
 import { Downloads, Takeaways } from "./figures";
 import { HeartWall } from "./heartwall";
 import { screenshot } from "./screenshot";
-import { printsAs } from "./sheet";
+import { printsAs } from "./sheetparts";
 import { ColourBar, byMap, coloursOf } from "./wall";
 
 export function ComparisonView({ id }: { id: string }) {

@@ -1,11 +1,8 @@
 // What the viewer prints: two pages of paper, of a beat one, the figures that matter first.
 
-import { type ComponentChildren, render } from "preact";
-import type { Volume } from "../api";
-import { counts, isFit, moment, nameOf, number, resultName, shape, study } from "../words";
+import type { ComponentChildren } from "preact";
+import { counts, isFit, moment, number, resultName, shape } from "../words";
 import { BeatSheet } from "./beatsheet";
-import { limitMapsOf, perfusionOf } from "./beatview";
-import { LimitsUsed, PerfusionTable } from "./comparedfacts";
 import { type Camera } from "./camera";
 import { DIVERGING, LUTS, UPTAKE } from "./colours";
 import { drawSlice } from "./drawing";
@@ -15,61 +12,14 @@ import type { Loaded } from "./loaded";
 import { PATIENT, frameOf, heartPlanes } from "./plane";
 import { drawPolar, hasValvePlane, uptakeMap } from "./polar";
 import type { Scene } from "./scene";
+import { BesideLimits, Drawn, Foot, Head, type Printed, RATIO } from "./sheetparts";
 import { drawStack } from "./stack";
 import { add, scale, unit } from "./vector";
 import { ColourBar, coloursOf, uptakeOf, wallCamera } from "./wall";
 
-/** Pixels of paper for one CSS pixel: 96 x 3 to the inch. */
-const RATIO = 3;
-
-export interface Printed {
-  scene: Scene;
-  volume: Volume;
-  shown: Loaded;
-  other: Loaded | null;
-  /** The parameters that differ from the defaults. */
-  parameters: [string, string][];
-}
-
 /** What is printed of a result. */
 export function sheetOf(printed: Printed): ComponentChildren {
   return printed.shown.beat ? <BeatSheet {...printed} beat={printed.shown.beat} /> : <Sheet {...printed} />;
-}
-
-/** Puts the sheet into the document while it is printed; the answer stops that. */
-export function printsAs(printed: () => ComponentChildren): () => void {
-  let host: HTMLElement | null = null;
-  const before = () => {
-    const now = printed();
-    if (!now || host) return;
-    host = document.createElement("div");
-    host.className = "sheet";
-    document.body.append(host);
-    render(now, host);
-  };
-  const after = () => {
-    if (!host) return;
-    render(null, host);
-    host.remove();
-    host = null;
-  };
-  addEventListener("beforeprint", before);
-  addEventListener("afterprint", after);
-  return () => {
-    after();
-    removeEventListener("beforeprint", before);
-    removeEventListener("afterprint", after);
-  };
-}
-
-export function Drawn({ width, height, name, draw }: { width: number; height: number; name: string; draw: (element: HTMLCanvasElement) => void }) {
-  return (
-    <canvas role="img" aria-label={name} ref={element => {
-      if (!element) return;
-      Object.assign(element, { width: width * RATIO, height: height * RATIO });
-      draw(element);
-    }} />
-  );
 }
 
 function Sheet({ scene, volume, shown, other, parameters }: Printed) {
@@ -148,39 +98,6 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
   );
 }
 
-/** The uptake beside normal limits, on paper. */
-export function BesideLimits({ shown }: { shown: Loaded }) {
-  const perfusion = perfusionOf(shown);
-  if (!perfusion) return null;
-  return (
-    <div class="beside-limits">
-      {limitMapsOf(shown).map(({ name, map, lut }) => (
-        <figure key={name}>
-          <Drawn width={180} height={180} name={name} draw={element => {
-            const context = element.getContext("2d");
-            if (context && lut) drawPolar(context, map, 180, RATIO, { lut, segments: false, threshold: false, territories: false, cursor: null });
-          }} />
-          <figcaption><span>{name}</span>{lut && <ColourBar lut={lut} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />}</figcaption>
-        </figure>
-      ))}
-      <div class="figures">
-        <PerfusionTable of={[["this scan", perfusion]]} />
-        <LimitsUsed perfusion={{ ...perfusion, flags: [] }} />
-      </div>
-    </div>
-  );
-}
-
-export function Head({ volume, title, children }: { volume: Volume; title: string; children?: ComponentChildren }) {
-  return (
-    <header>
-      <h1>{title}</h1>
-      <p><b>{study(volume) || nameOf(volume)}</b>{study(volume) && ` · ${nameOf(volume)}`}</p>
-      {children && <p class="quiet">{children}</p>}
-    </header>
-  );
-}
-
 /** The wall from both sides in the colours of the uptake; of a model, of its distance to the surface. */
 function Walls({ scene, shown }: { scene: Scene; shown: Loaded }) {
   const heart = shown.heart;
@@ -223,8 +140,4 @@ function Legend({ scene }: { scene: Scene }) {
       <ColourBar lut={scene.lut.value} low={counts(low)} high={counts(high)} />
     </p>
   );
-}
-
-export function Foot({ page, of = 2 }: { page: number; of?: number }) {
-  return <footer>ventriform: research software, not a medical device. Measurements are no diagnosis. Printed {moment(new Date().toISOString())}. Page {page} of {of}</footer>;
 }

@@ -20,7 +20,8 @@ import { Pictures } from "./pictures";
 import { Player } from "./player";
 import { PolarView } from "./polarview";
 import { Scene } from "./scene";
-import { type Printed, printsAs, sheetOf } from "./sheet";
+import { sheetOf } from "./sheet";
+import { type Printed, printsAs } from "./sheetparts";
 
 export function Viewer({ volume: id }: { volume: string }) {
   const [volume, setVolume] = useState<Volume | null>(null);

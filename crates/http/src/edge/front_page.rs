@@ -1,7 +1,8 @@
 //! `GET /`: the page for browsers, a few commands for curl. `/docs`, `/assets/*`: the rest of the page.
 //!
-//! The page is built from `web/` and committed as `web/dist`, each file beside its compressed forms. The
-//! names of what lies in `assets/` hold a hash of the content, so browsers keep those files for ever.
+//! The page is built from `web/` and committed as `web/dist`, under names that stay the same. It is served under
+//! `/assets/VERSION/`, where the version is a hash of all its files, so browsers keep them for ever, and never mix
+//! those of two versions. The files are compressed when the page is asked for first.
 //!
 //! The page names its files relative to itself, so it works under any path of a proxy. Where the path is
 //! known ([`crate::wire::public_base`]), they are named from the root instead: a proxy may show the page at
@@ -9,21 +10,29 @@
 //! their own address.
 
 use crate::wire::negotiate;
+use crate::wire::packed::PackedFile;
 use crate::wire::problem::not_found::no_such_path;
 use crate::wire::public_base::PublicBase;
 use axum::extract::Path;
 use axum::http::{HeaderMap, HeaderValue, Uri, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::{Html, IntoResponse, Response};
 use include_dir::{Dir, include_dir};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+use ventriform_service::base::records::hex;
 
-static PAGE_BUNDLE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
+static PAGE_FILES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/../../web/dist");
 
 const INDEX_FILE: &str = "index.html";
 
-const HTML_TYPE: &str = "text/html; charset=utf-8";
+/// The folder of the page's programs, styles and pictures.
+const ASSETS_FOLDER: &str = "assets";
 
-/// The beginning of the names of its files in the page.
-const PAGE_ROOT: &str = "./";
+const ICON_FILE: &str = "icon.svg";
+
+/// Hexadecimal digits of a version.
+const VERSION_DIGITS: usize = 16;
 
 /// Content security policy of the page: run the programs and styles that are files of this service, show pictures that
 /// it fetched or drew itself, and call its own service. Nothing comes from elsewhere.
@@ -36,132 +45,122 @@ const FOR_EVER: &str = "public, max-age=31536000, immutable";
 /// Cache control of files that are asked for again each time.
 const REVALIDATED_CACHE_CONTROL: &str = "no-cache";
 
+/// The files of the page.
+struct Page {
+    version: String,
+    index: &'static str,
+    /// By their names in [`ASSETS_FOLDER`].
+    assets: BTreeMap<&'static str, PackedFile>,
+    /// The icon under the address where browsers look for it, which has no version.
+    icon: Option<PackedFile>,
+}
+
+static PAGE: LazyLock<Page> = LazyLock::new(Page::pack);
+
+impl Page {
+    /// Hashes and compresses the files.
+    fn pack() -> Self {
+        let index = PAGE_FILES
+            .get_file(INDEX_FILE)
+            .and_then(|file| file.contents_utf8());
+        let folder = PAGE_FILES.get_dir(ASSETS_FOLDER);
+        let mut hash = Sha256::new();
+        let mut assets = BTreeMap::new();
+        for file in folder.into_iter().flat_map(Dir::files) {
+            let name = file.path().file_name().and_then(|name| name.to_str());
+            let Some((name, media_type)) = name.and_then(|name| Some((name, media_type(name)?)))
+            else {
+                continue;
+            };
+            for part in [name.as_bytes(), file.contents()] {
+                hash.update((part.len() as u64).to_le_bytes());
+                hash.update(part);
+            }
+            assets.insert(name, PackedFile::new(file.contents(), media_type, FOR_EVER));
+        }
+        let icon = PAGE_FILES.get_file(format!("{ASSETS_FOLDER}/{ICON_FILE}"));
+        let icon = icon.zip(media_type(ICON_FILE)).map(|(file, media_type)| {
+            PackedFile::new(file.contents(), media_type, REVALIDATED_CACHE_CONTROL)
+        });
+        let mut version = hex(&hash.finalize());
+        version.truncate(VERSION_DIGITS);
+        Self {
+            version,
+            index: index.unwrap_or_default(),
+            assets,
+            icon,
+        }
+    }
+
+    /// The page itself; `root` leads from where it is asked for to the root of the service.
+    fn index(&self, root: &str) -> Response {
+        let prefix = PublicBase::current().map(|base| base.prefix().to_owned());
+        let root = match prefix.as_deref() {
+            None | Some("") => root.to_owned(),
+            Some(prefix) => format!("{prefix}/"),
+        };
+        let assets = format!("\"{root}{ASSETS_FOLDER}/{}/", self.version);
+        let page = self
+            .index
+            .replace(&format!("\"./{ASSETS_FOLDER}/"), &assets)
+            .replace("\"./", &format!("\"{root}"));
+        let mut response = with_policy(Html(page).into_response());
+        let headers = response.headers_mut();
+        let revalidated = HeaderValue::from_static(REVALIDATED_CACHE_CONTROL);
+        headers.insert(header::CACHE_CONTROL, revalidated);
+        response
+    }
+}
+
+fn media_type(name: &str) -> Option<&'static str> {
+    match name.rsplit('.').next()? {
+        "js" => Some("text/javascript"),
+        "css" => Some("text/css"),
+        "svg" => Some("image/svg+xml"),
+        _ => None,
+    }
+}
+
 /// The page if the client prefers HTML, else text.
 pub async fn welcome(headers: HeaderMap) -> Response {
     let html = negotiate::best_offer(&headers, &["text/plain", "text/html"]) == Some(1);
-    let page = html.then(|| index("./", &headers));
-    let mut response = match page.flatten() {
-        Some(page) => page,
-        None => commands(&url()).into_response(),
+    let mut response = if html {
+        PAGE.index("./")
+    } else {
+        commands(&url()).into_response()
     };
-    let vary = HeaderValue::from_static("accept, accept-encoding");
+    let vary = HeaderValue::from_static("accept");
     response.headers_mut().insert(header::VARY, vary);
     response
 }
 
 /// The documentation of the API: the same page, which reads `/openapi.json`.
-pub async fn documentation(uri: Uri, headers: HeaderMap) -> Response {
-    let root = if uri.path().ends_with('/') {
-        "../"
-    } else {
-        "./"
-    };
-    match index(root, &headers) {
-        Some(page) => page,
-        None => no_such_path().await.into_response(),
-    }
-}
-
-/// The page; `root` leads from where it is asked for to the root of the service.
-fn index(root: &str, headers: &HeaderMap) -> Option<Response> {
-    let prefix = PublicBase::current().map(|base| base.prefix().to_owned());
-    let root = match prefix.as_deref() {
-        None | Some("") => root.to_owned(),
-        Some(prefix) => format!("{prefix}/"),
-    };
-    if root == PAGE_ROOT {
-        return file(INDEX_FILE, HTML_TYPE, REVALIDATED_CACHE_CONTROL, headers);
-    }
-    let page = PAGE_BUNDLE.get_file(INDEX_FILE)?.contents_utf8()?;
-    let page = page.replace(&format!("\"{PAGE_ROOT}"), &format!("\"{root}"));
-    Some(described(
-        page.into_response(),
-        HTML_TYPE,
-        REVALIDATED_CACHE_CONTROL,
-    ))
+pub async fn documentation(uri: Uri) -> Response {
+    let below = uri.path().ends_with('/');
+    PAGE.index(if below { "../" } else { "./" })
 }
 
 /// A program, style or picture of the page.
-pub async fn asset(Path(name): Path<String>, headers: HeaderMap) -> Response {
-    let media_type = match name.rsplit('.').next() {
-        Some("js") => "text/javascript",
-        Some("css") => "text/css",
-        Some("svg") => "image/svg+xml",
-        _ => return no_such_path().await.into_response(),
-    };
-    match file(&format!("assets/{name}"), media_type, FOR_EVER, &headers) {
-        Some(response) => response,
+pub async fn asset(Path((version, name)): Path<(String, String)>, headers: HeaderMap) -> Response {
+    match PAGE.assets.get(&*name).filter(|_| version == PAGE.version) {
+        Some(file) => with_policy(file.answer(&headers)),
         None => no_such_path().await.into_response(),
     }
 }
 
 /// The picture that browsers ask every site for, also when they show a report.
 pub async fn icon(headers: HeaderMap) -> Response {
-    let assets = PAGE_BUNDLE
-        .get_dir("assets")
-        .into_iter()
-        .flat_map(Dir::files);
-    let mut names = assets.filter_map(|file| file.path().to_str());
-    let name = names.find(|name| name.contains("/icon-") && name.ends_with(".svg"));
-    match name.and_then(|name| file(name, "image/svg+xml", REVALIDATED_CACHE_CONTROL, &headers)) {
-        Some(response) => response,
+    match &PAGE.icon {
+        Some(file) => with_policy(file.answer(&headers)),
         None => no_such_path().await.into_response(),
     }
 }
 
-/// A file of the bundle, in the smallest form that the client can unpack; `None` if there is none.
-fn file(
-    name: &str,
-    media_type: &'static str,
-    kept: &'static str,
-    headers: &HeaderMap,
-) -> Option<Response> {
-    let packed = [("br", ".br"), ("gzip", ".gz")]
-        .into_iter()
-        .find_map(|(coding, ending)| {
-            let content = PAGE_BUNDLE.get_file(format!("{name}{ending}"))?;
-            accepts(headers, coding).then_some((Some(coding), content))
-        });
-    let (coding, content) = packed.or_else(|| Some((None, PAGE_BUNDLE.get_file(name)?)))?;
-    let mut response = described(content.contents().into_response(), media_type, kept);
-    if let Some(coding) = coding {
-        let coding = HeaderValue::from_static(coding);
-        response
-            .headers_mut()
-            .insert(header::CONTENT_ENCODING, coding);
-    }
-    Some(response)
-}
-
-/// A part of the page with the headers that say what it is and may do.
-fn described(mut response: Response, media_type: &'static str, kept: &'static str) -> Response {
-    for (name, value) in [
-        (header::CONTENT_TYPE, media_type),
-        (header::CACHE_CONTROL, kept),
-        (header::VARY, "accept-encoding"),
-        (header::CONTENT_SECURITY_POLICY, PAGE_POLICY),
-    ] {
-        response
-            .headers_mut()
-            .insert(name, HeaderValue::from_static(value));
-    }
+fn with_policy(mut response: Response) -> Response {
+    let policy = HeaderValue::from_static(PAGE_POLICY);
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, policy);
     response
-}
-
-/// Whether `Accept-Encoding` names this coding and does not refuse it by `q=0`.
-fn accepts(headers: &HeaderMap, coding: &str) -> bool {
-    let values = headers.get_all(header::ACCEPT_ENCODING).iter();
-    let mut offers = values
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','));
-    offers.any(|offer| {
-        let (name, weight) = offer.split_once(';').unwrap_or((offer, ""));
-        let weight = weight
-            .trim()
-            .strip_prefix("q=")
-            .and_then(|text| text.parse::<f32>().ok());
-        name.trim().eq_ignore_ascii_case(coding) && weight != Some(0.0)
-    })
 }
 
 /// The address under which the client reached the service.

@@ -7,8 +7,7 @@ use utoipa::openapi::header::HeaderBuilder;
 use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Content, Ref, RefOr, Response, ResponseBuilder};
 use utoipa::{IntoResponses, PartialSchema, ToSchema};
-use ventriform::results::export::dicom::DicomObject;
-use ventriform::results::export::{Format, seg_nrrd};
+use ventriform::results::export::Format;
 
 /// The schema of a job, which the handlers register.
 const JOB_SCHEMA: &str = "Job";
@@ -20,12 +19,6 @@ const BEAT_REPORT: &str = "BeatReport";
 
 /// The schema of a comparison's report, which the document's frame registers.
 const COMPARISON_REPORT: &str = "ComparisonReport";
-
-/// The schema of normal limits, which the document's frame registers.
-const NORMAL_LIMITS: &str = "NormalLimits";
-
-/// The schema of a reader's profile, which the handlers register.
-const READER_PROFILE: &str = "ReaderProfile";
 
 type Responses = BTreeMap<String, RefOr<Response>>;
 
@@ -246,6 +239,8 @@ macro_rules! files {
 }
 
 files! {
+    /// 200 with a file of a result, whose media type follows from its name.
+    FileAnswer: "The file", [Contents::new()];
     /// 200 with a mesh in one of the formats.
     MeshAnswer: "The mesh", [meshes()];
     /// 200 with an uploaded file.
@@ -258,22 +253,10 @@ files! {
     ReportDocumentAnswer: "The report", [report_document()];
     /// 200 with the mask, mesh or report of a segmentation.
     SegmentationAnswer: "The mask, the mesh or the report", [meshes(), masks(), report_alone(SEGMENTATION_REPORT)];
-    /// 200 with any of a segmentation's files.
-    SegmentationFileAnswer: "The file", [meshes(), masks(), labels(), pictures(), reports(), objects()];
     /// 200 with the report of a beat, or a mesh of it.
     BeatAnswer: "The report or the mesh", [meshes(), report_alone(BEAT_REPORT)];
-    /// 200 with any of a beat's files.
-    BeatFileAnswer: "The file", [meshes(), masks(), pictures(), tables(), report_document(), objects()];
     /// 200 with the report of a comparison, or its slices.
     ComparisonAnswer: "The report or the slices", [files_of(["image/png"]), report_alone(COMPARISON_REPORT)];
-    /// 200 with any of a comparison's files.
-    ComparisonFileAnswer: "The file", [meshes(), regions(), pictures(), tables(), reports(), objects()];
-    /// 200 with normal limits.
-    NormalsFileAnswer: "The limits", [report_alone(NORMAL_LIMITS)];
-    /// 200 with a reader's profile.
-    ReaderFileAnswer: "The profile", [profiles()];
-    /// 200 with any of a model's files.
-    ModelFileAnswer: "The file", [meshes(), reports(), objects()];
 }
 
 /// 200 with a job's changes; the schema is that of one event.
@@ -347,31 +330,10 @@ fn masks() -> Contents {
     ])
 }
 
-fn regions() -> Contents {
-    files_of(["application/gzip"])
-}
-
-fn labels() -> Contents {
-    files_of([seg_nrrd::MEDIA_TYPE])
-}
-
-fn pictures() -> Contents {
-    files_of(["image/svg+xml", "image/png"])
-}
-
-fn objects() -> Contents {
-    files_of([DicomObject::MEDIA_TYPE])
-}
-
 fn files_of<const N: usize>(media_types: [&'static str; N]) -> Contents {
     media_types
         .map(|media_type| (media_type, Content::new(Some(binary()))))
         .into()
-}
-
-fn profiles() -> Contents {
-    let profile = Ref::from_schema_name(READER_PROFILE);
-    vec![("application/json", Content::new(Some(profile)))]
 }
 
 fn reports() -> Contents {
@@ -386,31 +348,9 @@ fn report_document() -> Contents {
     vec![("application/json", Content::new(Some(object())))]
 }
 
-fn tables() -> Contents {
-    files_of(["text/csv"])
-}
-
 fn report_alone(schema: &str) -> Contents {
     let report = Ref::from_schema_name(schema);
     vec![("application/json", Content::new(Some(report)))]
-}
-
-/// The media type of a product's file.
-pub fn media_type_of(name: &str) -> &'static str {
-    let extension = name.rsplit('.').next().unwrap_or_default();
-    match extension {
-        "dcm" => DicomObject::MEDIA_TYPE,
-        "gz" => "application/gzip",
-        "nrrd" => seg_nrrd::MEDIA_TYPE,
-        "html" => "text/html",
-        "csv" => "text/csv",
-        "png" => "image/png",
-        "svg" => "image/svg+xml",
-        _ => Format::ALL
-            .into_iter()
-            .find(|format| format.extension() == extension)
-            .map_or("application/octet-stream", Format::media_type),
-    }
 }
 
 fn object() -> Schema {

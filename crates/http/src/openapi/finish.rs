@@ -3,25 +3,23 @@
 //!
 //! 1. A struct that serde flattens into another one is described by the fields of the other. Whole numbers have
 //!    64 bits.
-//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave
-//!    the fields in one object, as generators of clients want them.
-//! 3. A path `.../{file}` becomes one path per file, so that each file has one media type and one
-//!    schema. Generators of clients choose how to read an answer by its first media type. The path itself stays for
-//!    names of a form: the meshes and labels of the gates of a beat.
+//! 2. A request for a job has a volume or a source: JSON Schema says so in words that utoipa does not have. They leave the
+//!    fields in one object, as generators of clients want them.
+//! 3. Paths `.../{file}` get a table of their files ([`super::result_files`]).
 //! 4. Bytes become `type: string, format: binary`. OpenAPI 3.1 would express them by a schema
 //!    without a type, which generators read as "anything".
 //! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
-//!    `scripts/check/contract.py`, and a command line for curl.
+//!    `scripts/check/contract.py`, and a command line for curl. A document has one example, under `components`.
 //! 6. Every operation takes `X-Request-Id`.
+//! 7. What several operations have alike stands under `components` ([`super::share`]).
 
-use super::answers::media_type_of;
 use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
-use crate::resources::files::REPORT_PAGE;
+use super::result_files::{self, binary, report_of};
+use super::share::share;
+use super::walk::{answers, contents, operations};
 use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
-use ventriform::results::export::Format;
-use ventriform::results::export::dicom::DicomObject;
 
 /// Requests and answers as a running service gave them.
 const RECORDED_EXAMPLES: &str = include_str!("examples.json");
@@ -31,9 +29,8 @@ pub fn finish(document: &mut Value) {
     flatten(&mut document["components"]["schemas"]);
     with_width(&mut document["components"]["schemas"]);
     require_input(&mut document["components"]["schemas"]);
-    one_path_per_file(document);
+    result_files::describe(document);
     let recorded = serde_json::from_str(RECORDED_EXAMPLES).expect("examples.json is an object");
-    let problems = problem_examples(&recorded);
     for (path, method, operation) in operations(document) {
         bytes_as_binary(operation);
         if let Some(request) = operation
@@ -45,19 +42,13 @@ pub fn finish(document: &mut Value) {
             add_upload_types(request);
         }
         type_report(path, operation);
-        add_examples(operation, &recorded);
+        add_examples(path, operation, &recorded);
         add_request_id(operation);
         let sample = command_line(path, method, operation, &recorded);
         operation["x-codeSamples"] = json!([{"lang": "Shell", "label": "curl", "source": sample}]);
     }
-    document["components"]["examples"] = problems;
-    document["components"]["parameters"] = json!({"RequestId": {
-        "name": "X-Request-Id",
-        "in": "header",
-        "required": false,
-        "description": "Names the request in the log; the answer repeats it",
-        "schema": {"type": "string"},
-    }});
+    document["components"]["examples"] = shared_examples(&recorded);
+    share(document);
 }
 
 /// The media types of uploaded volumes that the document names beside `application/octet-stream`, which stands for all of
@@ -163,180 +154,10 @@ fn require_input(schemas: &mut Value) {
     }
 }
 
-/// Path, method and content of every operation.
-fn operations(document: &mut Value) -> impl Iterator<Item = (&str, &str, &mut Value)> {
-    let paths = document["paths"].as_object_mut();
-    paths.into_iter().flatten().flat_map(|(path, item)| {
-        let methods = item.as_object_mut().into_iter().flatten();
-        methods
-            .filter(|(_, operation)| operation["operationId"].is_string())
-            .map(|(method, operation)| (path.as_str(), method.as_str(), operation))
-    })
-}
-
-/// Media type and content of a request or an answer.
-fn contents(body: &mut Value) -> impl Iterator<Item = (&str, &mut Value)> {
-    let contents = body.get_mut("content").and_then(Value::as_object_mut);
-    let contents = contents.into_iter().flatten();
-    contents.map(|(media_type, content)| (media_type.as_str(), content))
-}
-
-/// Every answer of an operation, with its status.
-fn answers(operation: &mut Value) -> impl Iterator<Item = (&str, &mut Value)> {
-    let answers = operation
-        .get_mut("responses")
-        .and_then(Value::as_object_mut);
-    let answers = answers.into_iter().flatten();
-    answers.map(|(status, answer)| (status.as_str(), answer))
-}
-
-fn one_path_per_file(document: &mut Value) {
-    let Some(Value::Object(paths)) = document.get_mut("paths").map(Value::take) else {
-        return;
-    };
-    let mut separate = Map::new();
-    for (path, item) in paths {
-        let Some(folder) = path.strip_suffix("/{file}") else {
-            separate.insert(path, item);
-            continue;
-        };
-        let names = take_file_names(&mut document["components"]["schemas"], &item);
-        if let Some(pattern) = names.get("pattern") {
-            let operation = of_numbered_files(pattern, &item["get"]);
-            separate.insert(path.clone(), json!({ "get": operation }));
-        }
-        let listed = names["enum"].as_array().into_iter().flatten();
-        for name in listed.filter_map(Value::as_str) {
-            let name = name.to_owned();
-            let operation = of_one_file(folder, &name, &item["get"]);
-            separate.insert(format!("{folder}/{name}"), json!({ "get": operation }));
-        }
-    }
-    separate.sort_keys();
-    document["paths"] = separate.into();
-}
-
-/// The schema of the parameter `file`, which is taken out.
-fn take_file_names(schemas: &mut Value, item: &Value) -> Value {
-    let parameters = item["get"]["parameters"].as_array();
-    let file = parameters
-        .into_iter()
-        .flatten()
-        .find(|parameter| parameter["name"] == "file");
-    let reference = file.and_then(|file| file["schema"]["$ref"].as_str());
-    let schema = reference.and_then(|reference| {
-        let name = reference.rsplit('/').next()?;
-        schemas.as_object_mut()?.remove(name)
-    });
-    schema.unwrap_or_default()
-}
-
-/// The operation that downloads a file whose name has that form, from the one that downloads any.
-fn of_numbered_files(pattern: &Value, any: &Value) -> Value {
-    let mut one = any.clone();
-    let parameters = one["parameters"].as_array_mut();
-    if let Some(parameters) = parameters {
-        // Meshes and labels of one gate name no patient, and have no parts.
-        parameters.retain(|parameter| parameter["name"] == "file" || parameter["in"] != "query");
-        let file = parameters.iter_mut().find(|one| one["name"] == "file");
-        if let Some(file) = file {
-            file["schema"] = json!({"type": "string", "pattern": pattern});
-        }
-    }
-    if let Some(answers) = one["responses"].as_object_mut() {
-        answers.shift_remove("406");
-    }
-    // Labels come first: generators of clients take all as bytes, as they take those.
-    let mut content = Map::new();
-    content.insert("application/gzip".into(), json!({ "schema": binary() }));
-    for format in Format::ALL {
-        let schema = match format {
-            Format::Json => reference("MeshDocument"),
-            Format::Gltf => json!({"type": "object"}),
-            _ => binary(),
-        };
-        content.insert(format.media_type().into(), json!({ "schema": schema }));
-    }
-    one["responses"]["200"]["content"] = content.into();
-    one
-}
-
-/// The operation that downloads the file `name`, from the one that downloads any.
-fn of_one_file(folder: &str, name: &str, any: &Value) -> Value {
-    let mut one = any.clone();
-    let stem = any["operationId"].as_str().unwrap_or_default();
-    let stem = stem.strip_suffix("file").unwrap_or(stem);
-    one["operationId"] = format!("{stem}{}", name.replace(['.', '-'], "_")).into();
-    one["summary"] = format!("Download {name}").into();
-    let media_type = media_type_of(name);
-    let is_object = media_type == DicomObject::MEDIA_TYPE;
-    if let Some(parameters) = one["parameters"].as_array_mut() {
-        parameters.retain(|parameter| match parameter["name"].as_str() {
-            Some("file") => false,
-            Some("deidentify") => is_object || name == REPORT_PAGE,
-            // The animation of a beat is one file, whole.
-            Some("part") => {
-                !is_object && name.starts_with("mesh") && !folder.starts_with("/v1/beats")
-            }
-            _ => true,
-        });
-    }
-    if let Some(answers) = one["responses"].as_object_mut() {
-        // The name says the format; `Accept` is not looked at.
-        answers.shift_remove("406");
-        if !is_object {
-            for status in ["403", "409", "422"] {
-                answers.shift_remove(status);
-            }
-        }
-    }
-    let schema = match (name, media_type) {
-        ("report.json" | "beat.json" | "comparison.json", _) => report_of(folder),
-        ("distance.json", _) => reference("Closeness"),
-        (
-            "polar.json" | "polar_ed.json" | "polar_es.json" | "polar_stress.json"
-            | "polar_rest.json",
-            _,
-        ) => reference("PolarMap"),
-        (figure, "application/json") if figure.starts_with("polar_") => reference("PolarFigure"),
-        ("normals.json", _) => reference("NormalLimits"),
-        ("profile.json", _) => reference("ReaderProfile"),
-        (mesh, "application/json") if mesh.starts_with("mesh") => reference("MeshDocument"),
-        (_, "model/gltf+json") => json!({"type": "object"}),
-        (_, "text/html" | "image/svg+xml") => json!({"type": "string"}),
-        _ => binary(),
-    };
-    let mut content = Map::new();
-    content.insert(media_type.to_owned(), json!({ "schema": schema }));
-    one["responses"]["200"]["content"] = content.into();
-    one
-}
-
-fn reference(schema: &str) -> Value {
-    json!({"$ref": format!("#/components/schemas/{schema}")})
-}
-
-/// The schema of the reports below `path`.
-fn report_of(path: &str) -> Value {
-    if path.starts_with("/v1/segmentations") {
-        reference("SegmentationReport")
-    } else if path.starts_with("/v1/beats") {
-        reference("BeatReport")
-    } else if path.starts_with("/v1/comparisons") {
-        reference("ComparisonReport")
-    } else {
-        reference("ModelReport")
-    }
-}
-
 fn type_report(path: &str, operation: &mut Value) {
     if path.ends_with("/report") {
         operation["responses"]["200"]["content"]["application/json"]["schema"] = report_of(path);
     }
-}
-
-fn binary() -> Value {
-    json!({"type": "string", "format": "binary", "contentMediaType": "application/octet-stream"})
 }
 
 /// utoipa writes `Vec<u8>` as an array of numbers.
@@ -357,47 +178,72 @@ fn bytes_as_binary(operation: &mut Value) {
     answers(operation).for_each(|(_, answer)| change(answer));
 }
 
-fn problem_examples(recorded: &Value) -> Value {
+/// An example of every problem, by its status, and of every document, by its schema.
+fn shared_examples(recorded: &Value) -> Value {
     let problems = recorded["problems"].as_object().into_iter().flatten();
-    let examples = problems.map(|(status, problem)| {
+    let problems = problems.map(|(status, problem)| {
         let example = json!({"summary": problem["title"], "value": problem});
         (format!("Problem{status}"), example)
     });
-    Value::Object(examples.collect())
+    let documents = recorded["documents"].as_object().into_iter().flatten();
+    let documents = documents.map(|(schema, value)| (schema.clone(), json!({ "value": value })));
+    Value::Object(documents.chain(problems).collect())
 }
 
-/// Adds the recorded request and answers, and to every problem without one of its own the example of its status.
-fn add_examples(operation: &mut Value, recorded: &Value) {
+/// Adds the recorded requests, answers and parts of paths.
+fn add_examples(path: &str, operation: &mut Value, recorded: &Value) {
     let id = operation["operationId"].as_str().unwrap_or_default();
     let own = &recorded["operations"][id];
     if let Some(request) = operation.get_mut("requestBody") {
-        add_own(request, &own["request"]);
+        add_body_examples(request, &own["request"], recorded);
     }
     for (status, answer) in answers(operation) {
-        add_own(answer, &own[status]);
+        add_body_examples(answer, &own[status], recorded);
         for (media_type, content) in contents(answer) {
             if media_type == MEDIA_TYPE
                 && content.get("example").is_none()
                 && recorded["problems"].get(status).is_some()
             {
-                let example = format!("#/components/examples/Problem{status}");
-                content["examples"] = json!({"problem": {"$ref": example}});
+                content["examples"] = example_reference(&format!("Problem{status}"));
             }
         }
     }
+    let first_file = operation["x-files"]
+        .as_object()
+        .and_then(|files| files.keys().next().cloned());
     let parameters = operation
         .get_mut("parameters")
         .and_then(Value::as_array_mut);
     for parameter in parameters.into_iter().flatten() {
-        let name = parameter["name"].as_str().unwrap_or_default();
-        if let Some(example) = own["parameters"].get(name) {
-            parameter["example"] = example.clone();
+        let (place, name) = (parameter["in"].as_str(), parameter["name"].as_str());
+        let (Some("path"), Some(name)) = (place, name) else {
+            continue;
+        };
+        let example = match &first_file {
+            Some(file) if name == "file" => file.as_str().into(),
+            _ => part_of_path(path, name, recorded).clone(),
+        };
+        if !example.is_null() {
+            parameter["example"] = example;
         }
     }
 }
 
+/// The recorded value of the part `name` of `path`: one for each collection.
+fn part_of_path<'r>(path: &str, name: &str, recorded: &'r Value) -> &'r Value {
+    let part = format!("{{{name}}}");
+    let end = path.find(&part).map_or(0, |start| start + part.len());
+    &recorded["parameters"][&path[..end]]
+}
+
 fn add_request_id(operation: &mut Value) {
-    let parameter = json!({"$ref": "#/components/parameters/RequestId"});
+    let parameter = json!({
+        "name": "X-Request-Id",
+        "in": "header",
+        "required": false,
+        "description": "Names the request in the log; the answer repeats it",
+        "schema": {"type": "string"},
+    });
     match operation
         .get_mut("parameters")
         .and_then(Value::as_array_mut)
@@ -407,12 +253,30 @@ fn add_request_id(operation: &mut Value) {
     }
 }
 
-fn add_own(body: &mut Value, examples: &Value) {
+/// Adds to each content of a request or an answer its own example, or that of its schema.
+fn add_body_examples(body: &mut Value, own: &Value, recorded: &Value) {
     for (media_type, content) in contents(body) {
-        if let Some(example) = examples.get(media_type) {
+        if let Some(example) = own.get(media_type) {
             content["example"] = example.clone();
+        } else if let Some(name) = documented_name(&content["schema"], recorded) {
+            content["examples"] = example_reference(&name);
         }
     }
+}
+
+/// The first of the schemas which `schema` may be of which a document is recorded.
+fn documented_name(schema: &Value, recorded: &Value) -> Option<String> {
+    let one_of = ["oneOf", "anyOf"].map(|key| schema[key].as_array());
+    let parts = one_of.into_iter().flatten().flatten();
+    let mut names = std::iter::once(schema)
+        .chain(parts)
+        .filter_map(|schema| schema["$ref"].as_str()?.rsplit('/').next());
+    let name = names.find(|name| recorded["documents"].get(name).is_some())?;
+    Some(name.to_owned())
+}
+
+fn example_reference(name: &str) -> Value {
+    json!({"recorded": {"$ref": format!("#/components/examples/{name}")}})
 }
 
 /// Queries of operations that are refused without one. The erasure is a dry run.
@@ -421,37 +285,65 @@ const SAMPLE_QUERIES: [(&str, &str); 2] = [
     ("revoke_keys_of_owner", "owner=contractor-7"),
 ];
 
+/// Longest request that stands in a command line; longer ones are a file.
+const SAMPLE_REQUEST_BYTES: usize = 600;
+
 /// A command line for curl; `$U` stands for the service's address.
 fn command_line(path: &str, method: &str, operation: &Value, recorded: &Value) -> String {
     let id = operation["operationId"].as_str().unwrap_or_default();
-    let own = &recorded["operations"][id];
     let mut url = path.to_owned();
-    for (name, value) in own["parameters"].as_object().into_iter().flatten() {
-        url = url.replace(&format!("{{{name}}}"), value.as_str().unwrap_or_default());
+    for parameter in operation["parameters"].as_array().into_iter().flatten() {
+        if let (Some(name), Some(value)) =
+            (parameter["name"].as_str(), parameter["example"].as_str())
+        {
+            url = url.replace(&format!("{{{name}}}"), value);
+        }
     }
+    let body = sample_body(&operation["requestBody"]["content"], recorded);
+    let implied = if body.is_some() { "post" } else { "get" };
     let mut words = vec!["curl -fsS".to_owned()];
-    if method == "delete" {
-        words.push("-X DELETE".into());
+    if method != implied {
+        words.push(format!("-X {}", method.to_ascii_uppercase()));
     }
-    let requests = &operation["requestBody"]["content"];
-    if requests.get("application/octet-stream").is_some() {
-        words.push("--data-binary @scan.nii.gz".into());
-    } else if let Some(request) = own["request"].get("application/json") {
-        words.push(format!(
-            "-H 'content-type: application/json' -d '{request}'"
-        ));
-    } else if requests.get("application/json").is_some() {
-        words.push("-H 'content-type: application/json' --data-binary @mesh.json".into());
-    }
+    words.extend(body);
     if let Some((_, query)) = SAMPLE_QUERIES.iter().find(|(of, _)| *of == id) {
         url = format!("{url}?{query}");
     }
     words.push(format!("\"$U{url}\""));
     let answers = operation["responses"]["200"]["content"].as_object();
     let bytes = |content: &Value| content["schema"]["format"] == "binary";
-    if answers.is_some_and(|answers| answers.values().all(bytes)) {
+    let file = operation.get("x-files").is_some();
+    if file || answers.is_some_and(|answers| answers.values().all(bytes)) {
         let name = url.rsplit('/').next().unwrap_or_default();
         words.push(format!("-o {name}"));
     }
     words.join(" ")
+}
+
+/// The flags of curl that send a request with one of these contents.
+fn sample_body(contents: &Value, recorded: &Value) -> Option<String> {
+    if contents.get("application/octet-stream").is_some() {
+        return Some("--data-binary @scan.nii.gz".into());
+    }
+    for (media_type, file) in [
+        ("application/dicom", "image.dcm"),
+        ("application/dicom+json", "workitem.json"),
+    ] {
+        if contents.get(media_type).is_some() {
+            return Some(format!(
+                "-H 'content-type: {media_type}' --data-binary @{file}"
+            ));
+        }
+    }
+    let json = contents.get("application/json")?;
+    let reference = json["examples"]["recorded"]["$ref"].as_str();
+    let shared = reference
+        .and_then(|text| text.rsplit('/').next())
+        .map(|name| &recorded["documents"][name]);
+    let request = json.get("example").or(shared).map(Value::to_string);
+    let data = match request {
+        Some(request) if request.len() <= SAMPLE_REQUEST_BYTES => format!("-d '{request}'"),
+        _ => "--data-binary @request.json".into(),
+    };
+    Some(format!("-H 'content-type: application/json' {data}"))
 }

@@ -144,7 +144,7 @@ headers! {
     /// The header of an erasure.
     ErasureHeader: ("Prefer", "`return=representation` asks for the receipt in the answer", text());
     /// The header of a request for what the client may have already.
-    CachedHeaders: ("If-None-Match", "Answer 304 if the `ETag` is among these", text());
+    CachedHeaders: ("If-None-Match", "Validators (`ETag`) of the client's copies; 304 if one is current", text());
     /// The headers of a download.
     ConditionalHeaders:
         ("If-None-Match", "Validators (`ETag`) of the client's copies; 304 if one is current", text()),

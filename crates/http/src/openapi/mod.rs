@@ -10,7 +10,10 @@
 //! | [`answers`] | answers and problems that several handlers share |
 //! | [`access`] | credentials, and how requests are refused before any handler |
 //! | [`operation`] | operations of handlers that serve several kinds of things |
-//! | [`finish`] | the last steps on the whole document: one path per file, bytes, examples |
+//! | [`finish`] | the last steps on the whole document: bytes, examples |
+//! | [`result_files`] | the files of results: names, media types, schemas |
+//! | [`share`] | what several operations have alike, said once |
+//! | [`walk`] | the operations of the document, with answers and contents |
 //!
 //! [`publish`] completes the document that the routes have collected.
 
@@ -20,13 +23,15 @@ mod bodies;
 mod finish;
 mod inputs;
 mod operation;
+mod result_files;
+mod share;
+mod walk;
 
 pub use answers::{
-    BeatAnswer, BeatFileAnswer, ComparisonAnswer, ComparisonFileAnswer, DicomProblems,
-    DownloadAnswers, EraseProblems, EventsAnswer, FileProblems, HoldProblems, IdentityProblems,
-    ListProblems, LookupProblems, MeshAnswer, ModelFileAnswer, NormalsFileAnswer, OriginalAnswer,
-    PatchProblems, ReaderFileAnswer, ReportAnswer, ReportDocumentAnswer, ScanErasureProblems,
-    ScopeProblems, SegmentationAnswer, SegmentationFileAnswer, StowAnswers, UnchangedAnswer,
+    BeatAnswer, ComparisonAnswer, DicomProblems, DownloadAnswers, EraseProblems, EventsAnswer,
+    FileAnswer, FileProblems, HoldProblems, IdentityProblems, ListProblems, LookupProblems,
+    MeshAnswer, OriginalAnswer, PatchProblems, ReportAnswer, ReportDocumentAnswer,
+    ScanErasureProblems, ScopeProblems, SegmentationAnswer, StowAnswers, UnchangedAnswer,
     UploadProblems, WaitAnswers, WorkitemConflict, WorkitemProblems,
 };
 pub use bodies::{

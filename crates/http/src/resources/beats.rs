@@ -40,17 +40,9 @@ impl ProductCollection for Beats {
 
     const REPORT_FILE: &'static str = REPORT_FILE;
     const FILE_SCHEMA: &'static str = "BeatFileName";
-    const FILE_HELP: &'static str = "`beat.json` (the report), `report.html` (made on request; it names patient, study \
-        and series as far as the key may see them), `curve.svg` (the volume curve), `phase.svg` (the \
-        histogram of the wall's phases), `gates.csv` and `segments.csv`, polar maps of uptake (`polar`, `polar_ed`, \
-        `polar_es`), motion, thickening and phase (`polar_motion`, ...) as `svg` and `json`, with normal limits also z \
-        and scores (`polar_z`, `polar_score`), the beat as an animation (`mesh.glb`), the mesh at end diastole \
-        (`mesh_ed.*`) and at end systole (`mesh_es.*`) in each format, and of every gate, counted from 01, its mesh in \
-        each format (`mesh_gate01.*`) and its labels on the gates' grid (`labels_gate01.nii.gz`: wall 1, cavity 2). \
-        All meshes of a beat have the same nodes and triangles, and the parts that `part` names. DICOM objects are \
-        wall and cavity at end diastole and at end systole (`mask_ed.dcm`, `mask_es.dcm`) and the figures \
-        (`measurements.dcm`).";
-    type FileAnswer = openapi::BeatFileAnswer;
+    const FILE_HELP: &'static str = "All meshes of a beat have the same nodes and triangles, and the parts that `part` \
+        names. The `.dcm` files are DICOM objects of the scan's patient and study, made on \
+        request; they need the scope `submit`, or `deidentify=true`.";
 }
 
 body_of_product!(

@@ -39,15 +39,8 @@ impl ProductCollection for Comparisons {
     const FILE_NAMES: &'static [&'static str] = FILE_NAMES;
     const REPORT_FILE: &'static str = REPORT_FILE;
     const FILE_SCHEMA: &'static str = "ComparisonFileName";
-    const FILE_HELP: &'static str = "`comparison.json` (the report), `report.html` (made on request; it names patient, \
-        study and series of the scan at stress as far as the key may see them), `slices.png` (slices of stress above \
-        those of rest), `segments.csv`, polar maps (`polar_stress`, `polar_rest`, `polar_difference`; with normal \
-        limits also `polar_z_stress`, `polar_score_stress` and those of rest) as `svg`, `png` and `json`, of each scan \
-        the fitted wall in each format (`mesh_stress.*`, `mesh_rest.*`, with the parts that `part` names) and the \
-        image about the heart in 256 steps (`region_stress.nii.gz`, `region_rest.nii.gz`). The `.dcm` files are DICOM \
-        objects of the study of the scan at stress, made on request; they need the scope `submit`, or \
-        `deidentify=true`.";
-    type FileAnswer = openapi::ComparisonFileAnswer;
+    const FILE_HELP: &'static str = "The `.dcm` files are DICOM objects of the study of the scan at stress, made on \
+        request; they need the scope `submit`, or `deidentify=true`.";
 }
 
 body_of_product!(

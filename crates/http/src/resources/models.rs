@@ -25,13 +25,9 @@ impl ProductCollection for Models {
     type Body = ModelBody;
     const FILE_NAMES: &'static [&'static str] =
         &["report.json", files::REPORT_PAGE, "distance.json"];
-    const FILE_SCHEMA: &'static str = "FileName";
-    const FILE_HELP: &'static str = "The mesh in each format, `report.json`, `distance.json` \
-        (signed distances of the model's vertices and triangles to the surface) and \
-        `report.html`, which is made on request and names patient, study and series as far as the \
-        key may see them. The `.dcm` files are DICOM objects of the scan's \
-        patient and study, made on request; they need the scope `submit`, or `deidentify=true`.";
-    type FileAnswer = openapi::ModelFileAnswer;
+    const FILE_SCHEMA: &'static str = "ModelFileName";
+    const FILE_HELP: &'static str = "The `.dcm` files are DICOM objects of the scan's patient and study, made on request; \
+        they need the scope `submit`, or `deidentify=true`.";
 }
 
 body_of_product!(

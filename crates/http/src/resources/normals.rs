@@ -40,9 +40,7 @@ impl ProductCollection for Normals {
     const MESH_NAMES: &'static [&'static str] = &[];
     const FILE_NAMES: &'static [&'static str] = &[NORMALS_FILE];
     const FILE_SCHEMA: &'static str = "NormalsFileName";
-    const FILE_HELP: &'static str = "The limits, as `ventriform segment --normals` takes them and `ventriform normals \
-        build` writes them.";
-    type FileAnswer = openapi::NormalsFileAnswer;
+    const FILE_HELP: &'static str = "The limits, as `ventriform segment --normals` takes them and `ventriform normals build` writes them.";
 }
 
 /// Normal limits: the uptake of healthy people, by sex, protocol, tracer and attenuation correction.

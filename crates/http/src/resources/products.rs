@@ -6,8 +6,8 @@
 use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::openapi::{
-    ConditionalHeaders, DicomProblems, Documented, DownloadAnswers, LookupProblems, MeshAnswer,
-    ReportAnswer, ReportDocumentAnswer,
+    ConditionalHeaders, DicomProblems, Documented, DownloadAnswers, FileAnswer, LookupProblems,
+    MeshAnswer, ReportAnswer, ReportDocumentAnswer,
 };
 use crate::resources::collection::{Collection, find};
 use crate::resources::files;
@@ -33,8 +33,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use utoipa::openapi::RefOr;
 use utoipa::openapi::path::HttpMethod;
-use utoipa::openapi::schema::{ObjectBuilder, Schema, Type};
-use utoipa::{IntoParams, IntoResponses, PartialSchema, ToSchema};
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::{IntoParams, PartialSchema, ToSchema};
 use utoipa_axum::router::UtoipaMethodRouter;
 use ventriform::base::progress::Monitor;
 use ventriform::results::export::{Format, Part};
@@ -83,9 +83,6 @@ pub trait ProductCollection: 'static {
 
     /// The description of a download in the document.
     const FILE_HELP: &'static str;
-
-    /// The document's description of a downloaded file.
-    type FileAnswer: IntoResponses;
 }
 
 impl<P: ProductCollection> Collection for P {
@@ -172,9 +169,13 @@ pub fn routes<P: ProductCollection>() -> Vec<UtoipaMethodRouter<App>> {
     .description(P::FILE_HELP);
     let names = file.refer::<FileNames<P>>();
     let mut file = file
-        .segment("file", "The file's name".into(), names)
+        .segment(
+            "file",
+            "The file's name; `x-files` says of each what it is".into(),
+            names,
+        )
         .parameters::<ConditionalHeaders>()
-        .answers::<P::FileAnswer>();
+        .answers::<FileAnswer>();
     if !P::MESH_NAMES.is_empty() {
         file = file.parameters::<PartQuery>();
     }
@@ -470,8 +471,8 @@ struct PartQuery {
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct DeidentifyQuery {
-    /// Of DICOM objects: whether to remove the patient's identity (PS3.15, basic profile); of report.html: whether it names nobody
-    #[param(default = false)]
+    // Without a default, which clients would send with every file, also with those that do not take it.
+    /// Of DICOM objects: whether to remove the patient's identity (PS3.15, basic profile); of report.html: whether it names nobody. Default: false
     deidentify: Option<bool>,
 }
 
@@ -764,7 +765,7 @@ fn file_names<P: ProductCollection>() -> Vec<String> {
     meshes.chain(others).chain(objects).collect()
 }
 
-/// The schema of [`file_names`]; its pattern is that of [`ProductCollection::NUMBERED_FILES`].
+/// The schema of [`file_names`], and of names of the form [`ProductCollection::NUMBERED_FILES`].
 struct FileNames<P>(PhantomData<P>);
 
 impl<P: ProductCollection> ToSchema for FileNames<P> {
@@ -775,10 +776,14 @@ impl<P: ProductCollection> ToSchema for FileNames<P> {
 
 impl<P: ProductCollection> PartialSchema for FileNames<P> {
     fn schema() -> RefOr<Schema> {
-        let names = ObjectBuilder::new()
-            .schema_type(Type::String)
-            .enum_values(Some(file_names::<P>()))
-            .pattern(P::NUMBERED_FILES);
-        Schema::from(names).into()
+        let text = || ObjectBuilder::new().schema_type(Type::String);
+        let listed = text().enum_values(Some(file_names::<P>()));
+        match P::NUMBERED_FILES {
+            None => Schema::from(listed).into(),
+            Some(form) => OneOfBuilder::new()
+                .item(listed)
+                .item(text().pattern(Some(form)))
+                .into(),
+        }
     }
 }

@@ -3,7 +3,7 @@
 use crate::app::App;
 use crate::edge::caller::Caller;
 use crate::edge::quota::reserve_item;
-use crate::openapi::{self, UploadProblems};
+use crate::openapi::UploadProblems;
 use crate::resources::products::{DownloadBody, Presented, ProductCollection, SoftwareBody};
 use crate::wire::links::{added, path_of, rfc3339};
 use crate::wire::problem::{Answer, ProblemBody};
@@ -35,7 +35,6 @@ impl ProductCollection for Readers {
     const FILE_NAMES: &'static [&'static str] = &[PROFILE_FILE];
     const FILE_SCHEMA: &'static str = "ReaderFileName";
     const FILE_HELP: &'static str = "The profile, as `ventriform segment --reader` takes it.";
-    type FileAnswer = openapi::ReaderFileAnswer;
 }
 
 /// A reader: a profile by which segmentations are drawn.

@@ -48,15 +48,8 @@ impl ProductCollection for Segmentations {
         "polar_score.png",
     ];
     const FILE_SCHEMA: &'static str = "SegmentationFileName";
-    const FILE_HELP: &'static str = "`mask.nii.gz`, `labels.nii.gz` and `labels.seg.nrrd` (wall 1, cavity 2, with \
-        names and colours; the second for 3D Slicer), the mesh in each format, `report.json`, `report.html` (made on \
-        request; it names patient, study and series as far as the key may see them), `slices.png` (three slices with \
-        the contour of the fit) and `region.nii.gz` (the scan about the organ, in 256 steps); for a left ventricle \
-        also `polar.json`, `polar.svg` and `polar.png`, with normal limits `polar_z.*` and `polar_score.*`, and mask \
-        and meshes of the wall that `edge` does not ask for: `mask_anatomical.nii.gz` and `mesh_anatomical.*`, or \
-        `mask_apparent.nii.gz` and `mesh_apparent.*`. The `.dcm` files are DICOM objects of the scan's patient and \
-        study, made on request; they need the scope `submit`, or `deidentify=true`.";
-    type FileAnswer = openapi::SegmentationFileAnswer;
+    const FILE_HELP: &'static str = "The `.dcm` files are DICOM objects of the scan's patient and study, made on request; \
+        they need the scope `submit`, or `deidentify=true`.";
 }
 
 body_of_product!(

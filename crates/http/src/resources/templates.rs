@@ -43,7 +43,6 @@ impl ProductCollection for Templates {
     const FILE_NAMES: &'static [&'static str] = &[];
     const FILE_SCHEMA: &'static str = "TemplateFileName";
     const FILE_HELP: &'static str = "The mesh in each format.";
-    type FileAnswer = openapi::MeshAnswer;
 }
 
 /// A template: a model that jobs name, or that every `model=auto` fits.

@@ -8,6 +8,7 @@ pub(crate) mod limits;
 pub(crate) mod links;
 pub(crate) mod memory;
 pub(crate) mod negotiate;
+pub(crate) mod packed;
 pub(crate) mod pagination;
 pub(crate) mod problem;
 pub(crate) mod public_base;
