@@ -6,6 +6,7 @@ Sources: a relative link leads to a committed file or folder, and its anchor to 
 inside leads to a file of the site and an anchor in it; scripts, styles, pictures and frames are files of the site.
 Links to elsewhere are `https://` with a host (`http://` for this machine only); they are not visited.
 """
+
 import html.parser
 import pathlib
 import re
@@ -20,7 +21,15 @@ LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"
 HTML_LINK = re.compile(r"<(?:a|img)\b[^>]*?\b(?:href|src)=\"([^\"]+)\"")
 LOCAL_HOSTS = {"127.0.0.1", "localhost"}
 # What a browser fetches by itself.
-FETCHED = {"script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src", "audio": "src", "link": "href"}
+FETCHED = {
+    "script": "src",
+    "img": "src",
+    "iframe": "src",
+    "source": "src",
+    "video": "src",
+    "audio": "src",
+    "link": "href",
+}
 # Links of a head that a browser does not fetch.
 TOLD = {"canonical", "alternate", "next", "prev"}
 
@@ -53,8 +62,13 @@ def elsewhere(url):
 
 
 def sources():
-    listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True,
-                            capture_output=True, text=True)
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     files = {name for name in listed.stdout.split("\0") if name and (ROOT / name).exists()}
     folders = {str(parent) for name in files for parent in pathlib.PurePosixPath(name).parents}
     count, faults, known = 0, [], {}

@@ -5,6 +5,7 @@
 In: reference.json, and the pages in html/. Guaranteed: every parameter of every function has a row in the reference,
 with its default; every notebook has a picture, and no cell ended with an error.
 """
+
 import html
 import json
 import pathlib
@@ -20,8 +21,10 @@ for name, told in functions.items():
     if not section:
         faults.append(f"the reference has no {name}")
         continue
-    cells = [[html.unescape(re.sub(r"<[^>]+>", "", cell)).strip() for cell in re.findall(r"<td>(.*?)</td>", row, re.S)]
-             for row in re.findall(r'<tr class="doc-section-item">.*?</tr>', section[0], re.S)]
+    cells = [
+        [html.unescape(re.sub(r"<[^>]+>", "", cell)).strip() for cell in re.findall(r"<td>(.*?)</td>", row, re.S)]
+        for row in re.findall(r'<tr class="doc-section-item">.*?</tr>', section[0], re.S)
+    ]
     defaults = {row[0]: row[-1] for row in cells if len(row) == 4}
     for one in told["parameters"]:
         rows += 1

@@ -1,4 +1,5 @@
 """What the pages of the site have beyond those of the repository."""
+
 import html
 import json
 import pathlib
@@ -41,13 +42,16 @@ def operations():
         for method, operation in methods.items():
             if isinstance(operation, dict) and "operationId" in operation:
                 shown.setdefault(operation["tags"][0], []).append(details(document, method, path, operation))
-    sections = [f"### {tag['name']}\n\n{tag['description']}\n\n" + "\n".join(shown.pop(tag["name"])) for tag in document["tags"]]
+    sections = [
+        f"### {tag['name']}\n\n{tag['description']}\n\n" + "\n".join(shown.pop(tag["name"])) for tag in document["tags"]
+    ]
     assert not shown, f"tags without a description: {list(shown)}"
     return "\n\n".join(sections)
 
 
 def details(document, method, path, operation):
     """One operation as HTML: a line, which opens to the rest."""
+
     def target(one):
         group, name = one["$ref"].split("/")[-2:] if "$ref" in one else (None, None)
         return {**document["components"][group][name], **one} if group else one
@@ -56,17 +60,55 @@ def details(document, method, path, operation):
     answers = [(status, target(one)) for status, one in operation["responses"].items()]
     body = operation.get("requestBody", {}).get("content", {})
     parts = [f"<p>{prose(operation['description'])}</p>"] if "description" in operation else []
-    parts.append(table("Parameters", ["Name", "In", "Type", "Meaning"], [
-        [code(one["name"]), one["in"], type_of(one.get("schema", {})), prose(one.get("description", ""))] for one in parameters]))
-    parts.append(table("Body", ["Media type", "Type"], [
-        [code(kind), type_of(content.get("schema", {}))] for kind, content in body.items()]))
-    parts.append(table("Answers", ["Status", "Meaning", "Media types"], [
-        [status, prose(one["description"]),
-         ", ".join(f"{code(kind)} {type_of(content.get('schema', {}))}" for kind, content in one.get("content", {}).items())]
-        for status, one in answers]))
-    parts.append(table("Files", ["Name", "Media type", "What it is", "Exists"], [
-        [code(name), f"{code(one['mediaType'])} {type_of(one['schema'])}", prose(one["description"]), prose(one["exists"])]
-        for name, one in operation.get("x-files", {}).items()]))
+    parts.append(
+        table(
+            "Parameters",
+            ["Name", "In", "Type", "Meaning"],
+            [
+                [code(one["name"]), one["in"], type_of(one.get("schema", {})), prose(one.get("description", ""))]
+                for one in parameters
+            ],
+        )
+    )
+    parts.append(
+        table(
+            "Body",
+            ["Media type", "Type"],
+            [[code(kind), type_of(content.get("schema", {}))] for kind, content in body.items()],
+        )
+    )
+    parts.append(
+        table(
+            "Answers",
+            ["Status", "Meaning", "Media types"],
+            [
+                [
+                    status,
+                    prose(one["description"]),
+                    ", ".join(
+                        f"{code(kind)} {type_of(content.get('schema', {}))}"
+                        for kind, content in one.get("content", {}).items()
+                    ),
+                ]
+                for status, one in answers
+            ],
+        )
+    )
+    parts.append(
+        table(
+            "Files",
+            ["Name", "Media type", "What it is", "Exists"],
+            [
+                [
+                    code(name),
+                    f"{code(one['mediaType'])} {type_of(one['schema'])}",
+                    prose(one["description"]),
+                    prose(one["exists"]),
+                ]
+                for name, one in operation.get("x-files", {}).items()
+            ],
+        )
+    )
     parts.append(f"<pre><code>{html.escape(operation['x-codeSamples'][0]['source'])}</code></pre>")
     line = f"{code(method.upper() + ' ' + path)} {prose(operation['summary'])}"
     return f"<details><summary>{line}</summary>\n{''.join(parts)}\n</details>\n"

@@ -4,6 +4,7 @@
 In: target/site/reference.json, which scripts/release/python_types.py writes of the installed package. Out: signature
 and docstring of each function there, as `help` shows them.
 """
+
 import json
 import pathlib
 import re
@@ -27,7 +28,14 @@ class TableParameters(griffe.Extension):
         for name, told in json.loads(REFERENCE.read_text()).items():
             function = pkg[f"_functions.{name}"]
             function.docstring.value = readable(told["docstring"])
-            function.parameters = griffe.Parameters(*(
-                griffe.Parameter(one["name"], kind=griffe.ParameterKind(one["kind"]), annotation=one["annotation"], default=one["default"])
-                for one in told["parameters"]
-            ))
+            function.parameters = griffe.Parameters(
+                *(
+                    griffe.Parameter(
+                        one["name"],
+                        kind=griffe.ParameterKind(one["kind"]),
+                        annotation=one["annotation"],
+                        default=one["default"],
+                    )
+                    for one in told["parameters"]
+                )
+            )

@@ -7,4 +7,7 @@ const { openapi, info, components } = JSON.parse(readFileSync("../openapi/ventri
 const document = { openapi, info, paths: {}, components: { schemas: components.schemas } };
 const types = await openapiTS(document, { defaultNonNullable: false, rootTypes: true, rootTypesNoSchemaPrefix: true });
 mkdirSync("src/generated", { recursive: true });
-writeFileSync("src/generated/openapi.ts", `// Made of openapi/ventriform.json by \`npm run types\`. Do not edit.\n\n${astToString(types)}`);
+writeFileSync(
+  "src/generated/openapi.ts",
+  `// Made of openapi/ventriform.json by \`npm run types\`. Do not edit.\n\n${astToString(types)}`,
+);

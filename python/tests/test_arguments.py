@@ -61,7 +61,12 @@ def test_an_argument_that_cannot_be_used_is_refused(field: str, call: Any) -> No
 
 
 def test_numbers_of_numpy_make_the_same_phantom() -> None:
-    numbers: dict[str, Any] = {"size": np.int64(32), "spacing_mm": np.float32(8.0), "seed": np.uint8(1), "heads": np.int8(1)}
+    numbers: dict[str, Any] = {
+        "size": np.int64(32),
+        "spacing_mm": np.float32(8.0),
+        "seed": np.uint8(1),
+        "heads": np.int8(1),
+    }
     made = vf.phantom(**numbers, defects={np.int64(8): np.float64(0)})  # type: ignore[dict-item]
     assert np.array_equal(made.volume.array, SCAN.array)
     each = vf.phantom(size=np.array([32, 32, 32]), spacing_mm=(8, 8, 8))  # type: ignore[arg-type]

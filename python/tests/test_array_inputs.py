@@ -38,11 +38,19 @@ class Tensor:
 class Named:
     """As `xarray.DataArray`."""
 
-    def __init__(self, values: Any, dims: tuple[str, ...], coords: dict[str, Any] | None = None, attrs: dict[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        values: Any,
+        dims: tuple[str, ...],
+        coords: dict[str, Any] | None = None,
+        attrs: dict[str, Any] | None = None,
+    ) -> None:
         self.values = np.asarray(values)
         self.dims = dims
         self.attrs = attrs or {}
-        self.coords = {name: along if isinstance(along, Named) else Named(along, (name,)) for name, along in (coords or {}).items()}
+        self.coords = {
+            name: along if isinstance(along, Named) else Named(along, (name,)) for name, along in (coords or {}).items()
+        }
 
     def transpose(self, *dims: str) -> Named:
         return Named(self.values.transpose([self.dims.index(dim) for dim in dims]), dims, self.coords, self.attrs)
@@ -77,7 +85,9 @@ FORMS: dict[str, Callable[[vf.Volume], Any]] = {
     "tensor in a pair": lambda v: (Tensor(v.array), Tensor(v.affine)),
     "named axes": lambda v: Named(v.array, ("x", "y", "z"), coordinates(v, "RAS")),
     "named axes in another order": lambda v: Named(v.array.transpose(2, 1, 0), ("z", "y", "x"), coordinates(v, "RAS")),
-    "named axes with an affine": lambda v: Named(v.array.transpose(2, 1, 0), ("k", "j", "i"), None, {"affine": v.affine}),
+    "named axes with an affine": lambda v: Named(
+        v.array.transpose(2, 1, 0), ("k", "j", "i"), None, {"affine": v.affine}
+    ),
     "of ITK": of_itk,
 }
 
@@ -90,7 +100,10 @@ def test_one_scan_in_every_form(form: str, volume: vf.Volume) -> None:
     if form.startswith("pair"):
         in_lps = vf.read((volume.array, volume.in_frame("LPS").affine), frame="LPS")
         assert np.allclose(in_lps.in_frame("RAS").affine, volume.affine)
-        assert vf.generate(given, points=60).report.to_dict()["parameters"] == vf.generate(volume, points=60).report.to_dict()["parameters"]
+        assert (
+            vf.generate(given, points=60).report.to_dict()["parameters"]
+            == vf.generate(volume, points=60).report.to_dict()["parameters"]
+        )
 
 
 def test_xarray_itself(volume: vf.Volume) -> None:
@@ -112,13 +125,19 @@ def test_xarray_itself(volume: vf.Volume) -> None:
         (("c", "x", "y", "z"), {}, {}, "`c`"),
     ],
 )
-def test_named_axes_that_say_too_little(dims: tuple[str, ...], coords: dict[str, Any], attrs: dict[str, Any], told: str) -> None:
+def test_named_axes_that_say_too_little(
+    dims: tuple[str, ...], coords: dict[str, Any], attrs: dict[str, Any], told: str
+) -> None:
     with pytest.raises(vf.InputError, match=told):
         vf.read(Named(np.ones((4,) * len(dims)), dims, coords, attrs))
 
 
-@pytest.mark.parametrize("shape", [(1, 40, 36, 32), (2, 40, 36, 32), (3, 64, 64, 64), (8, 64, 64, 40), (16, 64, 64, 32), (1, 1, 40, 36, 32)])
-@pytest.mark.parametrize("form", [lambda a: (a, np.eye(4)), lambda a: Tensor(a, np.eye(4)), lambda a: vf.Volume(a, np.eye(4))])
+@pytest.mark.parametrize(
+    "shape", [(1, 40, 36, 32), (2, 40, 36, 32), (3, 64, 64, 64), (8, 64, 64, 40), (16, 64, 64, 32), (1, 1, 40, 36, 32)]
+)
+@pytest.mark.parametrize(
+    "form", [lambda a: (a, np.eye(4)), lambda a: Tensor(a, np.eye(4)), lambda a: vf.Volume(a, np.eye(4))]
+)
 def test_a_first_axis_of_channels_is_asked_about(shape: tuple[int, ...], form: Callable[[Any], Any]) -> None:
     with pytest.raises(vf.InputError) as caught:
         vf.read(form(np.ones(shape, dtype=np.float32)))

@@ -29,7 +29,8 @@ def test_another_number_is_none_of_the_choices(other: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("function", "command"), [(vf.generate, "generate"), (vf.segment, "segment"), (vf.beat, "beat"), (vf.calibrate, "calibrate")]
+    ("function", "command"),
+    [(vf.generate, "generate"), (vf.segment, "segment"), (vf.beat, "beat"), (vf.calibrate, "calibrate")],
 )
 def test_none_is_refused_where_the_default_is_another_value(function: Any, command: str) -> None:
     for row in _tables.rows(command):

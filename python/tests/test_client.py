@@ -12,7 +12,9 @@ import ventriform as vf
 from ventriform.client import Client, ServiceError
 
 
-def test_upload_submit_wait_download_search(service: str, scan: pathlib.Path, fit: vf.Fit, tmp_path: pathlib.Path) -> None:
+def test_upload_submit_wait_download_search(
+    service: str, scan: pathlib.Path, fit: vf.Fit, tmp_path: pathlib.Path
+) -> None:
     told: list[float] = []
     with vf.Client(service) as client:
         volume = client.upload(scan)
@@ -88,7 +90,9 @@ def test_a_job_that_fails_is_raised_with_its_reason(service: str) -> None:
     import nibabel
     import numpy as np
 
-    empty = nibabel.Nifti1Image(np.zeros((32, 32, 32), np.int16) + np.eye(32, dtype=np.int16)[..., None], np.diag([4, 4, 4, 1]))
+    empty = nibabel.Nifti1Image(
+        np.zeros((32, 32, 32), np.int16) + np.eye(32, dtype=np.int16)[..., None], np.diag([4, 4, 4, 1])
+    )
     with Client(service) as client:
         volume = client.upload(gzip.compress(empty.to_bytes()), "empty.nii.gz")
         job = client.submit("segmentation", volume.id, model="auto")

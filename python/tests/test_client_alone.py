@@ -73,8 +73,12 @@ def test_the_key_is_sent_to_the_clients_own_origin_alone(server: Server) -> None
     port = other.server_address[1]
     with Client(address(server), "secret") as client:
         foreign = [
-            f"{address(other)}/mask", f"//127.0.0.1:{port}/mask", f"http://localhost:{server.server_address[1]}/mask",
-            address(server).replace("http:", "https:") + "/mask", "http://127.0.0.1/mask", "file:///etc/hosts",
+            f"{address(other)}/mask",
+            f"//127.0.0.1:{port}/mask",
+            f"http://localhost:{server.server_address[1]}/mask",
+            address(server).replace("http:", "https:") + "/mask",
+            "http://127.0.0.1/mask",
+            "file:///etc/hosts",
         ]
         for url in foreign:
             error = refusal(lambda url=url: client.download(url))  # type: ignore[misc]
@@ -95,7 +99,9 @@ def test_an_address_with_a_path_is_kept_and_named() -> None:
     assert "http://127.0.0.1:9/heart/v1/x" in raised.value.reason and raised.value.code == "unreachable"
 
 
-@pytest.mark.parametrize("url", [None, "", "127.0.0.1:8080", "http://256.1.1.1", "ftp://host", "http://host:99999", b"http://host"])
+@pytest.mark.parametrize(
+    "url", [None, "", "127.0.0.1:8080", "http://256.1.1.1", "ftp://host", "http://host:99999", b"http://host"]
+)
 def test_an_address_that_is_none_is_refused_at_once(url: Any) -> None:
     assert refusal(lambda: Client(url)).field == "url"
 
@@ -109,7 +115,12 @@ def test_a_key_that_no_header_has_is_refused_and_not_told(key: Any) -> None:
 def test_a_closed_client_says_so() -> None:
     client = Client("http://127.0.0.1:9")
     client.close()
-    for call in (lambda: client.job("j"), lambda: client.wait("j"), lambda: client.upload(b"x"), lambda: next(client.events("j"))):
+    for call in (
+        lambda: client.job("j"),
+        lambda: client.wait("j"),
+        lambda: client.upload(b"x"),
+        lambda: next(client.events("j")),
+    ):
         assert refusal(call).field == "client"
 
 
@@ -130,12 +141,16 @@ def test_other_arguments_are_checked(tmp_path: pathlib.Path) -> None:
 def test_numbers_of_numpy_and_uploads_are_sent(server: Server) -> None:
     volume = StoredVolume.from_dict({"id": "vol_1"})
     with Client(address(server)) as client:
-        client.submit("model", volume, points=np.int64(60), box=np.arange(6), mask_smoothing=np.float32(0.5), model=None)
+        client.submit(
+            "model", volume, points=np.int64(60), box=np.arange(6), mask_smoothing=np.float32(0.5), model=None
+        )
         client.submit("segmentation", "vol_1", orbit=180, resample=np.bool_(True), expert=volume)
         list(zip(client.search("volumes", volume=volume, gated=np.bool_(True)), range(1), strict=False))
     first, second = (json.loads(body) for _, _, body in server.got[:2])
     assert first == {
-        "kind": "model", "volume": "vol_1", "parameters": {"points": 60, "box": [0, 1, 2, 3, 4, 5], "mask_smoothing": 0.5}
+        "kind": "model",
+        "volume": "vol_1",
+        "parameters": {"points": 60, "box": [0, 1, 2, 3, 4, 5], "mask_smoothing": 0.5},
     }
     assert second["parameters"] == {"orbit": "180", "resample": True, "expert": "vol_1"}
     assert server.got[2][0] == "/v1/volumes?volume=vol_1&gated=true"
@@ -169,7 +184,17 @@ def test_several_files_are_sent_as_one_archive(server: Server, tmp_path: pathlib
 def test_what_cannot_be_sent_is_refused_by_its_name() -> None:
     circle: list[Any] = []
     circle.append(circle)
-    values = [object(), {1}, float("nan"), np.array([np.inf]), np.array([1j]), "\ud800", circle, b"x", pathlib.Path("x")]
+    values = [
+        object(),
+        {1},
+        float("nan"),
+        np.array([np.inf]),
+        np.array([1j]),
+        "\ud800",
+        circle,
+        b"x",
+        pathlib.Path("x"),
+    ]
     with Client("http://127.0.0.1:9") as client:
         for value in values:
             assert refusal(lambda value=value: client.submit("model", "vol_1", label=value)).field == "label"  # type: ignore[misc]

@@ -26,8 +26,18 @@ MOST_SECONDS_TO_END = 0.2
 MOMENTS = os.environ.get("ENDED_MOMENTS", "4")
 
 CALLS = [
-    "generate", "generate from noise", "segment", "beat", "compare", "measure", "measure surfaces", "calibrate", "evaluate",
-    "build_normals", "read", "phantom",
+    "generate",
+    "generate from noise",
+    "segment",
+    "beat",
+    "compare",
+    "measure",
+    "measure surfaces",
+    "calibrate",
+    "evaluate",
+    "build_normals",
+    "read",
+    "phantom",
 ]
 
 

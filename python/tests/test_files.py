@@ -52,7 +52,9 @@ def test_a_missing_file_is_named_by_its_whole_path(
     assert type(again) is type(error) and str(again) == str(error) and again.filename == whole
 
 
-def test_other_errors_of_the_system(scan: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_errors_of_the_system(
+    scan: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(IsADirectoryError, match=str(tmp_path)):
         vf.segment(scan, model=tmp_path, reader=tmp_path)
     with pytest.raises(NotADirectoryError, match="spect"):
@@ -81,13 +83,20 @@ def test_a_file_that_cannot_be_used_is_named_by_its_whole_path(content: bytes, t
         with pytest.raises(vf.InputError) as caught:
             vf.read(source)
         assert "patient_017" in str(caught.value), caught.value
-    told = subprocess.run([PROGRAM, "segment", file, "--model", "auto", "-o", tmp_path / "out"], capture_output=True, text=True)
+    told = subprocess.run(
+        [PROGRAM, "segment", file, "--model", "auto", "-o", tmp_path / "out"], capture_output=True, text=True
+    )
     assert told.returncode != 0 and str(file) in told.stderr, told.stderr
 
 
 def test_the_command_names_a_missing_file_by_its_path(tmp_path: pathlib.Path) -> None:
     missing = tmp_path / "patient_017/spect.nii.gz"
-    for words in (["segment", missing, "--model", "auto"], ["generate", missing], ["beat", missing], ["measure", missing, missing]):
+    for words in (
+        ["segment", missing, "--model", "auto"],
+        ["generate", missing],
+        ["beat", missing],
+        ["measure", missing, missing],
+    ):
         out = [] if words[0] == "measure" else ["-o", tmp_path / "out.glb"]
         told = subprocess.run([PROGRAM, *words, *out], capture_output=True, text=True)
         assert told.returncode != 0 and str(missing) in told.stderr, told.stderr
@@ -119,8 +128,14 @@ def test_a_file_that_changed_is_refused(way: str, tmp_path: pathlib.Path) -> Non
     packed = pickle.dumps(volume)
     changed(file, way)
     uses = (
-        lambda: volume.array, lambda: np.asarray(volume), lambda: vf.generate(volume, points=60), lambda: vf.segment(volume),
-        lambda: vf.measure(phantom.truth, volume), lambda: vf.beat(volume), volume.to_nibabel, lambda: volume.in_frame("LPS").data(),
+        lambda: volume.array,
+        lambda: np.asarray(volume),
+        lambda: vf.generate(volume, points=60),
+        lambda: vf.segment(volume),
+        lambda: vf.measure(phantom.truth, volume),
+        lambda: vf.beat(volume),
+        volume.to_nibabel,
+        lambda: volume.in_frame("LPS").data(),
         lambda: pickle.loads(packed).array,
     )
     for use in uses:
@@ -145,7 +160,9 @@ def test_a_file_that_was_only_touched_is_read(tmp_path: pathlib.Path) -> None:
 def test_another_file_in_a_folder_is_refused_after_a_pickle(tmp_path: pathlib.Path) -> None:
     folder = tmp_path / "scan"
     folder.mkdir()
-    pytest.importorskip("nibabel").save(vf.phantom(size=32, length_mm=60, width_mm=45).volume.to_nibabel(), folder / "a.nii")
+    pytest.importorskip("nibabel").save(
+        vf.phantom(size=32, length_mm=60, width_mm=45).volume.to_nibabel(), folder / "a.nii"
+    )
     volume = vf.read(folder)
     packed = pickle.dumps(volume)
     assert np.array_equal(pickle.loads(packed).array, volume.array)

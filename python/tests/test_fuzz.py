@@ -21,18 +21,28 @@ CHECKED = settings(
 
 SHAPES = arrays.array_shapes(min_dims=0, max_dims=5, min_side=0, max_side=6)
 DTYPES = st.one_of(
-    arrays.scalar_dtypes(), arrays.floating_dtypes(endianness="?"), arrays.integer_dtypes(endianness="?"),
+    arrays.scalar_dtypes(),
+    arrays.floating_dtypes(endianness="?"),
+    arrays.integer_dtypes(endianness="?"),
     arrays.unicode_string_dtypes(max_len=3),
 )
 ARRAYS = DTYPES.flatmap(lambda dtype: arrays.arrays(dtype, SHAPES))
 AFFINES = st.one_of(
     arrays.arrays(np.float64, (4, 4)),
     arrays.arrays(np.float64, (4,), elements=st.floats(-1e3, 1e3)).map(lambda d: np.diag([*d[:3], 1.0])),
-    st.none(), st.text(max_size=3), arrays.arrays(np.float32, SHAPES),
+    st.none(),
+    st.text(max_size=3),
+    arrays.arrays(np.float32, SHAPES),
 )
 SCALARS = st.one_of(
-    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=8), st.binary(max_size=8),
-    st.lists(st.one_of(st.integers(), st.floats(), st.text(max_size=2)), max_size=7), st.complex_numbers(),
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=8),
+    st.binary(max_size=8),
+    st.lists(st.one_of(st.integers(), st.floats(), st.text(max_size=2)), max_size=7),
+    st.complex_numbers(),
 )
 SMALL = vf.phantom(size=16, spacing_mm=12.0).volume
 
@@ -65,7 +75,9 @@ def test_any_bytes(content: bytes) -> None:
 
 
 @CHECKED
-@given(st.dictionaries(st.sampled_from([row["name"] for row in vf._tables.rows("generate")] + ["x"]), SCALARS, max_size=4))
+@given(
+    st.dictionaries(st.sampled_from([row["name"] for row in vf._tables.rows("generate")] + ["x"]), SCALARS, max_size=4)
+)
 def test_any_parameters_of_a_model(parameters: dict[str, Any]) -> None:
     parameters.setdefault("points", 20)
     if isinstance(parameters["points"], int) and parameters["points"] > 300:
@@ -76,7 +88,9 @@ def test_any_parameters_of_a_model(parameters: dict[str, Any]) -> None:
 
 
 @CHECKED
-@given(st.dictionaries(st.sampled_from([row["name"] for row in vf._tables.rows("segment")] + ["x"]), SCALARS, max_size=4))
+@given(
+    st.dictionaries(st.sampled_from([row["name"] for row in vf._tables.rows("segment")] + ["x"]), SCALARS, max_size=4)
+)
 def test_any_parameters_of_a_fit(parameters: dict[str, Any]) -> None:
     answered(lambda: vf.segment(SMALL, **parameters))
 
@@ -87,4 +101,6 @@ def test_any_other_arguments(one: Any, two: Any, three: Any) -> None:
     answered(lambda: vf.read(one))
     answered(lambda: vf.segment(SMALL, model=one, reader=two, normals=three))
     answered(lambda: vf.measure(SMALL, one))
-    answered(lambda: vf.phantom(seed=one if isinstance(one, int) else 1, size=16, spacing_mm=12.0, noise=two, heads=three))
+    answered(
+        lambda: vf.phantom(seed=one if isinstance(one, int) else 1, size=16, spacing_mm=12.0, noise=two, heads=three)
+    )

@@ -59,7 +59,9 @@ def made(kind: str, request: pytest.FixtureRequest, scan: pathlib.Path) -> Any:
 
 @pytest.mark.parametrize("kind", ["volume", "fit", "model", "beat", "phantom"])
 @pytest.mark.parametrize("frame", ["RAS", "LPS"])
-def test_no_array_is_the_packages_memory(kind: str, frame: str, request: pytest.FixtureRequest, scan: pathlib.Path) -> None:
+def test_no_array_is_the_packages_memory(
+    kind: str, frame: str, request: pytest.FixtureRequest, scan: pathlib.Path
+) -> None:
     thing = made(kind, request, scan)
     thing = thing.in_frame(frame) if hasattr(thing, "in_frame") else thing
     before = pickle.dumps(thing)
@@ -86,7 +88,11 @@ def test_vertices_that_are_assigned_are_the_surfaces_own(fit: vf.Fit, model: vf.
     again = pickle.loads(pickle.dumps(moved))
     assert np.array_equal(again.vertices, moved.vertices)
     assert np.array_equal(again.in_frame("RAS").vertices, moved.in_frame("RAS").vertices)
-    for use in (lambda: moved.save(tmp_path / "lv.stl"), lambda: moved.to_bytes("glb"), lambda: vf.segment(fit.mask_image(), model=moved)):
+    for use in (
+        lambda: moved.save(tmp_path / "lv.stl"),
+        lambda: moved.to_bytes("glb"),
+        lambda: vf.segment(fit.mask_image(), model=moved),
+    ):
         with pytest.raises(vf.InputError, match="assigned"):
             use()
     for wrong in ([1.0, 2.0], moved.vertices[1:], np.full_like(moved.vertices, np.nan), "no"):

@@ -133,7 +133,9 @@ UNUSABLE: list[tuple[str, str, Any, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("field", "array", "affine"), [case[1:] for case in UNUSABLE], ids=[case[0] for case in UNUSABLE])
+@pytest.mark.parametrize(
+    ("field", "array", "affine"), [case[1:] for case in UNUSABLE], ids=[case[0] for case in UNUSABLE]
+)
 def test_an_unusable_array_is_refused(field: str, array: Any, affine: Any) -> None:
     with pytest.raises(vf.InputError) as raised:
         vf.Volume(array, affine)

@@ -60,7 +60,10 @@ print(json.dumps({"resident": resident() - before[0], "traced": traced, "at": be
 
 def test_fits_keep_no_memory() -> None:
     made = subprocess.run(
-        [sys.executable, "-c", WORK, str(WARMING_FITS), str(FITS)], capture_output=True, text=True, timeout=60 + 5 * FITS
+        [sys.executable, "-c", WORK, str(WARMING_FITS), str(FITS)],
+        capture_output=True,
+        text=True,
+        timeout=60 + 5 * FITS,
     )
     assert made.returncode == 0, made.stderr
     grown = json.loads(made.stdout)

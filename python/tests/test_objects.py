@@ -15,12 +15,31 @@ from test_same_bytes import assert_same
 import ventriform as vf
 
 WHOSE = {
-    "patient_id": "4711", "patient_name": "Doe^Jane", "patient_birth_date": "19500131", "patient_sex": "F", "study_uid": "1.2.3",
-    "study_date": "20261123", "study_id": "17", "accession_number": "A1", "referring_physician": "Roe^Richard",
+    "patient_id": "4711",
+    "patient_name": "Doe^Jane",
+    "patient_birth_date": "19500131",
+    "patient_sex": "F",
+    "study_uid": "1.2.3",
+    "study_date": "20261123",
+    "study_id": "17",
+    "accession_number": "A1",
+    "referring_physician": "Roe^Richard",
     "frame_of_reference_uid": "1.2.4",
 }
 AT = "2026-11-23T13:45:00Z"
-ALONE = {"help", "output", "log", "verbose", "quiet", "print-config", "format", "part", "file-limit", "folder-limit", "mesh-limit"}
+ALONE = {
+    "help",
+    "output",
+    "log",
+    "verbose",
+    "quiet",
+    "print-config",
+    "format",
+    "part",
+    "file-limit",
+    "folder-limit",
+    "mesh-limit",
+}
 """Flags that have another form (`formats`, `parts`, what is returned), and the limits of what is read."""
 
 
@@ -43,7 +62,12 @@ def flags(given: dict[str, Any]) -> list[str]:
 )
 @pytest.mark.parametrize("kind", ["segment", "beat", "compare"])
 def test_the_bytes_are_those_of_the_command(
-    kind: str, given: dict[str, Any], scan: pathlib.Path, gated: pathlib.Path, folder: pathlib.Path, command: Command,
+    kind: str,
+    given: dict[str, Any],
+    scan: pathlib.Path,
+    gated: pathlib.Path,
+    folder: pathlib.Path,
+    command: Command,
     tmp_path: pathlib.Path,
 ) -> None:
     words = [*flags(given), "--made-at", AT, "-o", tmp_path / "out"]

@@ -17,7 +17,9 @@ from ventriform import _documents, _tables, reports
 def test_every_place_of_the_tables_is_known() -> None:
     for command in ("generate", "segment", "beat", "compare", "calibrate", "normals"):
         for row in _tables.rows(command):
-            assert ("LPS" in row["summary"] and row["kind"] in ("numbers", "direction")) == _documents.is_place(row["name"]), row
+            assert ("LPS" in row["summary"] and row["kind"] in ("numbers", "direction")) == _documents.is_place(
+                row["name"]
+            ), row
     for function in (vf.segment, vf.beat, vf.compare):
         text = (function.__doc__ or "").partition("Parameters")[2].replace("in RAS and 0,-1,0 in LPS", "")
         of_meshes = [line for line in text.splitlines() if "LPS" in line and "SPACE" not in line and "mesh" not in line]

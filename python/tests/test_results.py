@@ -35,7 +35,9 @@ def test_walls_lie_where_their_masks_are(fit: vf.Fit) -> None:
         assert ((inside >= low) & (inside <= high)).all()
         voxel_ml = abs(np.linalg.det(fit.affine[:3, :3])) / 1000.0
         mesh = wall.to_trimesh()
-        assert mesh.is_watertight and abs(mesh.volume / 1000.0 - wall.mask.sum() * voxel_ml) < 0.15 * mesh.volume / 1000.0
+        assert (
+            mesh.is_watertight and abs(mesh.volume / 1000.0 - wall.mask.sum() * voxel_ml) < 0.15 * mesh.volume / 1000.0
+        )
 
 
 def test_a_fit_tells_what_its_report_tells(fit: vf.Fit) -> None:
@@ -61,10 +63,14 @@ def test_masks_are_views_of_what_the_library_made(fit: vf.Fit) -> None:
 def test_everything_pickles(scan: pathlib.Path, model: vf.Model, fit: vf.Fit, gated: pathlib.Path) -> None:
     for again in (pickle.loads(pickle.dumps(fit)), copy.deepcopy(fit)):
         assert dict(again.files) == dict(fit.files) and np.array_equal(again.mask, fit.mask)
-        assert np.array_equal(again.vertices if hasattr(again, "vertices") else again.surface.vertices, fit.surface.vertices)
+        assert np.array_equal(
+            again.vertices if hasattr(again, "vertices") else again.surface.vertices, fit.surface.vertices
+        )
     again_model = pickle.loads(pickle.dumps(model.in_frame("LPS")))
     assert again_model.frame == "LPS"
-    assert again_model.to_bytes("glb") == model.to_bytes("glb") and again_model.report.to_dict() == model.report.to_dict()
+    assert (
+        again_model.to_bytes("glb") == model.to_bytes("glb") and again_model.report.to_dict() == model.report.to_dict()
+    )
     for volume in (vf.read(scan), vf.read(scan.read_bytes()), vf.read(gated), vf.phantom(size=32).volume):
         again_volume = pickle.loads(pickle.dumps(volume))
         assert np.array_equal(again_volume.array, volume.array) and np.array_equal(again_volume.affine, volume.affine)

@@ -106,14 +106,18 @@ def test_other_threads_run_while_a_fit_is_made(scan: pathlib.Path) -> None:
     thread = threading.Thread(target=tick)
     thread.start()
     begin = time.monotonic()
-    vf.beat(vf.read(scan.parent.parent / "gated.nii.gz")) if (scan.parent.parent / "gated.nii.gz").exists() else vf.segment(scan)
+    vf.beat(vf.read(scan.parent.parent / "gated.nii.gz")) if (
+        scan.parent.parent / "gated.nii.gz"
+    ).exists() else vf.segment(scan)
     seconds = time.monotonic() - begin
     ended.set()
     thread.join()
     assert ticks > seconds / 0.005 * 0.1
 
 
-def test_threads_that_share_a_volume_and_a_model_get_equal_results(scan: pathlib.Path, model: vf.Model, fit: vf.Fit) -> None:
+def test_threads_that_share_a_volume_and_a_model_get_equal_results(
+    scan: pathlib.Path, model: vf.Model, fit: vf.Fit
+) -> None:
     volume = vf.read(scan)
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
         fits = list(pool.map(lambda _: vf.segment(volume), range(4)))
@@ -150,7 +154,10 @@ def test_the_import_is_quick_and_brings_no_numpy() -> None:
         assert "numpy" not in sys.modules and "httpx" not in sys.modules, sorted(sys.modules)
         print(seconds)
     """)
-    made = [float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout) for _ in range(5)]
+    made = [
+        float(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout)
+        for _ in range(5)
+    ]
     assert min(made) < 0.15
 
 

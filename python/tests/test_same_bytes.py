@@ -50,11 +50,32 @@ def test_a_fit_with_a_model_an_expert_parts_and_parameters(
     model.save(tmp_path / "lv.json")
     truth = folder / "rest/lv_truth.nii.gz"
     command(
-        "segment", scan, "--model", tmp_path / "lv.json", "--model", "auto", "-o", tmp_path / "out", "--expert", truth,
-        "--format", "ply", "--part", "base", "--edge", "anatomical", "--polar-blur", 2,
+        "segment",
+        scan,
+        "--model",
+        tmp_path / "lv.json",
+        "--model",
+        "auto",
+        "-o",
+        tmp_path / "out",
+        "--expert",
+        truth,
+        "--format",
+        "ply",
+        "--part",
+        "base",
+        "--edge",
+        "anatomical",
+        "--polar-blur",
+        2,
     )
     ours = vf.segment(
-        scan, model=[tmp_path / "lv.json", "auto"], expert=truth, formats=["ply"], parts=["base"], edge="anatomical",
+        scan,
+        model=[tmp_path / "lv.json", "auto"],
+        expert=truth,
+        formats=["ply"],
+        parts=["base"],
+        edge="anatomical",
         polar_blur=2,
     )
     assert_same(ours.files, tmp_path / "out")
@@ -94,7 +115,9 @@ def test_normal_limits(command: Command, tmp_path: pathlib.Path) -> None:
     assert ours.report.perfusion is not None and ours.report.perfusion.summed_score < 10
 
 
-def test_measured_masks(scan: pathlib.Path, fit: vf.Fit, folder: pathlib.Path, command: Command, tmp_path: pathlib.Path) -> None:
+def test_measured_masks(
+    scan: pathlib.Path, fit: vf.Fit, folder: pathlib.Path, command: Command, tmp_path: pathlib.Path
+) -> None:
     fit.save(tmp_path)
     truth = folder / "rest/lv_truth.nii.gz"
     theirs = json.loads(command("measure", tmp_path / "mask.nii.gz", truth))
@@ -124,14 +147,21 @@ def test_a_calibration_and_an_evaluation(folder: pathlib.Path, command: Command,
     # Arrays have hashes of their own, and teach the same.
     volumes = [vf.read(scan) for scan, _ in pairs]
     masks = [vf.read(mask) for _, mask in pairs]
-    arrays = [
-        tuple(vf.Volume(one.array, one.affine) for one in pair) for pair in zip(volumes, masks, strict=True)
-    ]
+    arrays = [tuple(vf.Volume(one.array, one.affine) for one in pair) for pair in zip(volumes, masks, strict=True)]
     ours, theirs = (json.loads(one.profile.to_bytes()) for one in (vf.calibrate(arrays), made))
     assert ours.pop("learnt_on") != theirs.pop("learnt_on") and ours == theirs
     assert vf.calibrate(arrays).profile.to_bytes() == vf.calibrate(arrays).profile.to_bytes()
     read_back = vf.segment(cohort / "p0/spect.nii.gz", reader=made.profile)
-    command("segment", cohort / "p0/spect.nii.gz", "--model", "auto", "--reader", tmp_path / "reader.json", "-o", tmp_path / "out")
+    command(
+        "segment",
+        cohort / "p0/spect.nii.gz",
+        "--model",
+        "auto",
+        "--reader",
+        tmp_path / "reader.json",
+        "-o",
+        tmp_path / "out",
+    )
     assert_same(read_back.files, tmp_path / "out")
 
     (cohort / "p0").rename(cohort / "t0")

@@ -29,21 +29,37 @@ class Checked(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def objects(fit: vf.Fit, model: vf.Model, scan: pathlib.Path, folder: pathlib.Path, gated: pathlib.Path) -> dict[str, Any]:
+def objects(
+    fit: vf.Fit, model: vf.Model, scan: pathlib.Path, folder: pathlib.Path, gated: pathlib.Path
+) -> dict[str, Any]:
     volume = vf.read(scan)
     return {
-        "Volume": volume, "Fit": fit, "Model": model, "Surface": model.surface, "Wall": fit.surface, "Files": fit.files,
-        "Flag": vf.Flag("a", "b"), "Beat": vf.beat(gated), "Phantom": vf.Phantom(volume, volume),
-        "Comparison": vf.compare(stress=folder / "stress/spect.nii.gz", rest=scan), "Measured": vf.measure(fit, fit),
+        "Volume": volume,
+        "Fit": fit,
+        "Model": model,
+        "Surface": model.surface,
+        "Wall": fit.surface,
+        "Files": fit.files,
+        "Flag": vf.Flag("a", "b"),
+        "Beat": vf.beat(gated),
+        "Phantom": vf.Phantom(volume, volume),
+        "Comparison": vf.compare(stress=folder / "stress/spect.nii.gz", rest=scan),
+        "Measured": vf.measure(fit, fit),
         "Profile": vf.Profile(b'{"format": "ventriform-reader-profile", "kind": "level"}', "<b>Eve</b>"),
         "Calibration": vf.Calibration(vf.Profile(b'{"format": "ventriform-reader-profile"}'), [], [("a<", "b")]),
-        "Evaluation": vf.Evaluation("/tmp/<x>", []), "Coordinates": vf.Coordinates([1, 2, 3]),
-        "Client": Client("http://127.0.0.1:1"), "report": fit.report,
+        "Evaluation": vf.Evaluation("/tmp/<x>", []),
+        "Coordinates": vf.Coordinates([1, 2, 3]),
+        "Client": Client("http://127.0.0.1:1"),
+        "report": fit.report,
     }
 
 
 def test_nothing_is_an_object_at_an_address(objects: dict[str, Any]) -> None:
-    classes = {name for name in vf.__all__ if inspect.isclass(getattr(vf, name)) and not issubclass(getattr(vf, name), Exception)}
+    classes = {
+        name
+        for name in vf.__all__
+        if inspect.isclass(getattr(vf, name)) and not issubclass(getattr(vf, name), Exception)
+    }
     # It takes a cohort of normal scans; its text is tested with it.
     assert classes - set(objects) == {"NormalLimits"}
     for name, one in objects.items():

@@ -13,7 +13,18 @@ import pytest
 
 import ventriform as vf
 
-CALLS = ("read", "generate", "segment", "beat", "compare", "measure", "calibrate", "build_normals", "evaluate", "phantom")
+CALLS = (
+    "read",
+    "generate",
+    "segment",
+    "beat",
+    "compare",
+    "measure",
+    "calibrate",
+    "build_normals",
+    "evaluate",
+    "phantom",
+)
 
 
 @pytest.mark.parametrize("name", CALLS)
@@ -52,7 +63,9 @@ def test_threads_that_work_are_those_asked_for(scan: pathlib.Path) -> None:
 
 def test_extras_that_errors_name_exist() -> None:
     package = pathlib.Path(vf.__file__).parent
-    named = {name for file in package.glob("*.py") for name in re.findall(r'extra\("[^"]+", "([^"]+)"\)', file.read_text())}
+    named = {
+        name for file in package.glob("*.py") for name in re.findall(r'extra\("[^"]+", "([^"]+)"\)', file.read_text())
+    }
     assert {"nibabel", "tqdm", "simpleitk"} <= named
     assert named <= set(importlib.metadata.metadata("ventriform").get_all("Provides-Extra") or [])
 

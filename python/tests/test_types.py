@@ -13,7 +13,7 @@ import pytest
 import ventriform as vf
 from ventriform import _tables
 
-SCRIPT = '''
+SCRIPT = """
 import ventriform as vf
 
 scan = vf.read("rest.dcm")
@@ -28,11 +28,14 @@ beat = vf.beat("gated.nii.gz", mass_g=130.0)
 ef: float | None = beat.report.ef_percent
 with vf.Client("http://127.0.0.1:8080", "key") as service:
     job: str = service.submit("model", "vol_1", points=100).id
-'''
+"""
 
 
 MISTAKES = [
-    'vf.generate("a", points="many")', 'vf.generate("a", pointz=3)', 'vf.segment("a", edge="inner")', 'vf.segment("a").masks',
+    'vf.generate("a", points="many")',
+    'vf.generate("a", pointz=3)',
+    'vf.segment("a", edge="inner")',
+    'vf.segment("a").masks',
 ]
 
 
@@ -40,7 +43,9 @@ MISTAKES = [
 def errors(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     """The errors that the checker finds, by the name of the script. One run: each reads the types of NumPy anew."""
     folder = tmp_path_factory.mktemp("typed")
-    scripts = {"right": SCRIPT} | {f"mistake{n}": f"import ventriform as vf\n{text}\n" for n, text in enumerate(MISTAKES)}
+    scripts = {"right": SCRIPT} | {
+        f"mistake{n}": f"import ventriform as vf\n{text}\n" for n, text in enumerate(MISTAKES)
+    }
     for name, script in scripts.items():
         (folder / f"{name}.py").write_text(script)
     command = [sys.executable, "-m", "mypy", "--strict", "--no-incremental", "--cache-dir", folder / "cache"]
@@ -91,12 +96,42 @@ def test_the_command_has_the_same_parameters(name: str, command: object) -> None
     told = told.partition("\nExample")[0]
     flags = set(re.findall(r"^ +(?:-\w, )?--([a-z0-9-]+)", told, re.MULTILINE))
     elsewhere = {
-        "output", "report", "part", "format", "quiet", "help", "version", "dicom", "patient-id", "patient-name",
-        "patient-birth-date", "patient-sex", "study-uid", "study-date", "study-id", "accession-number",
-        "referring-physician", "frame-of-reference-uid", "deidentify", "deidentify-secret", "made-at", "file-limit",
-        "folder-limit", "mesh-limit", "model", "expert", "reader", "cohort", "out", "stress", "rest",
+        "output",
+        "report",
+        "part",
+        "format",
+        "quiet",
+        "help",
+        "version",
+        "dicom",
+        "patient-id",
+        "patient-name",
+        "patient-birth-date",
+        "patient-sex",
+        "study-uid",
+        "study-date",
+        "study-id",
+        "accession-number",
+        "referring-physician",
+        "frame-of-reference-uid",
+        "deidentify",
+        "deidentify-secret",
+        "made-at",
+        "file-limit",
+        "folder-limit",
+        "mesh-limit",
+        "model",
+        "expert",
+        "reader",
+        "cohort",
+        "out",
+        "stress",
+        "rest",
         # To study the effect of support springs, not to fit.
-        "support", "support-radius", "support-scaling", "no-align",
+        "support",
+        "support-radius",
+        "support-scaling",
+        "no-align",
     }
     ours = {parameter.replace("_", "-") for parameter in inspect.signature(getattr(vf, name)).parameters}
     assert len(flags) > 5

@@ -79,7 +79,11 @@ class Document:
         """Its figures and short texts by name."""
         values = [(name, getattr(self, name)) for name in _names(type(self))]
         short = (int, float, bool, Coordinates)
-        return [(name, value) for name, value in values if isinstance(value, short) or isinstance(value, str) and len(value) < 40]
+        return [
+            (name, value)
+            for name, value in values
+            if isinstance(value, short) or isinstance(value, str) and len(value) < 40
+        ]
 
     def _repr_html_(self) -> str:
         return _html.table(type(self).__name__, self._shown())

@@ -37,7 +37,6 @@ class InputError(VentriformError, ValueError):
         end = "" if self.reason.endswith(".") else "."
         return f"{about}{self.reason}{end} {self.fix}".rstrip()
 
-
     def _about(self, field: str, before: str = "") -> InputError:
         """The error, of another parameter, with words before its reason."""
         self.field = field

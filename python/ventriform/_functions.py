@@ -244,7 +244,9 @@ def compare(
             return frames[scan]
         if frames["stress"] != frames["rest"]:
             reason = f"It is for both scans, of which stress is in {frames['stress']} and rest in {frames['rest']}."
-            raise InputError(name, reason, "Give ventriform.Coordinates(numbers, frame=...), or bring both to one frame.")
+            raise InputError(
+                name, reason, "Give ventriform.Coordinates(numbers, frame=...), or bring both to one frame."
+            )
         return frames["stress"]
 
     parameters, order = _ordered("compare", parameters, deidentify, frame_for)
@@ -473,13 +475,19 @@ def evaluate(
         "cohort": _checks.folder("cohort", cohort),
         "points": _checks.wholes("points", points, 0, _checks.MOST_POINTS),
         "reference_points": _checks.wholes("reference_points", reference_points, 0, _checks.MOST_POINTS),
-        "models": _checks.words("models", models), "method": method,
+        "models": _checks.words("models", models),
+        "method": method,
         "manual": None if manual is None else _checks.text("manual", manual),
-        "label": None if label is None else str(label), "resample": bool(resample), "mesh_unit": mesh_unit,
-        "mesh_frame": mesh_frame, "leave_one_out": bool(leave_one_out),
+        "label": None if label is None else str(label),
+        "resample": bool(resample),
+        "mesh_unit": mesh_unit,
+        "mesh_frame": mesh_frame,
+        "leave_one_out": bool(leave_one_out),
         "in_sample": ["all"] if in_sample == "all" else _checks.words("in_sample", in_sample),
-        "align": not no_align, "support": _checks.number("support", support),
-        "support_radius": _checks.number("support_radius", support_radius), "support_scaling": support_scaling,
+        "align": not no_align,
+        "support": _checks.number("support", support),
+        "support_radius": _checks.number("support_radius", support_radius),
+        "support_scaling": support_scaling,
         "program": _program(),
     }
     how = _how(progress, threads)
@@ -546,8 +554,13 @@ def phantom(
     """
     kept = checked(frame)
     figures = {
-        "length_mm": length_mm, "width_mm": width_mm, "wall_mm": wall_mm, "noise": noise, "liver": liver,
-        "right_ventricle": right_ventricle, "motion_mm": motion_mm,
+        "length_mm": length_mm,
+        "width_mm": width_mm,
+        "wall_mm": wall_mm,
+        "noise": noise,
+        "liver": liver,
+        "right_ventricle": right_ventricle,
+        "motion_mm": motion_mm,
     }
     if defects is not None and not isinstance(defects, Mapping):
         raise InputError("defects", f"A {type(defects).__name__} is no dictionary.", "Give {segment: severity}.")
@@ -650,9 +663,13 @@ def _order(
     if normals is None and any(parameters.get(name) is not None for name in _OF_LIMITS):
         raise InputError("normals", "A scan's kind was stated without limits.", "Give `normals` too.")
     return {
-        "model": models, "formats": _checks.words("formats", formats), "parts": _checks.words("parts", parts),
+        "model": models,
+        "formats": _checks.words("formats", formats),
+        "parts": _checks.words("parts", parts),
         "normals": _limits(normals),
-        "expert": None, "reader": None, "deidentify": deidentify,
+        "expert": None,
+        "reader": None,
+        "deidentify": deidentify,
     }
 
 

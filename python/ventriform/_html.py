@@ -15,7 +15,10 @@ def figure(value: float | None, unit: str) -> str:
 
 def table(title: str, rows: Iterable[Row], picture: bytes | None = None) -> str:
     """An HTML table of names and values, both escaped, with a PNG picture beside it."""
-    lines = [f"<tr><th style='text-align:left'>{_text(name)}</th><td style='text-align:left'>{_text(value)}</td></tr>" for name, value in rows]
+    lines = [
+        f"<tr><th style='text-align:left'>{_text(name)}</th><td style='text-align:left'>{_text(value)}</td></tr>"
+        for name, value in rows
+    ]
     made = f"<table><caption style='text-align:left'><b>{_text(title)}</b></caption>{''.join(lines)}</table>"
     if picture is None:
         return made

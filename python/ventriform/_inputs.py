@@ -99,8 +99,10 @@ def _ask_about_first_axis(shape: tuple[int, ...]) -> None:
     if first <= FEWEST_VOXELS or first <= MOST_CHANNELS and 2 * first < min(others):
         raise InputError(
             "array",
-            f"The array has the shape {shape}, and its first axis may be one of channels or gates; (i, j, k, gate) " f"is taken.",
-            "Give array[0] for the only channel, or numpy.moveaxis(array, 0, -1) for gates. If it is an axis of " "voxels, exchange it "
+            f"The array has the shape {shape}, and its first axis may be one of channels or gates; (i, j, k, gate) "
+            f"is taken.",
+            "Give array[0] for the only channel, or numpy.moveaxis(array, 0, -1) for gates. If it is an axis of "
+            "voxels, exchange it "
             "with another, in the affine too.",
             "axis-order",
         )
@@ -220,7 +222,10 @@ class Stamp:
             return
         if _digest(self.path) != self.digest:
             raise InputError(
-                "source", f"{self.path} has changed since it was read.", "Read it again: ventriform.read(path).", "file-changed"
+                "source",
+                f"{self.path} has changed since it was read.",
+                "Read it again: ventriform.read(path).",
+                "file-changed",
             )
         self._seen = now
 
@@ -315,7 +320,9 @@ def of_xarray(image: Any, frame: Frame) -> _native.NativeVolume:
         return _native.NativeVolume.from_array(array, affine_rows(image.attrs["affine"], to_lps=frame == "RAS"))
     if spatial == "ijk" or not all(known[axis] in image.coords for axis in spatial):
         reason = "The DataArray states no place in the patient."
-        raise InputError("affine", reason, "Set attrs['affine'] (4x4), or coordinates x, y and z in millimetres. " + fix)
+        raise InputError(
+            "affine", reason, "Set attrs['affine'] (4x4), or coordinates x, y and z in millimetres. " + fix
+        )
     place = np.eye(4)
     for axis, letter in enumerate(spatial):
         along = np.asarray(image.coords[known[letter]].values, dtype=np.float64)
@@ -389,8 +396,15 @@ def nifti_bytes(array: NDArray[np.float32], sizes_mm: Sequence[float], ras: Sequ
     """A NIfTI-1 file of 32-bit floats (i, j, k) or (i, j, k, gate); `ras` is the affine to RAS mm, if the file states
     one."""
     if max(array.shape) > MOST_NIFTI_VOXELS:
-        reason = f"The array has the shape {array.shape}, and a NIfTI-1 file holds at most {MOST_NIFTI_VOXELS} " f"voxels along an axis."
-        fix = "Give ventriform.Volume(array, affine)." if ras is None else "Write it as a file of another format, and give its path."
+        reason = (
+            f"The array has the shape {array.shape}, and a NIfTI-1 file holds at most {MOST_NIFTI_VOXELS} "
+            f"voxels along an axis."
+        )
+        fix = (
+            "Give ventriform.Volume(array, affine)."
+            if ras is None
+            else "Write it as a file of another format, and give its path."
+        )
         raise InputError("array", reason, fix)
     header = bytearray(352)
     struct.pack_into("<i", header, 0, 348)
@@ -479,7 +493,8 @@ def native(source: Source, unwrap: Callable[[Any], Native | None], frame: Frame 
     raise InputError(
         "source",
         f"A value of type {type(source).__name__} is no volume.",
-        "Give a path, paths, bytes, an open file, a ventriform.Volume, (array, affine), an image of nibabel, " "SimpleITK, MONAI or "
+        "Give a path, paths, bytes, an open file, a ventriform.Volume, (array, affine), an image of nibabel, "
+        "SimpleITK, MONAI or "
         "xarray, or datasets of pydicom.",
     )
 

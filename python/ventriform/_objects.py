@@ -17,7 +17,9 @@ def _text(name: str, summary: str, example: str) -> Row:
 
 
 STATED: list[Row] = [
-    _text("patient_id", "Patient ID; needed for a volume that is not DICOM. With `deidentify`, the new Patient ID", "4711"),
+    _text(
+        "patient_id", "Patient ID; needed for a volume that is not DICOM. With `deidentify`, the new Patient ID", "4711"
+    ),
     _text("patient_name", "Patient's name, as FAMILY^GIVEN. With `deidentify`, the new name", "Doe^Jane"),
     _text("patient_birth_date", "Patient's birth date, as YYYYMMDD", "19500131"),
     _text("patient_sex", "Patient's sex: M, F or O", "F"),
@@ -31,19 +33,26 @@ STATED: list[Row] = [
 
 ROWS: list[Row] = [
     {
-        "name": "dicom", "kind": "switch", "default": "false",
+        "name": "dicom",
+        "kind": "switch",
+        "default": "false",
         "summary": "Also make DICOM objects of the results, of the scan's patient and study: they are among `files`",
     },
     *STATED,
     _text(
         "deidentify_secret",
-        "Secret from which `deidentify` derives new UIDs: with the same secret, objects of one study stay together. " "Default: "
+        "Secret from which `deidentify` derives new UIDs: with the same secret, objects of one study stay together. "
+        "Default: "
         "VENTRIFORM_DEIDENTIFY_SECRET of the environment, or a random one",
         "a long sentence",
     ),
     {
-        "name": "made_at", "kind": "time", "default": "", "example": "2026-11-23T13:45:00Z",
-        "summary": "Date and time of the DICOM objects: with the same time, the same input gives the same bytes. " "Default: now",
+        "name": "made_at",
+        "kind": "time",
+        "default": "",
+        "example": "2026-11-23T13:45:00Z",
+        "summary": "Date and time of the DICOM objects: with the same time, the same input gives the same bytes. "
+        "Default: now",
     },
 ]
 """Like the rows of the library's tables."""
@@ -73,7 +82,9 @@ def order(given: dict[str, Any], deidentify: bool) -> dict[str, Any] | None:
 
 
 def _secret(given: Any) -> bytes:
-    known = os.environ.get("VENTRIFORM_DEIDENTIFY_SECRET") if given is None else _checks.text("deidentify_secret", given)
+    known = (
+        os.environ.get("VENTRIFORM_DEIDENTIFY_SECRET") if given is None else _checks.text("deidentify_secret", given)
+    )
     return os.urandom(16) if known is None else known.encode()
 
 

@@ -42,7 +42,9 @@ def frame_of(source: Any, field: str = "scan") -> Frame:
     volumes = source if isinstance(source, (list, tuple)) else [source]
     frames: set[Frame] = {one.frame for one in volumes if isinstance(one, Volume)}
     if len(frames) > 1:
-        raise InputError(field, "Its volumes are in RAS and in LPS.", "Bring them to one frame: volume.in_frame('RAS').")
+        raise InputError(
+            field, "Its volumes are in RAS and in LPS.", "Bring them to one frame: volume.in_frame('RAS')."
+        )
     return frames.pop() if frames else "RAS"
 
 
@@ -300,7 +302,12 @@ class Surface:
         """What a notebook shows of it."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         size = " × ".join(f"{mm:.1f}" for mm in high - low)
-        return [("vertices", len(self._lps)), ("faces", len(self._faces)), ("size", f"{size} mm"), ("frame", self.frame)]
+        return [
+            ("vertices", len(self._lps)),
+            ("faces", len(self._faces)),
+            ("size", f"{size} mm"),
+            ("frame", self.frame),
+        ]
 
     def _repr_html_(self) -> str:
         return _html.table(type(self).__name__, self._rows())
@@ -480,7 +487,10 @@ class Files(Mapping[str, bytes]):
         ending = next((end for end in FILE_ENDINGS if name.lower().endswith(end)), None)
         if ending is not None and not os.path.isdir(path):
             alike = [own for own in self._files if own.lower().endswith(ending)] or list(self._files)
-            fix = f"Give the path of a folder, or one that ends in {' or '.join(alike)}; `files[name]` are the bytes " f"of each."
+            fix = (
+                f"Give the path of a folder, or one that ends in {' or '.join(alike)}; `files[name]` are the bytes "
+                f"of each."
+            )
             raise InputError("path", f"`{name}` is none of the {len(self._files)} files of the result.", fix)
         os.makedirs(path, exist_ok=True)
         for own, content in self._files.items():
@@ -494,8 +504,36 @@ class Files(Mapping[str, bytes]):
 
 
 FILE_ENDINGS = (
-    ".nii", ".nii.gz", ".gz", ".hdr", ".img", ".nrrd", ".mha", ".mhd", ".npy", ".npz", ".dcm", ".zip", ".json", ".html", ".csv",
-    ".png", ".svg", ".jpg", ".pdf", ".txt", ".xlsx", ".glb", ".gltf", ".stl", ".ply", ".obj", ".vtk", ".vtp", ".pkl", ".h5",
+    ".nii",
+    ".nii.gz",
+    ".gz",
+    ".hdr",
+    ".img",
+    ".nrrd",
+    ".mha",
+    ".mhd",
+    ".npy",
+    ".npz",
+    ".dcm",
+    ".zip",
+    ".json",
+    ".html",
+    ".csv",
+    ".png",
+    ".svg",
+    ".jpg",
+    ".pdf",
+    ".txt",
+    ".xlsx",
+    ".glb",
+    ".gltf",
+    ".stl",
+    ".ply",
+    ".obj",
+    ".vtk",
+    ".vtp",
+    ".pkl",
+    ".h5",
 )
 """What names of files end in, and hardly one of a folder."""
 
@@ -806,7 +844,10 @@ class Comparison(Result):
 
     def __repr__(self) -> str:
         report = self._report
-        return f"Comparison(TID {report.tid:.2f}, reversible {report.reversible_percent:.0f} %, fixed " f"{report.fixed_percent:.0f} %)"
+        return (
+            f"Comparison(TID {report.tid:.2f}, reversible {report.reversible_percent:.0f} %, fixed "
+            f"{report.fixed_percent:.0f} %)"
+        )
 
     def polar(self, scan: str) -> _Floats:
         """The polar map of `stress`, `rest` or their `difference`, (32, 60); NaN where there is none."""
@@ -1077,7 +1118,9 @@ def teller(progress: Any) -> Progress | None:
     if callable(progress):
         told: Progress = progress
         return told
-    raise InputError("progress", f"A {type(progress).__name__} cannot be told anything.", "Give a function(stage, fraction).")
+    raise InputError(
+        "progress", f"A {type(progress).__name__} cannot be told anything.", "Give a function(stage, fraction)."
+    )
 
 
 def _bar_teller(bar: Any) -> Progress:

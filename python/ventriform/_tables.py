@@ -172,7 +172,9 @@ def with_table(*commands: str) -> Callable[[Function], Function]:
         taken = {p.name for p in before}
         listed = [row for command in commands for row in rows(command) if row["name"] not in taken]
         added = [
-            inspect.Parameter(row["name"], inspect.Parameter.KEYWORD_ONLY, default=default(row), annotation=annotation(row))
+            inspect.Parameter(
+                row["name"], inspect.Parameter.KEYWORD_ONLY, default=default(row), annotation=annotation(row)
+            )
             for row in listed
         ]
 

@@ -97,7 +97,9 @@ class Client:
         if base.scheme not in ("http", "https") or not base.host or (base.port or 0) > MOST_PORT:
             raise InputError("url", f"`{url}` is no address of a service.", _ADDRESS)
         if key is not None and not (isinstance(key, str) and key.isascii() and key.isprintable()):
-            raise InputError("key", "It is no text of printable ASCII characters.", "Give the key as `keys create` printed it.")
+            raise InputError(
+                "key", "It is no text of printable ASCII characters.", "Give the key as `keys create` printed it."
+            )
         if timeout is not None and (not isinstance(timeout, (int, float)) or not timeout > 0):
             raise InputError("timeout", f"It is {timeout!r}.", "Give seconds above 0.")
         headers = {"Authorization": f"Bearer {key}"} if key else {}
@@ -129,7 +131,9 @@ class Client:
             try:
                 answer = self._http.request(method, target, **options)
             except (ValueError, TypeError, AttributeError) as error:
-                raise InputError("options", f"{error}.", "Give a method and options as httpx.Client.request takes them.") from error
+                raise InputError(
+                    "options", f"{error}.", "Give a method and options as httpx.Client.request takes them."
+                ) from error
         if answer.status_code >= 400:
             raise _refusal(answer)
         return answer
@@ -280,7 +284,9 @@ class Client:
             if now.state in ("failed", "cancelled"):
                 raise _problem(now.to_dict().get("error") or {}, 200, f"The job was {now.state}.", now.state)
             if time.monotonic() > end:
-                raise ServiceError(0, "timeout", f"The job {id} is {now.state} after {timeout:g} seconds.", "Wait longer.")
+                raise ServiceError(
+                    0, "timeout", f"The job {id} is {now.state} after {timeout:g} seconds.", "Wait longer."
+                )
             time.sleep(POLL_SECONDS)
 
     def events(self, job: str | Job) -> Iterator[Job]:
@@ -436,7 +442,9 @@ def _refusal(answer: httpx.Response) -> ServiceError:
         problem = {}
     if not isinstance(problem, Mapping):
         problem = {}
-    return _problem(problem, answer.status_code, f"The service answered {answer.status_code}.", f"http-{answer.status_code}")
+    return _problem(
+        problem, answer.status_code, f"The service answered {answer.status_code}.", f"http-{answer.status_code}"
+    )
 
 
 def _problem(problem: Mapping[str, Any], status: int, reason: str, code: str) -> ServiceError:

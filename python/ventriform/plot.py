@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 _RINGS = ((1, 45.0, 17), (4, 45.0, 13), (6, 60.0, 7), (6, 60.0, 1))
 
 
-def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str = "inferno", colorbar: bool = True) -> Axes:
+def polar(
+    fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str = "inferno", colorbar: bool = True
+) -> Axes:
     """Draws the polar map of a fit with the 17 segments of the AHA.
 
     Parameters
@@ -69,7 +71,11 @@ def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str =
             np.tile(angles[column : column + 2], (rows + 1, 1)),
             np.column_stack([radii[:, column], radii[:, column]]),
             shown[:, column : column + 1],
-            cmap=cmap, vmin=0.0, vmax=100.0, shading="flat", rasterized=True,
+            cmap=cmap,
+            vmin=0.0,
+            vmax=100.0,
+            shading="flat",
+            rasterized=True,
         )
     edges: list[Any] = [0.0, *rings.tolist()]
     for (parts, first, number), inner, outer in zip(_RINGS, edges[:-1], edges[1:], strict=True):
@@ -86,7 +92,12 @@ def polar(fit: Fit, *, ax: Axes | None = None, numbers: bool = True, cmap: str =
                 mean = "" if segment.mean_percent is None else f"\n{segment.mean_percent:.0f} %"
                 dark = (segment.mean_percent or 0.0) < 60.0
                 ax.text(
-                    angle, radius, f"{segment.number}{mean}", ha="center", va="center", fontsize=7,
+                    angle,
+                    radius,
+                    f"{segment.number}{mean}",
+                    ha="center",
+                    va="center",
+                    fontsize=7,
                     color="white" if dark else "black",
                 )
     ax.set_ylim(0.0, float(rings[-1]))

@@ -14,6 +14,7 @@ Loopback, and two addresses of its own namespace; stops by itself. Needs Postgre
 (scripts/requirements.txt), and root for PostgreSQL's user and the namespace. About 5 s a round on two cores.
 The last line is a JSON object; the exit status is 0 if nothing was lost, corrupt or made twice.
 """
+
 import argparse
 import gzip
 import hashlib
@@ -76,14 +77,16 @@ class Proxy:
         try:
             while data := source.recv(65536):
                 if self.mode in ("500", "503") and is_request and random.random() < 0.5:
-                    source.sendall(f"HTTP/1.1 {self.mode} Chaos\r\ncontent-length: 0\r\nconnection: close\r\n\r\n".encode())
+                    source.sendall(
+                        f"HTTP/1.1 {self.mode} Chaos\r\ncontent-length: 0\r\nconnection: close\r\n\r\n".encode()
+                    )
                     break
                 if self.mode == "slow":
                     time.sleep(random.uniform(0, 0.3))
                 if self.mode == "cut":
                     left[0] -= len(data)
                     if left[0] < 0:
-                        target.sendall(data[:len(data) // 2])
+                        target.sendall(data[: len(data) // 2])
                         break
                 target.sendall(data)
         except OSError:
@@ -102,8 +105,22 @@ class Chaos:
         self.program, self.folder, self.scan = options.program, folder, scan
         self.random = random.Random(options.seed)
         self.figures = dict.fromkeys(
-            ("rounds", "acknowledged", "jobs", "cancelled", "erased", "lost", "corrupt", "failed", "twice", "differs",
-             "files_checked", "refused"), 0)
+            (
+                "rounds",
+                "acknowledged",
+                "jobs",
+                "cancelled",
+                "erased",
+                "lost",
+                "corrupt",
+                "failed",
+                "twice",
+                "differs",
+                "files_checked",
+                "refused",
+            ),
+            0,
+        )
         self.faults, self.count = {}, 0
         self.lock = threading.Lock()
         self.volumes, self.erased, self.unsure, self.jobs, self.cancelled = {}, set(), set(), {}, set()
@@ -119,7 +136,9 @@ class Chaos:
         try:
             self.separate()
         except (subprocess.CalledProcessError, FileNotFoundError) as error:
-            print(f"no partition: this machine gives no network namespace ({getattr(error, 'stderr', error)})", flush=True)
+            print(
+                f"no partition: this machine gives no network namespace ({getattr(error, 'stderr', error)})", flush=True
+            )
             self.kinds = [kind for kind in self.kinds if kind != "partition"]
         near = self.far_address()
         self.postgres = Postgres(self.folder, ["127.0.0.1", *near], others=[FAR])
@@ -155,8 +174,18 @@ class Chaos:
         far = name == "worker-1" and bool(self.far_address())
         address = NEAR if far else "127.0.0.1"
         os.environ["AWS_ENDPOINT_URL"] = f"http://{address}:{self.proxy.port}"
-        arguments = ["--role", name.split("-")[0], "--database", self.postgres.url(address), "--blobs", "s3://hearts/chaos",
-                     "--lease", f"{LEASE}s", "--workers", "2"]
+        arguments = [
+            "--role",
+            name.split("-")[0],
+            "--database",
+            self.postgres.url(address),
+            "--blobs",
+            "s3://hearts/chaos",
+            "--lease",
+            f"{LEASE}s",
+            "--workers",
+            "2",
+        ]
         prefix = ["ip", "netns", "exec", self.space] if far else []
         self.services[name] = Service(self.program, f"{self.folder}/{name}", *arguments, wait=not far, prefix=prefix)
 
@@ -250,7 +279,10 @@ class Chaos:
             while not self.ending.is_set():
                 action()
 
-        clients = [threading.Thread(target=client, args=(a,)) for a in (self.upload, self.file, self.file, self.erase, self.watch)]
+        clients = [
+            threading.Thread(target=client, args=(a,))
+            for a in (self.upload, self.file, self.file, self.erase, self.watch)
+        ]
         for thread in clients:
             thread.start()
         time.sleep(self.random.uniform(0.3, 1))
@@ -300,10 +332,16 @@ class Chaos:
         process.send_signal(signal.SIGCONT)
 
     KINDS = {
-        "kill-worker": kill_worker, "kill-api": kill_api, "restart-postgres": restart_postgres,
-        "kill-postgres": kill_postgres, "store-500": lambda self: self.fail_store("500"),
-        "store-503": lambda self: self.fail_store("503"), "store-slow": lambda self: self.fail_store("slow"),
-        "store-cut": lambda self: self.fail_store("cut"), "partition": partition, "stop-worker": stop_worker,
+        "kill-worker": kill_worker,
+        "kill-api": kill_api,
+        "restart-postgres": restart_postgres,
+        "kill-postgres": kill_postgres,
+        "store-500": lambda self: self.fail_store("500"),
+        "store-503": lambda self: self.fail_store("503"),
+        "store-slow": lambda self: self.fail_store("slow"),
+        "store-cut": lambda self: self.fail_store("cut"),
+        "partition": partition,
+        "stop-worker": stop_worker,
     }
 
     def round(self, kind):
@@ -382,7 +420,9 @@ class Chaos:
             for file in random.sample(json.loads(content)["files"], 4):
                 status, content = self.surely(random.choice(replicas), file["href"])
                 self.figures["files_checked"] += 1
-                if status != 200 or (not file["name"].endswith(".html") and hashlib.sha256(content).hexdigest() != file["sha256"]):
+                if status != 200 or (
+                    not file["name"].endswith(".html") and hashlib.sha256(content).hexdigest() != file["sha256"]
+                ):
                     self.note("corrupt", f"{made} {file['name']}: {status}")
         for made, jobs in results.items():
             if len(jobs) > 1:

@@ -15,6 +15,7 @@ newest of their kind in that service. Variables hold to the end of their block.
 Out: the faults, and a count. Guaranteed: every command that was run ended with 0. What it printed or wrote is not
 looked at; the tests do that. Needs nibabel, pydicom and highdicom, and bash and curl. Exits with 1 if there is a fault.
 """
+
 import concurrent.futures
 import dataclasses
 import json
@@ -43,7 +44,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 LISTED = ROOT / "scripts/check/commands.toml"
 FENCE = re.compile(r"^(?P<indent> *)```(?:sh|bash|shell|console)\n(?P<text>.*?)^ *```", re.M | re.S)
 # A fence without a language that holds commands: they would escape this check.
-UNTOLD = re.compile(r"^ *```\n(?: *[$#].*\n)* *(?:\$ )?(?:(?:ventriform|curl|docker|pip|cargo) [-a-z.]|scripts/\S).*$", re.M)
+UNTOLD = re.compile(
+    r"^ *```\n(?: *[$#].*\n)* *(?:\$ )?(?:(?:ventriform|curl|docker|pip|cargo) [-a-z.]|scripts/\S).*$", re.M
+)
 SETTINGS = re.compile(r"^ *```toml\n(.*?)^ *```", re.M | re.S)
 ASSIGNMENT = re.compile(r"[A-Z_]+=")
 PLACEHOLDER = re.compile(r"\b(JOB|VOLUME|MODEL|SEGMENTATION|BEAT|COMPARISON|NORMALS|TEMPLATE|READER)\b")
@@ -68,7 +71,7 @@ class Command:
     def assigns(self):
         """Whether it only sets variables, which is done before each command of the block that follows."""
         words = shlex.split(self.text, comments=True)
-        return all(ASSIGNMENT.match(word) for word in words[words[:1] == ["export"]:])
+        return all(ASSIGNMENT.match(word) for word in words[words[:1] == ["export"] :])
 
     @property
     def short(self):
@@ -157,8 +160,14 @@ class Scans:
             elif name == "reader.json":
                 offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
                 hashes = {"scan": "a" * 64, "mask": "b" * 64}
-                profile = {"format": "ventriform-reader-profile", "version": 1, "edge": "apparent", "masks": 1,
-                           "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset}, "learnt_on": [hashes]}
+                profile = {
+                    "format": "ventriform-reader-profile",
+                    "version": 1,
+                    "edge": "apparent",
+                    "masks": 1,
+                    "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},
+                    "learnt_on": [hashes],
+                }
                 path.write_text(json.dumps(profile))
             elif name == "cohort/":
                 # Of an evaluation: a template and a patient, with masks.
@@ -207,7 +216,8 @@ class Page:
         small = shlex.join(SMALL)
         (programs / "ventriform").write_text(
             f'#!/bin/sh\ncase "$1 $*" in\n*--normal*) ;;\n"phantom "*) set -- "$@" {small} ;;\nesac\n'
-            f'exec {shlex.quote(str(program))} "$@"\n')
+            f'exec {shlex.quote(str(program))} "$@"\n'
+        )
         (programs / "ventriform").chmod(0o755)
         self.environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
         for name in [name for name in self.environment if name.startswith(("VENTRIFORM_", "AWS_"))]:
@@ -246,8 +256,14 @@ class Page:
                 return str(error)
         prelude = "\n".join([*self.prelude, *([f"U={self.address}", MADE] if self.address else [])])
         try:
-            made = subprocess.run(["bash", "-euo", "pipefail", "-c", f"{prelude}\n{text}"], cwd=self.folder, env=self.environment,
-                                  capture_output=True, timeout=COMMAND_SECONDS, stdin=subprocess.DEVNULL)
+            made = subprocess.run(
+                ["bash", "-euo", "pipefail", "-c", f"{prelude}\n{text}"],
+                cwd=self.folder,
+                env=self.environment,
+                capture_output=True,
+                timeout=COMMAND_SECONDS,
+                stdin=subprocess.DEVNULL,
+            )
         except subprocess.TimeoutExpired:
             return f"took longer than {COMMAND_SECONDS} s"
         if made.returncode == 0:
@@ -299,7 +315,9 @@ class Page:
 def unknown_flags(program, text):
     """Flags of a command of ventriform that its help does not have."""
     unknown = []
-    for part in re.findall(r"(?:^|[;&|]\s*|ventriform )ventriform ((?:[a-z]+ )+)([^|;&\n]*)", " " + re.sub(r"\s+#.*", "", text)):
+    for part in re.findall(
+        r"(?:^|[;&|]\s*|ventriform )ventriform ((?:[a-z]+ )+)([^|;&\n]*)", " " + re.sub(r"\s+#.*", "", text)
+    ):
         words = part[0].split()
         told = subprocess.run([program, *words, "--help"], capture_output=True, text=True)
         if told.returncode:
@@ -331,10 +349,17 @@ def main():
     program, chosen = pathlib.Path(arguments[0]).resolve(), arguments[1:]
     listed = tomllib.loads(LISTED.read_text())
     entries = [Entry(of) for of in listed["not_run"]]
-    faults = [f"{LISTED.name}: {entry.by} is no file" for entry in entries if entry.by and not (ROOT / entry.by).exists()]
-    tracked = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
-    faults += [f"{page}: a block of commands is not marked as ```sh: {found[0].splitlines()[1].strip()}"
-               for page in tracked for found in UNTOLD.finditer((ROOT / page).read_text())]
+    faults = [
+        f"{LISTED.name}: {entry.by} is no file" for entry in entries if entry.by and not (ROOT / entry.by).exists()
+    ]
+    tracked = subprocess.run(
+        ["git", "ls-files", "*.md"], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout.split()
+    faults += [
+        f"{page}: a block of commands is not marked as ```sh: {found[0].splitlines()[1].strip()}"
+        for page in tracked
+        for found in UNTOLD.finditer((ROOT / page).read_text())
+    ]
     lock, counts = threading.Lock(), {"run": 0, "listed": 0}
 
     with tempfile.TemporaryDirectory() as temporary:
@@ -352,14 +377,19 @@ def main():
                         for flag in unknown_flags(program, command.text):
                             found.append(f"{command.short}: {flag} is not in the help")
                         continue
-                    state = state or Page(page, listed["pages"].get(page, {}), program, scans, folder / page.replace("/", "-"))
+                    state = state or Page(
+                        page, listed["pages"].get(page, {}), program, scans, folder / page.replace("/", "-")
+                    )
                     at = time.monotonic()
                     fault = state.run(command)
                     run += not command.assigns
                     if verbose:
                         print(f"{time.monotonic() - at:6.2f} s  {command.short}", flush=True)
                     if fault:
-                        found.append(f"{command.short}\n    {fault}\n    Correct it, or name it in " f"scripts/check/commands.toml with the reason why it cannot be run.")
+                        found.append(
+                            f"{command.short}\n    {fault}\n    Correct it, or name it in "
+                            f"scripts/check/commands.toml with the reason why it cannot be run."
+                        )
             finally:
                 if state:
                     state.stop()

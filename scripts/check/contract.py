@@ -14,6 +14,7 @@ all fields that the recorded one has: it would only have other values.
 
 Needs openapi-spec-validator, jsonschema and pydicom, and `ventriform phantom` for a scan.
 """
+
 import copy
 import csv
 import gzip
@@ -50,25 +51,40 @@ ANSWER_SECONDS = 660
 
 # Problems that the walk cannot provoke, in the service's words.
 RARE = {
-    "401": ("unauthenticated", "This service needs an API key or a bearer token.",
-            "Send `Authorization: Bearer KEY`; `ventriform keys create` makes a key."),
-    "403": ("forbidden", "This key does not have the scope that the request needs.",
-            "Ask the operator for a key with that scope."),
+    "401": (
+        "unauthenticated",
+        "This service needs an API key or a bearer token.",
+        "Send `Authorization: Bearer KEY`; `ventriform keys create` makes a key.",
+    ),
+    "403": (
+        "forbidden",
+        "This key does not have the scope that the request needs.",
+        "Ask the operator for a key with that scope.",
+    ),
     "408": ("body-too-slow", "The body did not arrive in time.", "Send the request again over a faster connection."),
-    "429": ("queue-full", "1000 jobs are waiting, the most that this service allows.",
-            "Send the request again after `Retry-After` seconds."),
-    "500": ("internal", "The service failed to answer because of an internal error, which has been logged.",
-            "Report it with the x-request-id of this answer."),
+    "429": (
+        "queue-full",
+        "1000 jobs are waiting, the most that this service allows.",
+        "Send the request again after `Retry-After` seconds.",
+    ),
+    "500": (
+        "internal",
+        "The service failed to answer because of an internal error, which has been logged.",
+        "Report it with the x-request-id of this answer.",
+    ),
     "503": ("not-ready", "The service is shutting down.", None),
     "507": ("storage-full", "The disk of the service is full.", "Ask the operator to free or add space."),
 }
 
 # The checks in the answer of a service that is not ready, which the walk does not provoke either.
-NOT_READY = [{"name": "database", "status": "failing", "required": True, "detail": "The database does not answer."},
-             {"name": "audit", "status": "failing", "required": True, "detail": "The database does not answer."},
-             {"name": "files", "status": "ok", "required": True}, {"name": "disk", "status": "ok", "required": True},
-             {"name": "workers", "status": "failing", "required": True, "detail": "The database does not answer."},
-             {"name": "clock", "status": "ok", "required": False}]
+NOT_READY = [
+    {"name": "database", "status": "failing", "required": True, "detail": "The database does not answer."},
+    {"name": "audit", "status": "failing", "required": True, "detail": "The database does not answer."},
+    {"name": "files", "status": "ok", "required": True},
+    {"name": "disk", "status": "ok", "required": True},
+    {"name": "workers", "status": "failing", "required": True, "detail": "The database does not answer."},
+    {"name": "clock", "status": "ok", "required": False},
+]
 
 # What stands in the examples for the keys and secrets of the recorded service.
 SECRETS = {"key": "vf_0123456789abcdef_KEEP-IT-SECRET", "secret": "whsec_MfKQ9r8GKYqrTwjUPD8ILPZIo2LaLaSw"}
@@ -88,7 +104,9 @@ class Contract:
 
     def errors(self, schema, value, exact):
         schema = json.loads(json.dumps(schema).replace('"#/components/', '"urn:document#/components/'))
-        validator = Draft202012Validator(close(schema, self.document) if exact else schema, registry=self.registries[exact])
+        validator = Draft202012Validator(
+            close(schema, self.document) if exact else schema, registry=self.registries[exact]
+        )
         return [f"{'/'.join(map(str, e.absolute_path))}: {e.message[:200]}" for e in validator.iter_errors(value)]
 
     def operations(self):
@@ -158,8 +176,14 @@ def form(files):
     mark = "----contract"
     parts = b""
     for name, data in files.items():
-        parts += (f'--{mark}\r\nContent-Disposition: form-data; name="{name}"; filename="{name}.nii.gz"\r\n'
-                  "Content-Type: application/gzip\r\n\r\n").encode() + data + b"\r\n"
+        parts += (
+            (
+                f'--{mark}\r\nContent-Disposition: form-data; name="{name}"; filename="{name}.nii.gz"\r\n'
+                "Content-Type: application/gzip\r\n\r\n"
+            ).encode()
+            + data
+            + b"\r\n"
+        )
     return parts + f"--{mark}--\r\n".encode(), f"multipart/form-data; boundary={mark}"
 
 
@@ -176,8 +200,8 @@ class Walk:
         name = operation["operationId"]
         path = template
         for key, value in parameters.items():
-            path = path.replace("{%s}" % key, value)
-            part = template.index("{%s}" % key) + len(key) + 2
+            path = path.replace("{" + key + "}", value)
+            part = template.index("{" + key + "}") + len(key) + 2
             # The names of files are in the document.
             if key != "file":
                 self.recorded["parameters"][template[:part]] = value
@@ -262,12 +286,22 @@ def limits(walk, folder):
     healthy = os.path.join(folder, "healthy")
     subprocess.run([PROGRAM, "phantom", "--normal", "--cases", "14", "-o", healthy], check=True, capture_output=True)
     for row in csv.DictReader(open(os.path.join(healthy, "cohort.csv"))):
-        request = urllib.request.Request(f"{URL}/v1/volumes", data=open(os.path.join(healthy, row["file"]), "rb").read(),
-                                         headers={"content-type": "application/octet-stream"}, method="POST")
+        request = urllib.request.Request(
+            f"{URL}/v1/volumes",
+            data=open(os.path.join(healthy, row["file"]), "rb").read(),
+            headers={"content-type": "application/octet-stream"},
+            method="POST",
+        )
         stored = json.load(urllib.request.urlopen(request))
         told = {name: row[name] for name in ("case", "sex", "protocol", "tracer")}
-        cases.append({**told, "volume": stored["id"], "attenuation_corrected": row["attenuation_corrected"] == "yes",
-                      "healthy": row["healthy"] == "yes"})
+        cases.append(
+            {
+                **told,
+                "volume": stored["id"],
+                "attenuation_corrected": row["attenuation_corrected"] == "yes",
+                "healthy": row["healthy"] == "yes",
+            }
+        )
     order = {"name": "simulated", "cases": cases, "parameters": {"mixed": True}}
     _, job = call("post", "/v1/normals", expect=202, body=order)
     normals = wait(walk, job)["normals"]
@@ -284,14 +318,22 @@ def rest_and_stress(walk, folder, rest, normals):
     """A comparison of a scan with one that has a defect."""
     stress = os.path.join(folder, "stress")
     defect = ["--defect", "7:0.6", "--defect", "8:0.6", "--defect", "13:0.6", "--defect", "14:0.6"]
-    subprocess.run([PROGRAM, "phantom", "-o", stress, "--size", "64", "--spacing", "6.4", "--seed", "2", *defect],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [PROGRAM, "phantom", "-o", stress, "--size", "64", "--spacing", "6.4", "--seed", "2", *defect],
+        check=True,
+        capture_output=True,
+    )
     call = walk.call
     octets = {"content-type": "application/octet-stream"}
     scan = open(os.path.join(stress, "spect.nii.gz"), "rb").read()
     request = urllib.request.Request(f"{URL}/v1/volumes", data=scan, headers=octets, method="POST")
     stored = json.load(urllib.request.urlopen(request))
-    stated = {"patient_id": "4711", "patient_name": "Doe^Jane", "study_uid": "1.2.840.99999.1.2", "accession_number": "A18"}
+    stated = {
+        "patient_id": "4711",
+        "patient_name": "Doe^Jane",
+        "study_uid": "1.2.840.99999.1.2",
+        "accession_number": "A18",
+    }
     call("put", "/v1/volumes/{id}/identity", expect=200, id=stored["id"], body=stated)
     # The only protocol of the limits has neither word in its name.
     protocol = json.load(urllib.request.urlopen(f"{URL}/v1/normals/{normals}"))["summary"]["groups"][0]["protocol"]
@@ -328,8 +370,10 @@ def workitems(walk):
 def beating():
     """A heart in eight gates, as NIfTI: half an ellipsoid about an axis, which shrinks and thickens."""
     side, axis, base_mm, blur_mm = 40, (-0.64, 0.6, -0.48), 14.0, 2.4
+
     def within(distance):
         return 1 / (1 + math.exp(min(distance / blur_mm, 50)))
+
     # Distance along and across the axis of every voxel, mm; i runs fastest.
     places = []
     for k in range(side):
@@ -342,9 +386,11 @@ def beating():
     for contraction in (0, 0.4, 0.85, 1, 0.75, 0.45, 0.2, 0.05):
         across, down, thickness = 24 - 7.5 * contraction, 50 - 4 * contraction, 9 + 4.5 * contraction
         for along, off in places:
+
             def inside(a, b):
                 share = math.hypot(off / a, along / b)
                 return within((share - 1) * math.hypot(off, along) / max(share, 0.01))
+
             inner, outer = inside(across, down), inside(across + thickness, down + thickness)
             apical = within(-base_mm - along)
             voxels.append(round(1000 * apical * max(outer - inner, 0) + 120 * apical * inner + 100 * (1 - outer)))
@@ -378,7 +424,12 @@ def everything(walk, folder):
     call("get", "/v1/volumes/{id}/files/{name}", expect=200, id=volume["id"], name=volume["originals"][0]["name"])
     names = {"external_id": "A-2026-17", "labels": {"study": "42"}}
     call("patch", "/v1/volumes/{id}", expect=200, id=volume["id"], body=names)
-    stated = {"patient_id": "4711", "patient_name": "Doe^Jane", "study_uid": "1.2.840.99999.1.1", "accession_number": "A17"}
+    stated = {
+        "patient_id": "4711",
+        "patient_name": "Doe^Jane",
+        "study_uid": "1.2.840.99999.1.1",
+        "accession_number": "A17",
+    }
     call("put", "/v1/volumes/{id}/identity", expect=200, id=volume["id"], body=stated)
     call("get", "/v1/volumes/{id}/identity", expect=200, id=volume["id"])
     call("put", "/v1/volumes/{id}/hold", expect=200, id=volume["id"], body={"reason": "Case 17/2026"})
@@ -392,17 +443,30 @@ def everything(walk, folder):
     call("get", "/v1/jobs", expect=200)
     _, job = call("post", "/v1/models", expect=202, query="?points=110", body=scan, headers=octets)
     template_model = wait(walk, job)["model"]
-    call("post", "/v1/models", expect=200, query="?points=12", body=scan, cut=False,
-         headers={**octets, "prefer": UNTIL_DONE, "accept": "application/json"})
+    call(
+        "post",
+        "/v1/models",
+        expect=200,
+        query="?points=12",
+        body=scan,
+        cut=False,
+        headers={**octets, "prefer": UNTIL_DONE, "accept": "application/json"},
+    )
     _, models = call("get", "/v1/models", expect=200)
     model = models["models"][0]["id"]
     body, kind = form({"volume": scan, "expert": truth})
     _, job = call("post", "/v1/segmentations", expect=202, body=body, headers={"content-type": kind})
     segmentation = wait(walk, job)["segmentation"]
-    call("post", "/v1/segmentations", expect=200, body=body,
-         headers={"content-type": kind, "prefer": UNTIL_DONE, "accept": "application/json"})
-    _, job = call("post", "/v1/segmentations", expect=202, query="?edge=anatomical", body=body,
-                  headers={"content-type": kind})
+    call(
+        "post",
+        "/v1/segmentations",
+        expect=200,
+        body=body,
+        headers={"content-type": kind, "prefer": UNTIL_DONE, "accept": "application/json"},
+    )
+    _, job = call(
+        "post", "/v1/segmentations", expect=202, query="?edge=anatomical", body=body, headers={"content-type": kind}
+    )
     anatomical = wait(walk, job)["segmentation"]
     call("get", "/v1/segmentations", expect=200)
     call("get", "/v1/segmentations/{id}", expect=200, id=segmentation)
@@ -411,8 +475,14 @@ def everything(walk, folder):
     beat = wait(walk, job)["beat"]
     # The beat's DICOM objects belong to a patient and a study.
     call("put", "/v1/volumes/{id}/identity", expect=200, id=job["volume"], body=stated)
-    call("post", "/v1/beats", expect=200, query="?mass_g=130", body=gated,
-         headers={**octets, "prefer": UNTIL_DONE, "accept": "application/json"})
+    call(
+        "post",
+        "/v1/beats",
+        expect=200,
+        query="?mass_g=130",
+        body=gated,
+        headers={**octets, "prefer": UNTIL_DONE, "accept": "application/json"},
+    )
     normals = limits(walk, folder)
     scored = f"?normals={normals}&sex=F"
     body, kind = form({"volume": scan, "expert": truth})
@@ -429,16 +499,33 @@ def everything(walk, folder):
     call("get", "/v1/templates", expect=200)
     offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
     hashes = {"scan": "a" * 64, "mask": "b" * 64}
-    profile = {"format": "ventriform-reader-profile", "version": 2, "kind": "edge", "edge": "apparent", "masks": 1,
-               "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset}, "learnt_on": [hashes]}
+    profile = {
+        "format": "ventriform-reader-profile",
+        "version": 2,
+        "kind": "edge",
+        "edge": "apparent",
+        "masks": 1,
+        "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},
+        "learnt_on": [hashes],
+    }
     _, reader = call("post", "/v1/readers", expect=201, query="?name=first", body=profile)
     call("post", "/v1/readers", expect=200, query="?name=first", body=profile)
     call("get", "/v1/readers", expect=200)
 
-    of_kind = {"models": model, "segmentations": segmentation, "beats": beat, "comparisons": comparison, "normals": normals,
-               "templates": added["id"], "readers": reader["id"], "volumes": volume["id"]}
+    of_kind = {
+        "models": model,
+        "segmentations": segmentation,
+        "beats": beat,
+        "comparisons": comparison,
+        "normals": normals,
+        "templates": added["id"],
+        "readers": reader["id"],
+        "volumes": volume["id"],
+    }
     for template, item in walk.contract.document["paths"].items():
-        found = re.match(r"/v1/(models|segmentations|beats|comparisons|normals|templates|readers|volumes)/\{id\}(/.*)?$", template)
+        found = re.match(
+            r"/v1/(models|segmentations|beats|comparisons|normals|templates|readers|volumes)/\{id\}(/.*)?$", template
+        )
         if found and "get" in item and item["get"]["operationId"] not in walk.seen:
             accept = {"accept": "application/json"} if found[2] in ("/mesh", "/report") else {}
             made = of_kind[found[1]]
@@ -446,7 +533,13 @@ def everything(walk, folder):
                 call("get", template, expect=200, headers=accept, id=made)
             for name in item["get"].get("x-files", {}):
                 # The files of the other wall than the one that `edge` asks for are named by it.
-                call("get", template, expect=200, id=anatomical if "_apparent" in name else made, file=name.replace("NN", "01"))
+                call(
+                    "get",
+                    template,
+                    expect=200,
+                    id=anatomical if "_apparent" in name else made,
+                    file=name.replace("NN", "01"),
+                )
 
     webhooks(walk, order)
     received(walk)
@@ -500,8 +593,13 @@ def webhooks(walk, order):
     while told["deliveries"][0]["attempts"] == 0:
         time.sleep(0.05)
         _, told = call("get", "/v1/jobs/{id}/deliveries", expect=200, id=job["id"])
-    call("post", "/v1/jobs/{id}/deliveries/{delivery}/redeliver", expect=202,
-         id=job["id"], delivery=told["deliveries"][0]["id"])
+    call(
+        "post",
+        "/v1/jobs/{id}/deliveries/{delivery}/redeliver",
+        expect=202,
+        id=job["id"],
+        delivery=told["deliveries"][0]["id"],
+    )
     call("delete", "/v1/webhooks/{id}", expect=204, id=webhook["id"])
 
 
@@ -528,8 +626,12 @@ def received(walk):
     """Objects by STOW-RS: a volume, projections, none; what became of them."""
     call, one = walk.call, {"content-type": "application/dicom"}
     (scan, study), (projections, _) = nuclear("RECON TOMO"), nuclear("TOMO")
-    parts = b"".join(b"--m\r\nContent-Type: application/dicom\r\n\r\n" + part + b"\r\n"
-                     for part in (projections, b"no object")) + b"--m--\r\n"
+    parts = (
+        b"".join(
+            b"--m\r\nContent-Type: application/dicom\r\n\r\n" + part + b"\r\n" for part in (projections, b"no object")
+        )
+        + b"--m--\r\n"
+    )
     related = {"content-type": 'multipart/related; type="application/dicom"; boundary=m'}
     for template, of in (("/dicom-web/studies", {}), ("/dicom-web/studies/{study}", {"study": study})):
         call("post", template, expect=200, body=scan, headers=one, **of)
@@ -553,8 +655,9 @@ def access(walk):
     call = walk.call
     _, first = call("post", "/v1/keys", expect=201, body={"name": "contract", "scope": "admin"})
     walk.credentials = {"authorization": "Bearer " + first["key"]}
-    _, second = call("post", "/v1/keys", expect=201,
-                     body={"name": "scanner 2", "scope": "submit", "requests_per_minute": 600})
+    _, second = call(
+        "post", "/v1/keys", expect=201, body={"name": "scanner 2", "scope": "submit", "requests_per_minute": 600}
+    )
     call("get", "/v1/keys", expect=200)
     call("get", "/v1/audit", expect=200, query="?limit=6")
     call("delete", "/v1/keys/{id}", expect=204, id=second["id"])
@@ -647,8 +750,11 @@ def main():
     names = [operation["operationId"] for _, _, operation in contract.operations()]
     failures = [f"operationId {name} is not unique" for name in set(names) if names.count(name) > 1]
     folder = os.environ["SERVICE_DATA"] + "/phantom"
-    subprocess.run([PROGRAM, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [PROGRAM, "phantom", "-o", folder, "--size", "64", "--spacing", "6.4", "--seed", "1"],
+        check=True,
+        capture_output=True,
+    )
     walk = Walk(contract)
     everything(walk, folder)
     failures += walk.failures
@@ -656,15 +762,22 @@ def main():
     if target:
         for status, (code, detail, fix) in RARE.items():
             title = code.replace("-", " ").capitalize()
-            problem = {"type": f"urn:ventriform:problem:{code}", "title": title, "status": int(status), "detail": detail}
+            problem = {
+                "type": f"urn:ventriform:problem:{code}",
+                "title": title,
+                "status": int(status),
+                "detail": detail,
+            }
             walk.recorded["problems"].setdefault(status, {**problem, **({"fix": fix} if fix else {})})
         problem = {**walk.recorded["problems"]["503"], "detail": NOT_READY[0]["detail"], "checks": NOT_READY}
         walk.recorded["operations"]["ready"] = {"503": {PROBLEM: problem}}
         committed = json.load(open(EXAMPLES))
         schemas = document["components"]["schemas"]
         committed["documents"] = {
-            name: value for name, value in committed["documents"].items()
-            if name in schemas and not contract.errors({"$ref": f"#/components/schemas/{name}"}, value, exact=True)}
+            name: value
+            for name, value in committed["documents"].items()
+            if name in schemas and not contract.errors({"$ref": f"#/components/schemas/{name}"}, value, exact=True)
+        }
         kept = {group: steady(values, committed.get(group, {})) for group, values in walk.recorded.items()}
         with open(target, "w") as file:
             json.dump(kept, file, indent=1, ensure_ascii=False)

@@ -10,6 +10,7 @@ a released version is opened (tests/data). Loopback only; stops by itself; needs
 has its row of the audit trail. The last line is a JSON object; the exit status is 0 if nothing was lost,
 corrupt, orphaned, made twice or without its row.
 """
+
 import argparse
 import glob
 import gzip
@@ -43,8 +44,25 @@ class Rounds:
         self.random = random.Random(options.seed)
         self.folder = tempfile.mkdtemp(prefix="ventriform-crash-")
         self.figures = dict.fromkeys(
-            ("rounds", "acknowledged", "lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans",
-             "dangling", "unrecorded", "recorded", "files_checked", "erased_by_age", "upgrades"), 0)
+            (
+                "rounds",
+                "acknowledged",
+                "lost",
+                "corrupt",
+                "undeleted",
+                "changed",
+                "failed",
+                "twice",
+                "orphans",
+                "dangling",
+                "unrecorded",
+                "recorded",
+                "files_checked",
+                "erased_by_age",
+                "upgrades",
+            ),
+            0,
+        )
         self.ready, self.number, self.lock = [], 0, threading.Lock()
         self.fresh()
 
@@ -157,8 +175,11 @@ class Rounds:
         }
         database = sqlite3.connect(f"file:{self.data}/ventriform.db?mode=ro", uri=True, timeout=30)
         for activity, ids in changes.items():
-            rows = database.execute(f"""SELECT id, EXISTS (SELECT 1 FROM audit WHERE object = id
-                AND json_extract(event, '$.activity') = ?) FROM ({ids})""", (activity,)).fetchall()
+            rows = database.execute(
+                f"""SELECT id, EXISTS (SELECT 1 FROM audit WHERE object = id
+                AND json_extract(event, '$.activity') = ?) FROM ({ids})""",
+                (activity,),
+            ).fetchall()
             self.figures["recorded"] += sum(known for _, known in rows)
             for item, known in rows:
                 if not known:
@@ -320,33 +341,11 @@ class Rounds:
         self.figures["rounds"] += 1
         self.end()
 
-    def old_database(self, rows, parameters):
-        """Makes the database of the first version, with these volumes and a job on each; returns the jobs."""
-        folder = os.path.join(ROOT, "crates/store/src/migrations")
-        name = min(os.listdir(folder))
-        with open(os.path.join(folder, name)) as file:
-            script = file.read()
-        database = sqlite3.connect(f"{self.data}/ventriform.db")
-        database.executescript(script)
-        database.execute("""CREATE TABLE _sqlx_migrations (version BIGINT PRIMARY KEY, description TEXT NOT NULL,
-            installed_on TIMESTAMP NOT NULL DEFAULT CURRENT_TIMESTAMP, success BOOLEAN NOT NULL,
-            checksum BLOB NOT NULL, execution_time BIGINT NOT NULL)""")
-        version, description = name.removesuffix(".sql").split("_", 1)
-        database.execute(
-            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time) VALUES (?, ?, " "1, ?, 0)",
-            (int(version), description.replace("_", " "), hashlib.sha384(script.encode()).digest()))
-        jobs = []
-        for row in rows:
-            files = [file["name"] if isinstance(file, dict) else file for file in json.loads(row["files"])]
-            database.execute(
-                "INSERT INTO volumes (id, created_at, bytes, files, facts) VALUES (?, ?, ?, ?, ?)",
-                (row["id"], row["created_at"], row["bytes"], json.dumps(files), row["facts"]))
-            job = "job_" + row["id"][4:]
-            database.execute(
-                "INSERT INTO jobs (id, kind, volume, parameters, created_at, idempotency_key, fingerprint) "
-                "VALUES (?, 'model', ?, ?, ?, NULL, NULL)", (job, row["id"], parameters, row["created_at"]))
-            jobs.append(job)
-        database.commit()
+    def stored(self):
+        """The files of each item, and the state of each job."""
+        database = sqlite3.connect(f"file:{self.data}/ventriform.db?mode=ro", uri=True, timeout=30)
+        items = dict(database.execute("SELECT id, files FROM volumes UNION ALL SELECT id, files FROM products"))
+        jobs = dict(database.execute("SELECT id, state FROM jobs"))
         database.close()
         return items, jobs
 
@@ -359,8 +358,11 @@ def main():
     options = parser.parse_args()
     random.seed(options.seed)
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([options.program, "phantom", "--size", "64", "--spacing", "6.4", "-o", folder],
-                       check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [options.program, "phantom", "--size", "64", "--spacing", "6.4", "-o", folder],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
         with open(f"{folder}/spect.nii.gz", "rb") as file:
             scan = gzip.decompress(file.read())
     rounds = Rounds(options, scan)
@@ -376,8 +378,10 @@ def main():
             rounds.service.kill()
         shutil.rmtree(rounds.folder, ignore_errors=True)
     ready = sorted(rounds.ready)
-    rounds.figures |= {"ready_ms_median": round(ready[len(ready) // 2]),
-                       "ready_ms_p99": round(ready[min(len(ready) * 99 // 100, len(ready) - 1)])}
+    rounds.figures |= {
+        "ready_ms_median": round(ready[len(ready) // 2]),
+        "ready_ms_p99": round(ready[min(len(ready) * 99 // 100, len(ready) - 1)]),
+    }
     print(json.dumps(rounds.figures))
     faults = ("lost", "corrupt", "undeleted", "changed", "failed", "twice", "orphans", "dangling", "unrecorded")
     return int(any(rounds.figures[fault] for fault in faults))

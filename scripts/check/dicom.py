@@ -19,6 +19,7 @@ after PS3.3 C.8.4.15, and the objects are compared with mask.nii.gz and mesh.jso
 - all: patient, study, Frame of Reference, source; no private attribute, none that is not of the IOD, none
   missing that it asks for (tables of highdicom); codes have the meaning of PS3.16 (tables of pydicom).
 """
+
 import glob
 import itertools
 import json
@@ -50,8 +51,9 @@ def cases(voxels, affine):
     # Sagittal slices, turned a little.
     turn = np.eye(4)
     a, b = np.radians([8, -11])
-    turn[:3, :3] = (np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
-                    @ np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]))
+    turn[:3, :3] = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ np.array(
+        [[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]]
+    )
     swap = np.eye(4)[:, [1, 2, 0, 3]]
     yield "oblique", voxels.transpose(1, 2, 0), turn @ affine @ swap, 1
     yield "gated", voxels, affine, 2
@@ -78,8 +80,11 @@ def same_voxels(found, found_affine, mask, affine):
     indices = (points - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T
     nearest = np.rint(indices).astype(int)
     truth = np.argwhere(mask)
-    return (len(nearest) == len(truth) and np.abs(indices - nearest).max() < 0.01
-            and {*map(tuple, nearest)} == {*map(tuple, truth)})
+    return (
+        len(nearest) == len(truth)
+        and np.abs(indices - nearest).max() < 0.01
+        and {*map(tuple, nearest)} == {*map(tuple, truth)}
+    )
 
 
 def check_mask(out, mask, affine, cavity_ml):
@@ -90,8 +95,20 @@ def check_mask(out, mask, affine, cavity_ml):
     folder = out / "dcmqi"
     folder.mkdir()
     program = Path(sys.executable).parent / "segimage2itkimage"
-    subprocess.run([program, "--inputDICOM", out / "mask.dcm", "--outputDirectory", folder,
-                    "--outputType", "nii", "--mergeSegments"], check=True, capture_output=True)
+    subprocess.run(
+        [
+            program,
+            "--inputDICOM",
+            out / "mask.dcm",
+            "--outputDirectory",
+            folder,
+            "--outputType",
+            "nii",
+            "--mergeSegments",
+        ],
+        check=True,
+        capture_output=True,
+    )
     image = nibabel.load(glob.glob(str(folder / "*.nii*"))[0])
     labels = np.asarray(image.dataobj)
     assert same_voxels(labels == 1, LPS @ image.affine, mask, affine), "dcmqi: other voxels"
@@ -129,7 +146,7 @@ def check_contours(out, mask, affine):
 def check_meshes(out, mesh):
     vertices, triangles = np.array(mesh["vertices"]), np.array(mesh["triangles"])
     data = pydicom.dcmread(out / "mesh.dcm")
-    stl = data.EncapsulatedDocument[:data.EncapsulatedDocumentLength]
+    stl = data.EncapsulatedDocument[: data.EncapsulatedDocumentLength]
     count = struct.unpack("<I", stl[80:84])[0]
     facets = np.frombuffer(stl[84:], dtype=[("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
     assert count == len(triangles) == len(facets)
@@ -147,7 +164,7 @@ def check_meshes(out, mesh):
 def gltf_points(glb):
     """The vertices of a binary glTF as it stores them: millimetres, LPS."""
     length = struct.unpack("<I", glb[12:16])[0]
-    content, buffer = json.loads(glb[20:20 + length]), glb[20 + length + 8:]
+    content, buffer = json.loads(glb[20 : 20 + length]), glb[20 + length + 8 :]
     accessor = content["accessors"][content["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
     view = content["bufferViews"][accessor["bufferView"]]
     first = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
@@ -205,8 +222,9 @@ def check_measurements(out, report, seg):
     groups = {g.tracking_identifier: g for g in sr.content.get_image_measurement_groups()}
     program = Path(sys.executable).parent / "tid1500reader"
     read = out / "measurements.json"
-    subprocess.run([program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read], check=True, capture_output=True
+    )
     named = {g["TrackingIdentifier"]: g for g in json.loads(read.read_text())["Measurements"]}
     parts = {"cavity": report["volumes_ml"]["cavity"]}
     for way in "apparent", "anatomical":
@@ -217,8 +235,7 @@ def check_measurements(out, report, seg):
         found = [float(m.value) for m in groups[name].get_measurements() if m.name.meaning == "Volume"]
         assert np.allclose(found, [wanted]), (part, found, wanted)
         other = named[name]
-        found = [float(m["value"]) for m in other["measurementItems"]
-                 if m["quantity"]["CodeMeaning"] == "Volume"]
+        found = [float(m["value"]) for m in other["measurementItems"] if m["quantity"]["CodeMeaning"] == "Volume"]
         assert np.allclose(found, [wanted]), (part, found, wanted)
         cavity = part.endswith("cavity")
         assert (other["FindingSite"]["CodeValue"] == "LV-CAVITY") == cavity, other["FindingSite"]
@@ -247,36 +264,56 @@ def check_beat(program, folder):
         for label in 1, 2:
             assert same_voxels(volume.array == label, volume.affine, labels == label, affine), name
         own = {n + 1 for n, slot in enumerate(source.TimeSlotVector) if slot == gate}
-        named = {frame.DerivationImageSequence[0].SourceImageSequence[0].ReferencedFrameNumber
-                 for frame in seg.PerFrameFunctionalGroupsSequence}
+        named = {
+            frame.DerivationImageSequence[0].SourceImageSequence[0].ReferencedFrameNumber
+            for frame in seg.PerFrameFunctionalGroupsSequence
+        }
         assert named == own, (name, named, own)
     check_object(pydicom.dcmread(out / "measurements.dcm"))
-    wanted = {"8821-1": report["edv_ml"], "8823-7": report["esv_ml"], "90096001": report["sv_ml"],
-              "70822001": report["ef_percent"], "122447": report["mass_g"],
-              "122616": report["rates"]["peak_ejection_edv_per_s"],
-              "122618": report["rates"]["peak_filling_edv_per_s"], "PHASE-SD": report["phase"]["sd_degrees"],
-              "PHASE-BANDWIDTH": report["phase"]["bandwidth_degrees"]}
+    wanted = {
+        "8821-1": report["edv_ml"],
+        "8823-7": report["esv_ml"],
+        "90096001": report["sv_ml"],
+        "70822001": report["ef_percent"],
+        "122447": report["mass_g"],
+        "122616": report["rates"]["peak_ejection_edv_per_s"],
+        "122618": report["rates"]["peak_filling_edv_per_s"],
+        "PHASE-SD": report["phase"]["sd_degrees"],
+        "PHASE-BANDWIDTH": report["phase"]["bandwidth_degrees"],
+    }
     sr = highdicom.sr.srread(out / "measurements.dcm")
     groups = sr.content.get_image_measurement_groups()
-    ends = {g.tracking_identifier.split(", ")[-1]: {c.value.value for c in g[0].ContentSequence
-            if c.name.value == "246092007"} for g in groups if ", " in g.tracking_identifier}
+    ends = {
+        g.tracking_identifier.split(", ")[-1]: {
+            c.value.value for c in g[0].ContentSequence if c.name.value == "246092007"
+        }
+        for g in groups
+        if ", " in g.tracking_identifier
+    }
     assert ends == {"end diastole": {"416190007"}, "end systole": {"416430001"}}, ends
     assert len(groups) == 3 + len(report["segments"]), len(groups)
     found = {m.name.value: float(m.value) for g in groups[:3] for m in g.get_measurements()}
     program = Path(sys.executable).parent / "tid1500reader"
     read = out / "measurements.json"
-    subprocess.run([program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [program, "--inputDICOM", out / "measurements.dcm", "--outputMetadata", read], check=True, capture_output=True
+    )
     named = json.loads(read.read_text())["Measurements"]
     other = {m["quantity"]["CodeValue"]: float(m["value"]) for g in named[:3] for m in g["measurementItems"]}
     for code, value in wanted.items():
         assert np.isclose(found[code], value) and np.isclose(other[code], value), (code, found, other, value)
     # The ranges of uncertainty are properties of their measurements.
-    for code, value, (low, high) in [("8821-1", report["edv_ml"], report["edv_interval_ml"]),
-                                     ("8823-7", report["esv_ml"], report["esv_interval_ml"]),
-                                     ("70822001", report["ef_percent"], report["ef_interval_percent"])]:
+    for code, value, (low, high) in [
+        ("8821-1", report["edv_ml"], report["edv_interval_ml"]),
+        ("8823-7", report["esv_ml"], report["esv_interval_ml"]),
+        ("70822001", report["ef_percent"], report["ef_interval_percent"]),
+    ]:
         [of_figure] = [m for g in groups[:3] for m in g.get_measurements() if m.name.value == code]
-        ranges = {c.name.value: float(c.value) for c in of_figure[0].ContentSequence if c.relationship_type.value == "HAS PROPERTIES"}
+        ranges = {
+            c.name.value: float(c.value)
+            for c in of_figure[0].ContentSequence
+            if c.relationship_type.value == "HAS PROPERTIES"
+        }
         assert np.isclose(ranges["371885007"], value - low) and np.isclose(ranges["371886008"], high - value), ranges
     for group, segment in zip(groups[3:], report["segments"]):
         found = {m.name.value: float(m.value) for m in group.get_measurements()}
@@ -314,25 +351,47 @@ def check_comparison(program, folder):
             assert data.pixel_array.shape == (data.Rows, data.Columns, 3), name
             assert data.BurnedInAnnotation == ("YES" if name == "page" else "NO"), name
     sr = highdicom.sr.srread(out / "measurements.dcm")
-    evidence = {s.StudyInstanceUID for name in ("CurrentRequestedProcedureEvidenceSequence", "PertinentOtherEvidenceSequence")
-                for s in sr[name].value}
+    evidence = {
+        s.StudyInstanceUID
+        for name in ("CurrentRequestedProcedureEvidenceSequence", "PertinentOtherEvidenceSequence")
+        for s in sr[name].value
+    }
     assert evidence == {stress.StudyInstanceUID, rest.StudyInstanceUID}, evidence
     groups = sr.content.get_image_measurement_groups()
-    states = {g.tracking_identifier: c.value.value for g in groups for c in g[0].ContentSequence if c.name.value == "109054"}
-    assert states["Left ventricle myocardium at stress"] == "432655005" and states["Segment 7, rest"] == "128975004", states
+    states = {
+        g.tracking_identifier: c.value.value for g in groups for c in g[0].ContentSequence if c.name.value == "109054"
+    }
+    assert states["Left ventricle myocardium at stress"] == "432655005" and states["Segment 7, rest"] == "128975004", (
+        states
+    )
     read = out / "measurements.json"
-    subprocess.run([Path(sys.executable).parent / "tid1500reader", "--inputDICOM", out / "measurements.dcm",
-                    "--outputMetadata", read], check=True, capture_output=True)
-    named = {m["TrackingIdentifier"]: {i["quantity"]["CodeValue"]: float(i["value"]) for i in m["measurementItems"]}
-             for m in json.loads(read.read_text())["Measurements"]}
+    subprocess.run(
+        [
+            Path(sys.executable).parent / "tid1500reader",
+            "--inputDICOM",
+            out / "measurements.dcm",
+            "--outputMetadata",
+            read,
+        ],
+        check=True,
+        capture_output=True,
+    )
+    named = {
+        m["TrackingIdentifier"]: {i["quantity"]["CodeValue"]: float(i["value"]) for i in m["measurementItems"]}
+        for m in json.loads(read.read_text())["Measurements"]
+    }
     found = {g.tracking_identifier: {m.name.value: float(m.value) for m in g.get_measurements()} for g in groups}
     assert found.keys() == named.keys(), found.keys() ^ named.keys()
     for figures in found, named:
         both = figures["Left ventricle myocardium, rest and stress"]
-        assert np.isclose(both["428832008"], report["tid"]) and np.isclose(both["REVERSIBLE"], report["reversible_percent"])
+        assert np.isclose(both["428832008"], report["tid"]) and np.isclose(
+            both["REVERSIBLE"], report["reversible_percent"]
+        )
         for segment in report["segments"]:
+
             def of(state):
                 return figures[f"Segment {segment['segment']}, {state}"]
+
             assert np.isclose(of("stress")["251053005"], segment["stress_percent"]), segment
             assert np.isclose(of("rest")["251053005"], segment["rest_percent"]), segment
             assert np.isclose(of("change")["DIFFERENCE"], segment["difference_points"]), segment

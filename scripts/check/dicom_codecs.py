@@ -40,6 +40,7 @@ cases = []
 
 # --- images ------------------------------------------------------------------------------------------------------
 
+
 def dtype(bits, signed):
     width = 8 if bits <= 8 else 16 if bits <= 16 else 32
     return np.dtype(f"{'int' if signed else 'uint'}{width}")
@@ -111,6 +112,7 @@ def by_gdcm(path, shape, kind):
 
 
 # --- encoders ----------------------------------------------------------------------------------------------------
+
 
 def jpeg_lossless(image, bits, predictor=1, restart_rows=0, point=0):
     """ISO 10918-1, process 14, one component, the difference categories in codes of 4 and 5 bits."""
@@ -221,8 +223,13 @@ def lossless():
         image = images(40, 31, 16)["object"]
         for point in (1, 5):
             stream = jpeg_lossless(image, 16, predictor, 2, point)
-            case(f"JPEG lossless, point transform {point}, predictor {predictor}", LOSSLESS, [stream],
-                 (image, 16, False), image >> point << point)
+            case(
+                f"JPEG lossless, point transform {point}, predictor {predictor}",
+                LOSSLESS,
+                [stream],
+                (image, 16, False),
+                image >> point << point,
+            )
     for bits in range(2, 17):
         image = images(12, 21, bits)["noise"]
         case(f"JPEG lossless of {bits} bits", LOSSLESS, [jpeg_lossless(image, bits, 4, 2)], (image, bits, False), image)
@@ -231,31 +238,49 @@ def lossless():
         for bits in (8, 16):
             image = images(37, 53, bits)["object"]
             stream = imagecodecs.jpeg_encode(image, lossless=True, predictor=predictor, bitspersample=bits)
-            case(f"JPEG lossless by libjpeg-turbo, predictor {predictor}", LOSSLESS, [stream], (image, bits, False), image)
+            case(
+                f"JPEG lossless by libjpeg-turbo, predictor {predictor}",
+                LOSSLESS,
+                [stream],
+                (image, bits, False),
+                image,
+            )
     # Signed numbers as the bits of unsigned ones: of the stored width, and extended to 16.
     for bits in (12, 16):
         image = images(20, 20, bits, True)["noise"]
         for width in (bits, 16):
             raw = (image.astype(int) & ((1 << width) - 1)).astype(np.uint16)
-            case(f"signed JPEG lossless, {bits} bits stored, {width} coded", LOSSLESS,
-                 [jpeg_lossless(raw, width, 1)], (image, bits, True), image)
+            case(
+                f"signed JPEG lossless, {bits} bits stored, {width} coded",
+                LOSSLESS,
+                [jpeg_lossless(raw, width, 1)],
+                (image, bits, True),
+                image,
+            )
     image = images(20, 20, 12)["object"]
     case("JPEG lossless of 12 bits in 16 stored", LOSSLESS, [jpeg_lossless(image, 12, 1)], (image, 16, False), image)
     # The bits above Bits Stored are an overlay, or nothing, as in native data.
     wide = images(20, 20, 16)["noise"]
-    case("JPEG lossless of 16 bits in 12 stored", LOSSLESS, [jpeg_lossless(wide, 16, 1)], (wide, 12, False), wide & 0xFFF)
+    case(
+        "JPEG lossless of 16 bits in 12 stored", LOSSLESS, [jpeg_lossless(wide, 16, 1)], (wide, 12, False), wide & 0xFFF
+    )
     stream = jpeg_lossless(image, 12, 1)
     for name, changed in {
         "predictor 8": stream.replace(b"\xff\xda\x00\x08\x01\x01\x00\x01", b"\xff\xda\x00\x08\x01\x01\x00\x08"),
         "a restart within a row": stream.replace(b"\xff\xc3", b"\xff\xdd\x00\x04\x00\x07\xff\xc3"),
         "restarts that are not there": stream.replace(b"\xff\xc3", b"\xff\xdd\x00\x04\x00\x14\xff\xc3"),
-        "a second scan": stream[:-2] + stream[stream.index(b"\xff\xda"):],
+        "a second scan": stream[:-2] + stream[stream.index(b"\xff\xda") :],
         "a cut": stream[: len(stream) // 2] + b"\xff\xd9",
     }.items():
         case(f"JPEG lossless with {name}", LOSSLESS, [changed], (image, 12, False), refused="JPEG|restart|marker")
     restarts = jpeg_lossless(image, 12, 1, 2)
-    case("JPEG lossless with restarts out of order", LOSSLESS, [restarts.replace(b"\xff\xd1", b"\xff\xd3")],
-         (image, 12, False), refused="restart FF D1")
+    case(
+        "JPEG lossless with restarts out of order",
+        LOSSLESS,
+        [restarts.replace(b"\xff\xd1", b"\xff\xd3")],
+        (image, 12, False),
+        refused="restart FF D1",
+    )
 
 
 def baseline():
@@ -284,7 +309,13 @@ def baseline():
     cut = stream[: -len(stream) // 3] + b"\xff\xd9"
     case("JPEG baseline, cut", BASELINE, [cut], (image, 8, False), refused="cut off|baseline JPEG does not allow")
     scan = stream[stream.index(b"\xff\xda") : -2]
-    case("JPEG baseline, two scans", BASELINE, [stream[:-2] + scan + b"\xff\xd9"], (image, 8, False), refused="follows the scan")
+    case(
+        "JPEG baseline, two scans",
+        BASELINE,
+        [stream[:-2] + scan + b"\xff\xd9"],
+        (image, 8, False),
+        refused="follows the scan",
+    )
     colour = pillow(np.stack([image] * 3, -1), "JPEG", quality=75)
     case("JPEG baseline in colour", BASELINE, [colour], (image, 8, False), refused="3 component")
 
@@ -301,8 +332,13 @@ def jpeg_ls():
                         case(f"JPEG-LS {size} {bits} bits {name}", LS, [stream], (image, bits, signed), image)
                     else:
                         high = bits if near == 0 else image.dtype.itemsize * 8
-                        case(f"JPEG-LS {size} {bits} bits {name} near {near}", LS_NEAR, [stream],
-                             (image, high, signed), same)
+                        case(
+                            f"JPEG-LS {size} {bits} bits {name} near {near}",
+                            LS_NEAR,
+                            [stream],
+                            (image, high, signed),
+                            same,
+                        )
     image = images(30, 30, 8)["object"]
     near = jpegls(image, 2)
     case("near-lossless JPEG-LS as lossless", LS, [near], (image, 8, False), refused="lossless only")
@@ -320,9 +356,17 @@ def irreversible_tolerance(bits):
 def jpeg_2000():
     options = [{}]
     options += [{"tile_size": t} for t in ((16, 16), (25, 13), (64, 64))]
-    options += [{"tile_size": (20, 20), "offset": (5, 3), "tile_offset": (2, 1)}, {"offset": (3, 7), "tile_offset": (0, 0)}]
-    options += [{"progression": p, "num_resolutions": 4, "tile_size": (32, 32)} for p in ("LRCP", "RLCP", "RPCL", "PCRL", "CPRL")]
-    options += [{"progression": p, "precinct_size": (32, 32), "codeblock_size": (16, 16)} for p in ("LRCP", "RPCL", "PCRL")]
+    options += [
+        {"tile_size": (20, 20), "offset": (5, 3), "tile_offset": (2, 1)},
+        {"offset": (3, 7), "tile_offset": (0, 0)},
+    ]
+    options += [
+        {"progression": p, "num_resolutions": 4, "tile_size": (32, 32)}
+        for p in ("LRCP", "RLCP", "RPCL", "PCRL", "CPRL")
+    ]
+    options += [
+        {"progression": p, "precinct_size": (32, 32), "codeblock_size": (16, 16)} for p in ("LRCP", "RPCL", "PCRL")
+    ]
     options += [{"num_resolutions": n} for n in (1, 2, 8)]
     options += [{"codeblock_size": c} for c in ((4, 4), (64, 16), (8, 64))]
     options += [{"plt": True, "comment": "plt"}]
@@ -343,16 +387,27 @@ def jpeg_2000():
     # Layers: all of them, and irreversible at rates at which edges overshoot.
     for bits in (8, 16):
         for name, image in images(64, 50, bits).items():
-            for option in ({"quality_layers": [20, 10, 1]}, {"quality_layers": [40, 20, 10, 5, 2, 1], "progression": "RPCL"}):
+            for option in (
+                {"quality_layers": [20, 10, 1]},
+                {"quality_layers": [40, 20, 10, 5, 2, 1], "progression": "RPCL"},
+            ):
                 stream = j2k(image, quality_mode="rates", **option)
                 case(f"JPEG 2000 {bits} bits {name} {option}", J2K_REVERSIBLE, [stream], (image, bits, False), image)
             for rate in (2, 4, 10, 30):
                 for option in ({}, {"tile_size": (32, 32)}, {"progression": "PCRL"}):
                     for irreversible in (True, False):
-                        stream = j2k(image, quality_mode="rates", quality_layers=[rate], irreversible=irreversible, **option)
+                        stream = j2k(
+                            image, quality_mode="rates", quality_layers=[rate], irreversible=irreversible, **option
+                        )
                         same = imagecodecs.jpeg2k_decode(stream)
-                        case(f"JPEG 2000 {bits} bits {name} rate {rate} {option} {irreversible}", J2K, [stream],
-                             (image, bits, False), same, irreversible_tolerance(bits))
+                        case(
+                            f"JPEG 2000 {bits} bits {name} rate {rate} {option} {irreversible}",
+                            J2K,
+                            [stream],
+                            (image, bits, False),
+                            same,
+                            irreversible_tolerance(bits),
+                        )
     # 12 bits and signed numbers, by another binding of OpenJPEG.
     for bits, signed in [(8, True), (10, False), (12, False), (12, True), (16, True)]:
         for name, image in images(48, 61, bits, signed).items():
@@ -361,8 +416,14 @@ def jpeg_2000():
             for ratio in (2, 4, 10):
                 stream = encode_array(image, bits_stored=bits, photometric_interpretation=2, compression_ratios=[ratio])
                 same = imagecodecs.jpeg2k_decode(stream)
-                case(f"JPEG 2000 {bits} bits {signed} {name} ratio {ratio}", J2K, [stream], (image, bits, signed), same,
-                     irreversible_tolerance(bits))
+                case(
+                    f"JPEG 2000 {bits} bits {signed} {name} ratio {ratio}",
+                    J2K,
+                    [stream],
+                    (image, bits, signed),
+                    same,
+                    irreversible_tolerance(bits),
+                )
     image = images(40, 40, 16)["noise"].astype(np.uint32) << 4
     stream = imagecodecs.jpeg2k_encode(image, reversible=True, level=0, bitspersample=20, codecformat="j2k")
     case("JPEG 2000 of 20 bits", J2K_REVERSIBLE, [stream], (image, 20, False), image)
@@ -380,14 +441,24 @@ def jpeg_2000():
         ("a change of progression", stream[:sot] + segment(0xFF5F, b"\0\0\0\1\6\1\0") + stream[sot:], "POC"),
         ("capabilities", stream[:sot] + segment(0xFF50, b"\0\2\0\0\0\0") + stream[sot:], "CAP"),
         ("a cut", stream[: len(stream) // 2], "cut off"),
-        ("33 layers", stream.replace(b"\xff\x52\x00\x0c\x00\x00\x00\x01", b"\xff\x52\x00\x0c\x00\x00\x00\x21"), "33 layers"),
+        (
+            "33 layers",
+            stream.replace(b"\xff\x52\x00\x0c\x00\x00\x00\x01", b"\xff\x52\x00\x0c\x00\x00\x00\x21"),
+            "33 layers",
+        ),
         ("subsampling", stream[:43] + b"\2\2" + stream[45:], "subsampled"),
     ]:
         case(f"JPEG 2000 with {name}", J2K, [changed], (image, 8, False), refused=pattern)
     tiled = j2k(image, tile_size=(16, 16))
     first = tiled.index(b"\xff\x90")
     length = struct.unpack_from(">I", tiled, first + 6)[0]
-    case("JPEG 2000 without its first tile", J2K, [tiled[:first] + tiled[first + length :]], (image, 8, False), refused="tile 0")
+    case(
+        "JPEG 2000 without its first tile",
+        J2K,
+        [tiled[:first] + tiled[first + length :]],
+        (image, 8, False),
+        refused="tile 0",
+    )
     open_end = bytearray(stream)
     struct.pack_into(">I", open_end, sot + 6, 0)
     case("JPEG 2000 whose last tile-part states no length", J2K_REVERSIBLE, [bytes(open_end)], (image, 8, False), image)

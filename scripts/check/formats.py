@@ -11,6 +11,7 @@ by their names, lengths and values, and no others, and properties of the PLY fil
 their cell array and face property, the groups of the OBJ file and the primitives of the glTF files; the uncertainty
 also the attribute `_UNCERTAINTY` of glTF files, whose vertices have a colour where there is a field.
 """
+
 import json
 import sys
 from pathlib import Path

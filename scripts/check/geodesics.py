@@ -6,6 +6,7 @@ PROGRAM is the example `geodesics`: it reads a mesh with points on it as JSON an
 between all points. pygeodesic measures between vertices only, so the points become vertices of the
 mesh that it gets: a point inside a triangle splits it into three, which changes no distance.
 """
+
 import json
 import subprocess
 import sys

@@ -285,11 +285,31 @@ def encrypted(program, folder):
     (folder / "leaf").write_text("subjectAltName=IP:127.0.0.1\nbasicConstraints=CA:FALSE\n")
     for name in ("service", "camera"):
         openssl("req", *new, "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")
-        openssl("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
-                "-extfile", "leaf", "-out", f"{name}.pem")
-    service = Receiver(program, folder, "--dicom-tls-cert", str(folder / "service.pem"),
-                      "--dicom-tls-key", str(folder / "service.key"),
-                      "--dicom-tls-client-ca", str(folder / "ca.pem"))
+        openssl(
+            "x509",
+            "-req",
+            "-in",
+            f"{name}.csr",
+            "-CA",
+            "ca.pem",
+            "-CAkey",
+            "ca.key",
+            "-CAcreateserial",
+            "-extfile",
+            "leaf",
+            "-out",
+            f"{name}.pem",
+        )
+    service = Receiver(
+        program,
+        folder,
+        "--dicom-tls-cert",
+        str(folder / "service.pem"),
+        "--dicom-tls-key",
+        str(folder / "service.key"),
+        "--dicom-tls-client-ca",
+        str(folder / "ca.pem"),
+    )
     try:
         trusted = ["+cf", str(folder / "ca.pem")]
         own = ["+tls", str(folder / "camera.key"), str(folder / "camera.pem")]

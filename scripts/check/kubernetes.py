@@ -8,6 +8,7 @@ Every container runs as a user that is not root, on a read-only root, without ca
 has no secret but by reference. Selectors find pods. Every setting in a variable and every flag is accepted by the
 program. Exits with 1 and the list of what is wrong.
 """
+
 import os
 import subprocess
 import sys
@@ -60,7 +61,9 @@ def check_container(item, pod, container):
         say(item, "requests no processor or has no limit of memory")
     for variable in container.get("env", []):
         name = variable["name"]
-        if any(word in name for word in ("SECRET", "KEY", "PASSWORD", "DATABASE")) and "secretKeyRef" not in variable.get("valueFrom", {}):
+        if any(
+            word in name for word in ("SECRET", "KEY", "PASSWORD", "DATABASE")
+        ) and "secretKeyRef" not in variable.get("valueFrom", {}):
             say(item, f"{name} is written out, not taken from a secret")
     for source in container.get("envFrom", []):
         if source["configMapRef"]["name"] not in maps:
@@ -68,11 +71,15 @@ def check_container(item, pod, container):
     # The program reads the flags and the variables, or says which one it does not know.
     variables = dict(settings)
     for variable in container.get("env", []):
-        variables[variable["name"]] = "postgres://user@db/ventriform" if variable["name"] == "VENTRIFORM_DATABASE" else "some"
+        variables[variable["name"]] = (
+            "postgres://user@db/ventriform" if variable["name"] == "VENTRIFORM_DATABASE" else "some"
+        )
     unknown = [name for name in variables if name.startswith("VENTRIFORM_") and not known(name)]
     if unknown:
         say(item, f"the program has no setting {', '.join(unknown)}")
-    answer = subprocess.run([program, *container["args"], "--print-config"], env={**os.environ, **variables}, capture_output=True, text=True)
+    answer = subprocess.run(
+        [program, *container["args"], "--print-config"], env={**os.environ, **variables}, capture_output=True, text=True
+    )
     if answer.returncode:
         say(item, f"the program refuses its settings: {answer.stderr.strip()}")
 
@@ -100,7 +107,9 @@ for item in objects:
     }.get(item["kind"])
     if selector and not any(selector().items() <= found.items() for found in labels):
         say(item, f"finds no pods by {selector()}")
-    if item["kind"] == "HorizontalPodAutoscaler" and spec["scaleTargetRef"]["name"] not in [d["metadata"]["name"] for d in deployments]:
+    if item["kind"] == "HorizontalPodAutoscaler" and spec["scaleTargetRef"]["name"] not in [
+        d["metadata"]["name"] for d in deployments
+    ]:
         say(item, "scales nothing")
     if item["kind"] == "Secret":
         say(item, "a secret is written out")

@@ -7,6 +7,7 @@ Each attack runs against a service of its own that may have 1 GiB of data (`prli
 processor time. Meanwhile another client, told apart by a trusted proxy's header, asks for its lists, health and small
 uploads; it must be answered within two seconds (more where `--patience` says so, for slow programs), and the
 service must live and be what it was when the attack is over. Uses the standard library alone."""
+
 import argparse
 import http.server
 import json
@@ -37,7 +38,9 @@ HONEST = {"X-Forwarded-For": "192.0.2.7"}
 def start(program, folder, *flags):
     """The service with a limit of memory, behind a proxy that says for whom a request is."""
     prefix = ["prlimit", f"--data={GIB}", "--cpu=60", "--nofile=16384"]
-    return Service(program, folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", *flags, prefix=prefix, dicom=True)
+    return Service(
+        program, folder, "--workers", "1", "--trusted-proxies", "127.0.0.1", *flags, prefix=prefix, dicom=True
+    )
 
 
 def connect(service):
@@ -67,8 +70,12 @@ class Honest(threading.Thread):
         while not self.over.is_set():
             number += 1
             upload = self.scan[:-8] + struct.pack("<d", number)
-            for method, path, body in [("GET", "/healthz", None), ("GET", "/v1/volumes?limit=5", None), ("GET", "/v1/jobs", None),
-                                       ("POST", "/v1/volumes", upload)]:
+            for method, path, body in [
+                ("GET", "/healthz", None),
+                ("GET", "/v1/volumes?limit=5", None),
+                ("GET", "/v1/jobs", None),
+                ("POST", "/v1/volumes", upload),
+            ]:
                 began = time.time()
                 headers = dict(HONEST, **({"content-type": "application/octet-stream"} if body else {}))
                 try:
@@ -95,7 +102,7 @@ def nifti(side=16):
     struct.pack_into("<12f", header, 280, 4, 0, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0)
     header[344:348] = b"n+1\0"
     noise = random.Random(1)
-    return bytes(header) + struct.pack(f"<{side ** 3}d", *(noise.random() for _ in range(side ** 3)))
+    return bytes(header) + struct.pack(f"<{side**3}d", *(noise.random() for _ in range(side**3)))
 
 
 def archive(entries, plain):
@@ -136,7 +143,13 @@ def head(method, path, length=None, kind="application/octet-stream"):
 def zip64(service):
     said = []
     for plain in (1, 0xFFFF):
-        status, body = service.ask("POST", "/v1/volumes", archive(600_000, plain), {"content-type": "application/octet-stream", "X-Forwarded-For": "192.0.2.66"}, 60)
+        status, body = service.ask(
+            "POST",
+            "/v1/volumes",
+            archive(600_000, plain),
+            {"content-type": "application/octet-stream", "X-Forwarded-For": "192.0.2.66"},
+            60,
+        )
         assert status in (413, 422), (status, body)
         said.append(status)
     return f"answers {said}"
@@ -181,7 +194,7 @@ def dense_json(service):
 
 
 def half_forms(service):
-    start = b"--B\r\nContent-Disposition: form-data; name=\"f\"; filename=\"a\"\r\n\r\n" + bytes(400_000)
+    start = b'--B\r\nContent-Disposition: form-data; name="f"; filename="a"\r\n\r\n' + bytes(400_000)
     kind = "multipart/form-data; boundary=B"
     return held(service, lambda _: head("POST", "/v1/volumes", 900_000, kind) + start, 800)
 
@@ -196,9 +209,15 @@ def labelled(service):
     """Lists whose entries are as large as a client can make them, asked for and not read."""
     _, body = service.ask("POST", "/v1/volumes", nifti(), {"content-type": "application/octet-stream"})
     volume = json.loads(body)["id"]
-    labels = {f"n{number}": "\U0001F600" * 256 for number in range(16)}
+    labels = {f"n{number}": "\U0001f600" * 256 for number in range(16)}
     for seed in range(60):
-        order = {"kind": "model", "volume": volume, "priority": "bulk", "labels": labels, "parameters": {"points": 67, "seed": seed}}
+        order = {
+            "kind": "model",
+            "volume": volume,
+            "priority": "bulk",
+            "labels": labels,
+            "parameters": {"points": 67, "seed": seed},
+        }
         status, body = service.ask("POST", "/v1/jobs", json.dumps(order).encode(), {"content-type": "application/json"})
         assert status == 202, (status, body)
     return held(service, lambda _: head("GET", "/v1/jobs?limit=100"), 800)
@@ -207,7 +226,9 @@ def labelled(service):
 def work_items(service):
     item = [{"00741000": {"vr": "CS", "Value": ["SCHEDULED"]}, "00741204": {"vr": "LT", "Value": ["x" * 240_000]}}]
     for _ in range(100):
-        status, body = service.ask("POST", "/dicom-web/workitems", json.dumps(item).encode(), {"content-type": "application/json"})
+        status, body = service.ask(
+            "POST", "/dicom-web/workitems", json.dumps(item).encode(), {"content-type": "application/json"}
+        )
         assert status == 201, (status, body)
     queries = ["limit=1000", "limit=1000&PatientName=*a*b*c*", "ProcedureStepLabel=*x*x*x*x*y", "limit=1000&offset=90"]
     return held(service, lambda n: head("GET", "/dicom-web/workitems?" + queries[n % len(queries)]), 400, 5)
@@ -222,7 +243,9 @@ def slow_downloads(service):
 def wavelet_frame(side):
     """A JPEG 2000 frame whose code blocks have as many coding passes as there can be, without any data: the costliest
     for its size, and not to be interrupted (tests/api/bombs.rs)."""
-    out = b"\xff\x4f\xff\x51" + struct.pack(">HH8I", 41, 0, side, side, 0, 0, side, side, 0, 0) + bytes([0, 1, 15, 1, 1])
+    out = (
+        b"\xff\x4f\xff\x51" + struct.pack(">HH8I", 41, 0, side, side, 0, 0, side, side, 0, 0) + bytes([0, 1, 15, 1, 1])
+    )
     # No levels, blocks of 64 x 64, reversible; 31 bit-planes.
     out += bytes([0xFF, 0x52, 0, 12, 0, 0, 0, 1, 0, 0, 4, 4, 0, 1, 0xFF, 0x5C, 0, 4, 0x20, 31 << 3])
     blocks = side // 64
@@ -236,7 +259,9 @@ def wavelet_frame(side):
         width = 7 if packet and packet[-1] == 0xFF else 8
         packet.append(int(bits[:width].ljust(width, "0"), 2))
         bits = bits[width:]
-    return out + struct.pack(">HHHIBB", 0xFF90, 10, 0, 14 + len(packet), 0, 1) + b"\xff\x93" + bytes(packet) + b"\xff\xd9"
+    return (
+        out + struct.pack(">HHHIBB", 0xFF90, 10, 0, 14 + len(packet), 0, 1) + b"\xff\x93" + bytes(packet) + b"\xff\xd9"
+    )
 
 
 def element(group, number, vr, value):
@@ -254,20 +279,43 @@ def file_start(syntax, sop_class=NM_CLASS, instance=b"1.2.3.4"):
 
 def dicom_image(syntax, side, frames, frame):
     """A Nuclear Medicine Image whose frames are all `frame`, of 16 bits."""
+
     def item(content):
         content += b"\0" * (len(content) % 2)
         return b"\xfe\xff\x00\xe0" + struct.pack("<I", len(content)) + content
 
     def us(*numbers):
         return struct.pack(f"<{len(numbers)}H", *numbers)
+
     place = element(0x20, 0x32, b"DS", b"0\\0\\0") + element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0")
-    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"), element(8, 0x16, b"UI", NM_CLASS),
-            element(8, 0x18, b"UI", b"1.2.3.4"), element(8, 0x60, b"CS", b"NM"), element(0x18, 0x50, b"DS", b"4"), element(0x18, 0x88, b"DS", b"4"),
-            element(0x28, 2, b"US", us(1)), element(0x28, 8, b"IS", str(frames).encode()), element(0x28, 9, b"AT", b"\x54\0\x80\0"),
-            element(0x28, 0x10, b"US", us(side)), element(0x28, 0x11, b"US", us(side)), element(0x28, 0x30, b"DS", b"4\\4"),
-            element(0x28, 0x100, b"US", us(16)), element(0x28, 0x101, b"US", us(16)), element(0x28, 0x102, b"US", us(15)),
-            element(0x28, 0x103, b"US", us(0)), element(0x54, 0x22, b"SQ", item(place)), element(0x54, 0x80, b"US", us(*range(1, frames + 1)))]
-    pixels = struct.pack("<HH", 0x7FE0, 0x10) + b"OB\0\0\xff\xff\xff\xff" + item(b"") + item(frame) * frames + b"\xfe\xff\xdd\xe0" + bytes(4)
+    data = [
+        element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION"),
+        element(8, 0x16, b"UI", NM_CLASS),
+        element(8, 0x18, b"UI", b"1.2.3.4"),
+        element(8, 0x60, b"CS", b"NM"),
+        element(0x18, 0x50, b"DS", b"4"),
+        element(0x18, 0x88, b"DS", b"4"),
+        element(0x28, 2, b"US", us(1)),
+        element(0x28, 8, b"IS", str(frames).encode()),
+        element(0x28, 9, b"AT", b"\x54\0\x80\0"),
+        element(0x28, 0x10, b"US", us(side)),
+        element(0x28, 0x11, b"US", us(side)),
+        element(0x28, 0x30, b"DS", b"4\\4"),
+        element(0x28, 0x100, b"US", us(16)),
+        element(0x28, 0x101, b"US", us(16)),
+        element(0x28, 0x102, b"US", us(15)),
+        element(0x28, 0x103, b"US", us(0)),
+        element(0x54, 0x22, b"SQ", item(place)),
+        element(0x54, 0x80, b"US", us(*range(1, frames + 1))),
+    ]
+    pixels = (
+        struct.pack("<HH", 0x7FE0, 0x10)
+        + b"OB\0\0\xff\xff\xff\xff"
+        + item(b"")
+        + item(frame) * frames
+        + b"\xfe\xff\xdd\xe0"
+        + bytes(4)
+    )
     return file_start(syntax) + b"".join(data) + pixels
 
 
@@ -335,7 +383,14 @@ def stored_scan(service, scan=None):
 
 def cohort(volume, number, cases=1000):
     """A job as large as a client can make it."""
-    case = {"volume": volume, "sex": "F", "protocol": "r" * 40, "tracer": "t" * 40, "attenuation_corrected": True, "healthy": True}
+    case = {
+        "volume": volume,
+        "sex": "F",
+        "protocol": "r" * 40,
+        "tracer": "t" * 40,
+        "attenuation_corrected": True,
+        "healthy": True,
+    }
     body = {"name": f"n{number}", "priority": "bulk", "cases": [dict(case, case=str(row)) for row in range(cases)]}
     return json.dumps(body, separators=(",", ":")).encode()
 
@@ -367,7 +422,11 @@ def hostile_archive(service, seconds=5):
     threading.Thread(target=server.serve_forever, daemon=True).start()
     for number in range(8):
         # Each is an archive of its own.
-        source = {"dicomweb": f"http://127.1.1.{number + 1}:{server.server_port}/dw", "study": "1.2.3", "series": f"1.2.3.{number + 1}"}
+        source = {
+            "dicomweb": f"http://127.1.1.{number + 1}:{server.server_port}/dw",
+            "study": "1.2.3",
+            "series": f"1.2.3.{number + 1}",
+        }
         order = {"kind": "model", "source": source, "parameters": {"points": 67}}
         status, body = service.ask("POST", "/v1/jobs", json.dumps(order).encode(), JSON)
         assert status == 202, (status, body)
@@ -380,14 +439,18 @@ def hostile_archive(service, seconds=5):
 def huge_normals(service):
     """Documents of normal limits, as large as they may be."""
     body = little_objects(15 << 20, b'{"format":"ventriform-normals","groups":[')
-    said = together(4, lambda number: service.ask("POST", f"/v1/normals?name=n{number}", body, dict(JSON, **ATTACKER), 60))
+    said = together(
+        4, lambda number: service.ask("POST", f"/v1/normals?name=n{number}", body, dict(JSON, **ATTACKER), 60)
+    )
     return f"answers {said}"
 
 
 def profiles(service):
     """Readers' profiles, as large as they may be."""
     body = little_objects((1 << 20) - 100, b'{"format":"ventriform-reader","a":[')
-    said = together(64, lambda number: service.ask("POST", f"/v1/readers?name=r{number}", body, dict(JSON, **ATTACKER), 60))
+    said = together(
+        64, lambda number: service.ask("POST", f"/v1/readers?name=r{number}", body, dict(JSON, **ATTACKER), 60)
+    )
     return f"answers {said}"
 
 
@@ -411,17 +474,36 @@ def half_patches(service):
 
 def pet_slice(number):
     """One of many slices of a PET scan."""
+
     def us(value):
         return struct.pack("<H", value)
+
     instance = f"1.2.9.{number + 1}".encode()
-    data = [element(8, 8, b"CS", b"ORIGINAL\\PRIMARY"), element(8, 0x16, b"UI", PET_CLASS), element(8, 0x18, b"UI", instance), element(8, 0x60, b"CS", b"PT"),
-            element(0x18, 0x50, b"DS", b"1"), element(0x20, 0xD, b"UI", b"1.2.9"), element(0x20, 0xE, b"UI", b"1.2.9.9"),
-            element(0x20, 0x13, b"IS", str(number + 1).encode()), element(0x20, 0x32, b"DS", f"0\\0\\{number}".encode()),
-            element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0"), element(0x20, 0x52, b"UI", b"1.2.9.2"), element(0x28, 2, b"US", us(1)),
-            element(0x28, 4, b"CS", b"MONOCHROME2"), element(0x28, 0x10, b"US", us(8)), element(0x28, 0x11, b"US", us(8)),
-            element(0x28, 0x30, b"DS", b"4\\4"), element(0x28, 0x100, b"US", us(16)), element(0x28, 0x101, b"US", us(16)),
-            element(0x28, 0x102, b"US", us(15)), element(0x28, 0x103, b"US", us(0)), element(0x28, 0x1052, b"DS", b"0"), element(0x28, 0x1053, b"DS", b"1"),
-            struct.pack("<HH2sHI", 0x7FE0, 0x10, b"OW", 0, 128) + struct.pack("<64H", *range(number, number + 64))]
+    data = [
+        element(8, 8, b"CS", b"ORIGINAL\\PRIMARY"),
+        element(8, 0x16, b"UI", PET_CLASS),
+        element(8, 0x18, b"UI", instance),
+        element(8, 0x60, b"CS", b"PT"),
+        element(0x18, 0x50, b"DS", b"1"),
+        element(0x20, 0xD, b"UI", b"1.2.9"),
+        element(0x20, 0xE, b"UI", b"1.2.9.9"),
+        element(0x20, 0x13, b"IS", str(number + 1).encode()),
+        element(0x20, 0x32, b"DS", f"0\\0\\{number}".encode()),
+        element(0x20, 0x37, b"DS", b"1\\0\\0\\0\\1\\0"),
+        element(0x20, 0x52, b"UI", b"1.2.9.2"),
+        element(0x28, 2, b"US", us(1)),
+        element(0x28, 4, b"CS", b"MONOCHROME2"),
+        element(0x28, 0x10, b"US", us(8)),
+        element(0x28, 0x11, b"US", us(8)),
+        element(0x28, 0x30, b"DS", b"4\\4"),
+        element(0x28, 0x100, b"US", us(16)),
+        element(0x28, 0x101, b"US", us(16)),
+        element(0x28, 0x102, b"US", us(15)),
+        element(0x28, 0x103, b"US", us(0)),
+        element(0x28, 0x1052, b"DS", b"0"),
+        element(0x28, 0x1053, b"DS", b"1"),
+        struct.pack("<HH2sHI", 0x7FE0, 0x10, b"OW", 0, 128) + struct.pack("<64H", *range(number, number + 64)),
+    ]
     return file_start(EXPLICIT, PET_CLASS, instance) + b"".join(data)
 
 
@@ -435,7 +517,10 @@ def late_bodies(service, slices=1500):
     status, body = service.ask("POST", "/v1/volumes", form, {"content-type": "multipart/form-data; boundary=B"}, 60)
     assert status == 201, (status, body[:300])
     volume = json.loads(body)["id"]
-    bodies = [("PUT", f"/v1/volumes/{volume}/identity", b'{"patient_id":"1"}'), ("PATCH", f"/v1/volumes/{volume}", b'{"external_id":"e"}')]
+    bodies = [
+        ("PUT", f"/v1/volumes/{volume}/identity", b'{"patient_id":"1"}'),
+        ("PATCH", f"/v1/volumes/{volume}", b'{"external_id":"e"}'),
+    ]
 
     def request(number):
         method, path, whole = bodies[number % 2]
@@ -453,8 +538,14 @@ def work_item_changes(service):
     claim = [{"00741000": {"vr": "CS", "Value": ["IN PROGRESS"]}, "00081195": {"vr": "UI", "Value": ["9.9"]}}]
     status, body = service.ask("PUT", "/dicom-web/workitems/1.2.3/state", json.dumps(claim).encode(), JSON)
     assert status == 200, (status, body)
-    requests = [("POST", "/dicom-web/workitems/1.2.3/cancelrequest", b"[{}]"),
-                ("POST", "/dicom-web/workitems/1.2.3", b'[{"00741202":{"vr":"LO","Value":["x"]},"00081195":{"vr":"UI","Value":["9.9"]}}]')]
+    requests = [
+        ("POST", "/dicom-web/workitems/1.2.3/cancelrequest", b"[{}]"),
+        (
+            "POST",
+            "/dicom-web/workitems/1.2.3",
+            b'[{"00741202":{"vr":"LO","Value":["x"]},"00081195":{"vr":"UI","Value":["9.9"]}}]',
+        ),
+    ]
 
     def send(number):
         method, path, body = requests[number % 2]
@@ -467,6 +558,7 @@ def work_item_changes(service):
 
 def associations(service, count=500):
     """Requests for associations as long as they may be, of presentation contexts without content, held open."""
+
     def item(kind, content):
         return bytes([kind, 0]) + struct.pack(">H", len(content)) + content
 
@@ -502,12 +594,18 @@ def associations(service, count=500):
 def header_bomb(size):
     """A deflated image whose header has `size` bytes of empty items."""
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
-    start = element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION") + element(8, 0x16, b"UI", NM_CLASS) + element(8, 0x18, b"UI", b"1.2.3.4")
+    start = (
+        element(8, 8, b"CS", b"ORIGINAL\\PRIMARY\\RECON TOMO\\EMISSION")
+        + element(8, 0x16, b"UI", NM_CLASS)
+        + element(8, 0x18, b"UI", b"1.2.3.4")
+    )
     out = packer.compress(start + b"\x08\0\x40\x11SQ\0\0\xff\xff\xff\xff")
     items = b"\xfe\xff\x00\xe0\0\0\0\0" * (1 << 17)
     for _ in range(size // len(items)):
         out += packer.compress(items)
-    out += packer.compress(b"\xfe\xff\xdd\xe0\0\0\0\0" + element(0x20, 0xD, b"UI", b"1.2.9") + element(0x20, 0xE, b"UI", b"1.2.9.1"))
+    out += packer.compress(
+        b"\xfe\xff\xdd\xe0\0\0\0\0" + element(0x20, 0xD, b"UI", b"1.2.9") + element(0x20, 0xE, b"UI", b"1.2.9.1")
+    )
     return out + packer.flush()
 
 
@@ -545,6 +643,7 @@ def header_bombs(service, seconds=4):
 
 def c_store(service, data_set):
     """Sends a deflated image by C-STORE and waits a second for the answer."""
+
     def item(kind, content):
         return bytes([kind, 0]) + struct.pack(">H", len(content)) + content
 
@@ -558,11 +657,28 @@ def c_store(service, data_set):
         value += b"\0" * (len(value) % 2)
         return struct.pack("<HHI", 0, number, len(value)) + value
 
-    request = struct.pack(">H", 1) + bytes(2) + b"VENTRIFORM".ljust(16) + b"ATTACKER".ljust(16) + bytes(32) + item(0x10, b"1.2.840.10008.3.1.1.1")
-    request += item(0x20, bytes([1, 0, 0, 0]) + item(0x30, NM_CLASS) + item(0x40, DEFLATED)) + item(0x50, item(0x51, struct.pack(">I", 1 << 20)))
+    request = (
+        struct.pack(">H", 1)
+        + bytes(2)
+        + b"VENTRIFORM".ljust(16)
+        + b"ATTACKER".ljust(16)
+        + bytes(32)
+        + item(0x10, b"1.2.840.10008.3.1.1.1")
+    )
+    request += item(0x20, bytes([1, 0, 0, 0]) + item(0x30, NM_CLASS) + item(0x40, DEFLATED)) + item(
+        0x50, item(0x51, struct.pack(">I", 1 << 20))
+    )
+
     def short(number):
         return struct.pack("<H", number)
-    elements = command(2, NM_CLASS) + command(0x100, short(1)) + command(0x110, short(1)) + command(0x700, short(0)) + command(0x800, short(0))
+
+    elements = (
+        command(2, NM_CLASS)
+        + command(0x100, short(1))
+        + command(0x110, short(1))
+        + command(0x700, short(0))
+        + command(0x800, short(0))
+    )
     elements += command(0x1000, b"1.2.3.4")
     with socket.create_connection(("127.0.0.1", service.dicom_port), 5) as s:
         s.settimeout(5)
@@ -571,7 +687,7 @@ def c_store(service, data_set):
             raise ConnectionError("the association was refused")
         s.sendall(values(3, command(0, struct.pack("<I", len(elements))) + elements))
         for place in range(0, len(data_set), 16000):
-            piece = data_set[place:place + 16000]
+            piece = data_set[place : place + 16000]
             s.sendall(values(2 if place + 16000 >= len(data_set) else 0, piece))
         time.sleep(1)
 
@@ -582,7 +698,7 @@ def packed_volume(side):
     struct.pack_into("<8h", header, 40, 3, side, side, side, 1, 1, 1, 1)
     struct.pack_into("<2h", header, 70, 2, 8)
     packer = zlib.compressobj(6, zlib.DEFLATED, 31)
-    out, left = [packer.compress(bytes(header))], side ** 3
+    out, left = [packer.compress(bytes(header))], side**3
     noise = random.Random(2).randbytes(1 << 10) * 1024
     while left:
         out.append(packer.compress(noise[:left]))
@@ -594,7 +710,13 @@ def large_volumes(service, seconds=20):
     """Voxels and jobs of volumes that take little when they are uploaded, and all memory as numbers."""
     said = []
     for side in (300, 500, 610):
-        status, body = service.ask("POST", "/v1/volumes", packed_volume(side), dict(ATTACKER, **{"content-type": "application/octet-stream"}), 60)
+        status, body = service.ask(
+            "POST",
+            "/v1/volumes",
+            packed_volume(side),
+            dict(ATTACKER, **{"content-type": "application/octet-stream"}),
+            60,
+        )
         assert status == 201, (status, body[:300])
         volume = json.loads(body)["id"]
         for path in ("preview.png", "voxels.nii.gz", "voxels.nii.gz?mask=true"):
@@ -645,9 +767,17 @@ def many_writes(service):
 
     def request(number, again):
         if number % 2:
-            body, target, kind = json.dumps({"external_id": f"{number}-{again}"}).encode(), ("PATCH", f"/v1/volumes/{volume}"), "application/json"
+            body, target, kind = (
+                json.dumps({"external_id": f"{number}-{again}"}).encode(),
+                ("PATCH", f"/v1/volumes/{volume}"),
+                "application/json",
+            )
         else:
-            body, target, kind = scan[:-8] + struct.pack("<2i", number, again), ("POST", "/v1/volumes"), "application/octet-stream"
+            body, target, kind = (
+                scan[:-8] + struct.pack("<2i", number, again),
+                ("POST", "/v1/volumes"),
+                "application/octet-stream",
+            )
         return head(*target, len(body), kind) + body
 
     return repeated(service, request)
@@ -661,13 +791,41 @@ def many_bodies(service):
 
 
 # Settings of the service under an attack. Where a large job runs at the end, the service is not to wait for it.
-FLAGS = {few_threads: ["--blocking-threads", str(BLOCKING_THREADS)], hostile_archive: ["--dicomweb-allow", "127.0.0.0/8"],
-         large_jobs: ["--shutdown-grace", "1s"], large_volumes: ["--shutdown-grace", "1s"], half_patches: ["--shutdown-grace", "1s"]}
+FLAGS = {
+    few_threads: ["--blocking-threads", str(BLOCKING_THREADS)],
+    hostile_archive: ["--dicomweb-allow", "127.0.0.0/8"],
+    large_jobs: ["--shutdown-grace", "1s"],
+    large_volumes: ["--shutdown-grace", "1s"],
+    half_patches: ["--shutdown-grace", "1s"],
+}
 
 
-ATTACKS = [wavelets, wavelet_voxels, zip64, half_uploads, few_threads, half_json, dense_json, half_forms, half_objects, labelled, work_items, slow_downloads,
-           hostile_archive, huge_normals, profiles, large_jobs, half_patches, late_bodies, work_item_changes, associations, header_bombs,
-           large_volumes, many_writes, many_bodies]
+ATTACKS = [
+    wavelets,
+    wavelet_voxels,
+    zip64,
+    half_uploads,
+    few_threads,
+    half_json,
+    dense_json,
+    half_forms,
+    half_objects,
+    labelled,
+    work_items,
+    slow_downloads,
+    hostile_archive,
+    huge_normals,
+    profiles,
+    large_jobs,
+    half_patches,
+    late_bodies,
+    work_item_changes,
+    associations,
+    header_bombs,
+    large_volumes,
+    many_writes,
+    many_bodies,
+]
 
 
 # Memory of the service: a third of the limit is left for attacks that come together.
@@ -704,7 +862,10 @@ def attempt(attack, program, patience):
         stop(service)
         slowest = f"slowest of {honest.asked} honest requests {honest.slowest[0]:.2f} s ({honest.slowest[1]})"
         took = time.time() - began
-        print(f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {took:.0f} s; {slowest} {'; '.join(wrong)}", flush=True)
+        print(
+            f"{'FAILED' if wrong else 'ok'}: {attack.__name__}: {said}; {took:.0f} s; {slowest} {'; '.join(wrong)}",
+            flush=True,
+        )
         return not wrong
 
 

@@ -6,6 +6,7 @@ For each header the program writes mask.nii.gz, labels.nii.gz and labels.seg.nrr
 exactly where they find the scan, and the labels must be the mask (1) and, outside of it, the cavity (2). Of a sheared
 grid, which ITK does not read, the masks on an orthogonal grid must lie where nibabel finds the scan.
 """
+
 import subprocess
 import sys
 from pathlib import Path
@@ -48,9 +49,16 @@ def same_place(scan, mask):
     """The first difference of two files' places to ITK, as text; None if there is none."""
     a, b = sitk.ReadImage(str(scan)), sitk.ReadImage(str(mask))
     n = min(a.GetDimension(), b.GetDimension(), 3)
+
     def grid(image):
         return np.array(image.GetDirection()).reshape(image.GetDimension(), -1)[:n, :n]
-    pairs = (a.GetSize()[:n], b.GetSize()[:n]), (a.GetOrigin()[:n], b.GetOrigin()[:n]), (a.GetSpacing()[:n], b.GetSpacing()[:n]), (grid(a), grid(b))
+
+    pairs = (
+        (a.GetSize()[:n], b.GetSize()[:n]),
+        (a.GetOrigin()[:n], b.GetOrigin()[:n]),
+        (a.GetSpacing()[:n], b.GetSpacing()[:n]),
+        (grid(a), grid(b)),
+    )
     for what, (x, y) in zip(("size", "origin", "spacing", "direction"), pairs):
         if not np.array_equal(np.array(x), np.array(y)):
             return f"ITK's {what} {y} instead of {x}"
@@ -91,7 +99,10 @@ def check_sheared(program, folder, scan):
     image = header(scan, np.asanyarray(scan.dataobj).astype(np.float32), None, (shear @ scan.affine, 1))
     nib.save(image, folder / "sheared.nii.gz")
     command = [program, "segment", folder / "sheared.nii.gz", "--model", "auto", "-o"]
-    made = [subprocess.run([*command, folder / name, *flags], capture_output=True, text=True) for name, flags in (("sheared", []), ("orthogonal", ["--mask-grid", "orthogonal"]))]
+    made = [
+        subprocess.run([*command, folder / name, *flags], capture_output=True, text=True)
+        for name, flags in (("sheared", []), ("orthogonal", ["--mask-grid", "orthogonal"]))
+    ]
     if any(run.returncode for run in made):
         return [run.stderr for run in made if run.returncode]
     problems = [] if "right angles" in made[0].stderr else ["no warning of the shear"]
@@ -110,7 +121,9 @@ def check_sheared(program, folder, scan):
 def main(program, folder):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run([program, "phantom", "-o", folder, "--size", "64", "--spacing", "5"], check=True, capture_output=True)
+    subprocess.run(
+        [program, "phantom", "-o", folder, "--size", "64", "--spacing", "5"], check=True, capture_output=True
+    )
     scan = nib.load(folder / "spect.nii.gz")
     failed = 0
     results = [(name, check(name, program, folder, image, flags)) for name, image, flags in cases(scan)]

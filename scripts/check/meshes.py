@@ -7,6 +7,7 @@ and its mesh written by trimesh and VTK in every way they know, must agree with 
 in millimetres, centimetres and metres where that is stated; without a statement, other units and open surfaces must be
 refused.
 """
+
 import json
 import subprocess
 import sys

@@ -18,6 +18,7 @@ then those of the commands.
 The order of the mutants is that of a hash of their names, so [offset, offset + size) is a random sample, and
 samples that do not overlap as numbers share no mutant.
 """
+
 import argparse
 import collections
 import hashlib
@@ -46,8 +47,10 @@ STAGES = [
 ]
 # Building the crate takes longer than its tests: it is optimised less than usual; what it depends on is not rebuilt.
 PROFILE = [
-    "--config", "profile.dev.package.ventriform.opt-level=1",
-    "--config", "profile.dev.package.ventriform.debug=false",
+    "--config",
+    "profile.dev.package.ventriform.opt-level=1",
+    "--config",
+    "profile.dev.package.ventriform.debug=false",
 ]
 MEMORY = 8 << 30  # A mutant that pushes for ever must not take the machine's.
 ACCEPTED = Path("scripts/check/mutants_accepted.txt")
@@ -116,7 +119,9 @@ def listed(clean):
     for group, files in GROUPS:
         out = subprocess.run(
             ["cargo", "mutants", "--dir", clean, "--file", files, "--list", "--json"],
-            check=True, capture_output=True, text=True,
+            check=True,
+            capture_output=True,
+            text=True,
         ).stdout
         texts = {}
         for raw in json.loads(out):
@@ -135,9 +140,7 @@ def listed(clean):
 
 def masked(text):
     """The text with comments and literals blanked out, of the same length."""
-    token = re.compile(
-        r'//[^\n]*|/\*.*?\*/|r(#*)".*?"\1|"(?:\\.|[^"\\])*"|\'(?:\\[^\n]{1,8}?|[^\'\\\n])\'', re.S
-    )
+    token = re.compile(r'//[^\n]*|/\*.*?\*/|r(#*)".*?"\1|"(?:\\.|[^"\\])*"|\'(?:\\[^\n]{1,8}?|[^\'\\\n])\'', re.S)
     return token.sub(lambda m: " " * len(m.group()), text)
 
 
@@ -192,7 +195,10 @@ class Tree:
         """The messages of cargo, as it builds."""
         run = subprocess.run(
             ["cargo", *arguments, *PROFILE, "--message-format=json"],
-            cwd=self.path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            cwd=self.path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
             env={**os.environ, "CARGO_INCREMENTAL": "1"},
         )
         messages = [json.loads(line) for line in run.stdout.splitlines() if line.startswith("{")]
@@ -211,7 +217,8 @@ class Tree:
 
 def errors(messages):
     return [
-        m["message"] for m in messages
+        m["message"]
+        for m in messages
         if m["reason"] == "compiler-message" and m["message"]["level"] == "error" and m["message"]["spans"]
     ]
 
@@ -226,15 +233,19 @@ def instrument(tree, mutants):
     originals = {file: tree.original(file) for file in by_file}
     library = tree.original("crates/ventriform/src/lib.rs")
     first = re.search(r"^(pub )?mod ", library, re.M).start()
-    tree.write({
-        "crates/ventriform/src/lib.rs": "#![allow(warnings, unconditional_panic, arithmetic_overflow)]\n"
-        + library[:first] + "mod mutant_switch;\n" + library[first:],
-        "crates/ventriform/src/mutant_switch.rs": SWITCH.replace("COUNT", str(max([m.id for m in mutants], default=0) + 1)),
-    })
-    while True:
-        files = {
-            file: switched(originals[file], [m for m in ms if m.outcome is None]) for file, ms in by_file.items()
+    tree.write(
+        {
+            "crates/ventriform/src/lib.rs": "#![allow(warnings, unconditional_panic, arithmetic_overflow)]\n"
+            + library[:first]
+            + "mod mutant_switch;\n"
+            + library[first:],
+            "crates/ventriform/src/mutant_switch.rs": SWITCH.replace(
+                "COUNT", str(max([m.id for m in mutants], default=0) + 1)
+            ),
         }
+    )
+    while True:
+        files = {file: switched(originals[file], [m for m in ms if m.outcome is None]) for file, ms in by_file.items()}
         tree.write(files)
         program, failures = tree.build(STAGES[0])
         if program:
@@ -267,7 +278,10 @@ def run(tree, tests, seconds, **environment):
     """Whether tests of one program pass, and which failed; raises TimeoutExpired."""
     process = subprocess.Popen(
         [tests[0].program, "--exact", *(t.name for t in tests)],
-        cwd=tree.path, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        cwd=tree.path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
         env={**os.environ, "CARGO_MANIFEST_DIR": str(tree.path), "RUST_BACKTRACE": "0", **environment},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY)),
     )
@@ -386,10 +400,19 @@ def main():
         def record(m):
             if m.outcome == "missed" and m.place in excused:
                 m.outcome = "accepted"
-            results.write(json.dumps({
-                "group": m.group, "outcome": m.outcome, "name": m.name, "place": m.place, "by": m.by,
-                "seconds": round(m.seconds, 1),
-            }) + "\n")
+            results.write(
+                json.dumps(
+                    {
+                        "group": m.group,
+                        "outcome": m.outcome,
+                        "name": m.name,
+                        "place": m.place,
+                        "by": m.by,
+                        "seconds": round(m.seconds, 1),
+                    }
+                )
+                + "\n"
+            )
             results.flush()
             print(f"{m.outcome:9} {m.seconds:6.1f} s  {m.name}  {m.by}", flush=True)
 

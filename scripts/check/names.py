@@ -7,6 +7,7 @@ the names they stand for are below, as pydicom's own tests have them. Beside the
 encoded by pydicom, by its term alone and as a code extension, and must come back from `inspect` as it was (of Unicode
 and GB18030, sixty values).
 """
+
 import json
 import re
 import subprocess
@@ -83,7 +84,7 @@ def check(name, terms, raw, wanted):
     passed, failed = passed + good, failed + (not good)
     if not good:
         at = next((n for n, (a, b) in enumerate(zip(found or "", wanted)) if a != b), 0)
-        print(f"FAILED {name}: {(found or 'nothing')[at:at + 12]!r} for {wanted[at:at + 12]!r}")
+        print(f"FAILED {name}: {(found or 'nothing')[at : at + 12]!r} for {wanted[at : at + 12]!r}")
 
 
 for path in sorted(get_charset_files("*.dcm")):
@@ -149,8 +150,8 @@ for term, codec in sorted(python_encoding.items()):
     terms = ["", term] if multi else [term]
     # As many as the standard allows in one value. Of the sets that hold all of Unicode, sixty values spread over them.
     starts = range(0, len(letters), LONGEST)
-    for start in starts[::1 if len(letters) < 10000 else -(-len(starts) // 60)]:
-        text = "".join(letters[start:start + LONGEST])
+    for start in starts[:: 1 if len(letters) < 10000 else -(-len(starts) // 60)]:
+        text = "".join(letters[start : start + LONGEST])
         raw = encode_string(text, ["iso8859", codec] if multi else [codec])
         if term == "ISO 2022 IR 159":
             # pydicom writes letters of Latin 1 as such, where the file names no such set.

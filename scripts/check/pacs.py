@@ -14,6 +14,7 @@ killed and started again. Then:
 - a work item with the code of a procedure is performed and names its output, which the archive has;
 - Orthanc sends to the service, by C-STORE and by STOW-RS: every voxel comes as it was stored there.
 """
+
 import base64
 import io
 import json
@@ -65,14 +66,27 @@ class Archive:
         token = base64.b64encode(f"{self.user}:{self.password}".encode()).decode()
         self.headers = {"Authorization": f"Basic {token}"}
         (folder / "db").mkdir(parents=True)
-        (folder / "orthanc.json").write_text(json.dumps({
-            "Name": "check", "StorageDirectory": str(folder / "db"), "IndexDirectory": str(folder / "db"),
-            "Plugins": ["/usr/share/orthanc/plugins/libOrthancDicomWeb.so"],
-            "RemoteAccessAllowed": False, "AuthenticationEnabled": True,
-            "RegisteredUsers": {self.user: self.password},
-            "HttpPort": self.web, "DicomPort": self.dicom, "DicomAet": "ORTHANC", "DicomCheckCalledAet": True,
-            "UnknownSopClassAccepted": True, "OverwriteInstances": False, "SyncStorageArea": True,
-            "DicomWeb": {"Enable": True, "Root": "/dicom-web/", "EnableWado": False}}))
+        (folder / "orthanc.json").write_text(
+            json.dumps(
+                {
+                    "Name": "check",
+                    "StorageDirectory": str(folder / "db"),
+                    "IndexDirectory": str(folder / "db"),
+                    "Plugins": ["/usr/share/orthanc/plugins/libOrthancDicomWeb.so"],
+                    "RemoteAccessAllowed": False,
+                    "AuthenticationEnabled": True,
+                    "RegisteredUsers": {self.user: self.password},
+                    "HttpPort": self.web,
+                    "DicomPort": self.dicom,
+                    "DicomAet": "ORTHANC",
+                    "DicomCheckCalledAet": True,
+                    "UnknownSopClassAccepted": True,
+                    "OverwriteInstances": False,
+                    "SyncStorageArea": True,
+                    "DicomWeb": {"Enable": True, "Root": "/dicom-web/", "EnableWado": False},
+                }
+            )
+        )
         self.start()
 
     def start(self):
@@ -96,16 +110,18 @@ class Archive:
 
     def instances(self, study):
         """The instances of a study: UID to series."""
-        answer, _ = fetch(f"{self.base}/studies/{study}/instances",
-                          headers={**self.headers, "Accept": "application/dicom+json"})
+        answer, _ = fetch(
+            f"{self.base}/studies/{study}/instances", headers={**self.headers, "Accept": "application/dicom+json"}
+        )
         found = json.loads(answer) if answer else []
-        return {i["00080018"]["Value"][0]: i["0020000D"]["Value"][0] + " " + i["0020000E"]["Value"][0]
-                for i in found}
+        return {i["00080018"]["Value"][0]: i["0020000D"]["Value"][0] + " " + i["0020000E"]["Value"][0] for i in found}
 
     def retrieve(self, study, series, instance):
         accept = 'multipart/related; type="application/dicom"; transfer-syntax=*'
-        body, headers = fetch(f"{self.base}/studies/{study}/series/{series}/instances/{instance}",
-                              headers={**self.headers, "Accept": accept})
+        body, headers = fetch(
+            f"{self.base}/studies/{study}/series/{series}/instances/{instance}",
+            headers={**self.headers, "Accept": accept},
+        )
         boundary = headers["Content-Type"].split("boundary=")[1].split(";")[0].strip('"').encode()
         (part,) = [p for p in body.split(b"--" + boundary)[1:-1]]
         head, content = part.split(b"\r\n\r\n", 1)
@@ -113,18 +129,21 @@ class Archive:
 
     def ask(self, method, path, content):
         """A request to Orthanc's own interface."""
-        request = urllib.request.Request(f"http://127.0.0.1:{self.web}{path}", json.dumps(content).encode(),
-                                         self.headers, method=method)
+        request = urllib.request.Request(
+            f"http://127.0.0.1:{self.web}{path}", json.dumps(content).encode(), self.headers, method=method
+        )
         with urllib.request.urlopen(request, timeout=60) as answer:
             return json.loads(answer.read() or "null")
 
     def store(self, path):
         boundary = "check"
-        body = (f"--{boundary}\r\nContent-Type: application/dicom\r\n\r\n".encode() + path.read_bytes()
-                + f"\r\n--{boundary}--\r\n".encode())
+        body = (
+            f"--{boundary}\r\nContent-Type: application/dicom\r\n\r\n".encode()
+            + path.read_bytes()
+            + f"\r\n--{boundary}--\r\n".encode()
+        )
         kind = f'multipart/related; type="application/dicom"; boundary={boundary}'
-        fetch(f"{self.base}/studies", body,
-              {**self.headers, "Content-Type": kind, "Accept": "application/dicom+json"})
+        fetch(f"{self.base}/studies", body, {**self.headers, "Content-Type": kind, "Accept": "application/dicom+json"})
 
 
 class Exchange(Service):
@@ -160,8 +179,15 @@ ae_title = "ORTHANC"
 addresses = ["127.0.0.1"]
 ''')
         passwords = {"CHECK_USER": archive.user, "CHECK_PASSWORD": archive.password, "CHECK_WRONG": "wrong"}
-        super().__init__(program, folder / "data", "--config", folder / "ventriform.toml", log=folder / "log",
-                         environment=passwords, dicom=True)
+        super().__init__(
+            program,
+            folder / "data",
+            "--config",
+            folder / "ventriform.toml",
+            log=folder / "log",
+            environment=passwords,
+            dicom=True,
+        )
 
     def file(self, **job):
         body = json.dumps(job).encode()
@@ -177,8 +203,12 @@ def source(archive, data):
 
 
 def delivered(service, jobs):
-    return [d for job in jobs for d in service.get(f"/v1/jobs/{job['id']}").get("deliveries", [])
-            if d["state"] == "delivered"]
+    return [
+        d
+        for job in jobs
+        for d in service.get(f"/v1/jobs/{job['id']}").get("deliveries", [])
+        if d["state"] == "delivered"
+    ]
 
 
 def run(archive, service, folder):
@@ -196,12 +226,21 @@ def run(archive, service, folder):
             subprocess.run(["storescu", "-aec", "ORTHANC", "127.0.0.1", str(archive.dicom), path], check=True)
         parameters = {"model": "auto", **({"frame": 1} if gates > 1 else {})}
         to = "old" if name == "oblique" else "pacs"
-        job = service.file(kind="segmentation", source=source("pacs", pydicom.dcmread(path)),
-                           parameters=parameters, send=[f"{n}.dcm" for n in NAMES], to=to)
+        job = service.file(
+            kind="segmentation",
+            source=source("pacs", pydicom.dcmread(path)),
+            parameters=parameters,
+            send=[f"{n}.dcm" for n in NAMES],
+            to=to,
+        )
         scans.append((name, here, affine, to, NAMES, job))
     plain = scans[0]
-    model = service.file(kind="model", source=source("pacs", pydicom.dcmread(plain[1] / "nm.dcm")),
-                         send=[f"{n}.dcm" for n in MODEL_NAMES], to="pacs")
+    model = service.file(
+        kind="model",
+        source=source("pacs", pydicom.dcmread(plain[1] / "nm.dcm")),
+        send=[f"{n}.dcm" for n in MODEL_NAMES],
+        to="pacs",
+    )
     jobs = [scan[5] for scan in scans] + [model]
 
     # Killed in the middle of delivery: first the archive, then both.
@@ -234,8 +273,7 @@ def run(archive, service, folder):
             found = held[data.SOPInstanceUID]
             assert found == f"{nm_file.StudyInstanceUID} {data.SeriesInstanceUID}"
             back = archive.retrieve(data.StudyInstanceUID, data.SeriesInstanceUID, data.SOPInstanceUID)
-            same = (back == offered if to == "pacs"
-                    else pydicom.dcmread(io.BytesIO(back)) == data)
+            same = back == offered if to == "pacs" else pydicom.dcmread(io.BytesIO(back)) == data
             assert same, f"{name}/{kind}: the archive returns other bytes"
             (here / "out" / f"{kind}.dcm").write_bytes(back)
             check_object(data)
@@ -248,8 +286,9 @@ def run(archive, service, folder):
 
     known = pydicom.dcmread(plain[1] / "nm.dcm")
     for order, code in [
-            (source("locked", known), "archive-credentials"),
-            ({**source("pacs", known), "series": "1.2.3.4"}, "no-such-series")]:
+        (source("locked", known), "archive-credentials"),
+        ({**source("pacs", known), "series": "1.2.3.4"}, "no-such-series"),
+    ]:
         job = service.file(kind="model", source=order)
         job = until("a refusal", lambda: service.ended(job))
         assert job["state"] == "failed" and job["error"]["type"].endswith(f":{code}"), job
@@ -269,15 +308,21 @@ def run(archive, service, folder):
 
 def perform(archive, service, source, delivery):
     """A work item on the series is performed; its output is the object that is in the archive already."""
+
     def text(vr, value):
         return {"vr": vr, "Value": [value]}
 
     code = {"00080100": text("SH", "LVMODEL"), "00080102": text("SH", "99CHECK"), "00080104": text("LO", "Model")}
     series = {"0020000D": text("UI", source.StudyInstanceUID), "0020000E": text("UI", source.SeriesInstanceUID)}
-    item = {"00741000": text("CS", "SCHEDULED"), "00404041": text("CS", "READY"),
-            "00404018": {"vr": "SQ", "Value": [code]}, "00404021": {"vr": "SQ", "Value": [series]}}
-    _, headers = fetch(f"{service.url}/dicom-web/workitems", json.dumps([item]).encode(),
-                       {"Content-Type": "application/dicom+json"})
+    item = {
+        "00741000": text("CS", "SCHEDULED"),
+        "00404041": text("CS", "READY"),
+        "00404018": {"vr": "SQ", "Value": [code]},
+        "00404021": {"vr": "SQ", "Value": [series]},
+    }
+    _, headers = fetch(
+        f"{service.url}/dicom-web/workitems", json.dumps([item]).encode(), {"Content-Type": "application/dicom+json"}
+    )
     path = headers["Location"]
 
     def completed():
@@ -294,15 +339,17 @@ def perform(archive, service, source, delivery):
 
 def receive(archive, service, scans):
     """Orthanc sends one scan by C-STORE and another by STOW-RS."""
-    archive.ask("PUT", "/modalities/ventriform",
-                {"AET": "VENTRIFORM", "Host": "127.0.0.1", "Port": service.dicom_port})
+    archive.ask("PUT", "/modalities/ventriform", {"AET": "VENTRIFORM", "Host": "127.0.0.1", "Port": service.dicom_port})
     archive.ask("PUT", "/dicom-web/servers/ventriform", {"Url": f"{service.url}/dicom-web/"})
-    ways = [("c-store", "/modalities/ventriform/store", {"Synchronous": True}),
-            ("stow-rs", "/dicom-web/servers/ventriform/stow", {"Synchronous": True})]
+    ways = [
+        ("c-store", "/modalities/ventriform/store", {"Synchronous": True}),
+        ("stow-rs", "/dicom-web/servers/ventriform/stow", {"Synchronous": True}),
+    ]
     for (protocol, path, order), (name, here, *_) in zip(ways, scans[1:]):
         source = pydicom.dcmread(here / "nm.dcm")
-        (found,) = archive.ask("POST", "/tools/find", {
-            "Level": "Instance", "Query": {"SOPInstanceUID": source.SOPInstanceUID}})
+        (found,) = archive.ask(
+            "POST", "/tools/find", {"Level": "Instance", "Query": {"SOPInstanceUID": source.SOPInstanceUID}}
+        )
         archive.ask("POST", path, {"Resources": [found], **order})
 
         def stored():

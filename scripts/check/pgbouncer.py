@@ -7,6 +7,7 @@ In session mode with PgBouncer's defaults the service starts and computes, each 
 or writes anything, a lock that somebody holds ends a request in time, and a PgBouncer that is started anew is found
 again. In the other modes, and where PgBouncer refuses a connection, the service ends at once, and its message begins
 with the cause. Uses the standard library alone; the last line counts the checks."""
+
 import argparse
 import json
 import os
@@ -98,8 +99,22 @@ pool_mode = {mode}
 
 
 def start(program, folder, url):
-    return Service(program, folder + "/data", "--workers", "1", "--database", url, "--database-wait", "60s", "--min-free", "0B",
-                   "--wait-limit", "10m", log=folder + "/service.log", wait=False)
+    return Service(
+        program,
+        folder + "/data",
+        "--workers",
+        "1",
+        "--database",
+        url,
+        "--database-wait",
+        "60s",
+        "--min-free",
+        "0B",
+        "--wait-limit",
+        "10m",
+        log=folder + "/service.log",
+        wait=False,
+    )
 
 
 def ask(service, *request):
@@ -132,8 +147,13 @@ def session_mode(program, folder, postgres, scan):
         check(statuses == {200}, "session mode: a hundred lists", statuses)
 
         # Somebody holds a lock: the session's limit ends the wait.
-        command = [postgres.bin + "psql", *postgres.place(), "-qc",
-                   "BEGIN; LOCK TABLE jobs; SELECT pg_sleep(60)", "ventriform"]
+        command = [
+            postgres.bin + "psql",
+            *postgres.place(),
+            "-qc",
+            "BEGIN; LOCK TABLE jobs; SELECT pg_sleep(60)",
+            "ventriform",
+        ]
         holder = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         until(lambda: ["AccessExclusiveLock"] in postgres.query("SELECT mode FROM pg_locks"), "the lock")
         since = time.time()
@@ -142,7 +162,10 @@ def session_mode(program, folder, postgres, scan):
         check(status == 503 and took < 30, "session mode: a lock ends a request by lock_timeout", status, took)
         holder.kill()
         holder.wait()
-        postgres.query("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != " "pg_backend_pid()")
+        postgres.query(
+            "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE query LIKE '%pg_sleep%' AND pid != "
+            "pg_backend_pid()"
+        )
         check(until(service.is_ready, "readiness"), "session mode: ready again after the lock")
 
         pooler.end()
@@ -159,10 +182,18 @@ def session_mode(program, folder, postgres, scan):
                 if "DISCARD ALL" in text:
                     limited = None
                 elif "set_config(name, value" in text:
-                    names = ["lock_timeout", "statement_timeout", "idle_in_transaction_session_timeout", "ventriform.run"]
+                    names = [
+                        "lock_timeout",
+                        "statement_timeout",
+                        "idle_in_transaction_session_timeout",
+                        "ventriform.run",
+                    ]
                     limited = all(name in text for name in names)
                     sessions += limited
-                elif re.search(r"\b(FROM|INTO|UPDATE) (jobs|volumes|holdings|products)\b", text) and "LOCK TABLE" not in text:
+                elif (
+                    re.search(r"\b(FROM|INTO|UPDATE) (jobs|volumes|holdings|products)\b", text)
+                    and "LOCK TABLE" not in text
+                ):
                     # The start, which makes the tables, has no limit of time; nor has what this script asks.
                     unlimited += limited is False and "FROM jobs" in text
         check(sessions > 1, "session mode: sessions with all limits", sessions)
@@ -177,11 +208,25 @@ def refused(program, folder, postgres):
         pooler = PgBouncer(folder, postgres, mode)
         said, seconds = refusal(start(program, folder, pooler.url()))
         pooler.end()
-        check("status 0" not in said and "pool_mode = session" in said and seconds < 20, f"{mode} mode is refused: {said}", seconds)
+        check(
+            "status 0" not in said and "pool_mode = session" in said and seconds < 20,
+            f"{mode} mode is refused: {said}",
+            seconds,
+        )
     for what, auth, more, begins in [
-        ("a parameter that it does not know", "trust", dict(more="&options=-c%20statement_timeout%3D5000"), "unsupported startup parameter"),
+        (
+            "a parameter that it does not know",
+            "trust",
+            dict(more="&options=-c%20statement_timeout%3D5000"),
+            "unsupported startup parameter",
+        ),
         ("a database that it does not have", "trust", dict(database="elsewhere"), "no such database"),
-        ("a user whom it does not know", "scram-sha-256", dict(user="stranger:x"), "(no such user|.*authentication failed)"),
+        (
+            "a user whom it does not know",
+            "scram-sha-256",
+            dict(user="stranger:x"),
+            "(no such user|.*authentication failed)",
+        ),
         ("a wrong password", "scram-sha-256", dict(user="ventriform:wrong"), "(password|SASL) authentication failed"),
     ]:
         pooler = PgBouncer(folder, postgres, "session", auth=auth)

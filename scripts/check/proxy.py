@@ -66,8 +66,12 @@ def nginx(server, outside="", tls=False):
     port = free_port()
     home = f"{FOLDER}/nginx{port}"
     os.makedirs(home)
-    temporary = "".join(f"{kind}_temp_path {home}/{kind}; " for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
-    listen = f"{port} ssl; ssl_certificate {FOLDER}/cert.pem; ssl_certificate_key {FOLDER}/key.pem" if tls else str(port)
+    temporary = "".join(
+        f"{kind}_temp_path {home}/{kind}; " for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    )
+    listen = (
+        f"{port} ssl; ssl_certificate {FOLDER}/cert.pem; ssl_certificate_key {FOLDER}/key.pem" if tls else str(port)
+    )
     with open(f"{home}/conf", "w") as conf:
         conf.write(
             f"daemon off; pid {home}/pid; worker_processes 1; events {{}}\n"
@@ -75,7 +79,9 @@ def nginx(server, outside="", tls=False):
             f"server {{ listen 127.0.0.1:{listen}; server_name localhost; client_max_body_size 0;\n{server} }} }}\n"
         )
     log = open(f"{home}/log", "w")
-    children.append(subprocess.Popen(["nginx", "-c", f"{home}/conf", "-p", home, "-e", f"{home}/error"], stdout=log, stderr=log))
+    children.append(
+        subprocess.Popen(["nginx", "-c", f"{home}/conf", "-p", home, "-e", f"{home}/error"], stdout=log, stderr=log)
+    )
     listening(port)
     return port
 
@@ -99,7 +105,11 @@ def proxied(service, rest=""):
 
 
 def scan():
-    subprocess.run([PROGRAM, "phantom", "-o", f"{FOLDER}/phantom", "--size", "32", "--spacing", "6"], check=True, capture_output=True)
+    subprocess.run(
+        [PROGRAM, "phantom", "-o", f"{FOLDER}/phantom", "--size", "32", "--spacing", "6"],
+        check=True,
+        capture_output=True,
+    )
     with open(f"{FOLDER}/phantom/spect.nii.gz", "rb") as file:
         return file.read()
 
@@ -126,13 +136,18 @@ def early_refusals(plain, encrypted):
 
 def waiting(service, volume):
     port = nginx(proxied(service, "proxy_read_timeout 4s;"))
-    status, headers, _ = ask(port, "POST", "/v1/models?points=9000", volume, Prefer="wait=60", Content_Type="application/zip")
+    status, headers, _ = ask(
+        port, "POST", "/v1/models?points=9000", volume, Prefer="wait=60", Content_Type="application/zip"
+    )
     applied = headers.get("preference-applied")
     check(status in (200, 202) and applied == "wait=3", f"a long wait ends before the proxy's: {status}, {applied}")
     printed = subprocess.run([PROGRAM, "serve", "--print-config"], check=True, capture_output=True, text=True).stdout
     seconds = {name: int(value) for name, value in re.findall(r'^(\w+) = "(\d+)s"', printed, re.M)}
     check(seconds["wait_limit"] < 50, f"wait_limit {seconds['wait_limit']} s is below HAProxy's 50 s and nginx's 60 s")
-    check(seconds["keep_alive_timeout"] > 600, f"keep_alive_timeout {seconds['keep_alive_timeout']} s is above what proxies keep")
+    check(
+        seconds["keep_alive_timeout"] > 600,
+        f"keep_alive_timeout {seconds['keep_alive_timeout']} s is above what proxies keep",
+    )
     # It would keep the only worker.
     for job in json.loads(ask(port, "GET", "/v1/jobs?state=running")[2])["jobs"]:
         ask(port, "DELETE", job["links"]["self"])
@@ -144,7 +159,9 @@ def events(service, volume):
     job = json.loads(ask(port, "POST", "/v1/models?points=700&seed=7", volume)[2])
     stream = socket.create_connection(("127.0.0.1", port), PATIENCE)
     begun, times, text = time.monotonic(), [], b""
-    stream.sendall(f"GET {job['links']['events']} HTTP/1.1\r\nHost: localhost\r\nAccept: text/event-stream\r\n\r\n".encode())
+    stream.sendall(
+        f"GET {job['links']['events']} HTTP/1.1\r\nHost: localhost\r\nAccept: text/event-stream\r\n\r\n".encode()
+    )
     while b'"state":"succeeded"' not in text and time.monotonic() < begun + PATIENCE:
         piece = stream.recv(65536)
         if not piece:
@@ -153,7 +170,10 @@ def events(service, volume):
         times.append(time.monotonic() - begun)
     stream.close()
     check(b'"state":"succeeded"' in text, "events until the end of the job")
-    check(len(times) > 1 and times[0] < times[-1] / 2 + 0.05, f"events come one by one, at {[round(t, 2) for t in times][:6]} s")
+    check(
+        len(times) > 1 and times[0] < times[-1] / 2 + 0.05,
+        f"events come one by one, at {[round(t, 2) for t in times][:6]} s",
+    )
 
 
 def usable(port, page_path, tls, prefix):
@@ -178,20 +198,37 @@ def usable(port, page_path, tls, prefix):
     links = [link for link in job["links"].values() if link and not link.endswith("/events")]
     got = {link: ask(port, "GET", link, tls=tls)[0] for link in links}
     check(links and set(got.values()) == {200}, f"links of a job: {got}")
-    status, headers, body = ask(port, "POST", f"{prefix}/v1/jobs", json.dumps({"kind": "model", "volume": job["volume"], "parameters": {"points": 67}}), tls=tls, content_type="application/json")
+    status, headers, body = ask(
+        port,
+        "POST",
+        f"{prefix}/v1/jobs",
+        json.dumps({"kind": "model", "volume": job["volume"], "parameters": {"points": 67}}),
+        tls=tls,
+        content_type="application/json",
+    )
     location = headers.get("location")
-    check(status in (200, 202) and ask(port, "GET", location, tls=tls)[0] == 200, f"Location of a filed job: {location}")
+    check(
+        status in (200, 202) and ask(port, "GET", location, tls=tls)[0] == 200, f"Location of a filed job: {location}"
+    )
 
 
 def addresses(trusting, based, stranger):
-    told = "proxy_set_header X-Forwarded-Prefix /heart; proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header " "X-Forwarded-Host $http_host;"
+    told = (
+        "proxy_set_header X-Forwarded-Prefix /heart; proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header "
+        "X-Forwarded-Host $http_host;"
+    )
     stripped = nginx(f"location /heart/ {{ proxy_pass http://127.0.0.1:{trusting.port}/; {told} }}")
     usable(stripped, "/heart/", False, "/heart")
     tls = nginx(f"location /heart/ {{ proxy_pass http://127.0.0.1:{trusting.port}/; {told} }}", tls=True)
     usable(tls, "/heart/", True, "/heart")
-    root = nginx(proxied(trusting, "proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header X-Forwarded-Host $http_host;"), tls=True)
+    root = nginx(
+        proxied(trusting, "proxy_set_header X-Forwarded-Proto $scheme; proxy_set_header X-Forwarded-Host $http_host;"),
+        tls=True,
+    )
     usable(root, "/", True, "")
-    whole = nginx(f"location /apps/heart {{ proxy_pass http://127.0.0.1:{based.port}; proxy_set_header Host $http_host; }}")
+    whole = nginx(
+        f"location /apps/heart {{ proxy_pass http://127.0.0.1:{based.port}; proxy_set_header Host $http_host; }}"
+    )
     usable(whole, "/apps/heart", False, "/apps/heart")
     # Who is not trusted changes nothing, but the page still finds its files.
     other = nginx(f"location /heart/ {{ proxy_pass http://127.0.0.1:{stranger.port}/; {told} }}")
@@ -206,7 +243,9 @@ def addresses(trusting, based, stranger):
 def idle_connections(service):
     """Requests at the end of `header_timeout`, which is not the end of an idle connection."""
     upstream = f"upstream service {{ server 127.0.0.1:{service.port}; keepalive 32; }}"
-    port = nginx("location / { proxy_pass http://service; proxy_http_version 1.1; proxy_set_header Connection ''; }", upstream)
+    port = nginx(
+        "location / { proxy_pass http://service; proxy_http_version 1.1; proxy_set_header Connection ''; }", upstream
+    )
     got = collections.Counter()
 
     def one(number):
@@ -223,7 +262,9 @@ def idle_connections(service):
 def main():
     subject = ["-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-days", "1"]
     new = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes"]
-    subprocess.run(new + ["-keyout", f"{FOLDER}/key.pem", "-out", f"{FOLDER}/cert.pem"] + subject, check=True, capture_output=True)
+    subprocess.run(
+        new + ["-keyout", f"{FOLDER}/key.pem", "-out", f"{FOLDER}/cert.pem"] + subject, check=True, capture_output=True
+    )
     volume = scan()
     certificate = ("--tls-cert", f"{FOLDER}/cert.pem", "--tls-key", f"{FOLDER}/key.pem")
     early_refusals(

@@ -11,6 +11,7 @@ and no other fault.
 
 Needs what scripts/check/chaos.py needs. The last line is a JSON object; the exit status is 0 if nothing was lost.
 """
+
 import argparse
 import json
 import os
@@ -50,7 +51,9 @@ def main():
     parser.add_argument("--old", required=True)
     parser.add_argument("--new", required=True)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=chaos.JOBS, help="jobs of a step; fewer for programs that are not optimised")
+    parser.add_argument(
+        "--jobs", type=int, default=chaos.JOBS, help="jobs of a step; fewer for programs that are not optimised"
+    )
     options = parser.parse_args()
     chaos.JOBS = options.jobs
     options.only, options.program = None, options.old

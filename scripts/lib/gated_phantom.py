@@ -6,6 +6,7 @@ FOLDER holds spect.nii.gz and lv_truth.nii.gz of `ventriform phantom`. Writes a 
 End systole lies at three eighths of the cycle, where every length about the heart is a tenth shorter and the counts are
 the same: a beat for checks of files, not of figures.
 """
+
 import sys
 
 import nibabel

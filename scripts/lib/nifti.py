@@ -1,4 +1,5 @@
 """NIfTI-1 files for the scripts, with nothing but Python."""
+
 import struct
 
 # Data type: code in the header, bits, and the letter of `struct`.

@@ -1,4 +1,5 @@
 """A nuclear medicine (NM) image as a DICOM file, for the scripts."""
+
 import numpy as np
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import ExplicitVRLittleEndian

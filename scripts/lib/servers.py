@@ -1,4 +1,5 @@
 """Servers of other programs as processes of a script's own: PostgreSQL, and S3 by moto."""
+
 import glob
 import os
 import shutil
@@ -22,8 +23,11 @@ def run(*command, **options):
 def s3_server():
     """Starts moto with the bucket `hearts`; the process and its port."""
     port = free_port()
-    process = subprocess.Popen([sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     bucket = ["curl", "-fs", "-X", "PUT", f"http://127.0.0.1:{port}/hearts"]
     for _ in range(300):
         if subprocess.run(bucket, capture_output=True).returncode == 0:
@@ -48,7 +52,20 @@ class Postgres:
         os.makedirs(self.data)
         if AS_POSTGRES:
             shutil.chown(self.data, "postgres", "postgres")
-        run(*AS_POSTGRES, self.bin + "initdb", "-A", "trust", "-U", "ventriform", "-E", "UTF8", "--no-locale", "-N", self.data, cwd="/")
+        run(
+            *AS_POSTGRES,
+            self.bin + "initdb",
+            "-A",
+            "trust",
+            "-U",
+            "ventriform",
+            "-E",
+            "UTF8",
+            "--no-locale",
+            "-N",
+            self.data,
+            cwd="/",
+        )
         with open(self.data + "/pg_hba.conf", "a") as file:
             file.writelines(f"host all all {address}/32 trust\n" for address in others)
         self.start()

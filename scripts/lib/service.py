@@ -3,6 +3,7 @@ again.
 
 Needs Python and nothing else. Its log is DATA.log unless another is named.
 """
+
 import http.client
 import json
 import os

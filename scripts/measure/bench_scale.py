@@ -10,6 +10,7 @@ One replica that answers requests, over PostgreSQL and an S3 store (moto).
 4. With ROWS ended jobs: 100 claims a second, and 1, 2 and 4 processes whose jobs sleep (benches/queue.rs).
 Prints medians; quiet machines only. Needs what scripts/check/chaos.py needs.
 """
+
 import argparse
 import gzip
 import http.client
@@ -36,15 +37,31 @@ class Bench:
         self.postgres = Postgres(folder, ["127.0.0.1"], ["shared_preload_libraries=pg_stat_statements"])
         self.postgres.query("CREATE EXTENSION pg_stat_statements")
         self.store, self.store_port = s3_server()
-        os.environ |= {"AWS_ACCESS_KEY_ID": "bench", "AWS_SECRET_ACCESS_KEY": "bench", "AWS_REGION": "us-east-1",
-                       "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.store_port}"}
+        os.environ |= {
+            "AWS_ACCESS_KEY_ID": "bench",
+            "AWS_SECRET_ACCESS_KEY": "bench",
+            "AWS_REGION": "us-east-1",
+            "AWS_ENDPOINT_URL": f"http://127.0.0.1:{self.store_port}",
+        }
         self.count = 0
         self.api = self.start("api")
 
     def start(self, role):
         self.count += 1
-        return Service(self.program, f"{self.folder}/{role}-{self.count}", "--role", role, "--workers", "1",
-                       "--database", self.postgres.url("127.0.0.1"), "--blobs", "s3://hearts/bench", "--queue-limit", "1000000")
+        return Service(
+            self.program,
+            f"{self.folder}/{role}-{self.count}",
+            "--role",
+            role,
+            "--workers",
+            "1",
+            "--database",
+            self.postgres.url("127.0.0.1"),
+            "--blobs",
+            "s3://hearts/bench",
+            "--queue-limit",
+            "1000000",
+        )
 
     def jobs_per_second(self, workers, seed):
         """All jobs are waiting when the workers start; the time is from the first start to the last end."""
@@ -61,7 +78,9 @@ class Bench:
         for service in services:
             service.stop()
         # The first and the last tenth are left out: workers start and end one after the other.
-        rows = self.postgres.query(f"SELECT finished_at FROM jobs WHERE volume = '{volume}' AND state = 'succeeded' ORDER BY 1")
+        rows = self.postgres.query(
+            f"SELECT finished_at FROM jobs WHERE volume = '{volume}' AND state = 'succeeded' ORDER BY 1"
+        )
         ends = [int(row[0]) for row in rows]
         assert len(ends) == self.options.jobs, f"{len(ends)} succeeded"
         cut = len(ends) // 10
@@ -74,8 +93,12 @@ class Bench:
             for workers, rates in found.items():
                 rates.append(self.jobs_per_second(workers, 10 * turn + workers))
         for workers, rates in found.items():
-            print(f"{workers} workers: {statistics.median(rates):.2f} jobs/s, " f"{statistics.median(rates) / workers:.2f} each "
-                  f"({', '.join(f'{rate:.2f}' for rate in rates)})", flush=True)
+            print(
+                f"{workers} workers: {statistics.median(rates):.2f} jobs/s, "
+                f"{statistics.median(rates) / workers:.2f} each "
+                f"({', '.join(f'{rate:.2f}' for rate in rates)})",
+                flush=True,
+            )
 
     def uploads(self):
         def put(number):
@@ -114,41 +137,62 @@ class Bench:
                 started = time.perf_counter()
                 assert self.api.ask("GET", path)[0] == 200
                 times.append(time.perf_counter() - started)
-            print(f"{when}, GET {path}: median {statistics.median(times) * 1e3:.1f} ms, p99 " f"{sorted(times)[98] * 1e3:.1f} ms", flush=True)
+            print(
+                f"{when}, GET {path}: median {statistics.median(times) * 1e3:.1f} ms, p99 "
+                f"{sorted(times)[98] * 1e3:.1f} ms",
+                flush=True,
+            )
 
     def copies(self, state, count):
         """Rows of jobs in the table, like one that succeeded."""
-        columns = self.postgres.query("SELECT column_name FROM information_schema.columns WHERE table_name = 'jobs' "
-                                      "AND column_name NOT IN ('sequence', 'id', 'idempotency_key', 'state')")
+        columns = self.postgres.query(
+            "SELECT column_name FROM information_schema.columns WHERE table_name = 'jobs' "
+            "AND column_name NOT IN ('sequence', 'id', 'idempotency_key', 'state')"
+        )
         rest = ", ".join(row[0] for row in columns)
         # Without triggers: a million notifications would keep the replicas busy for minutes.
-        self.postgres.query("SET session_replication_role = replica; "
-                            f"INSERT INTO jobs (id, state, {rest}) SELECT 'job_' || md5('{state}' || n), '{state}', {rest} "
-                            f"FROM (SELECT * FROM jobs WHERE state = 'succeeded' LIMIT 1) one, generate_series(1, {count}) n")
+        self.postgres.query(
+            "SET session_replication_role = replica; "
+            f"INSERT INTO jobs (id, state, {rest}) SELECT 'job_' || md5('{state}' || n), '{state}', {rest} "
+            f"FROM (SELECT * FROM jobs WHERE state = 'succeeded' LIMIT 1) one, generate_series(1, {count}) n"
+        )
         # What the server does after so many rows at once is no part of any figure.
         self.postgres.query("VACUUM (ANALYZE) jobs")
         self.postgres.query("CHECKPOINT")
 
     def full_tables(self):
         self.lists("few jobs")
-        count = ("SELECT xact_commit, pg_current_wal_lsn() - '0/0', (SELECT sum(calls) FROM pg_stat_statements "
-                 "WHERE query LIKE '%pg_advisory_xact_lock%') FROM pg_stat_database WHERE datname = 'ventriform'")
+        count = (
+            "SELECT xact_commit, pg_current_wal_lsn() - '0/0', (SELECT sum(calls) FROM pg_stat_statements "
+            "WHERE query LIKE '%pg_advisory_xact_lock%') FROM pg_stat_database WHERE datname = 'ventriform'"
+        )
         time.sleep(1)
         start = [float(part) for part in self.postgres.query(count)[0]]
         before = self.jobs_per_second(2, 101)
         time.sleep(1)
-        transactions, written, alone = ((float(end) - start) / self.options.jobs for end, start in zip(self.postgres.query(count)[0], start))
-        print(f"a job: {transactions:.1f} transactions (idle polls among them), {alone:.1f} of them one after the other, "
-              f"{written / 1024:.1f} KiB of write-ahead log", flush=True)
+        transactions, written, alone = (
+            (float(end) - start) / self.options.jobs for end, start in zip(self.postgres.query(count)[0], start)
+        )
+        print(
+            f"a job: {transactions:.1f} transactions (idle polls among them), {alone:.1f} of them one after the other, "
+            f"{written / 1024:.1f} KiB of write-ahead log",
+            flush=True,
+        )
         self.copies("succeeded", self.options.rows)
-        table, indexes, rows = map(int, self.postgres.query("SELECT pg_table_size('jobs'), pg_indexes_size('jobs'), count(*) FROM jobs")[0])
+        table, indexes, rows = map(
+            int, self.postgres.query("SELECT pg_table_size('jobs'), pg_indexes_size('jobs'), count(*) FROM jobs")[0]
+        )
         print(f"{rows} jobs: {table / rows:.0f} bytes a row, {indexes / rows:.0f} bytes of indexes", flush=True)
         self.lists(f"{rows} jobs")
         after = self.jobs_per_second(2, 102)
         print(f"2 workers: {before:.2f} jobs/s before, {after:.2f} with {rows} ended jobs in the table", flush=True)
 
     def sleepers(self):
-        environment = {**os.environ, "VENTRIFORM_DATABASE": self.postgres.url("127.0.0.1"), "VENTRIFORM_BLOBS": "s3://hearts/bench"}
+        environment = {
+            **os.environ,
+            "VENTRIFORM_DATABASE": self.postgres.url("127.0.0.1"),
+            "VENTRIFORM_BLOBS": "s3://hearts/bench",
+        }
         subprocess.run(["cargo", "bench", "--quiet", "--bench", "queue"], cwd=ROOT, env=environment, check=True)
 
     def end(self):

@@ -10,6 +10,7 @@ round, so that what else the machine does meets all. Prints the median of each a
 
 Needs the Debian packages orthanc and wrk, and the Python packages of scripts/requirements.txt.
 """
+
 import argparse
 import base64
 import http.client
@@ -120,13 +121,22 @@ def ventriform(name, program, folder):
 def orthanc(folder):
     port = free_port()
     settings = {
-        "StorageDirectory": str(folder / "orthanc"), "IndexDirectory": str(folder / "orthanc"), "HttpPort": port,
-        "DicomServerEnabled": False, "RemoteAccessAllowed": False, "AuthenticationEnabled": True,
-        "RegisteredUsers": {USER: PASSWORD}, "SyncStorageArea": True, "KeepAlive": True, "TcpNoDelay": True,
+        "StorageDirectory": str(folder / "orthanc"),
+        "IndexDirectory": str(folder / "orthanc"),
+        "HttpPort": port,
+        "DicomServerEnabled": False,
+        "RemoteAccessAllowed": False,
+        "AuthenticationEnabled": True,
+        "RegisteredUsers": {USER: PASSWORD},
+        "SyncStorageArea": True,
+        "KeepAlive": True,
+        "TcpNoDelay": True,
     }
     (folder / "orthanc.json").write_text(json.dumps(settings))
     basic = base64.b64encode(f"{USER}:{PASSWORD}".encode()).decode()
-    process = subprocess.Popen(["Orthanc", str(folder / "orthanc.json")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        ["Orthanc", str(folder / "orthanc.json")], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     server = Server("Orthanc", process, port, f"Basic {basic}", "/instances")
     for _ in range(500):
         try:
@@ -180,8 +190,13 @@ class Stored:
         self.model = shown["model"]
 
     def paths(self):
-        return ["/healthz", f"/v1/volumes/{self.volume}", f"/v1/jobs/{self.job}", f"/v1/models/{self.model}",
-                f"/v1/models/{self.model}/mesh.stl"]
+        return [
+            "/healthz",
+            f"/v1/volumes/{self.volume}",
+            f"/v1/jobs/{self.job}",
+            f"/v1/models/{self.model}",
+            f"/v1/models/{self.model}/mesh.stl",
+        ]
 
     def beside_its_work(self, measure):
         """A measurement while all workers compute."""
@@ -198,20 +213,30 @@ class Stored:
 
 def bench(servers, files, scan, rounds):
     for turn, clients in enumerate((1, 4)):
+
         def part(i):
-            return files[10 * (turn * rounds + i):][:10]
-        compare(f"uploads of 8 MiB, {clients} at a time", "MiB/s", rounds,
-                sides(servers, lambda server, i: server.upload(part(i), clients)))
+            return files[10 * (turn * rounds + i) :][:10]
+
+        compare(
+            f"uploads of 8 MiB, {clients} at a time",
+            "MiB/s",
+            rounds,
+            sides(servers, lambda server, i: server.upload(part(i), clients)),
+        )
     *versions, theirs = servers
     stored = [Stored(server, scan) for server in versions]
     instance = theirs.json("GET", "/instances")[0]
     of_orthanc = ["/system", *[f"/instances/{instance}"] * 3, f"/instances/{instance}/simplified-tags"]
+
     def idle(each, measure):
         return measure()
+
     for state, beside in (("idle", idle), ("all workers busy", Stored.beside_its_work)):
         for number, other in enumerate(of_orthanc):
-            measured = {each.server.name: lambda i, each=each: beside(
-                each, lambda: each.server.requests(each.paths()[number])) for each in stored}
+            measured = {
+                each.server.name: lambda i, each=each: beside(each, lambda: each.server.requests(each.paths()[number]))
+                for each in stored
+            }
             # Orthanc computes nothing: today's workers compete with it as with their own service.
             measured[theirs.name] = lambda i: beside(stored[0], lambda: theirs.requests(other))
             name = re.sub(r"/[a-z]{3}_\w+", "/ID", stored[0].paths()[number])

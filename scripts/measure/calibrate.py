@@ -19,6 +19,7 @@ model is estimated from, and kept within four standard deviations; those of the 
 
 {reproduced}
 """
+
 import argparse
 import csv
 import math
@@ -58,7 +59,9 @@ EVERY_SET = [*SHAPE, *PROJECTIONS, "2101", "2103", "2104", "5001", "9301"]
 
 def good(wall):
     """1 for a good fit of the wall, None for a refused scan or one without a heart."""
-    return lambda row: None if row[f"jaccard_{wall}"] is None or not row["heart"] else float(row[f"jaccard_{wall}"] >= 0.75)
+    return lambda row: (
+        None if row[f"jaccard_{wall}"] is None or not row["heart"] else float(row[f"jaccard_{wall}"] >= 0.75)
+    )
 
 
 def bad(wall):
@@ -108,42 +111,91 @@ def log_size(row):
 def of_set(wall):
     """Terms of a good fit by several models. The wall of a small or a large heart agrees less with a fitted one that
     lies off by as much."""
-    return {"mean log odds": figure(f"log_odds_{wall}"), f"ln cavity / {USUAL_CAVITY_ML:g} ml": log_size,
-            "its square": lambda row: log_size(row) ** 2}
+    return {
+        "mean log odds": figure(f"log_odds_{wall}"),
+        f"ln cavity / {USUAL_CAVITY_ML:g} ml": log_size,
+        "its square": lambda row: log_size(row) ** 2,
+    }
 
 
 OF_VIEWS = {"dark": figure("dark"), "ln gain": log_gain}
-OF_FIT = {"active": figure("active"), "ln thickness spread / mm": log("thickness_spread_mm", 0.1), "strain": figure("strain"),
-          "ln unroundness": log("unroundness", 1e-3), "hollowness": figure("hollowness")}
+OF_FIT = {
+    "active": figure("active"),
+    "ln thickness spread / mm": log("thickness_spread_mm", 0.1),
+    "strain": figure("strain"),
+    "ln unroundness": log("unroundness", 1e-3),
+    "hollowness": figure("hollowness"),
+}
 
 MODELS = {
     "BAD_FIT_APPARENT": dict(
-        doc="A fit of the apparent wall with a Jaccard index below 0.75.", sets=ONE_FIT, target=bad("apparent"), terms=OF_FIT),
+        doc="A fit of the apparent wall with a Jaccard index below 0.75.",
+        sets=ONE_FIT,
+        target=bad("apparent"),
+        terms=OF_FIT,
+    ),
     "BAD_FIT_ANATOMICAL": dict(
-        doc="A fit of the anatomical wall with a Jaccard index below 0.75.", sets=ONE_FIT, target=bad("anatomical"), terms=OF_FIT),
+        doc="A fit of the anatomical wall with a Jaccard index below 0.75.",
+        sets=ONE_FIT,
+        target=bad("anatomical"),
+        terms=OF_FIT,
+    ),
     "MOTION_BY_SHAPE": dict(
-        doc="Motion, by the shape of the wall.", sets=SHAPE, target=moved,
-        terms={"active": figure("active"), "ln thickness spread / mm": log("thickness_spread_mm", 0.1), "ln cavity / ml": log("cavity_ml", 0.1),
-               "slenderness": figure("slenderness"), "ln unroundness": log("unroundness", 1e-3), "offset": figure("offset"),
-               "dark": figure("dark"), "beside": figure("beside")}),
+        doc="Motion, by the shape of the wall.",
+        sets=SHAPE,
+        target=moved,
+        terms={
+            "active": figure("active"),
+            "ln thickness spread / mm": log("thickness_spread_mm", 0.1),
+            "ln cavity / ml": log("cavity_ml", 0.1),
+            "slenderness": figure("slenderness"),
+            "ln unroundness": log("unroundness", 1e-3),
+            "offset": figure("offset"),
+            "dark": figure("dark"),
+            "beside": figure("beside"),
+        },
+    ),
     "HEART_FITTED": dict(
-        doc="A left ventricle where the model was fitted.", sets=SIZE, target=is_heart,
-        terms={"hollowness": figure("hollowness"), "agreement": figure("agreement"), "search": figure("search")}),
+        doc="A left ventricle where the model was fitted.",
+        sets=SIZE,
+        target=is_heart,
+        terms={"hollowness": figure("hollowness"), "agreement": figure("agreement"), "search": figure("search")},
+    ),
     "GOOD_SET_APPARENT": dict(
-        doc="A good fit of the apparent wall, by the fits of several models, without projections.", sets=EVERY_SET, raw=True,
-        target=good("apparent"), terms=of_set("apparent")),
+        doc="A good fit of the apparent wall, by the fits of several models, without projections.",
+        sets=EVERY_SET,
+        raw=True,
+        target=good("apparent"),
+        terms=of_set("apparent"),
+    ),
     "GOOD_SET_ANATOMICAL": dict(
-        doc="A good fit of the anatomical wall, likewise.", sets=EVERY_SET, raw=True,
-        target=good("anatomical"), terms=of_set("anatomical")),
+        doc="A good fit of the anatomical wall, likewise.",
+        sets=EVERY_SET,
+        raw=True,
+        target=good("anatomical"),
+        terms=of_set("anatomical"),
+    ),
     "GOOD_SET_APPARENT_BY_PROJECTIONS": dict(
-        doc="A good fit of the apparent wall, by the fits of several models and the projections.", sets=EVERY_SET, raw=True,
-        target=good("apparent"), terms={**of_set("apparent"), **OF_VIEWS}),
+        doc="A good fit of the apparent wall, by the fits of several models and the projections.",
+        sets=EVERY_SET,
+        raw=True,
+        target=good("apparent"),
+        terms={**of_set("apparent"), **OF_VIEWS},
+    ),
     "GOOD_SET_ANATOMICAL_BY_PROJECTIONS": dict(
-        doc="A good fit of the anatomical wall, likewise.", sets=EVERY_SET, raw=True,
-        target=good("anatomical"), terms={**of_set("anatomical"), **OF_VIEWS}),
+        doc="A good fit of the anatomical wall, likewise.",
+        sets=EVERY_SET,
+        raw=True,
+        target=good("anatomical"),
+        terms={**of_set("anatomical"), **OF_VIEWS},
+    ),
     "MOTION_BY_PROJECTIONS": dict(
-        doc="Motion, by the projections and the shape of the wall.", sets=PROJECTIONS, raw=True,
-        target=moved, terms={"ln gain": log_gain, "log odds by shape": of_shape}),
+        doc="Motion, by the projections and the shape of the wall.",
+        sets=PROJECTIONS,
+        raw=True,
+        target=moved,
+        terms={"ln gain": log_gain, "log odds by shape": of_shape},
+    ),
 }
 
 HEADER = f"""\
@@ -164,9 +216,14 @@ def committed():
     """{model: (intercept, terms)} of the file as it is."""
     number = r"(-?[0-9.]+)"
     models = {}
-    for name, intercept, body in re.findall(rf"const (\w+): Logistic = Logistic {{\s+intercept: {number},\s+terms: &\[(.*?)\],\n", OUTPUT.read_text(), re.S):
+    for name, intercept, body in re.findall(
+        rf"const (\w+): Logistic = Logistic {{\s+intercept: {number},\s+terms: &\[(.*?)\],\n", OUTPUT.read_text(), re.S
+    ):
         terms = re.findall(rf'Term::new\("([^"]+)", {number}, {number}, {number}\)', body)
-        models[name] = float(intercept), [dict(name=n, mean=float(m), sd=float(s), weight=float(w)) for n, m, s, w in terms]
+        models[name] = (
+            float(intercept),
+            [dict(name=n, mean=float(m), sd=float(s), weight=float(w)) for n, m, s, w in terms],
+        )
     return models
 
 
@@ -179,9 +236,17 @@ def layout(models):
     text = HEADER
     for name, model in MODELS.items():
         intercept, terms = models[name]
-        calls = [f"Term::new(\"{t['name']}\", {literal(t['mean'], 4)}, {literal(t['sd'], 4)}, {literal(t['weight'], 3)})" for t in terms]
-        array = f"[{calls[0]}]" if len(calls) == 1 else "[\n" + "".join(f"        {call},\n" for call in calls) + "    ]"
-        text += f"/// {model['doc']}\npub const {name}: Logistic = Logistic {{\n    intercept: " f"{literal(intercept, 3)},\n    terms: &{array},\n}};\n\n"
+        calls = [
+            f'Term::new("{t["name"]}", {literal(t["mean"], 4)}, {literal(t["sd"], 4)}, {literal(t["weight"], 3)})'
+            for t in terms
+        ]
+        array = (
+            f"[{calls[0]}]" if len(calls) == 1 else "[\n" + "".join(f"        {call},\n" for call in calls) + "    ]"
+        )
+        text += (
+            f"/// {model['doc']}\npub const {name}: Logistic = Logistic {{\n    intercept: "
+            f"{literal(intercept, 3)},\n    terms: &{array},\n}};\n\n"
+        )
     return text.rstrip("\n") + "\n"
 
 
@@ -208,7 +273,11 @@ def logistic(x, y, ridge):
 def auc(score, y):
     """Share of pairs of a 1 and a 0 of which the 1 has the greater score."""
     ones, zeros = score[y == 1], score[y == 0]
-    return float(np.mean(ones[:, None] > zeros) + 0.5 * np.mean(ones[:, None] == zeros)) if len(ones) and len(zeros) else math.nan
+    return (
+        float(np.mean(ones[:, None] > zeros) + 0.5 * np.mean(ones[:, None] == zeros))
+        if len(ones) and len(zeros)
+        else math.nan
+    )
 
 
 def selected(model, table):
@@ -261,9 +330,13 @@ def compare(table):
         for a, b in zip(before[name][1], after[1]):
             cells = [f"{t['mean']:9.4f} {t['sd']:8.4f} {t['weight']:8.3f}" for t in (a, b)]
             print(f"  {a['name']:26}{cells[0]:>27}{cells[1]:>27}{b['weight'] - a['weight']:+20.3f}")
-        print(f"  area under the curve {auc(old, y):.3f} committed, {auc(new, y):.3f} estimated (in-sample); chances " f"differ by "
-              f"{np.mean(np.abs(chance[0] - chance[1])):.3f} in the mean, {np.abs(chance[0] - chance[1]).max():.3f} " f"at most, "
-              f"correlation of the log odds {np.corrcoef(old, new)[0, 1]:.3f}\n")
+        print(
+            f"  area under the curve {auc(old, y):.3f} committed, {auc(new, y):.3f} estimated (in-sample); chances "
+            f"differ by "
+            f"{np.mean(np.abs(chance[0] - chance[1])):.3f} in the mean, {np.abs(chance[0] - chance[1]).max():.3f} "
+            f"at most, "
+            f"correlation of the log odds {np.corrcoef(old, new)[0, 1]:.3f}\n"
+        )
 
 
 FOLDS = 10
@@ -294,15 +367,20 @@ def reliability(table, chances_of):
     """Prints how often fits are good, by the tenth of the chance that `chances_of` gives them."""
     for name in ("GOOD_SET_APPARENT_BY_PROJECTIONS", "GOOD_SET_ANATOMICAL_BY_PROJECTIONS"):
         p, y, moved = (np.array(column) for column in zip(*chances_of(name, table)))
-        print(f"{name}: {len(y)} scans, {int((1 - y).sum())} of them bad; area under the curve {auc(p, y):.3f}, of the "
-              f"{int((~moved).sum())} without motion ({int((1 - y[~moved]).sum())} bad) {auc(p[~moved], y[~moved]):.3f}; "
-              f"Brier score {np.mean((p - y) ** 2):.3f}")
+        print(
+            f"{name}: {len(y)} scans, {int((1 - y).sum())} of them bad; area under the curve {auc(p, y):.3f}, of the "
+            f"{int((~moved).sum())} without motion ({int((1 - y[~moved]).sum())} bad) {auc(p[~moved], y[~moved]):.3f}; "
+            f"Brier score {np.mean((p - y) ** 2):.3f}"
+        )
         for tenth in range(10):
             inside = (10 * p).astype(int).clip(0, 9) == tenth
             if inside.any():
                 error = math.sqrt(max(p[inside].mean() * (1 - p[inside].mean()), 1e-9) / inside.sum())
-                print(f"  {tenth / 10:.1f} to {(tenth + 1) / 10:.1f}: {int(inside.sum()):4} scans, mean chance " f"{p[inside].mean():.2f}, "
-                      f"good {y[inside].mean():.2f} (standard error {error:.2f})")
+                print(
+                    f"  {tenth / 10:.1f} to {(tenth + 1) / 10:.1f}: {int(inside.sum()):4} scans, mean chance "
+                    f"{p[inside].mean():.2f}, "
+                    f"good {y[inside].mean():.2f} (standard error {error:.2f})"
+                )
 
 
 def main():
@@ -310,10 +388,28 @@ def main():
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--table", type=pathlib.Path, default=TABLE, help="table of features (CSV)")
     action = parser.add_mutually_exclusive_group(required=True)
-    action.add_argument("--check", action="store_true", help="compare the estimate with the constants as committed; 1 if the file is not laid out as --layout would")
-    action.add_argument("--write", nargs="*", choices=MODELS, metavar="MODEL", help="write the estimated constants of all models or of these")
-    action.add_argument("--reliability", action="store_true", help="how often fits are good that have a chance, each tenth of the scans left out in turn")
-    action.add_argument("--held-out", action="store_true", help="the same by the committed constants, of scans (--table) that those do not come from")
+    action.add_argument(
+        "--check",
+        action="store_true",
+        help="compare the estimate with the constants as committed; 1 if the file is not laid out as --layout would",
+    )
+    action.add_argument(
+        "--write",
+        nargs="*",
+        choices=MODELS,
+        metavar="MODEL",
+        help="write the estimated constants of all models or of these",
+    )
+    action.add_argument(
+        "--reliability",
+        action="store_true",
+        help="how often fits are good that have a chance, each tenth of the scans left out in turn",
+    )
+    action.add_argument(
+        "--held-out",
+        action="store_true",
+        help="the same by the committed constants, of scans (--table) that those do not come from",
+    )
     action.add_argument("--layout", action="store_true", help="write the committed constants again")
     a = parser.parse_args()
     if a.layout:
@@ -325,7 +421,11 @@ def main():
         return 0
     if a.write is not None:
         chosen, before = a.write or MODELS, committed()
-        OUTPUT.write_text(layout({name: estimate(model, table)[0] if name in chosen else before[name] for name, model in MODELS.items()}))
+        OUTPUT.write_text(
+            layout(
+                {name: estimate(model, table)[0] if name in chosen else before[name] for name, model in MODELS.items()}
+            )
+        )
         return 0
     compare(table)
     if OUTPUT.read_text() != layout(committed()):

@@ -27,8 +27,20 @@ def make(program, out, seed, cases):
     for number in range(cases):
         spacing = rng.choice([3.2, 4.0, 4.8, 6.4, 6.4, 6.8])
         size = rng.choice([64, 64, 72, 80]) if spacing >= 4.8 else rng.choice([80, 96])
-        flags = ["--size", size, "--spacing", spacing, "--seed", rng.randrange(10_000), "--noise", rng.choice([0.02, 0.05, 0.08]),
-                 "--liver", rng.choice([0, 0.2, 0.3, 0.5, 0.7, 1.2]), "--right-ventricle", rng.choice([0, 0.2, 0.3, 0.5])]
+        flags = [
+            "--size",
+            size,
+            "--spacing",
+            spacing,
+            "--seed",
+            rng.randrange(10_000),
+            "--noise",
+            rng.choice([0.02, 0.05, 0.08]),
+            "--liver",
+            rng.choice([0, 0.2, 0.3, 0.5, 0.7, 1.2]),
+            "--right-ventricle",
+            rng.choice([0, 0.2, 0.3, 0.5]),
+        ]
         for _ in range(rng.choice([0, 0, 1, 2])):
             flags += ["--defect", f"{rng.randint(1, 17)}:{rng.choice([0.4, 0.7, 0.9])}"]
         folder = f"{out}/{number:03d}"
@@ -38,8 +50,10 @@ def make(program, out, seed, cases):
 
 def lowest(rows, pair):
     """The lowest score of right images, and the highest of those whose axes were exchanged."""
+
     def total(row):
         return float(row[f"{pair}_ends"]) + float(row[f"{pair}_side"])
+
     right = [total(row) for row in rows if row["kind"] in ("whole", "cut-out")]
     exchanged = [total(row) for row in rows if row["kind"] == pair]
     return right, exchanged
@@ -69,8 +83,10 @@ def main():
             right, exchanged = lowest(half, pair)
             flagged = sum(score < limit for score in exchanged)
             wrong = sum(score < limit for score in right)
-            print(f"  {name}: {flagged} of {len(exchanged)} exchanged flagged (highest score {max(exchanged):.2f}), "
-                  f"{wrong} of {len(right)} right ones and cut-outs (lowest {min(right):.2f})")
+            print(
+                f"  {name}: {flagged} of {len(exchanged)} exchanged flagged (highest score {max(exchanged):.2f}), "
+                f"{wrong} of {len(right)} right ones and cut-outs (lowest {min(right):.2f})"
+            )
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ of the simulator of pairs (no part of this project):
   down again.
 - Quotient of the walls: four deviations of its logarithm.
 """
+
 import argparse
 import csv
 import pathlib
@@ -55,10 +56,25 @@ def write():
     gain = TURN_MARGIN * column(unchanged, "turn_gain").max()
     muscle = np.exp(MUSCLE_SDS * np.sqrt(np.mean(np.log(column(rows, "muscle")) ** 2)))
     constants = [
-        ("pub const DIFFERENCE_SD_POINTS", sd, 1,
-         "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's " "reference."),
-        ("pub(super) const SIGNIFICANT_TURN_GAIN", gain, 2, "Share by which a turn must lower the mean squared difference."),
-        ("pub const MOST_MUSCLE_QUOTIENT", muscle, 2, "Quotient of the walls' volumes beyond which they are hardly of one heart."),
+        (
+            "pub const DIFFERENCE_SD_POINTS",
+            sd,
+            1,
+            "Standard deviation of the smoothed difference where nothing changed, per cent of the rest map's "
+            "reference.",
+        ),
+        (
+            "pub(super) const SIGNIFICANT_TURN_GAIN",
+            gain,
+            2,
+            "Share by which a turn must lower the mean squared difference.",
+        ),
+        (
+            "pub const MOST_MUSCLE_QUOTIENT",
+            muscle,
+            2,
+            "Quotient of the walls' volumes beyond which they are hardly of one heart.",
+        ),
     ]
     text = HEADER
     for name, value, places, says in constants:
@@ -73,9 +89,15 @@ def check(table):
     print(f"TID: {len(rows)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, worst {abs(error).max():.3f}")
     sure = [row for row in rows if "tid_uncertain" not in row["flags"]]
     error = column(sure, "tid") - column(sure, "true_tid")
-    print(f"TID where it is not flagged: {len(sure)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, " f"worst {abs(error).max():.3f}")
+    print(
+        f"TID where it is not flagged: {len(sure)} pairs, bias {error.mean():+.3f}, SD {error.std(ddof=1):.3f}, "
+        f"worst {abs(error).max():.3f}"
+    )
     unchanged = without_reversible(rows)
-    print(f"unchanged: {len(unchanged)} pairs, largest reversible share {column(unchanged, 'reversible').max():.1f} " f"per cent")
+    print(
+        f"unchanged: {len(unchanged)} pairs, largest reversible share {column(unchanged, 'reversible').max():.1f} "
+        f"per cent"
+    )
     for strength in (20, 40, 60):
         own = [row for row in rows if row["kind"].endswith(str(strength))]
         found = [row for row in own if float(row["reversible"]) > FOUND_PERCENT]

@@ -8,8 +8,8 @@
 The tables are what the tools `beats` and `volumes` print. scripts/measure/calibration/beats.csv, for
 crates/ventriform/src/heart/beat/calibration.rs, has the studies of seeds 500 and 501, 20 each, and the set "dev" of the
 simulator of gated hearts; scripts/measure/calibration/volumes.csv, for
-crates/ventriform/src/heart/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans (neither
-is part of this project):
+crates/ventriform/src/heart/judge/volume_calibration.rs, the first 118 scans of seed 5001 of the simulator of scans
+(neither is part of this project):
 
     gated.py --out CASES --seed 500 --n 20
     cargo run --release -p ventriform-tools --bin beats -- CASES/* > TABLE
@@ -19,6 +19,7 @@ is part of this project):
 An error is found minus true (EF, points) or found over true minus 1 (volumes). Its variance is usual^2 + (dark share)^2
 + (small 60 ml / cavity)^2, by maximum likelihood of a normal distribution.
 """
+
 import argparse
 import csv
 import pathlib
@@ -63,8 +64,10 @@ def errors(name, table):
     with open(table, newline="") as file:
         lines = [line for line in file if line.count(",") > 5]
     rows = list(csv.DictReader(lines))
+
     def column(name):
         return np.array([float(row[name]) for row in rows])
+
     of = {}
     for constant, (figure, _) in figures.items():
         found, true = column(figure), column(f"true_{figure}")
@@ -84,7 +87,10 @@ def estimate(error, cavity, dark):
 
     scale = error.std()
     starts = [(error.mean(), scale * a, scale * b, scale * c) for a in (0.5, 1) for b in (0.5, 3) for c in (0.3, 1)]
-    found = min((minimize(cost, s, method="Nelder-Mead", options=dict(maxiter=4000, xatol=1e-6, fatol=1e-6)) for s in starts), key=lambda f: f.fun)
+    found = min(
+        (minimize(cost, s, method="Nelder-Mead", options=dict(maxiter=4000, xatol=1e-6, fatol=1e-6)) for s in starts),
+        key=lambda f: f.fun,
+    )
     return [found.x[0], *np.abs(found.x[1:])]
 
 
@@ -105,13 +111,19 @@ def report(name, table):
     terms = committed(name)
     for constant, error in of.items():
         off = np.abs(error - terms[constant][0]) / deviation(terms[constant], cavity, dark)
-        print(f"{constant}: {np.mean(off < HALF_WIDTH_SDS):.0%} of {len(off)} within the interval of 90 %; standard " f"deviation of error over deviation {np.sqrt(np.mean(off**2)):.2f}")
+        print(
+            f"{constant}: {np.mean(off < HALF_WIDTH_SDS):.0%} of {len(off)} within the interval of 90 %; standard "
+            f"deviation of error over deviation {np.sqrt(np.mean(off**2)):.2f}"
+        )
 
 
 def write(name):
     path, head, method, _, figures = FILES[name]
     of, cavity, dark = errors(name, TABLES / f"{name}.csv")
-    text = f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse " f"crate::numeric::error_terms::ErrorTerms;\n"
+    text = (
+        f"{head} Written by `scripts/measure/calibrate_intervals.py`: do not edit.\n//!\n{method}\n\nuse "
+        f"crate::numeric::error_terms::ErrorTerms;\n"
+    )
     for constant, (_, doc) in figures.items():
         terms = zip(TERMS, estimate(of[constant], cavity, dark))
         fields = "".join(f"    {key}: {float(f'{value:.3f}')},\n" for key, value in terms)

@@ -6,7 +6,7 @@
                                             tables
     calibrate_walls.py --layout             write the files again with the constants as they are
 
-The files are crates/ventriform/src/heart/deform/calibration.rs and crates/ventriform/src/heart/judge/uncertainty_calibration.rs.
+The files are heart/deform/calibration.rs and heart/judge/uncertainty_calibration.rs of crates/ventriform/src.
 The tables (scripts/measure/calibration/{rims,signal_ends,rays,nodes,smoothness}.csv, --tables for another folder) are
 made by
 
@@ -34,6 +34,7 @@ made by
 
 {reproduced}
 """
+
 import argparse
 import collections
 import csv
@@ -75,8 +76,19 @@ SPREAD_OFFSET_MM = 0.3
 SHARE = 0.68
 LEAST_DISTANCE_MM = 0.01
 
-RAY_FIELDS = ["constant", "thickness", "ln_radius", "ln_radius_squared", "thickness_here", "narrowness_here", "missing_uptake",
-              "missing_uptake_squared", "way", "way_squared", "nearness_to_apex"]
+RAY_FIELDS = [
+    "constant",
+    "thickness",
+    "ln_radius",
+    "ln_radius_squared",
+    "thickness_here",
+    "narrowness_here",
+    "missing_uptake",
+    "missing_uptake_squared",
+    "way",
+    "way_squared",
+    "nearness_to_apex",
+]
 NODE_FIELDS = ["constant", "seen", "ln_spread", "log_odds", "way", "way_squared"]
 WAVES = 7  # mean, cosine and sine of one to three times the angle
 RIDGE = 60.0
@@ -93,10 +105,23 @@ TERMS = {
     "RIM_DEVIATION": (WALLS, "RimDeviation", "Standard deviation of the height of a rim."),
     "INNER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the inner surface moves outward, mm."),
     "OUTER_SHIFT_MM": (WALLS, "RayTerms", "Distance by which the outer surface moves outward, mm."),
-    "NARROW_CAVITY_SHIFT": (WALLS, "SizeShift", "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as " "the blur\n"
-                            "/// hardly moves its edge any more when it shrinks."),
-    "CAVITY_SIZE_SHIFT": (WALLS, "SizeShift", "Distance by which the outer surface moves outward of that, the more, the smaller the cavity looks."),
-    "SMOOTHNESS_SHIFT": (WALLS, "SmoothnessShift", "Distances by which both surfaces move outward of that, where the image is smoother than usual."),
+    "NARROW_CAVITY_SHIFT": (
+        WALLS,
+        "SizeShift",
+        "Distance by which the inner surface moves inward of that, where the cavity looks smaller: one as narrow as "
+        "the blur\n"
+        "/// hardly moves its edge any more when it shrinks.",
+    ),
+    "CAVITY_SIZE_SHIFT": (
+        WALLS,
+        "SizeShift",
+        "Distance by which the outer surface moves outward of that, the more, the smaller the cavity looks.",
+    ),
+    "SMOOTHNESS_SHIFT": (
+        WALLS,
+        "SmoothnessShift",
+        "Distances by which both surfaces move outward of that, where the image is smoother than usual.",
+    ),
     "APPARENT_TERMS": (NODES, "NodeTerms", "Distance from an expert's mask."),
     "ANATOMICAL_TERMS": (NODES, "NodeTerms", "Distance from the true wall."),
 }
@@ -135,7 +160,9 @@ def committed():
             shape = re.search(r"RimShape \{\n(.*?)\n\};", text, re.S)[1]
             mean = re.findall(rf"cosine: {NUMBER},\s+sine: {NUMBER}", shape)
             rows = re.findall(r"\[(-?[0-9][^\[\]]*)\]", shape)
-            found["RIM_SHAPE"] = dict(mean=np.array(mean, float).ravel(), precision=np.array([row.split(", ") for row in rows], float))
+            found["RIM_SHAPE"] = dict(
+                mean=np.array(mean, float).ravel(), precision=np.array([row.split(", ") for row in rows], float)
+            )
             for name in ("RIM_CORRECTION", "SMOOTHNESS_SHIFT"):
                 values = re.search(rf"const {name}:.*?range_mm: \[{NUMBER}, {NUMBER}\]", text, re.S)
                 found[name]["range_mm"] = [float(x) for x in values.groups()]
@@ -147,7 +174,10 @@ def committed():
 
 def committed_regression(text):
     """The regression of the rim: a row of numbers for each coefficient of the distance."""
-    numbers = [np.array(re.findall(NUMBER, re.sub(r"\w+:", "", terms)), float) for terms in re.findall(r"RimTerms \{(.*?)\}", text, re.S)]
+    numbers = [
+        np.array(re.findall(NUMBER, re.sub(r"\w+:", "", terms)), float)
+        for terms in re.findall(r"RimTerms \{(.*?)\}", text, re.S)
+    ]
     ranges = [[float(x) for x in values] for values in re.findall(rf"range_mm: \[{NUMBER}, {NUMBER}\]", text)]
     return dict(terms=np.array(numbers), length_range_mm=ranges[0], range_mm=ranges[1])
 
@@ -163,24 +193,37 @@ def literal(x, digits=3):
 def layout(constants):
     """{file: text} with these constants."""
     shape, correction = constants["RIM_SHAPE"], constants["RIM_CORRECTION"]
-    harmonics = "".join(f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n     " f"   }},\n"
-                        for c, s in zip(shape["mean"][::2], shape["mean"][1::2]))
+    harmonics = "".join(
+        f"        RimHarmonic {{\n            cosine: {literal(c, 4)},\n            sine: {literal(s, 4)},\n     "
+        f"   }},\n"
+        for c, s in zip(shape["mean"][::2], shape["mean"][1::2])
+    )
     rows = "".join("        [" + ", ".join(literal(round(x), 1) for x in row) + "],\n" for row in shape["precision"])
     text = {WALLS: WALLS_HEADER, NODES: NODES_HEADER}
-    text[WALLS] += ("\n/// Shape of the rims of hearts.\npub const RIM_SHAPE: RimShape = RimShape {\n"
-                    f"    mean: [\n{harmonics}    ],\n    precision: [\n{rows}    ],\n}};\n"
-                    "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: " "RimCorrection = RimCorrection {\n"
-                    + "".join(f"    {field}: {literal(correction[field])},\n" for field in [*CORRECTION_FIELDS, "range_mm"]) + "};\n")
+    text[WALLS] += (
+        "\n/// Shape of the rims of hearts.\npub const RIM_SHAPE: RimShape = RimShape {\n"
+        f"    mean: [\n{harmonics}    ],\n    precision: [\n{rows}    ],\n}};\n"
+        "\n/// The share of a rim's distance from its shape that is taken back.\npub const RIM_CORRECTION: "
+        "RimCorrection = RimCorrection {\n"
+        + "".join(f"    {field}: {literal(correction[field])},\n" for field in [*CORRECTION_FIELDS, "range_mm"])
+        + "};\n"
+    )
     regression = constants["RIM_REGRESSION"]
-    text[WALLS] += ("\n/// The rim's distance from where the sensors left it, by its shape and the ends of the signal.\n"
-                    "pub const RIM_REGRESSION: RimRegression = RimRegression {\n    terms: [\n"
-                    + "".join(rim_terms(row) for row in regression["terms"]) + "    ],\n"
-                    + "".join(f"    {field}: {literal(regression[field])},\n" for field in ("length_range_mm", "range_mm")) + "};\n")
+    text[WALLS] += (
+        "\n/// The rim's distance from where the sensors left it, by its shape and the ends of the signal.\n"
+        "pub const RIM_REGRESSION: RimRegression = RimRegression {\n    terms: [\n"
+        + "".join(rim_terms(row) for row in regression["terms"])
+        + "    ],\n"
+        + "".join(f"    {field}: {literal(regression[field])},\n" for field in ("length_range_mm", "range_mm"))
+        + "};\n"
+    )
     for name, (file, kind, doc) in TERMS.items():
         fields = "".join(f"    {field}: {literal(value)},\n" for field, value in constants[name].items())
         text[file] += f"\n/// {doc}\npub const {name}: {kind} = {kind} {{\n{fields}}};\n"
-    text[NODES] += ("\n/// The distance that stands for that from other fits where there are none: its median, mm.\n"
-                    f"pub const MEDIAN_SPREAD_MM: f64 = {literal(constants['MEDIAN_SPREAD_MM'])};\n")
+    text[NODES] += (
+        "\n/// The distance that stands for that from other fits where there are none: its median, mm.\n"
+        f"pub const MEDIAN_SPREAD_MM: f64 = {literal(constants['MEDIAN_SPREAD_MM'])};\n"
+    )
     return text
 
 
@@ -198,7 +241,11 @@ def rim_terms(row):
 
 def table(path, sets):
     with open(path, newline="") as file:
-        return [{k: v if k in ("set", "case") else float(v) for k, v in row.items()} for row in csv.DictReader(file) if row["set"] in sets]
+        return [
+            {k: v if k in ("set", "case") else float(v) for k, v in row.items()}
+            for row in csv.DictReader(file)
+            if row["set"] in sets
+        ]
 
 
 def column(rows, name):
@@ -228,7 +275,9 @@ def from_shape(rows, shape):
 
 
 def bent(distance, bend):
-    return np.column_stack([np.ones(distance.size), distance, np.maximum(distance - bend, 0), np.maximum(-distance - bend, 0)])
+    return np.column_stack(
+        [np.ones(distance.size), distance, np.maximum(distance - bend, 0), np.maximum(-distance - bend, 0)]
+    )
 
 
 def corrected(distance, correction):
@@ -247,7 +296,9 @@ def rim_evidence(tables, constants):
     what limits their moves: the shifts by shape and the ends of the signal."""
     rows = [row for row in table(tables / "signal_ends.csv", END_SETS) if not row["case"].startswith("motion")]
     by_shape = corrected(from_shape(rows, constants["RIM_SHAPE"]), constants["RIM_CORRECTION"])
-    x = np.column_stack([column(rows, "length_mm"), *(waves(d) for d in (by_shape, heights(rows, "heart"), heights(rows, "direction")))])
+    x = np.column_stack(
+        [column(rows, "length_mm"), *(waves(d) for d in (by_shape, heights(rows, "heart"), heights(rows, "direction")))]
+    )
     return rows, x, heights(rows, "sensed") - heights(rows, "true"), (by_shape, heights(rows, "heart"))
 
 
@@ -265,7 +316,9 @@ def regressed(x, regression, limits):
     x = np.column_stack([np.ones(len(x)), x[:, 0].clip(low, high), x[:, 1:]])
     moved = (x @ regression["terms"].T @ BASIS.T).clip(*regression["range_mm"])
     (by_shape, ends), (dark, bright) = limits, DARK_ENDS_MM
-    return np.where(moved < by_shape, by_shape + (moved - by_shape) * ((ends - dark) / (bright - dark)).clip(0, 1), moved)
+    return np.where(
+        moved < by_shape, by_shape + (moved - by_shape) * ((ends - dark) / (bright - dark)).clip(0, 1), moved
+    )
 
 
 def rim_regression(x, distance):
@@ -313,10 +366,17 @@ def rays(tables, sets):
         of_case.setdefault((row["set"], row["case"]), []).append((row["inner_mm"], row["outer_mm"]))
     met = {case for case, shifts in of_case.items() if np.abs(np.median(shifts, axis=0)).max() < LOST_MM}
     rows = [row for row in rows if (row["set"], row["case"]) in met]
-    value = {name: column(rows, name) for name in ("thickness", "ln_radius", "thickness_here", "narrowness_here", "missing_uptake", "way")}
+    value = {
+        name: column(rows, name)
+        for name in ("thickness", "ln_radius", "thickness_here", "narrowness_here", "missing_uptake", "way")
+    }
     value |= {"constant": np.ones(len(rows)), "nearness_to_apex": np.exp(-(value["way"] + 0.5) / 0.12)}
     value |= {f"{name}_squared": value[name] ** 2 for name in ("ln_radius", "missing_uptake", "way")}
-    return rows, np.column_stack([value[field] for field in RAY_FIELDS]), [column(rows, name) for name in ("inner_mm", "outer_mm")]
+    return (
+        rows,
+        np.column_stack([value[field] for field in RAY_FIELDS]),
+        [column(rows, name) for name in ("inner_mm", "outer_mm")],
+    )
 
 
 def of_hearts(rows, values):
@@ -361,7 +421,9 @@ def filtered(tables, constants):
     expected."""
     rows = table(tables / "smoothness.csv", SMOOTHNESS_SETS)
     rest = [left(rows, constants, surface) for surface in ("inner", "outer")]
-    lost = {(row["set"], row["case"]) for row, distances in zip(rows, zip(*rest)) if max(np.abs(distances)) > LOST_MEAN_MM}
+    lost = {
+        (row["set"], row["case"]) for row, distances in zip(rows, zip(*rest)) if max(np.abs(distances)) > LOST_MEAN_MM
+    }
     fits = collections.Counter((row["set"], row["case"]) for row in rows)
     return [row for row in rows if (row["set"], row["case"]) not in lost and fits[row["set"], row["case"]] == FILTERS]
 
@@ -369,7 +431,11 @@ def filtered(tables, constants):
 def left(rows, constants, surface):
     """What the constants but SMOOTHNESS_SHIFT leave of the distances of a surface."""
     x = np.column_stack([np.ones(len(rows)), *(column(rows, field) for field in RAY_FIELDS[1:])])
-    return column(rows, f"{surface}_mm") - linear(constants[f"{surface.upper()}_SHIFT_MM"], x) - of_size(rows, constants, surface)
+    return (
+        column(rows, f"{surface}_mm")
+        - linear(constants[f"{surface.upper()}_SHIFT_MM"], x)
+        - of_size(rows, constants, surface)
+    )
 
 
 def smoothness_shift(tables, constants):
@@ -386,7 +452,11 @@ def by_added_filter(rows, values):
     """Deviation among the scans as they are, and mean change behind each further filter."""
     added = column(rows, "added_mm")
     as_is = values[added == 0]
-    changes = [f"{(values[added == filter] - as_is).mean():+.2f} behind {filter:g} mm" for filter in sorted(set(added)) if filter]
+    changes = [
+        f"{(values[added == filter] - as_is).mean():+.2f} behind {filter:g} mm"
+        for filter in sorted(set(added))
+        if filter
+    ]
     return f"deviation {as_is.std():.3f} mm as it is, mean change {', '.join(changes)}"
 
 
@@ -395,8 +465,16 @@ def nodes(tables, wall):
     rows = table(tables / "nodes.csv", NODE_SETS)
     rows = [row for row in rows if np.isfinite(row["spread_mm"])]
     way = column(rows, "way").clip(0, 1) - 0.5
-    x = np.column_stack([np.ones(len(rows)), column(rows, "seen"), np.log(column(rows, "spread_mm") + SPREAD_OFFSET_MM),
-                         column(rows, f"log_odds_{wall}"), way, way**2])
+    x = np.column_stack(
+        [
+            np.ones(len(rows)),
+            column(rows, "seen"),
+            np.log(column(rows, "spread_mm") + SPREAD_OFFSET_MM),
+            column(rows, f"log_odds_{wall}"),
+            way,
+            way**2,
+        ]
+    )
     return rows, x, np.abs(column(rows, f"{wall}_mm")).clip(LEAST_DISTANCE_MM)
 
 
@@ -408,9 +486,17 @@ def estimate(tables, chosen, names=()):
     made["RIM_SHAPE"] = dict(mean=np.mean(of_true, axis=0), precision=np.linalg.inv(np.cov(np.array(of_true).T)))
     distance = from_shape(rows, made["RIM_SHAPE"]).ravel()
     bend = chosen["RIM_CORRECTION"]["bend_mm"]
-    intercept, slope, short, long = least_squares(bent(distance, bend), (heights(rows, "sensed") - heights(rows, "true")).ravel())
-    made["RIM_CORRECTION"] = dict(intercept_mm=intercept, slope=slope, bend_mm=bend, short_slope=short, long_slope=long,
-                                  range_mm=chosen["RIM_CORRECTION"]["range_mm"])
+    intercept, slope, short, long = least_squares(
+        bent(distance, bend), (heights(rows, "sensed") - heights(rows, "true")).ravel()
+    )
+    made["RIM_CORRECTION"] = dict(
+        intercept_mm=intercept,
+        slope=slope,
+        bend_mm=bend,
+        short_slope=short,
+        long_slope=long,
+        range_mm=chosen["RIM_CORRECTION"]["range_mm"],
+    )
     _, x, both = rays(tables, RAY_SETS)
     for name, y in zip(("INNER_SHIFT_MM", "OUTER_SHIFT_MM"), both):
         made[name] = dict(zip(RAY_FIELDS, least_squares(x, y)))
@@ -427,7 +513,9 @@ def estimate(tables, chosen, names=()):
         made[name] = dict(zip(NODE_FIELDS, quantile_regression(x, np.log(distance), SHARE)))
     made["MEDIAN_SPREAD_MM"] = float(np.median(column(rows, "spread_mm")))
     used = chosen if names else made  # the regression stands on the other two
-    rows, x, distance, limits = rim_evidence(tables, chosen | {name: used[name] for name in ("RIM_SHAPE", "RIM_CORRECTION")})
+    rows, x, distance, limits = rim_evidence(
+        tables, chosen | {name: used[name] for name in ("RIM_SHAPE", "RIM_CORRECTION")}
+    )
     made["RIM_REGRESSION"] = rim_regression(x, distance)
     made["RIM_DEVIATION"] = rim_deviation(rows, distance - left_out(x, distance, limits))
     if names:
@@ -460,8 +548,12 @@ def compare(tables, before, after):
     show("RIM_CORRECTION", before["RIM_CORRECTION"], after["RIM_CORRECTION"])
     error = heights(rows, "sensed") - heights(rows, "true")
     shift = [corrected(from_shape(rows, c["RIM_SHAPE"]), c["RIM_CORRECTION"]) for c in (before, after)]
-    print(f"  {len(rows)} rims: rms error {rms(error):.2f} mm as sensed, {rms(error - shift[0]):.2f} committed, " f"{rms(error - shift[1]):.2f} estimated; "
-          f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation " f"{np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n")
+    print(
+        f"  {len(rows)} rims: rms error {rms(error):.2f} mm as sensed, {rms(error - shift[0]):.2f} committed, "
+        f"{rms(error - shift[1]):.2f} estimated; "
+        f"corrections differ by {rms(shift[0] - shift[1]):.2f} mm (rms), correlation "
+        f"{np.corrcoef(shift[0].ravel(), shift[1].ravel())[0, 1]:.3f}\n"
+    )
     for sets in (RAY_SETS, SIZE_SETS):
         rows, x, both = rays(tables, sets)
         for surface, y in zip(("inner", "outer"), both):
@@ -469,25 +561,41 @@ def compare(tables, before, after):
             if sets is RAY_SETS:
                 show(name, before[name], after[name])
             shift = [linear(c[name], x) + of_size(rows, c, surface) for c in (before, after)]
-            print(f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} " f"left by committed, "
-                  f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm " f"(rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
-                  f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n")
+            print(
+                f"  sets {', '.join(sets)}, {len(y)} rays: rms distance {rms(y):.2f} mm, {rms(y - shift[0]):.2f} "
+                f"left by committed, "
+                f"{rms(y - shift[1]):.2f} by estimated constants; they differ by {rms(shift[0] - shift[1]):.2f} mm "
+                f"(rms), mean {np.mean(shift[1] - shift[0]):+.2f}, "
+                f"correlation {np.corrcoef(*shift)[0, 1]:.3f}\n"
+            )
     rows, x, distance, limits = rim_evidence(tables, before)
     error = distance - left_out(x, distance, limits)
-    print(f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone " f"{of_rims(distance - limits[0])}; "
-          f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION'], limits))}; each tenth left out " f"{of_rims(error)}\n")
+    print(
+        f"RIM_REGRESSION\n  {len(rows)} rims: as sensed {of_rims(distance)}; by shape alone "
+        f"{of_rims(distance - limits[0])}; "
+        f"committed {of_rims(distance - regressed(x, before['RIM_REGRESSION'], limits))}; each tenth left out "
+        f"{of_rims(error)}\n"
+    )
     show("RIM_DEVIATION", before["RIM_DEVIATION"], after["RIM_DEVIATION"])
-    share = np.abs(error) / np.hypot(before["RIM_DEVIATION"]["least_mm"], before["RIM_DEVIATION"]["per_scatter"] * scatter(rows))[:, None]
+    share = (
+        np.abs(error)
+        / np.hypot(before["RIM_DEVIATION"]["least_mm"], before["RIM_DEVIATION"]["per_scatter"] * scatter(rows))[:, None]
+    )
     quarters = np.array_split(share[np.argsort(scatter(rows))], 4)
-    print("  left out, within one / two standard deviations: " + ", ".join(f"{np.mean(part <= 1):.0%} / {np.mean(part <= 2):.0%}" for part in [share, *quarters])
-          + " (all; quarters by scatter)\n")
+    print(
+        "  left out, within one / two standard deviations: "
+        + ", ".join(f"{np.mean(part <= 1):.0%} / {np.mean(part <= 2):.0%}" for part in [share, *quarters])
+        + " (all; quarters by scatter)\n"
+    )
     for name in ("NARROW_CAVITY_SHIFT", "CAVITY_SIZE_SHIFT"):
         show(name, before[name], after[name])
     show("SMOOTHNESS_SHIFT", before["SMOOTHNESS_SHIFT"], after["SMOOTHNESS_SHIFT"])
     rows = filtered(tables, before)
     smoothness = np.log(column(rows, "smoothness_mm"))
     for surface in ("inner", "outer"):
-        print(f"  {len(rows)} fits, {surface} surface, without it: {by_added_filter(rows, left(rows, before, surface))}")
+        print(
+            f"  {len(rows)} fits, {surface} surface, without it: {by_added_filter(rows, left(rows, before, surface))}"
+        )
         for which, c in (("committed", before), ("estimated", after)):
             shift = c["SMOOTHNESS_SHIFT"]
             rest = left(rows, c, surface) - shift[f"{surface}_per_log_mm"] * (smoothness - np.log(shift["usual_mm"]))
@@ -498,8 +606,12 @@ def compare(tables, before, after):
         _, x, distance = nodes(tables, wall)
         sd = [np.exp(linear(c[name], x)).clip(0.5, 15.0) for c in (before, after)]
         within = [f"{np.mean(distance <= s):.0%} / {np.mean(distance <= 2 * s):.0%}" for s in sd]
-        print(f"  {len(distance)} nodes within one / two standard deviations: {within[0]} committed, {within[1]} " f"estimated; "
-              f"they differ by a factor of {np.exp(rms(np.log(sd[0] / sd[1]))):.2f} (rms), correlation of the " f"logarithms {np.corrcoef(*np.log(sd))[0, 1]:.3f}\n")
+        print(
+            f"  {len(distance)} nodes within one / two standard deviations: {within[0]} committed, {within[1]} "
+            f"estimated; "
+            f"they differ by a factor of {np.exp(rms(np.log(sd[0] / sd[1]))):.2f} (rms), correlation of the "
+            f"logarithms {np.corrcoef(*np.log(sd))[0, 1]:.3f}\n"
+        )
     print(f"MEDIAN_SPREAD_MM{before['MEDIAN_SPREAD_MM']:24.3f}{after['MEDIAN_SPREAD_MM']:12.3f}")
 
 
@@ -513,8 +625,14 @@ def main():
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tables", type=pathlib.Path, default=TABLES, help="folder of the tables of features (CSV)")
     action = parser.add_mutually_exclusive_group(required=True)
-    action.add_argument("--check", action="store_true", help="compare the estimate with the constants as committed; 1 if a file is not laid out as --layout would")
-    action.add_argument("--write", nargs="*", metavar="NAME", help="write the estimated constants: those of these names, or all")
+    action.add_argument(
+        "--check",
+        action="store_true",
+        help="compare the estimate with the constants as committed; 1 if a file is not laid out as --layout would",
+    )
+    action.add_argument(
+        "--write", nargs="*", metavar="NAME", help="write the estimated constants: those of these names, or all"
+    )
     action.add_argument("--layout", action="store_true", help="write the committed constants again")
     a = parser.parse_args()
     before = committed()

@@ -1,4 +1,5 @@
 """Times ventriform against other tools. Run by scripts/measure/compare_peers.sh."""
+
 import argparse
 import functools
 import json
@@ -31,6 +32,7 @@ def heart_alone(folder, spacing):
     The peers cannot find the heart. They get a volume in which everything else was set to 0, and that step is not
     timed. ventriform gets the whole volume."""
     import others
+
     voxels = numpy.asarray(nibabel.load(folder / "spect.nii.gz").dataobj, dtype=numpy.float32)
     near = numpy.asarray(nibabel.load(folder / "lv_truth.nii.gz").dataobj) > 0
     for _ in range(round(8 / spacing)):
@@ -60,8 +62,11 @@ class Bench:
         """The folder of a simulated scan, which is made on the first call."""
         folder = self.work / f"phantom-{side}-{spacing:g}"
         if not (folder / "params.json").exists():
-            subprocess.run([self.ventriform, "phantom", "--size", str(side), "--spacing",
-                            str(spacing), "-o", str(folder)], check=True, capture_output=True)
+            subprocess.run(
+                [self.ventriform, "phantom", "--size", str(side), "--spacing", str(spacing), "-o", str(folder)],
+                check=True,
+                capture_output=True,
+            )
         return folder
 
     def as_float(self, scan, name):
@@ -80,17 +85,25 @@ class Bench:
         os.sched_setaffinity(0, set(range(os.cpu_count())))
 
     def keep(self, part, result):
-        about = {"measured": time.strftime("%Y-%m-%d"), "cores": os.cpu_count(),
-                 "load": os.getloadavg()[0], "results": result}
+        about = {
+            "measured": time.strftime("%Y-%m-%d"),
+            "cores": os.cpu_count(),
+            "load": os.getloadavg()[0],
+            "results": result,
+        }
         (self.work / f"{part}.json").write_text(json.dumps(about, indent=1) + "\n")
 
     # ------------------------------------------------------------------ parts
     def speed(self):
         """Marching Cubes alone, from voxels to 150 points, and from a surface in memory to 150 points."""
         import others
+
         self.pin()
-        remeshers = {name: others.Remesher(str(self.work / f"{name}.so"))
-                     for name in ("geogram", "cgal") if (self.work / f"{name}.so").exists()}
+        remeshers = {
+            name: others.Remesher(str(self.work / f"{name}.so"))
+            for name in ("geogram", "cgal")
+            if (self.work / f"{name}.so").exists()
+        }
         result = {}
         for spacing in (3.2, 2.0):
             folder = self.phantom(128, spacing)
@@ -100,10 +113,13 @@ class Bench:
             voxels, alone = heart_alone(folder, spacing)
             whole = others.image(voxels, [spacing] * 3)
             name = f"Marching Cubes, 128^3 voxels of {spacing} mm"
-            result[name] = in_turn({
-                "ventriform": ours.turn("surface", iso),
-                "vtkFlyingEdges3D": timed(lambda: others.flying_edges(whole, iso)),
-            }, 3 * self.a.rounds)
+            result[name] = in_turn(
+                {
+                    "ventriform": ours.turn("surface", iso),
+                    "vtkFlyingEdges3D": timed(lambda: others.flying_edges(whole, iso)),
+                },
+                3 * self.a.rounds,
+            )
             show(name, result[name])
             edge = edge_for(remeshers.get("cgal"), others, alone, iso, POINTS)
 
@@ -126,8 +142,7 @@ class Bench:
             # The steps that both have: no search for the heart, no topology control, no noise filter.
             made = others.flying_edges(alone, iso)
             contestants = {
-                "ventriform": ours.turn(
-                    "model", POINTS, lambda number: number, without=["surface", "report"]),
+                "ventriform": ours.turn("model", POINTS, lambda number: number, without=["surface", "report"]),
                 "pyacvd": timed(lambda: others.acvd(made, POINTS)),
             }
             for name, remesh in remeshers.items():
@@ -143,6 +158,7 @@ class Bench:
     def sizes(self):
         """ventriform and CGAL against the number of points and the size of the volume."""
         import others
+
         library = self.work / "cgal.so"
         if not library.exists():
             print("skipped: CGAL does not build here")
@@ -160,13 +176,16 @@ class Bench:
             edge = edge_for(cgal, others, alone, iso, points)
             turn = functools.partial(ours.turn, "model", points, lambda number: number)
             name = f"{points} points, {side}^3 voxels of {spacing} mm"
-            result[name] = in_turn({
-                "ventriform with its report": turn(),
-                "ventriform": turn(without=["report"]),
-                "vtkFlyingEdges3D + CGAL": timed(lambda: cgal(others.flying_edges(alone, iso), edge)),
-                "ventriform from the surface": turn(without=["surface", "report"]),
-                "CGAL from the surface": timed(lambda: cgal(made, edge)),
-            }, self.a.rounds if points <= POINTS else max(3, self.a.rounds // 3))
+            result[name] = in_turn(
+                {
+                    "ventriform with its report": turn(),
+                    "ventriform": turn(without=["report"]),
+                    "vtkFlyingEdges3D + CGAL": timed(lambda: cgal(others.flying_edges(alone, iso), edge)),
+                    "ventriform from the surface": turn(without=["surface", "report"]),
+                    "CGAL from the surface": timed(lambda: cgal(made, edge)),
+                },
+                self.a.rounds if points <= POINTS else max(3, self.a.rounds // 3),
+            )
             show(name, result[name])
             ours.close()
         self.unpin()
@@ -180,11 +199,13 @@ class Bench:
         for name, path in {"int16": scan, "float32": self.as_float(scan, "float.nii.gz")}.items():
             ours = Ours(self.stopwatch)
             title = f"Reading .nii.gz, 128^3 {name}"
-            result[title] = in_turn({
-                "ventriform": ours.turn("read", path),
-                "nibabel": timed(
-                    lambda: numpy.asarray(nibabel.load(path).dataobj, dtype=numpy.float32)),
-            }, 2 * self.a.rounds)
+            result[title] = in_turn(
+                {
+                    "ventriform": ours.turn("read", path),
+                    "nibabel": timed(lambda: numpy.asarray(nibabel.load(path).dataobj, dtype=numpy.float32)),
+                },
+                2 * self.a.rounds,
+            )
             show(title, result[title])
             ours.close()
         self.unpin()
@@ -199,9 +220,10 @@ class Bench:
             for worker in workers.values():
                 worker.ask("read", scan)
             title = f"Volume in memory to {points} points, {side}^3"
-            result[title] = in_turn({
-                f"{n} thread{'s' * (n > 1)}": worker.turn("model", points, 1)
-                for n, worker in workers.items()}, self.a.rounds)
+            result[title] = in_turn(
+                {f"{n} thread{'s' * (n > 1)}": worker.turn("model", points, 1) for n, worker in workers.items()},
+                self.a.rounds,
+            )
             show(title, result[title])
             for worker in workers.values():
                 worker.close()
@@ -239,8 +261,11 @@ class Bench:
                 self.a.docs / f"scaling-{name}.svg",
                 title=f"Cost against {axis}",
                 axes=(axis, "processor time, ms"),
-                series={stage: [(r[key], r["stages_cpu_ms"][stage]) for r in rows]
-                        for stage in ("total", "surface", "retile", "optimise", "report")})
+                series={
+                    stage: [(r[key], r["stages_cpu_ms"][stage]) for r in rows]
+                    for stage in ("total", "surface", "retile", "optimise", "report")
+                },
+            )
             print(f"\nCost against {axis}: cpu ms, growth exponent from the row before")
             for before, row in zip([None, *rows], rows):
                 exponent = "" if before is None else growth(before, row, key)
@@ -252,15 +277,18 @@ class Bench:
         seeds = (1, 2, 3) if points < 10_000 else (1,)
         ours = Ours(self.stopwatch)
         ours.ask("read", self.phantom(side, 256 / side) / "spect.nii.gz")
-        runs = sorted((ours.ask("model", points, seed) for seed in seeds),
-                      key=lambda answer: answer["cpu_ms"])
+        runs = sorted((ours.ask("model", points, seed) for seed in seeds), key=lambda answer: answer["cpu_ms"])
         ours.close()
         median = runs[len(runs) // 2]
         walls = {stage: ms for stage, ms in median["stages_ms"].items() if stage != "read"}
         share = median["cpu_ms"] / walls["total"]
         print(f"  {side}^3, {points} points: {median['cpu_ms']:.0f} ms", flush=True)
-        return {"side": side, "points": points, "triangles": median["triangles"],
-                "stages_cpu_ms": {stage: ms * share for stage, ms in walls.items()}}
+        return {
+            "side": side,
+            "points": points,
+            "triangles": median["triangles"],
+            "stages_cpu_ms": {stage: ms * share for stage, ms in walls.items()},
+        }
 
 
 def dilated(mask):

@@ -1,5 +1,4 @@
-"""Estimates the bounds of crates/ventriform/src/image/volume/gate_look.rs and beat_evidence.rs, and counts what they let
-pass.
+"""Estimates the bounds of image/volume/gate_look.rs and beat_evidence.rs (crates/ventriform/src), counts what passes.
 
 usage: gate_look.py --people SCAN.nii.gz... --gated GATED.nii.gz...
 
@@ -10,6 +9,7 @@ one heart in chance sizes, scans under a ladder of filters (in order and not), o
 and the bounds that follow, then for both halves how many beats are summed and how many others are refused with the
 constants that stand in the sources.
 """
+
 import argparse
 import ast
 import re
@@ -87,7 +87,9 @@ def course(product, orders):
     shares = []
     for times in (1, 2):
         waves = np.exp(1j * times * turns)
-        shares.append(2 / count * np.einsum("oa,ab,ob->o", waves, product, waves.conj()).real / max(np.trace(product), 1e-300))
+        shares.append(
+            2 / count * np.einsum("oa,ab,ob->o", waves, product, waves.conj()).real / max(np.trace(product), 1e-300)
+        )
     main = np.linalg.eigh(product)[1][:, -1]
     steps = np.abs(np.roll(main[orders], -1, 1) - main[orders]).max(1) / max(np.ptp(main), 1e-300)
     return np.array([shares[0], shares[0] + shares[1], steps]).T
@@ -160,8 +162,10 @@ def zoomed(image, scale):
 def others(people, rng):
     """What is no beat, of people on one grid: kind, volumes, and whether any order of them is none."""
     for count in COUNTS:
+
         def picked():
             return people[rng.integers(len(people))]
+
         if len(people) >= count:
             for _ in range(2):
                 yield "people", [people[n] for n in rng.choice(len(people), count, False)], True
@@ -187,7 +191,10 @@ def measured(gated, people, rng):
         gates = np.moveaxis(np.asarray(image.dataobj, float), 3, 0)
         spacing = image.header.get_zooms()[:3]
         own = course(products(gates, spacing), np.arange(len(gates))[None])
-        print(f"{'/'.join(Path(path).parts[-3:-1]):32s} {len(gates):2d} gates, once {own[0, 0]:.3f}, twice " f"{own[0, 1]:.3f}, step {own[0, 2]:.3f}")
+        print(
+            f"{'/'.join(Path(path).parts[-3:-1]):32s} {len(gates):2d} gates, once {own[0, 0]:.3f}, twice "
+            f"{own[0, 1]:.3f}, step {own[0, 2]:.3f}"
+        )
         courses["beat"].append((len(gates), own))
         figures["beat"].append(coarse(gates, spacing))
         figures["with its mean"].append(coarse(with_mean(gates), spacing))
@@ -211,7 +218,9 @@ def passes(values, bounds):
 def estimated(courses, many):
     """The bounds on the course, of few or of many volumes, that let the fewest others pass and keep KEPT_SHARE of the
     beats that any bounds keep; with the share of the others that pass."""
-    own = {kind: [value for count, value in values if (count >= MANY_GATES) == many] for kind, values in courses.items()}
+    own = {
+        kind: [value for count, value in values if (count >= MANY_GATES) == many] for kind, values in courses.items()
+    }
     beats = np.concatenate(own["beat"])
     rest = [np.concatenate(values) for kind, values in own.items() if kind != "beat"]
     most = passes(beats, (0.5, 0.7, 0.9)).mean()
@@ -233,10 +242,16 @@ def report(name, courses, figures, known):
     print(f"\n{name}")
     for kind, values in courses.items():
         passed = [passes(own, bounds[count >= MANY_GATES]).mean() for count, own in values]
-        apart = [own["GROUPS_APART"] < known["GROUPS_APART"] and own["LEAST_CORRELATION"] >= known["LEAST_CORRELATION"] for own in figures[kind]]
+        apart = [
+            own["GROUPS_APART"] < known["GROUPS_APART"] and own["LEAST_CORRELATION"] >= known["LEAST_CORRELATION"]
+            for own in figures[kind]
+        ]
         summed = sum(p * a for p, a in zip(passed, apart))
         orders = sum(len(own) for _, own in values)
-        print(f"  {kind:20s} {summed:7.2f} of {len(values)} summed ({orders} orders; by the course alone " f"{sum(passed):.2f})")
+        print(
+            f"  {kind:20s} {summed:7.2f} of {len(values)} summed ({orders} orders; by the course alone "
+            f"{sum(passed):.2f})"
+        )
 
 
 def main():
@@ -249,11 +264,17 @@ def main():
     courses, figures = halves[0]
     print("\nestimating half: range of each figure, and the bound in the sources")
     for figure in figures["beat"][0]:
-        ranges = [f"{kind} {min(own[figure] for own in values):.4g} to {max(own[figure] for own in values):.4g}" for kind, values in figures.items()]
+        ranges = [
+            f"{kind} {min(own[figure] for own in values):.4g} to {max(own[figure] for own in values):.4g}"
+            for kind, values in figures.items()
+        ]
         print(f"  {figure} {known.get(figure)}: " + "; ".join(ranges))
     for many, what in ((False, "fewer than"), (True, "from")):
         passed, bounds = estimated(courses, many)
-        print(f"  course, {what} {MANY_GATES} volumes: once {bounds[0]:.2f}, twice {bounds[1]:.2f}, step " f"{bounds[2]:.2f}; {100 * passed:.2f} % of the others pass")
+        print(
+            f"  course, {what} {MANY_GATES} volumes: once {bounds[0]:.2f}, twice {bounds[1]:.2f}, step "
+            f"{bounds[2]:.2f}; {100 * passed:.2f} % of the others pass"
+        )
     for name, half in zip(("in-sample", "held-out"), halves):
         report(name, *half, known)
 

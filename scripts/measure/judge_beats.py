@@ -11,6 +11,7 @@ wall is found; and for each study its own last gate with a quarter of the counts
 already), and its gates in another order round the cycle. EF, EDV and ESV are also given without the studies that were
 made with lost counts or rotated gates. Needs numpy and nibabel.
 """
+
 import argparse
 import json
 import os
@@ -24,7 +25,9 @@ import numpy as np
 
 def beat(program, gated, out):
     environment = {**os.environ, "RAYON_NUM_THREADS": "1"}
-    run = subprocess.run([program, "beat", gated, "-o", out, "--format", "json"], capture_output=True, text=True, env=environment)
+    run = subprocess.run(
+        [program, "beat", gated, "-o", out, "--format", "json"], capture_output=True, text=True, env=environment
+    )
     if run.returncode:
         return {"error": run.stderr.strip().split("\n")[-1]}
     return json.loads((out / "beat.json").read_text())
@@ -53,14 +56,20 @@ def lag(late, early):
 
 def mean_phase(segments, numbers):
     """Circular mean of the phases of these segments, degrees."""
-    turns = [np.radians(s["phase_degrees"]) for s in segments if s["segment"] in numbers and s["phase_degrees"] is not None]
+    turns = [
+        np.radians(s["phase_degrees"]) for s in segments if s["segment"] in numbers and s["phase_degrees"] is not None
+    ]
     return np.degrees(np.angle(np.mean(np.exp(1j * np.array(turns))))) if turns else np.nan
 
 
 def phase_error(found, true):
     """Deviation of the errors of the phases of segments that contract, about their median, degrees."""
     true = {s["segment"]: s["phase_degrees"] for s in true if s["contraction"] > 0.5}
-    pairs = [(s["phase_degrees"], true[s["segment"]]) for s in found if s["phase_degrees"] is not None and true.get(s["segment"]) is not None]
+    pairs = [
+        (s["phase_degrees"], true[s["segment"]])
+        for s in found
+        if s["phase_degrees"] is not None and true.get(s["segment"]) is not None
+    ]
     errors = np.array([lag(found, true) for found, true in pairs])
     return np.std(errors - np.median(errors))
 
@@ -90,7 +99,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("cases", nargs="+", type=pathlib.Path)
-    parser.add_argument("--no-variants", action="store_true", help="leave out lost counts and rotated gates, two thirds of the time")
+    parser.add_argument(
+        "--no-variants", action="store_true", help="leave out lost counts and rotated gates, two thirds of the time"
+    )
     options = parser.parse_args()
     program = options.program.resolve()
     rows, segments, hearts, changes = [], [], [], {"lost": [], "rotated": []}
@@ -117,22 +128,56 @@ def main():
         true = {s["segment"]: s for s in result["segments"]}
         for own in found["segments"]:
             of = true[own["segment"]]
-            segments.append((case.name, own["thickening_percent"], of["thickening_percent"], own["motion_mm"],
-                             of.get("motion_mm", np.nan), of["state"] != "normal"))
+            segments.append(
+                (
+                    case.name,
+                    own["thickening_percent"],
+                    of["thickening_percent"],
+                    own["motion_mm"],
+                    of.get("motion_mm", np.nan),
+                    of["state"] != "normal",
+                )
+            )
         akinetic = any(s["state"] != "normal" for s in result["segments"])
         made = truth.get("made", "")
         delayed = [s["segment"] for s in result["segments"] if s["delay_degrees"] > 0]
         late = [lateness(of, delayed) for of in (result["segments"], found["segments"])] if delayed else [0, 0]
-        hearts.append((case.name, found["phase"]["sd_degrees"], found["phase"]["reliable"], akinetic, *late,
-                       found["phase"]["noise_degrees"], phase_error(found["segments"], result["segments"])))
+        hearts.append(
+            (
+                case.name,
+                found["phase"]["sd_degrees"],
+                found["phase"]["reliable"],
+                akinetic,
+                *late,
+                found["phase"]["noise_degrees"],
+                phase_error(found["segments"], result["segments"]),
+            )
+        )
         walls = [g["wall_ml"] for g in found["gates"]]
         swing = 100 * (max(walls) - min(walls)) / np.mean(walls)
-        rows.append((case.name, made, found["ef_percent"], 100 * result["ef"], found["edv_ml"], result["edv_ml"],
-                     found["esv_ml"], result["esv_ml"], swing, [f["code"] for f in found["flags"]]))
-        print(f"{case.name:24} EF {found['ef_percent']:5.1f} of {100 * result['ef']:5.1f}  EDV {found['edv_ml']:6.1f} of "
-              f"{result['edv_ml']:6.1f}  ESV {found['esv_ml']:6.1f} of {result['esv_ml']:6.1f}  {' '.join(rows[-1][-1])}", flush=True)
+        rows.append(
+            (
+                case.name,
+                made,
+                found["ef_percent"],
+                100 * result["ef"],
+                found["edv_ml"],
+                result["edv_ml"],
+                found["esv_ml"],
+                result["esv_ml"],
+                swing,
+                [f["code"] for f in found["flags"]],
+            )
+        )
+        print(
+            f"{case.name:24} EF {found['ef_percent']:5.1f} of {100 * result['ef']:5.1f}  EDV {found['edv_ml']:6.1f} of "
+            f"{result['edv_ml']:6.1f}  ESV {found['esv_ml']:6.1f} of {result['esv_ml']:6.1f}  {' '.join(rows[-1][-1])}",
+            flush=True,
+        )
+
     def number(column):
         return np.array([row[column] for row in rows])
+
     ef = number(2) - number(3)
     line(f"EF of {len(rows)}: bias, SD, points", spread(ef), "<= 1.5, <= 4")
     line("EF within 5 points; worst", f"{100 * np.mean(abs(ef) <= 5):.0f} %; {abs(ef).max():.1f}", ">= 85 %, <= 10")
@@ -144,8 +189,10 @@ def main():
     if small.any():
         line("EF of hearts below 95 ml: worst", f"{abs(ef[small]).max():.1f} of {small.sum()}", "<= 6")
     line("muscle over the beat: worst swing", f"{number(8).max():.1f} %", "<= 3 %")
+
     def of(column):
         return np.array([segment[column] for segment in segments])
+
     for name, at, goal in ("thickening", 1, "r >= .85, SD <= 8"), ("motion", 3, "r >= .85, SD <= 1.3"):
         known = np.isfinite(of(at + 1))
         if known.any():
@@ -155,20 +202,32 @@ def main():
     akinetic = of(5)
     if akinetic.any():
         line("akinetic segments by thickening: AUC", f"{area_under_curve(of(1), akinetic):.3f}", ">= .9")
-        within = [np.corrcoef(of(1)[own], of(2)[own])[0, 1] for name in {h[0] for h in hearts if h[3]}
-                  for own in [of(0) == name]]
-        line("thickening within hearts with akinesia: r", f"mean {np.mean(within):.2f}, least {min(within):.2f}", ">= .7")
+        within = [
+            np.corrcoef(of(1)[own], of(2)[own])[0, 1]
+            for name in {h[0] for h in hearts if h[3]}
+            for own in [of(0) == name]
+        ]
+        line(
+            "thickening within hearts with akinesia: r", f"mean {np.mean(within):.2f}, least {min(within):.2f}", ">= .7"
+        )
     for kind, which in ("", True), (", reliable", False):
         still = [h[1] for h in hearts if not h[3] and abs(h[4]) < 10 and (which or h[2])]
         if still:
-            line(f"phase SD without delay and akinesia{kind}", f"mean {np.mean(still):.1f}, greatest {max(still):.1f}, of {len(still)}", "<= 8")
+            line(
+                f"phase SD without delay and akinesia{kind}",
+                f"mean {np.mean(still):.1f}, greatest {max(still):.1f}, of {len(still)}",
+                "<= 8",
+            )
     noise, error = (np.array([h[at] for h in hearts]) for at in (6, 7))
     r = np.corrcoef(np.log(noise), np.log(error))[0, 1]
     line("error of phases over their noise: median", f"{np.median(error / noise):.2f}; r of the logarithms {r:.2f}")
     reliable = np.array([h[2] for h in hearts])
     for kind, own in ("reliable", reliable), ("not", ~reliable):
         if own.any():
-            line(f"error of phases, {kind}, degrees", f"mean {error[own].mean():.1f}, greatest {error[own].max():.1f}, of {own.sum()}")
+            line(
+                f"error of phases, {kind}, degrees",
+                f"mean {error[own].mean():.1f}, greatest {error[own].max():.1f}, of {own.sum()}",
+            )
     for name, _, reliable, _, delay, late, *_ in hearts:
         if abs(delay) >= 10:
             line(f"delayed wall, {name}", f"{late:.0f} of {delay:.0f} degrees, reliable {reliable}", "within 30 %")

@@ -50,7 +50,9 @@ def make_apices(simulator, out, seed):
                 "whole": lambda: [make_cases.defect([13, 14, 15, 16, 17], severity, 0.7)],
                 "half": lambda: [make_cases.defect(HALVES[n], severity, 0.7)],
                 "single": lambda: [make_cases.defect([13 + n] if n % 2 == 0 else [13 + n, 17], severity, 0.7)],
-                "plus": lambda: [make_cases.defect(sorted({13, 14, 15, 16, 17, *territories[n % 3]}), severity, 0.6, 0.25)],
+                "plus": lambda: [
+                    make_cases.defect(sorted({13, 14, 15, 16, 17, *territories[n % 3]}), severity, 0.6, 0.25)
+                ],
                 "healthy": list,
             }[kind]()
             simulate.N, simulate.NF = matrix, 2 * matrix
@@ -93,9 +95,13 @@ def resliced(values, affine, rng):
     linear = turn(rng) @ affine[:3, :3] * (new / spacing)
     to = np.eye(4)
     to[:3, :3] = linear
-    to[:3, 3] = affine[:3, :3] @ ((np.array(values.shape) - 1) / 2) + affine[:3, 3] - linear @ np.full(3, (count - 1) / 2)
+    to[:3, 3] = (
+        affine[:3, :3] @ ((np.array(values.shape) - 1) / 2) + affine[:3, 3] - linear @ np.full(3, (count - 1) / 2)
+    )
     step = np.linalg.inv(affine) @ to
-    made = ndimage.affine_transform(values, step[:3, :3], step[:3, 3], output_shape=(count,) * 3, order=1, mode="constant", cval=0)
+    made = ndimage.affine_transform(
+        values, step[:3, :3], step[:3, 3], output_shape=(count,) * 3, order=1, mode="constant", cval=0
+    )
     return made.astype(np.float32), to
 
 
@@ -109,7 +115,9 @@ def make_cuts(out, seed, cases):
         write(*resliced(values, affine, rng), f"{out}/{name}_whole")
         for axis, side in ((2, 0), (0, 0), (1, 1), (2, 1)):
             away = [slice(None)] * 3
-            away[axis] = slice(0, wall.min(0)[axis] + depth) if side == 0 else slice(wall.max(0)[axis] - depth + 1, None)
+            away[axis] = (
+                slice(0, wall.min(0)[axis] + depth) if side == 0 else slice(wall.max(0)[axis] - depth + 1, None)
+            )
             for what, value in (("zero", 0), ("const", CONSTANT)) if (axis, side) == (2, 0) else (("zero", 0),):
                 cut = values.copy()
                 cut[tuple(away)] = value

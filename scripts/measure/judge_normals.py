@@ -23,8 +23,15 @@ def make_basal(simulator, out, seed, protocol):
     import make_healthy
 
     def one_segment(rng):
-        return dict(territory="basal", segments=[int(rng.integers(1, 7))], severity=round(float(rng.uniform(0.4, 0.95)), 3),
-                    shift_theta=round(float(rng.normal(0, 8)), 1), shift_mu=round(float(rng.normal(0, 3)), 1), akinesia=0.0, thinning=0.0)
+        return dict(
+            territory="basal",
+            segments=[int(rng.integers(1, 7))],
+            severity=round(float(rng.uniform(0.4, 0.95)), 3),
+            shift_theta=round(float(rng.normal(0, 8)), 1),
+            shift_mu=round(float(rng.normal(0, 3)), 1),
+            akinesia=0.0,
+            thinning=0.0,
+        )
 
     make_healthy.one_defect = one_segment
     for number in range(BASAL):
@@ -45,15 +52,31 @@ def main():
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
     def make(name, seed, number, *more):
-        subprocess.run([sys.executable, f"{given.simulator}/make_healthy.py", "--out", f"{given.out}/{name}", "--seed", str(seed),
-                        "--n", str(number), "--protocol", given.protocol, *more], check=True)
+        subprocess.run(
+            [
+                sys.executable,
+                f"{given.simulator}/make_healthy.py",
+                "--out",
+                f"{given.out}/{name}",
+                "--seed",
+                str(seed),
+                "--n",
+                str(number),
+                "--protocol",
+                given.protocol,
+                *more,
+            ],
+            check=True,
+        )
 
     make("normals", given.seed + 1, NORMALS)
     make("defects", given.seed + 2, DEFECTS, "--one-defect")
     make("healthy", given.seed + 3, HEALTHY)
     make_basal(given.simulator, f"{given.out}/basal", given.seed + 4, given.protocol)
     limits = f"{given.out}/normals.json"
-    subprocess.run([f"{given.programs}/ventriform", "normals", "build", f"{given.out}/normals", "-o", limits], check=True)
+    subprocess.run(
+        [f"{given.programs}/ventriform", "normals", "build", f"{given.out}/normals", "-o", limits], check=True
+    )
     judged = [f"{given.out}/{name}" for name in ("healthy", "defects", "basal")]
     subprocess.run([f"{given.programs}/perfusion", limits, *judged], check=True)
 

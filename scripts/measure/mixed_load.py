@@ -12,6 +12,7 @@ each over the second half. Ends with status 1 if a request failed that should no
 
 Needs Python 3 alone.
 """
+
 import http.client
 import json
 import os

@@ -176,19 +176,14 @@ def judge(mesh, reference):
     vertices, triangles = mesh
     normals = area_normals(vertices, triangles)
     areas = np.linalg.norm(normals, axis=1)
-    sides = [
-        np.linalg.norm(vertices[triangles[:, k]] - vertices[triangles[:, k - 1]], axis=1)
-        for k in range(3)
-    ]
+    sides = [np.linalg.norm(vertices[triangles[:, k]] - vertices[triangles[:, k - 1]], axis=1) for k in range(3)]
     # 2r/R = 16 area^2 / (perimeter/2 * abc) / 2
     ratio = 16 * areas**2 / (sum(sides) * np.prod(sides, axis=0))
     half = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     _, edge = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
     order = np.argsort(edge.ravel(), kind="stable").reshape(-1, 2)
     n, m = (normals[order[:, k] % len(triangles)] for k in range(2))
-    angles = np.degrees(
-        np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), np.einsum("ix,ix->i", n, m))
-    )
+    angles = np.degrees(np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), np.einsum("ix,ix->i", n, m)))
     middles = vertices[half[order[:, 0]]].mean(axis=1)
     curved = reference.near_curved(middles)
     data = poly_data(vertices, triangles)
@@ -217,21 +212,20 @@ class Bench:
         self.scans = []
         for spacing, noise, seed in PHANTOMS:
             folder = WORK / f"phantom-{seed}"
-            self.run("phantom", "-o", folder, "--spacing", spacing, "--noise", noise,
-                     "--seed", seed, "--liver", 0)
+            self.run("phantom", "-o", folder, "--spacing", spacing, "--noise", noise, "--seed", seed, "--liver", 0)
             scan = folder / "spect.nii.gz"
             _, report = self.model(scan, 150, 1, {})
             self.scans.append((scan, Reference(scan, report["surface"]["iso_value"])))
 
     def run(self, *words):
-        subprocess.run([self.binary, *map(str, words)], check=True, stdout=subprocess.DEVNULL,
-                       stderr=subprocess.DEVNULL)
+        subprocess.run(
+            [self.binary, *map(str, words)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
 
     def model(self, scan, points, seed, parameters):
         mesh, report = WORK / "model.ply", WORK / "report.json"
         words = [f"--{name.replace('_', '-')}={value}" for name, value in parameters.items()]
-        self.run("generate", scan, "-o", mesh, "--report", report, "--points", points,
-                 "--seed", seed, *words)
+        self.run("generate", scan, "-o", mesh, "--report", report, "--points", points, "--seed", seed, *words)
         reader = vtk.vtkPLYReader()
         reader.SetFileName(str(mesh))
         reader.Update()
@@ -262,8 +256,7 @@ def head(title, *cells):
 
 
 def flips_table(bench, title, form, parameters, sizes):
-    head(title, "N", "F re-tiled", "F after flips", "gain % (least..most)", "mean 2r/R",
-         "worst 2r/R")
+    head(title, "N", "F re-tiled", "F after flips", "gain % (least..most)", "mean 2r/R", "worst 2r/R")
     for points in sizes:
         before, after, gains, shapes = [], [], [], []
         for _, report, _ in bench.each(points, parameters):
@@ -275,14 +268,18 @@ def flips_table(bench, title, form, parameters, sizes):
             ratios = [report["retile"]["shape"], report["shape"]]
             shapes.append([[r["radius_ratio"][k] for r in ratios] for k in ("mean", "min")])
         (mean0, mean1), (least0, least1) = np.mean(shapes, axis=0)
-        row(points, f"{np.mean(before):.3f}", f"{np.mean(after):.3f}",
+        row(
+            points,
+            f"{np.mean(before):.3f}",
+            f"{np.mean(after):.3f}",
             f"{np.mean(gains):+.1f} ({min(gains):+.1f}..{max(gains):+.1f})",
-            f"{mean0:.3f} -> {mean1:.3f}", f"{least0:.3f} -> {least1:.3f}")
+            f"{mean0:.3f} -> {mean1:.3f}",
+            f"{least0:.3f} -> {least1:.3f}",
+        )
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__,
-                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--binary", type=Path)
     options.add_argument("--seeds", type=int, default=5)
     options.add_argument("--points", default="67,110,150,200,300")
@@ -296,31 +293,57 @@ def main():
     bench = Bench(binary, given.seeds)
     print(f"Means over {len(PHANTOMS)} phantoms, {given.seeds} seeds each.")
 
-    flips_table(bench, "Paper's route, raw fitness, local gain, no guard", "raw",
-                PAPER | RAW, sizes)
-    flips_table(bench, "Paper's route, normalised fitness, total gain, guard", "normalised",
-                PAPER, sizes)
+    flips_table(bench, "Paper's route, raw fitness, local gain, no guard", "raw", PAPER | RAW, sizes)
+    flips_table(bench, "Paper's route, normalised fitness, total gain, guard", "normalised", PAPER, sizes)
     flips_table(bench, "Refined route (fit and flips), raw fitness", "raw", {}, sizes)
-    flips_table(bench, "Refined route (fit and flips), normalised fitness", "normalised", {},
-                sizes)
+    flips_table(bench, "Refined route (fit and flips), normalised fitness", "normalised", {}, sizes)
 
-    head("Refined route, measured by VTK", "N", "mean 2r/R", "worst 2r/R", "mean dihedral angle °",
-         "mean distance mm", "Hausdorff mm", "volume %")
+    head(
+        "Refined route, measured by VTK",
+        "N",
+        "mean 2r/R",
+        "worst 2r/R",
+        "mean dihedral angle °",
+        "mean distance mm",
+        "Hausdorff mm",
+        "volume %",
+    )
     for points in sizes:
         m = bench.judged(points, {})
-        row(points, f"{m['ratio']:.4f}", f"{m['least_ratio']:.3f}", f"{m['dihedral']:.1f}",
-            f"{m['distance']:.3f}", f"{m['hausdorff']:.2f}", f"{m['volume']:.2f}")
+        row(
+            points,
+            f"{m['ratio']:.4f}",
+            f"{m['least_ratio']:.3f}",
+            f"{m['dihedral']:.1f}",
+            f"{m['distance']:.3f}",
+            f"{m['hausdorff']:.2f}",
+            f"{m['volume']:.2f}",
+        )
 
-    head("Curvature-adaptive density in the most curved fifth of the surface", "N", "adaptive",
-         "mean dihedral angle °", "largest dihedral angle °", "mean distance mm",
-         "Hausdorff mm, whole surface", "mean distance mm, whole surface",
-         "mean 2r/R, whole model")
+    head(
+        "Curvature-adaptive density in the most curved fifth of the surface",
+        "N",
+        "adaptive",
+        "mean dihedral angle °",
+        "largest dihedral angle °",
+        "mean distance mm",
+        "Hausdorff mm, whole surface",
+        "mean distance mm, whole surface",
+        "mean 2r/R, whole model",
+    )
     for points in [n for n in sizes if n <= 110]:
         for adaptive in ("0", "0.25", "0.5"):
             m = bench.judged(points, {"adaptive": adaptive, "adaptive_from": "0"})
-            row(points, adaptive, f"{m['curved_dihedral']:.1f}", f"{m['curved_most']:.0f}",
-                f"{m['curved_distance']:.3f}", f"{m['hausdorff']:.2f}", f"{m['distance']:.3f}",
-                f"{m['ratio']:.4f}")
+            row(
+                points,
+                adaptive,
+                f"{m['curved_dihedral']:.1f}",
+                f"{m['curved_most']:.0f}",
+                f"{m['curved_distance']:.3f}",
+                f"{m['hausdorff']:.2f}",
+                f"{m['distance']:.3f}",
+                f"{m['ratio']:.4f}",
+            )
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ and again, each time after SIGKILL, and measures the time from the start of the 
 of `/readyz`; then reads some of the volumes back and compares every byte. Loopback only; stops by itself;
 needs Python 3 and about 1 GB of disk for 100,000 volumes. The last line is a JSON object.
 """
+
 import argparse
 import hashlib
 import json
@@ -106,11 +107,15 @@ def main():
             compare(service, written)
         finally:
             service.kill()
-        print(json.dumps({
-            "volumes": options.volumes,
-            "starts": len(ready),
-            "ready_ms": {"median": round(statistics.median(ready)), "max": round(max(ready))},
-        }))
+        print(
+            json.dumps(
+                {
+                    "volumes": options.volumes,
+                    "starts": len(ready),
+                    "ready_ms": {"median": round(statistics.median(ready)), "max": round(max(ready))},
+                }
+            )
+        )
     finally:
         shutil.rmtree(work)
 

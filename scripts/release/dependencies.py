@@ -1,9 +1,9 @@
 """Judges the dependencies by deny.toml, and lists them in a software bill of materials.
 
     python scripts/release/dependencies.py check             licences, bans and sources
-    python scripts/release/dependencies.py program           prints ventriform.cdx.json, which scripts/generate.sh writes
+    python scripts/release/dependencies.py program           prints ventriform.cdx.json (scripts/generate.sh writes it)
     python scripts/release/dependencies.py python            prints the bill of the Python package
-    python scripts/release/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of scripts/release/image.sh
+    python scripts/release/dependencies.py image PACKAGES    prints that of an image; PACKAGES: the file of image.sh
 
 The bill is CycloneDX 1.6. It holds what the program is built of: every crate that the default features need at run
 time or at build time on Linux, the C libraries inside of them, and the npm packages inside of the page. That of the
@@ -14,6 +14,7 @@ cyclonedx-python-lib[json-validation]; no network beyond what cargo needs to hav
 `cargo deny check` judges by the same deny.toml and by the advisories of rustsec.org as well; it needs
 cargo-deny and the network.
 """
+
 import json
 import pathlib
 import re
@@ -105,15 +106,20 @@ def bill(of="program", installed=None):
     graph = metadata("--filter-platform", PLATFORM)
     packages = {package["id"]: package for package in graph["packages"]}
     nodes = {node["id"]: node for node in graph["resolve"]["nodes"]}
-    checksums = {(p["name"], p["version"]): p.get("checksum")
-                 for p in tomllib.loads((ROOT / "Cargo.lock").read_text())["package"]}
+    checksums = {
+        (p["name"], p["version"]): p.get("checksum")
+        for p in tomllib.loads((ROOT / "Cargo.lock").read_text())["package"]
+    }
     root = graph["resolve"]["root"]
     if of == "python":
         root = next(package["id"] for package in graph["packages"] if package["name"] == "ventriform-python")
 
     def needs(node):
-        return sorted(dep["pkg"] for dep in nodes[node]["deps"]
-                      if any(kind["kind"] in (None, "build") for kind in dep["dep_kinds"]))
+        return sorted(
+            dep["pkg"]
+            for dep in nodes[node]["deps"]
+            if any(kind["kind"] in (None, "build") for kind in dep["dep_kinds"])
+        )
 
     reached, open_ = {root}, [root]
     while open_:
@@ -141,9 +147,17 @@ def bill(of="program", installed=None):
 
     # What the page is built of, apart from its tools: web/dist holds it.
     locked = json.loads((ROOT / "web/package-lock.json").read_text())["packages"]
-    page = [{"type": "library", "bom-ref": f"pkg:npm/{name}@{one['version']}", "name": name, "version": one["version"],
-             "licenses": [{"expression": one["license"]}], "purl": f"pkg:npm/{name}@{one['version']}"}
-            for name, one in ((name, locked[f"node_modules/{name}"]) for name in sorted(locked[""]["dependencies"]))]
+    page = [
+        {
+            "type": "library",
+            "bom-ref": f"pkg:npm/{name}@{one['version']}",
+            "name": name,
+            "version": one["version"],
+            "licenses": [{"expression": one["license"]}],
+            "purl": f"pkg:npm/{name}@{one['version']}",
+        }
+        for name, one in ((name, locked[f"node_modules/{name}"]) for name in sorted(locked[""]["dependencies"]))
+    ]
     page = [] if of == "python" else page
 
     libraries = sorted((packages[i] for i in reached - {root}), key=lambda p: (p["name"], p["version"]))
@@ -154,8 +168,10 @@ def bill(of="program", installed=None):
         "version": 1,
         "metadata": {"component": component(packages[root], "library" if of == "python" else "application")},
         "components": [component(package, "library") for package in libraries] + page,
-        "dependencies": [{"ref": purl(packages[i]), "dependsOn": sorted(purl(packages[d]) for d in needs(i))}
-                         for i in sorted(reached, key=lambda i: purl(packages[i]))],
+        "dependencies": [
+            {"ref": purl(packages[i]), "dependsOn": sorted(purl(packages[d]) for d in needs(i))}
+            for i in sorted(reached, key=lambda i: purl(packages[i]))
+        ],
     }
     subject = document["metadata"]["component"]
     if of == "python":
@@ -165,11 +181,17 @@ def bill(of="program", installed=None):
     if of == "image":
         image = f"ventriform:{subject['version']}"
         document["metadata"]["component"] = {
-            "type": "container", "bom-ref": image, "name": "ventriform", "version": subject["version"],
-            "description": "Image of a container: the program on Debian's essential packages"}
+            "type": "container",
+            "bom-ref": image,
+            "name": "ventriform",
+            "version": subject["version"],
+            "description": "Image of a container: the program on Debian's essential packages",
+        }
         inside = list(debian(installed))
         document["components"] = [subject, *document["components"], *inside]
-        document["dependencies"].append({"ref": image, "dependsOn": [subject["bom-ref"], *(one["bom-ref"] for one in inside)]})
+        document["dependencies"].append(
+            {"ref": image, "dependsOn": [subject["bom-ref"], *(one["bom-ref"] for one in inside)]}
+        )
     serial = uuid.uuid5(uuid.NAMESPACE_URL, json.dumps(document, sort_keys=True))
     document["serialNumber"] = f"urn:uuid:{serial}"
     return json.dumps(document, indent=1) + "\n"

@@ -6,6 +6,7 @@ Of every crate that PACKAGE (`ventriform-program`, `ventriform-python`) needs at
 licence that it states, and the texts that lie beside its sources; crates with the same text share it. Crates that come
 without a text are listed at the end. Needs cargo alone.
 """
+
 import json
 import pathlib
 import subprocess
@@ -17,7 +18,8 @@ PLATFORM = "x86_64-unknown-linux-gnu"
 NAMES = ("license", "licence", "copying", "unlicense", "notice", "copyright")
 # Works of third parties inside a crate whose licence its own file does not name.
 INSIDE = {
-    "noto-sans-mono-bitmap": "Its glyphs are drawn from the font Noto Sans Mono, copyright The Noto Project Authors, " "under the SIL Open Font License "
+    "noto-sans-mono-bitmap": "Its glyphs are drawn from the font Noto Sans Mono, copyright The Noto Project Authors, "
+    "under the SIL Open Font License "
     "1.1: https://openfontlicense.org"
 }
 # Licences whose texts are these, whoever holds the copyright.
@@ -73,7 +75,10 @@ def main():
     for text, crates in sorted(sections.items(), key=lambda section: section[1]):
         print(f"\n{rule}\n" + "\n".join(crates) + f"\n{rule}\n\n{text}")
     if without:
-        print(f"\n{rule}\nCrates without a text beside their sources, under the licence that they state:\n" + "\n".join(without))
+        print(
+            f"\n{rule}\nCrates without a text beside their sources, under the licence that they state:\n"
+            + "\n".join(without)
+        )
 
 
 main()

@@ -4,10 +4,11 @@
     python scripts/release/python_types.py functions           prints _functions.pyi
     python scripts/release/python_types.py reference FILE      writes signatures and docstrings as JSON, for the site
 
-`python/ventriform/reports.py` has the reports' classes, from the OpenAPI document (DOCUMENT, or openapi/ventriform.json);
-`_functions.pyi` the signatures of the functions that take parameters, from the tables of the installed package.
-scripts/generate.sh writes both.
+`python/ventriform/reports.py` has the reports' classes, from the OpenAPI document (DOCUMENT, or
+openapi/ventriform.json); `_functions.pyi` the signatures of the functions that take parameters, from the tables of the
+installed package. scripts/generate.sh writes both.
 """
+
 import ast
 import inspect
 import json
@@ -22,11 +23,25 @@ PACKAGE = ROOT / "python/ventriform"
 
 # The documents that the package returns; what they refer to follows.
 DOCUMENTS = [
-    "ModelReport", "SegmentationReport", "BeatReport", "ComparisonReport", "NormalLimits", "PolarMap", "Agreement", "Job",
+    "ModelReport",
+    "SegmentationReport",
+    "BeatReport",
+    "ComparisonReport",
+    "NormalLimits",
+    "PolarMap",
+    "Agreement",
+    "Job",
     "Volume",
 ]
 # Objects whose fields are the caller's parameters.
-OPEN = {"ModelParameters", "SegmentationParameters", "BeatParameters", "ComparisonParameters", "NormalsFitParameters", "JobParameters"}
+OPEN = {
+    "ModelParameters",
+    "SegmentationParameters",
+    "BeatParameters",
+    "ComparisonParameters",
+    "NormalsFitParameters",
+    "JobParameters",
+}
 # What the package has another object for.
 RENAMED = {"Volume": "StoredVolume", "NormalLimits": "LimitsDocument"}
 PLAIN = {"number": "float", "integer": "int", "string": "str", "boolean": "bool", "null": "None"}
@@ -134,9 +149,19 @@ def stub():
 
     source = (PACKAGE / "_functions.py").read_text()
     tree = ast.parse(source)
-    lines = ['"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library\'s ' 'tables."""', ""]
+    lines = [
+        '"""Signatures of `_functions`. Written by scripts/release/python_types.py: change that, or the library\'s '
+        'tables."""',
+        "",
+    ]
     results = [alias.name for node in tree.body if getattr(node, "module", "") == "_results" for alias in node.names]
-    lines += ["import os", "from collections.abc import Iterable, Mapping, Sequence", "from datetime import datetime", "from typing import Any, Literal", ""]
+    lines += [
+        "import os",
+        "from collections.abc import Iterable, Mapping, Sequence",
+        "from datetime import datetime",
+        "from typing import Any, Literal",
+        "",
+    ]
     lines += [f"from ._results import {', '.join(name for name in results if name[0].isupper())}", ""]
     for node in tree.body:
         if isinstance(node, ast.Assign) and node.targets[0].id not in ("__all__",):
@@ -185,7 +210,12 @@ def reference():
 
     def shown(parameter):
         default = None if parameter.default is parameter.empty else repr(parameter.default)
-        return {"name": parameter.name, "kind": parameter.kind.description, "annotation": parameter.annotation, "default": default}
+        return {
+            "name": parameter.name,
+            "kind": parameter.kind.description,
+            "annotation": parameter.annotation,
+            "default": default,
+        }
 
     taking = {name: made for name, made in vars(ventriform).items() if hasattr(made, "__signature__")}
     return {

@@ -1,7 +1,19 @@
 // Requests to the service, with the key of the caller and with problems as the service words them.
 
 import { at } from "./base";
-import type { Beat, BeatSummary, Comparison, ComparisonSummary, Download, Job as AnyJob, Model, ModelSummary, Problem, Segmentation, SegmentationSummary } from "./generated/openapi";
+import type {
+  Beat,
+  BeatSummary,
+  Comparison,
+  ComparisonSummary,
+  Download,
+  Job as AnyJob,
+  Model,
+  ModelSummary,
+  Problem,
+  Segmentation,
+  SegmentationSummary,
+} from "./generated/openapi";
 import { saveBlob } from "./save";
 import { Watched } from "./state";
 
@@ -98,7 +110,11 @@ export async function call(path: string, options: CallOptions = {}): Promise<Res
     const problem = problemOf(answer.status, await answer.text());
     if (answer.status !== 401) throw new ProblemError(problem);
     if (key.value === used) {
-      await nextKey(used ? "The service no longer accepts the key. Give another one; what you did is kept." : "This service asks for a key.");
+      await nextKey(
+        used
+          ? "The service no longer accepts the key. Give another one; what you did is kept."
+          : "This service asks for a key.",
+      );
     }
   }
 }
@@ -118,7 +134,10 @@ export async function post<T>(path: string, body: unknown): Promise<T> {
 }
 
 /** One page of a list. */
-export async function page<T>(kind: string, query: Record<string, string | number> = {}): Promise<{ items: T[]; next: string | null }> {
+export async function page<T>(
+  kind: string,
+  query: Record<string, string | number> = {},
+): Promise<{ items: T[]; next: string | null }> {
   const words = new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)]));
   const answer = await call(`/v1/${kind}?${words}`);
   const limit = /max-size=(\d+)/.exec(answer.headers.get("upload-limit") ?? "");

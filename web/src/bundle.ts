@@ -8,7 +8,11 @@ import { zip } from "./zip";
 
 /** The name of a scan as files may have it, without the endings of its own files. */
 export function fileNameOf(volume: Volume): string {
-  return nameOf(volume).replace(/\.(nii|gz|hdr|img|dcm|zip)\b/gi, "").replace(/[^\w.-]+/g, "_") || "scan";
+  return (
+    nameOf(volume)
+      .replace(/\.(nii|gz|hdr|img|dcm|zip)\b/gi, "")
+      .replace(/[^\w.-]+/g, "_") || "scan"
+  );
 }
 
 interface Wanted {
@@ -23,13 +27,17 @@ interface Wanted {
  * they would be.
  */
 export function objectsOf(volume: Volume, result: Result): string[] {
-  return volume.dicom ? result.links.dicom ?? [] : [];
+  return volume.dicom ? (result.links.dicom ?? []) : [];
 }
 
 function filesOf(volume: Volume, result: Result, folder: string): Wanted[] {
   const page = result.links.page;
   const files = result.files.map(file => ({ name: `${folder}/${file.name}`, path: file.href }));
-  const made = objectsOf(volume, result).map(path => ({ name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`, path, object: true }));
+  const made = objectsOf(volume, result).map(path => ({
+    name: `${folder}/${path.slice(path.lastIndexOf("/") + 1)}`,
+    path,
+    object: true,
+  }));
   return [...files, ...(page ? [{ name: `${folder}/report.html`, path: page }] : []), ...made];
 }
 
@@ -70,6 +78,12 @@ export async function saveScan(volume: Volume, told: (text: string) => void): Pr
   await loadScan(volume.id);
   const results = [...resultsOf(volume.id), ...comparisonsOf(volume.id).filter(made => made.volume === volume.id)];
   const scan = volume.originals.map(file => ({ name: `scan/${file.name}`, path: file.href }));
-  const made = results.flatMap(result => filesOf(volume, result, `${isFit(result.id) ? "fit" : isBeat(result.id) ? "beat" : isComparison(result.id) ? "comparison" : "model"}_${result.id.slice(0, 12)}`));
+  const made = results.flatMap(result =>
+    filesOf(
+      volume,
+      result,
+      `${isFit(result.id) ? "fit" : isBeat(result.id) ? "beat" : isComparison(result.id) ? "comparison" : "model"}_${result.id.slice(0, 12)}`,
+    ),
+  );
   await saved(fileNameOf(volume), [...scan, ...made], told);
 }

@@ -26,7 +26,13 @@ export interface Evaluation {
   templates: { case: string; source: string }[];
   problems: { case: string; problem: string }[];
   findings: { claim: string; verdict: string; figures: string; sample: string }[];
-  figure3: { template: string; model: Variant; points: number; fitness: { raw: number; normalised: number }; radius_ratio: { mean: number; least: number } }[];
+  figure3: {
+    template: string;
+    model: Variant;
+    points: number;
+    fitness: { raw: number; normalised: number };
+    radius_ratio: { mean: number; least: number };
+  }[];
   fits: FitOfCase[];
   pictures: { case: string; caption: string; file: string }[];
 }
@@ -53,17 +59,33 @@ export interface Opened {
 
 /** Reads the results among files, by their path. */
 export async function openFolder(all: Map<string, File>): Promise<Opened> {
-  const found = [...all.keys()].filter(path => /(^|\/)evaluation\.json$/.test(path)).sort((a, b) => a.length - b.length)[0];
-  if (found === undefined) throw new Error("There is no evaluation.json in it. Choose the folder that ventriform evaluate --output wrote.");
+  const found = [...all.keys()]
+    .filter(path => /(^|\/)evaluation\.json$/.test(path))
+    .sort((a, b) => a.length - b.length)[0];
+  if (found === undefined)
+    throw new Error("There is no evaluation.json in it. Choose the folder that ventriform evaluate --output wrote.");
   const folder = found.slice(0, -"evaluation.json".length);
-  const files = new Map([...all].flatMap(([path, file]): [string, File][] => (path.startsWith(folder) ? [[path.slice(folder.length), file]] : [])));
+  const files = new Map(
+    [...all].flatMap(([path, file]): [string, File][] =>
+      path.startsWith(folder) ? [[path.slice(folder.length), file]] : [],
+    ),
+  );
   let evaluation: Evaluation;
   try {
-    evaluation = { problems: [], findings: [], figure3: [], templates: [], settings: {}, pictures: [], ...(JSON.parse(await files.get("evaluation.json")!.text()) as Partial<Evaluation>) } as Evaluation;
+    evaluation = {
+      problems: [],
+      findings: [],
+      figure3: [],
+      templates: [],
+      settings: {},
+      pictures: [],
+      ...(JSON.parse(await files.get("evaluation.json")!.text()) as Partial<Evaluation>),
+    } as Evaluation;
   } catch {
     throw new Error("evaluation.json cannot be read: it is not what the program writes.");
   }
-  if (!Array.isArray(evaluation.fits)) throw new Error("evaluation.json holds no fits: it is not what the program writes.");
+  if (!Array.isArray(evaluation.fits))
+    throw new Error("evaluation.json holds no fits: it is not what the program writes.");
   const csv = await files.get("table1.csv")?.text();
   return { name: folder.split("/").filter(Boolean).pop() ?? "", evaluation, table: csv ? table1(csv) : [], files };
 }

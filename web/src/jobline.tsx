@@ -6,13 +6,23 @@ import { cancel, forget, isActive } from "./library";
 import { open, openComparison } from "./route";
 import { ordinal, stage } from "./words";
 
-const KINDS: Record<Job["kind"], string> = { model: "Model", segmentation: "Fit", beat: "Beat", comparison: "Rest and stress", normals: "Normal limits" };
+const KINDS: Record<Job["kind"], string> = {
+  model: "Model",
+  segmentation: "Fit",
+  beat: "Beat",
+  comparison: "Rest and stress",
+  normals: "Normal limits",
+};
 
 /** What is wrong, and what to do. */
 export function Trouble({ problem }: { problem: Problem | null | undefined }) {
   if (!problem) return null;
   const [detail, fix] = sentences(problem);
-  return <span class="error">{detail} {fix && <strong>{fix}</strong>}</span>;
+  return (
+    <span class="error">
+      {detail} {fix && <strong>{fix}</strong>}
+    </span>
+  );
 }
 
 export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) => void) | undefined }) {
@@ -27,25 +37,37 @@ export function JobLine({ job, onChange }: { job: Job; onChange?: ((job: Job) =>
   return (
     <div class={`job ${job.state}`}>
       <span class="what">{what}</span>
-      {job.state === "queued" && <span>{job.queue_position ? `${ordinal(job.queue_position)} in the queue` : "queued"}</span>}
+      {job.state === "queued" && (
+        <span>{job.queue_position ? `${ordinal(job.queue_position)} in the queue` : "queued"}</span>
+      )}
       {job.state === "running" && (
         <>
           <progress value={job.progress} max={1} aria-label={`${what}: ${stage(job)}`} />
           <span>{stage(job)}</span>
         </>
       )}
-      {job.state === "failed" && (
-        <Trouble problem={job.error} />
-      )}
+      {job.state === "failed" && <Trouble problem={job.error} />}
       {job.state === "cancelled" && <span>cancelled</span>}
       {problem && <span class="error">{problem}</span>}
       {isActive(job) ? (
-        <button type="button" class="plain" disabled={job.state === "running" && problem === "" && job.stage === "cancelling"} onClick={act(() => cancel(job))}>Cancel</button>
+        <button
+          type="button"
+          class="plain"
+          disabled={job.state === "running" && problem === "" && job.stage === "cancelling"}
+          onClick={act(() => cancel(job))}>
+          Cancel
+        </button>
       ) : (
         job.state !== "succeeded" && (
           <>
-            {job.kind !== "normals" && <button type="button" onClick={change}>Change and retry</button>}
-            <button type="button" class="plain" onClick={act(() => forget(job))}>Remove</button>
+            {job.kind !== "normals" && (
+              <button type="button" onClick={change}>
+                Change and retry
+              </button>
+            )}
+            <button type="button" class="plain" onClick={act(() => forget(job))}>
+              Remove
+            </button>
           </>
         )
       )}

@@ -1,7 +1,18 @@
 // What is stored, as far as this page has read it, and the states of jobs as they change.
 
 import { at } from "./base";
-import { type Job, type Normals, type Result, type Volume, authorization, call, get, page, reachable, words } from "./api";
+import {
+  type Job,
+  type Normals,
+  type Result,
+  type Volume,
+  authorization,
+  call,
+  get,
+  page,
+  reachable,
+  words,
+} from "./api";
 import { Watched } from "./state";
 import { isBeat, isComparison, isFit, newest } from "./words";
 
@@ -24,7 +35,14 @@ const PAGE = 30;
 
 /** Reads the newest of everything. */
 export async function refresh(): Promise<void> {
-  const known = { volumes: volumes.value, jobs: jobs.value, models: models.value, fits: fits.value, beats: beats.value, comparisons: comparisons.value };
+  const known = {
+    volumes: volumes.value,
+    jobs: jobs.value,
+    models: models.value,
+    fits: fits.value,
+    beats: beats.value,
+    comparisons: comparisons.value,
+  };
   try {
     // The jobs first: the results of those that had ended are then in the lists, which are read after them.
     const j = await page<Job>("jobs", { limit: 100 });
@@ -107,7 +125,10 @@ export async function loadAllResults(): Promise<void> {
   for (const [kind, list] of KINDS) {
     let cursor: string | null = null;
     do {
-      const next: { items: Result[]; next: string | null } = await page<Result>(kind, { limit: 100, ...(cursor ? { cursor } : {}) });
+      const next: { items: Result[]; next: string | null } = await page<Result>(kind, {
+        limit: 100,
+        ...(cursor ? { cursor } : {}),
+      });
       const known = new Set(list.value.map(result => result.id));
       list.value = [...list.value, ...next.items.filter(result => !known.has(result.id))];
       cursor = next.next;
@@ -118,7 +139,12 @@ export async function loadAllResults(): Promise<void> {
 const MOST = 2000;
 
 /** The results of scans: their collection, and what of it was read. */
-const KINDS = [["segmentations", fits], ["models", models], ["beats", beats], ["comparisons", comparisons]] as const;
+const KINDS = [
+  ["segmentations", fits],
+  ["models", models],
+  ["beats", beats],
+  ["comparisons", comparisons],
+] as const;
 
 function kindOf(id: string): (typeof KINDS)[number] {
   return KINDS[isFit(id) ? 0 : isBeat(id) ? 2 : isComparison(id) ? 3 : 1];
@@ -236,7 +262,11 @@ async function follow(job: Job): Promise<void> {
       const events = text.split("\n\n");
       text = events.pop() ?? "";
       for (const event of events) {
-        const data = event.split("\n").filter(line => line.startsWith("data:")).map(line => line.slice(5)).join("\n");
+        const data = event
+          .split("\n")
+          .filter(line => line.startsWith("data:"))
+          .map(line => line.slice(5))
+          .join("\n");
         if (data) put(JSON.parse(data) as Job);
       }
     }

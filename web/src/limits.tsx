@@ -27,7 +27,11 @@ export function LimitsView() {
         const name = file.name.replace(/\.json$/i, "").slice(0, 100);
         // As it was written: read and written again by a browser, numbers are spelt otherwise, and the file's hash is
         // another.
-        const answer = await call(`/v1/normals?${new URLSearchParams({ name })}`, { method: "POST", headers: { "content-type": "application/json" }, body: await textOf(file) });
+        const answer = await call(`/v1/normals?${new URLSearchParams({ name })}`, {
+          method: "POST",
+          headers: { "content-type": "application/json" },
+          body: await textOf(file),
+        });
         const added = (await answer.json()) as Normals;
         setState(`Added: ${added.name}.`);
       } catch (error) {
@@ -44,21 +48,50 @@ export function LimitsView() {
       <section class={`drop${over ? " over" : ""}`} aria-label="Add normal limits">
         <div class="choose">
           <strong>{over ? "Let go to add" : "Drop a file of normal limits here"}</strong>
-          <span class="quiet">The JSON file that <code>ventriform normals build</code> writes of a cohort of healthy people.</span>
+          <span class="quiet">
+            The JSON file that <code>ventriform normals build</code> writes of a cohort of healthy people.
+          </span>
         </div>
         <div class="buttons">
-          <button type="button" class="main" onClick={() => chooser.current?.click()}>Choose a file</button>
-          <input ref={chooser} class="hidden" type="file" accept=".json,application/json" tabIndex={-1} aria-label="File of normal limits" onChange={event => {
-            void add([...(event.currentTarget.files ?? [])]);
-            event.currentTarget.value = "";
-          }} />
+          <button type="button" class="main" onClick={() => chooser.current?.click()}>
+            Choose a file
+          </button>
+          <input
+            ref={chooser}
+            class="hidden"
+            type="file"
+            accept=".json,application/json"
+            tabIndex={-1}
+            aria-label="File of normal limits"
+            onChange={event => {
+              void add([...(event.currentTarget.files ?? [])]);
+              event.currentTarget.value = "";
+            }}
+          />
         </div>
       </section>
-      <p role="status" class="quiet">{state}</p>
-      {(failed || problem) && <p class="error" role="alert">{failed || problem}</p>}
-      {building.map(job => <JobLine key={job.id} job={job} />)}
-      {isLoaded && all.length === 0 && <p class="quiet">None is stored. Without limits, uptake is shown in per cent of each scan’s own brightest wall, and there are no scores. None comes with the program: limits belong to a camera, a protocol and a tracer.</p>}
-      <ul class="limits-list">{all.map(limits => <LimitsItem key={limits.id} limits={limits} />)}</ul>
+      <p role="status" class="quiet">
+        {state}
+      </p>
+      {(failed || problem) && (
+        <p class="error" role="alert">
+          {failed || problem}
+        </p>
+      )}
+      {building.map(job => (
+        <JobLine key={job.id} job={job} />
+      ))}
+      {isLoaded && all.length === 0 && (
+        <p class="quiet">
+          None is stored. Without limits, uptake is shown in per cent of each scan’s own brightest wall, and there are
+          no scores. None comes with the program: limits belong to a camera, a protocol and a tracer.
+        </p>
+      )}
+      <ul class="limits-list">
+        {all.map(limits => (
+          <LimitsItem key={limits.id} limits={limits} />
+        ))}
+      </ul>
     </div>
   );
 }
@@ -83,14 +116,37 @@ function LimitsItem({ limits }: { limits: Normals }) {
         <h2>{name}</h2>
         {summary.simulated && <Simulated />}
         <span class="end">
-          <button type="button" class="plain" aria-label={`Download ${name}`} onClick={() => void save(links.limits, `${name}.json`).catch((error: unknown) => setProblem(words(error)))}>Download</button>
-          <Confirm label={`Erase ${name}`} question="Erase these limits? What was scored by them stays." act={() => eraseNormals(limits.id)}>Erase</Confirm>
+          <button
+            type="button"
+            class="plain"
+            aria-label={`Download ${name}`}
+            onClick={() => void save(links.limits, `${name}.json`).catch((error: unknown) => setProblem(words(error)))}>
+            Download
+          </button>
+          <Confirm
+            label={`Erase ${name}`}
+            question="Erase these limits? What was scored by them stays."
+            act={() => eraseNormals(limits.id)}>
+            Erase
+          </Confirm>
         </span>
       </div>
-      <p class="quiet">{summary.people} · added {moment(created_at)} · built by version {summary.program_version}{summary.excluded > 0 && ` · ${summary.excluded} ${summary.excluded === 1 ? "case" : "cases"} left out`}</p>
+      <p class="quiet">
+        {summary.people} · added {moment(created_at)} · built by version {summary.program_version}
+        {summary.excluded > 0 && ` · ${summary.excluded} ${summary.excluded === 1 ? "case" : "cases"} left out`}
+      </p>
       <div class="scrolled" tabIndex={0} role="region" aria-label={`Groups of ${name}`}>
         <table class="plain-table">
-          <thead><tr><th scope="col">Group</th><th scope="col">protocol</th><th scope="col">tracer</th><th scope="col">attenuation corrected</th><th scope="col">people</th><th scope="col">own wall below the others’ limits</th></tr></thead>
+          <thead>
+            <tr>
+              <th scope="col">Group</th>
+              <th scope="col">protocol</th>
+              <th scope="col">tracer</th>
+              <th scope="col">attenuation corrected</th>
+              <th scope="col">people</th>
+              <th scope="col">own wall below the others’ limits</th>
+            </tr>
+          </thead>
           <tbody>
             {summary.groups.map(group => (
               <tr key={`${group.sex} ${group.protocol} ${group.tracer} ${group.attenuation_corrected}`}>
@@ -105,7 +161,11 @@ function LimitsItem({ limits }: { limits: Normals }) {
           </tbody>
         </table>
       </div>
-      {problem && <p class="error" role="alert">{problem}</p>}
+      {problem && (
+        <p class="error" role="alert">
+          {problem}
+        </p>
+      )}
     </li>
   );
 }

@@ -19,33 +19,67 @@ function Page() {
   const signedIn = useWatched(key);
   return (
     <>
-      <a class="skip" href="#main" onClick={event => {
-        event.preventDefault();
-        document.getElementById("main")?.focus();
-      }}>Skip to the content</a>
+      <a
+        class="skip"
+        href="#main"
+        onClick={event => {
+          event.preventDefault();
+          document.getElementById("main")?.focus();
+        }}>
+        Skip to the content
+      </a>
       <header class="top">
         <a class="brand" href={at("/#/")}>
-          <svg viewBox="0 0 32 32" aria-hidden="true"><path d="M8 6c-1.500 11 2 20 8 20s9.500-9 8-20" /><path class="inner" d="M12.500 7c-.7 6 .8 11 3.500 11s4.200-5 3.500-11" /></svg>
+          <svg viewBox="0 0 32 32" aria-hidden="true">
+            <path d="M8 6c-1.500 11 2 20 8 20s9.500-9 8-20" />
+            <path class="inner" d="M12.500 7c-.7 6 .8 11 3.500 11s4.200-5 3.500-11" />
+          </svg>
           ventriform
         </a>
         <nav aria-label="Pages">
-          <a href={at("/#/")} aria-current={view === "list" && !DOCS ? "page" : undefined}>Scans</a>
-          <a href={at("/#/limits")} aria-current={view === "limits" && !DOCS ? "page" : undefined}>Normal limits</a>
-          <a href={at("/#/evaluation")} aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>Evaluation</a>
-          <a href={at("/docs")} aria-current={DOCS ? "page" : undefined}>API</a>
+          <a href={at("/#/")} aria-current={view === "list" && !DOCS ? "page" : undefined}>
+            Scans
+          </a>
+          <a href={at("/#/limits")} aria-current={view === "limits" && !DOCS ? "page" : undefined}>
+            Normal limits
+          </a>
+          <a href={at("/#/evaluation")} aria-current={view === "evaluation" && !DOCS ? "page" : undefined}>
+            Evaluation
+          </a>
+          <a href={at("/docs")} aria-current={DOCS ? "page" : undefined}>
+            API
+          </a>
         </nav>
         <span class="research">Research software, not a medical device</span>
-        {signedIn && <button type="button" class="plain" onClick={() => signIn("")}>Forget the key</button>}
+        {signedIn && (
+          <button type="button" class="plain" onClick={() => signIn("")}>
+            Forget the key
+          </button>
+        )}
       </header>
       {!answers && (
         <p class="banner" role="alert">
           The service does not answer. This page tries again by itself; what you chose is kept.
-          <button type="button" onClick={() => void refresh()}>Try now</button>
+          <button type="button" onClick={() => void refresh()}>
+            Try now
+          </button>
         </p>
       )}
       {asked && <SignIn reason={asked} />}
       <main id="main" tabIndex={-1}>
-        {DOCS ? <Chunk load={docs} name="documentation" /> : volume ? <Chunk key={volume} load={viewer} name="viewer" volume={volume} /> : view === "comparison" && result ? <Chunk key="comparison" load={comparison} name="comparison" volume={result} /> : view === "limits" ? <Chunk key="limits" load={limits} name="normal limits" /> : view === "evaluation" ? <Chunk key="evaluation" load={evaluation} name="evaluation" /> : <WorkList />}
+        {DOCS ? (
+          <Chunk load={docs} name="documentation" />
+        ) : volume ? (
+          <Chunk key={volume} load={viewer} name="viewer" volume={volume} />
+        ) : view === "comparison" && result ? (
+          <Chunk key="comparison" load={comparison} name="comparison" volume={result} />
+        ) : view === "limits" ? (
+          <Chunk key="limits" load={limits} name="normal limits" />
+        ) : view === "evaluation" ? (
+          <Chunk key="evaluation" load={evaluation} name="evaluation" />
+        ) : (
+          <WorkList />
+        )}
       </main>
     </>
   );
@@ -55,13 +89,22 @@ function Page() {
 function SignIn({ reason }: { reason: string }) {
   const [text, setText] = useState("");
   return (
-    <form class="banner sign-in" aria-label="Sign in" onSubmit={event => {
-      event.preventDefault();
-      if (text.trim()) signIn(text);
-    }}>
+    <form
+      class="banner sign-in"
+      aria-label="Sign in"
+      onSubmit={event => {
+        event.preventDefault();
+        if (text.trim()) signIn(text);
+      }}>
       <label>
         {reason} API key
-        <input type="password" value={text} autocomplete="off" autofocus onInput={event => setText(event.currentTarget.value)} />
+        <input
+          type="password"
+          value={text}
+          autocomplete="off"
+          autofocus
+          onInput={event => setText(event.currentTarget.value)}
+        />
       </label>
       <button class="main">Use this key</button>
       <span class="quiet">Kept in this tab until it is closed.</span>
@@ -70,17 +113,33 @@ function SignIn({ reason }: { reason: string }) {
 }
 
 const viewer = () => import("./viewer/viewer").then(module => module.Viewer as ComponentType<{ volume?: string }>);
-const comparison = () => import("./viewer/comparisonview").then(({ ComparisonView }) => (({ volume }) => <ComparisonView key={volume} id={volume ?? ""} />) as ComponentType<{ volume?: string }>);
+const comparison = () =>
+  import("./viewer/comparisonview").then(
+    ({ ComparisonView }) =>
+      (({ volume }) => <ComparisonView key={volume} id={volume ?? ""} />) as ComponentType<{ volume?: string }>,
+  );
 const limits = () => import("./limits").then(module => module.LimitsView as ComponentType<{ volume?: string }>);
-const evaluation = () => import("./evaluationview").then(module => module.EvaluationView as ComponentType<{ volume?: string }>);
+const evaluation = () =>
+  import("./evaluationview").then(module => module.EvaluationView as ComponentType<{ volume?: string }>);
 const docs = () => import("./docs").then(module => module.Docs as ComponentType<{ volume?: string }>);
 
 /** Viewer and documentation are fetched when they are opened first. */
-function Chunk({ load, name, ...rest }: { load: () => Promise<ComponentType<{ volume?: string }>>; name: string; volume?: string }) {
+function Chunk({
+  load,
+  name,
+  ...rest
+}: {
+  load: () => Promise<ComponentType<{ volume?: string }>>;
+  name: string;
+  volume?: string;
+}) {
   const [View, setView] = useState<ComponentType<{ volume?: string }> | null>(null);
   const [failed, setFailed] = useState(false);
   useEffect(() => {
-    load().then(view => setView(() => view), () => setFailed(true));
+    load().then(
+      view => setView(() => view),
+      () => setFailed(true),
+    );
   }, []);
   if (failed) return <p class="error pad">The {name} could not be loaded. Reload the page.</p>;
   return View ? <View {...rest} /> : <p class="quiet pad">Loading the {name} …</p>;

@@ -27,7 +27,14 @@ interface Props {
   onClose?: () => void;
 }
 
-export function PairForm({ pair, stress: chosenBefore = null, draft: before = {}, problem: first = null, otherPatient = false, onClose }: Props) {
+export function PairForm({
+  pair,
+  stress: chosenBefore = null,
+  draft: before = {},
+  problem: first = null,
+  otherPatient = false,
+  onClose,
+}: Props) {
   const [a, b] = pair;
   const guess = useMemo(() => stressOf(a, b), [a, b]);
   const [stress, setStress] = useState<string | null>(chosenBefore ?? guess.stress?.id ?? null);
@@ -45,7 +52,12 @@ export function PairForm({ pair, stress: chosenBefore = null, draft: before = {}
     try {
       const { normals, ...parameters } = valuesOf(draft, (await parameterSpecs()).comparison);
       const [atStress, atRest] = stress === a.id ? [a, b] : [b, a];
-      const job = await fileComparison({ stress: atStress, rest: atRest, normals: typeof normals === "string" ? normals : null, parameters });
+      const job = await fileComparison({
+        stress: atStress,
+        rest: atRest,
+        normals: typeof normals === "string" ? normals : null,
+        parameters,
+      });
       picked.value = [];
       openComparison(job.id);
     } catch (error) {
@@ -59,28 +71,60 @@ export function PairForm({ pair, stress: chosenBefore = null, draft: before = {}
         <legend>Which scan is stress?</legend>
         {pair.map(volume => (
           <label key={volume.id} class="pair-choice">
-            <input type="radio" name="stress" value={volume.id} checked={stress === volume.id} onChange={() => setStress(volume.id)} />
+            <input
+              type="radio"
+              name="stress"
+              value={volume.id}
+              checked={stress === volume.id}
+              onChange={() => setStress(volume.id)}
+            />
             <span>
               <b title={nameOf(volume)}>{cut(nameOf(volume))}</b>
-              {stress && <span class={`role ${stress === volume.id ? "stress" : "rest"}`}>{stress === volume.id ? "stress" : "rest"}</span>}
-              <span class="quiet">{[study(volume, cut), ...acquisition(volume), moment(volume.created_at)].filter(Boolean).join(" · ")}</span>
+              {stress && (
+                <span class={`role ${stress === volume.id ? "stress" : "rest"}`}>
+                  {stress === volume.id ? "stress" : "rest"}
+                </span>
+              )}
+              <span class="quiet">
+                {[study(volume, cut), ...acquisition(volume), moment(volume.created_at)].filter(Boolean).join(" · ")}
+              </span>
             </span>
           </label>
         ))}
       </fieldset>
       <p class="quiet">{guess.told ? TOLD[guess.told] : "Neither header nor name tells it: choose."}</p>
       {alike && <p class="warning">Both headers say {statedRole(a)}.</p>}
-      {twoPatients && !asOnePatient && <p class="warning">The headers name two patients: their scans are only compared if you say that they are one.</p>}
+      {twoPatients && !asOnePatient && (
+        <p class="warning">
+          The headers name two patients: their scans are only compared if you say that they are one.
+        </p>
+      )}
       {(twoPatients || asOnePatient) && (
         <label class="inline">
-          <input type="checkbox" checked={asOnePatient} onChange={event => setDraft({ ...draft, same_patient: event.currentTarget.checked ? "true" : "" })} />
+          <input
+            type="checkbox"
+            checked={asOnePatient}
+            onChange={event => setDraft({ ...draft, same_patient: event.currentTarget.checked ? "true" : "" })}
+          />
           These are scans of one patient
         </label>
       )}
-      <ParameterForm kind="comparison" volume={stress === b.id ? b : a} draft={draft} onChange={setDraft} problem={problem} />
+      <ParameterForm
+        kind="comparison"
+        volume={stress === b.id ? b : a}
+        draft={draft}
+        onChange={setDraft}
+        problem={problem}
+      />
       <span class="buttons">
-        <button class="main" disabled={sending || !stress}>Compare rest and stress</button>
-        {onClose && <button type="button" class="plain" onClick={onClose}>Not now</button>}
+        <button class="main" disabled={sending || !stress}>
+          Compare rest and stress
+        </button>
+        {onClose && (
+          <button type="button" class="plain" onClick={onClose}>
+            Not now
+          </button>
+        )}
       </span>
     </form>
   );
@@ -96,10 +140,14 @@ export function PickedPair() {
   const close = () => (picked.value = []);
   return (
     <section class="picked" aria-label="Picked for a comparison">
-      {b ? <PairForm key={`${a.id} ${b.id}`} pair={[a, b]} onClose={close} /> : (
+      {b ? (
+        <PairForm key={`${a.id} ${b.id}`} pair={[a, b]} onClose={close} />
+      ) : (
         <p>
           <b>{cut(nameOf(a))}</b> is picked: pick the patient’s other scan below to compare rest and stress.{" "}
-          <button type="button" class="plain" onClick={close}>Not now</button>
+          <button type="button" class="plain" onClick={close}>
+            Not now
+          </button>
         </p>
       )}
     </section>

@@ -32,7 +32,10 @@ function hintedRole(volume: Volume): Role | null {
 
 /** The scan at stress of two, and what tells it. */
 export function stressOf(a: Volume, b: Volume): { stress: Volume | null; told: "headers" | "names" | null } {
-  for (const [told, read] of [["headers", statedRole], ["names", hintedRole]] as const) {
+  for (const [told, read] of [
+    ["headers", statedRole],
+    ["names", hintedRole],
+  ] as const) {
     const [one, other] = [read(a), read(b)];
     // Two scans of one role are for the service to name; a role of one scan tells that of the other.
     if (one && one === other) continue;
@@ -42,7 +45,11 @@ export function stressOf(a: Volume, b: Volume): { stress: Volume | null; told: "
   return { stress: null, told: null };
 }
 
-const plain = (text: string | null | undefined) => text?.trim().replace(/[\^ ]+$/, "").toUpperCase() ?? "";
+const plain = (text: string | null | undefined) =>
+  text
+    ?.trim()
+    .replace(/[\^ ]+$/, "")
+    .toUpperCase() ?? "";
 
 /** What scans of one patient's study have in common; null where no header tells. */
 export function studyKey({ dicom }: Volume): string | null {

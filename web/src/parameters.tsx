@@ -40,7 +40,17 @@ interface Document {
 }
 
 /** Of requests, and of both scans of a comparison, which the page has chosen before. */
-const NOT_OF_THE_WORK = new Set(["external_id", "labels", "webhook", "webhook_events", "priority", "send", "to", "stress", "rest"]);
+const NOT_OF_THE_WORK = new Set([
+  "external_id",
+  "labels",
+  "webhook",
+  "webhook_events",
+  "priority",
+  "send",
+  "to",
+  "stress",
+  "rest",
+]);
 
 let specs: Promise<Record<Kind, Spec[]>> | undefined;
 
@@ -77,7 +87,10 @@ function read(document: Document, path: string): Spec[] {
     if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
     const help = parameter.description ?? schema.description ?? "";
     const numeric = ["number", "integer", "array"].includes(String(schema.type));
-    const unit = numeric && !["axis", "anterior", "segments_from"].includes(name) ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "") : "";
+    const unit =
+      numeric && !["axis", "anterior", "segments_from"].includes(name)
+        ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "")
+        : "";
     return [{ name, schema, help, unit }];
   });
 }
@@ -92,15 +105,39 @@ const FEW: Record<Kind, string[]> = {
 /** What chooses the group of the normal limits, once limits are chosen. */
 const GROUP = ["sex", "protocol", "stress_protocol", "rest_protocol", "tracer", "attenuation_corrected"];
 
-const PLACE = ["center", "axis", "base", "seed_point", "box", "roll", "superior", "anterior", "segments_from", "kept_model"];
+const PLACE = [
+  "center",
+  "axis",
+  "base",
+  "seed_point",
+  "box",
+  "roll",
+  "superior",
+  "anterior",
+  "segments_from",
+  "kept_model",
+];
 const EDGE = ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"];
-const SPRINGS = ["spring_stiffness", "torsion_stiffness", "body_stiffness", "thickness_stiffness", "mass", "damping", "time_step", "tolerance", "max_iterations"];
+const SPRINGS = [
+  "spring_stiffness",
+  "torsion_stiffness",
+  "body_stiffness",
+  "thickness_stiffness",
+  "mass",
+  "damping",
+  "time_step",
+  "tolerance",
+  "max_iterations",
+];
 
 const GROUPS: Record<Kind, [string, string[]][]> = {
   model: [
     ["Repeat and choose", ["seed", "starts", "frame"]],
     ["Object", ["isolate", "box", "seed_point", "label", "topology", "mask_smoothing", "denoise"]],
-    ["Points", ["adaptive", "adaptive_from", "repulsion_iterations", "repulsion_strength", "geodesics", "relaxation_iterations"]],
+    [
+      "Points",
+      ["adaptive", "adaptive_from", "repulsion_iterations", "repulsion_strength", "geodesics", "relaxation_iterations"],
+    ],
     ["Fit to the surface", ["fit_*"]],
     ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],
   ],
@@ -150,8 +187,10 @@ export function valuesOf(draft: Draft, all: Spec[]): Record<string, ParameterVal
   for (const { name, schema } of all) {
     const text = draft[name]?.trim();
     if (!text) continue;
-    if (schema.type === "array") values[name] = text.split(/[\s,;]+/).map(part => (Number.isFinite(Number(part)) ? Number(part) : part));
-    else if (schema.type === "integer" || schema.type === "number") values[name] = Number.isFinite(Number(text)) ? Number(text) : text;
+    if (schema.type === "array")
+      values[name] = text.split(/[\s,;]+/).map(part => (Number.isFinite(Number(part)) ? Number(part) : part));
+    else if (schema.type === "integer" || schema.type === "number")
+      values[name] = Number.isFinite(Number(text)) ? Number(text) : text;
     else if (schema.type === "boolean") values[name] = text === "true";
     else values[name] = text;
   }
@@ -197,7 +236,10 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
   const [presets, setPresets] = useState(() => presetsOf(kind));
   const [naming, setNaming] = useState("");
   useEffect(() => {
-    void parameterSpecs().then(found => setAll(found[kind]), () => setAll([]));
+    void parameterSpecs().then(
+      found => setAll(found[kind]),
+      () => setAll([]),
+    );
     setPresets(presetsOf(kind));
   }, [kind]);
   if (!all) return <p class="quiet">Reading the parameters …</p>;
@@ -209,7 +251,13 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
       volume={volume}
       text={draft[spec.name] ?? ""}
       limits={draft["normals"] ?? ""}
-      onText={text => onChange({ ...draft, ...(spec.name === "normals" ? Object.fromEntries(GROUP.map(name => [name, ""])) : {}), [spec.name]: text })}
+      onText={text =>
+        onChange({
+          ...draft,
+          ...(spec.name === "normals" ? Object.fromEntries(GROUP.map(name => [name, ""])) : {}),
+          [spec.name]: text,
+        })
+      }
       error={problem?.field === spec.name ? problem.text : ""}
     />
   );
@@ -224,9 +272,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
         {draft["normals"] && group.map(field)}
       </div>
       <details open={mustShow || undefined}>
-        <summary>
-          More{changed(inMore) ? <span class="count">{changed(inMore)} set</span> : null}
-        </summary>
+        <summary>More{changed(inMore) ? <span class="count">{changed(inMore)} set</span> : null}</summary>
         {groups.map(([title, list]) => (
           <details class="group" key={title} open={list.some(spec => spec.name === problem?.field) || undefined}>
             <summary>
@@ -239,34 +285,55 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
         <div class="presets">
           <label>
             Preset
-            <select value="" onChange={event => {
-              const chosen = presets[event.currentTarget.value];
-              if (chosen) onChange(chosen);
-            }}>
+            <select
+              value=""
+              onChange={event => {
+                const chosen = presets[event.currentTarget.value];
+                if (chosen) onChange(chosen);
+              }}>
               <option value="">choose …</option>
-              {Object.keys(presets).map(name => <option key={name}>{name}</option>)}
+              {Object.keys(presets).map(name => (
+                <option key={name}>{name}</option>
+              ))}
             </select>
           </label>
           <label>
             Keep as
             <input value={naming} placeholder="a name" onInput={event => setNaming(event.currentTarget.value)} />
           </label>
-          <button type="button" disabled={!naming.trim()} onClick={() => {
-            const next = { ...presets, [naming.trim()]: draft };
-            keep(kind, next);
-            setPresets(next);
-            setNaming("");
-          }}>Keep</button>
+          <button
+            type="button"
+            disabled={!naming.trim()}
+            onClick={() => {
+              const next = { ...presets, [naming.trim()]: draft };
+              keep(kind, next);
+              setPresets(next);
+              setNaming("");
+            }}>
+            Keep
+          </button>
           {Object.keys(presets).length > 0 && (
-            <button type="button" class="plain" onClick={() => {
-              keep(kind, {});
-              setPresets({});
-            }}>Forget all</button>
+            <button
+              type="button"
+              class="plain"
+              onClick={() => {
+                keep(kind, {});
+                setPresets({});
+              }}>
+              Forget all
+            </button>
           )}
-          <button type="button" class="plain" onClick={() => onChange({})}>All defaults</button>
+          <button type="button" class="plain" onClick={() => onChange({})}>
+            All defaults
+          </button>
         </div>
       </details>
-      {problem && !all.some(spec => spec.name === problem.field && (draft["normals"] || !GROUP.includes(spec.name))) && <p class="error" role="alert">{problem.text}</p>}
+      {problem &&
+        !all.some(spec => spec.name === problem.field && (draft["normals"] || !GROUP.includes(spec.name))) && (
+          <p class="error" role="alert">
+            {problem.text}
+          </p>
+        )}
     </div>
   );
 }
@@ -316,31 +383,69 @@ function Field({ spec, volume, text, limits, onText, error }: FieldProps) {
   const range = [
     schema.minimum !== undefined && schema.maximum !== undefined ? `${schema.minimum} to ${schema.maximum}` : "",
     schema.default !== undefined ? `default ${standard}` : "",
-  ].filter(Boolean).join(", ");
+  ]
+    .filter(Boolean)
+    .join(", ");
   let input;
   if (name === "model") input = <ModelChoice common={common} text={text} onText={onText} volume={volume} />;
   else if (name === "expert") input = <ExpertChoice common={common} text={text} onText={onText} volume={volume} />;
   else if (name === "normals") input = <NormalsChoice common={common} text={text} onText={onText} />;
-  else if (name === "tracer" || /(^|_)protocol$/.test(name)) input = <GroupChoice common={common} text={text} onText={onText} limits={limits} of={name === "tracer" ? "tracer" : "protocol"} />;
+  else if (name === "tracer" || /(^|_)protocol$/.test(name))
+    input = (
+      <GroupChoice
+        common={common}
+        text={text}
+        onText={onText}
+        limits={limits}
+        of={name === "tracer" ? "tracer" : "protocol"}
+      />
+    );
   else if (name === "reader") input = <ReaderChoice common={common} text={text} onText={onText} />;
   else if (schema.type === "boolean") {
     input = (
-      <select {...common} value={text || standard} onChange={event => onText(event.currentTarget.value === standard ? "" : event.currentTarget.value)}>
+      <select
+        {...common}
+        value={text || standard}
+        onChange={event => onText(event.currentTarget.value === standard ? "" : event.currentTarget.value)}>
         <option value="false">no</option>
         <option value="true">yes</option>
       </select>
     );
   } else if (schema.enum) {
     input = (
-      <select {...common} value={text || (schema.default as string | undefined) || ""} onChange={event => onText(event.currentTarget.value === schema.default ? "" : event.currentTarget.value)}>
+      <select
+        {...common}
+        value={text || (schema.default as string | undefined) || ""}
+        onChange={event => onText(event.currentTarget.value === schema.default ? "" : event.currentTarget.value)}>
         {schema.default === undefined && <option value="">automatic</option>}
-        {schema.enum.map(choice => <option key={choice} value={choice}>{choice.replaceAll("_", " ")}</option>)}
+        {schema.enum.map(choice => (
+          <option key={choice} value={choice}>
+            {choice.replaceAll("_", " ")}
+          </option>
+        ))}
       </select>
     );
   } else {
     const numeric = schema.type === "number" || schema.type === "integer";
-    const shown = schema.type === "array" ? (schema.maxItems === 3 ? "x, y, z" : schema.maxItems === 6 ? "i0, j0, k0, i1, j1, k1" : "") : standard;
-    input = <input {...common} value={text} inputMode={numeric ? "decimal" : "text"} placeholder={shown} onInput={event => onText(event.currentTarget.value)} autocomplete="off" spellcheck={false} />;
+    const shown =
+      schema.type === "array"
+        ? schema.maxItems === 3
+          ? "x, y, z"
+          : schema.maxItems === 6
+            ? "i0, j0, k0, i1, j1, k1"
+            : ""
+        : standard;
+    input = (
+      <input
+        {...common}
+        value={text}
+        inputMode={numeric ? "decimal" : "text"}
+        placeholder={shown}
+        onInput={event => onText(event.currentTarget.value)}
+        autocomplete="off"
+        spellcheck={false}
+      />
+    );
   }
   return (
     <div class={error ? "field wrong" : "field"}>
@@ -351,10 +456,19 @@ function Field({ spec, volume, text, limits, onText, error }: FieldProps) {
       {input}
       <details class="help">
         <summary aria-label={`About ${title(name)}`}>?</summary>
-        <span>{help}{range && ` (${range})`}</span>
+        <span>
+          {help}
+          {range && ` (${range})`}
+        </span>
       </details>
-      <span id={`${id}-help`} class="hidden">{help} {range}</span>
-      {error && <p id={`${id}-error`} class="error" role="alert">{error}</p>}
+      <span id={`${id}-help`} class="hidden">
+        {help} {range}
+      </span>
+      {error && (
+        <p id={`${id}-error`} class="error" role="alert">
+          {error}
+        </p>
+      )}
     </div>
   );
 }
@@ -371,11 +485,38 @@ function ModelChoice({ common, text, onText, volume }: ChoiceProps) {
   const library = useWatched(templates) as (Result & { name?: string })[];
   const own = useWatched(fits).filter(fit => fit.volume === volume.id);
   return (
-    <select {...common} value={text || "auto"} onChange={event => onText(event.currentTarget.value === "auto" ? "" : event.currentTarget.value)}>
+    <select
+      {...common}
+      value={text || "auto"}
+      onChange={event => onText(event.currentTarget.value === "auto" ? "" : event.currentTarget.value)}>
       <option value="auto">auto: the best of the built-in hearts and the library</option>
-      {library.length > 0 && <optgroup label="Library">{library.map(item => <option key={item.id} value={item.id}>{item.name ?? item.id}</option>)}</optgroup>}
-      {known.length > 0 && <optgroup label="Models">{known.map(item => <option key={item.id} value={item.id}>{String(item.summary["vertices"])} points, {moment(item.created_at)}</option>)}</optgroup>}
-      {own.length > 0 && <optgroup label="Fits of this scan">{own.map(item => <option key={item.id} value={item.id}>fit of {moment(item.created_at)}</option>)}</optgroup>}
+      {library.length > 0 && (
+        <optgroup label="Library">
+          {library.map(item => (
+            <option key={item.id} value={item.id}>
+              {item.name ?? item.id}
+            </option>
+          ))}
+        </optgroup>
+      )}
+      {known.length > 0 && (
+        <optgroup label="Models">
+          {known.map(item => (
+            <option key={item.id} value={item.id}>
+              {String(item.summary["vertices"])} points, {moment(item.created_at)}
+            </option>
+          ))}
+        </optgroup>
+      )}
+      {own.length > 0 && (
+        <optgroup label="Fits of this scan">
+          {own.map(item => (
+            <option key={item.id} value={item.id}>
+              fit of {moment(item.created_at)}
+            </option>
+          ))}
+        </optgroup>
+      )}
       {text && ![...known, ...library, ...own].some(item => item.id === text) && <option value={text}>{text}</option>}
     </select>
   );
@@ -386,7 +527,11 @@ function ExpertChoice({ common, text, onText, volume }: ChoiceProps) {
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
       <option value="">none</option>
-      {masks.map(mask => <option key={mask.id} value={mask.id}>{cut(nameOf(mask))}</option>)}
+      {masks.map(mask => (
+        <option key={mask.id} value={mask.id}>
+          {cut(nameOf(mask))}
+        </option>
+      ))}
       {text && !masks.some(mask => mask.id === text) && <option value={text}>{text}</option>}
     </select>
   );
@@ -398,20 +543,35 @@ function NormalsChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
       <option value="">none: no z, no scores</option>
-      {known.map(limits => <option key={limits.id} value={limits.id}>{cut(limits.name)}{limits.summary.simulated ? " (simulated people, not patients)" : ""}</option>)}
+      {known.map(limits => (
+        <option key={limits.id} value={limits.id}>
+          {cut(limits.name)}
+          {limits.summary.simulated ? " (simulated people, not patients)" : ""}
+        </option>
+      ))}
       {text && !known.some(limits => limits.id === text) && <option value={text}>{text}</option>}
     </select>
   );
 }
 
 /** Protocols or tracers of the groups of normal limits. */
-function GroupChoice({ common, text, onText, limits, of }: Omit<ChoiceProps, "volume"> & { limits: string; of: "protocol" | "tracer" }) {
+function GroupChoice({
+  common,
+  text,
+  onText,
+  limits,
+  of,
+}: Omit<ChoiceProps, "volume"> & { limits: string; of: "protocol" | "tracer" }) {
   const groups = useWatched(normals).find(one => one.id === limits)?.summary.groups ?? [];
   const words = [...new Set(groups.map(group => group[of]))];
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
       <option value="">automatic</option>
-      {words.map(word => <option key={word} value={word}>{word}</option>)}
+      {words.map(word => (
+        <option key={word} value={word}>
+          {word}
+        </option>
+      ))}
       {text && !words.includes(text) && <option value={text}>{text}</option>}
     </select>
   );
@@ -421,12 +581,19 @@ function GroupChoice({ common, text, onText, limits, of }: Omit<ChoiceProps, "vo
 export function ReaderChoice({ common, text, onText }: Omit<ChoiceProps, "volume">) {
   const [readers, setReaders] = useState<{ id: string; name: string }[]>([]);
   useEffect(() => {
-    void page<{ id: string; name: string }>("readers", { limit: 100 }).then(found => setReaders(found.items), () => undefined);
+    void page<{ id: string; name: string }>("readers", { limit: 100 }).then(
+      found => setReaders(found.items),
+      () => undefined,
+    );
   }, []);
   return (
     <select {...common} value={text} onChange={event => onText(event.currentTarget.value)}>
       <option value="">nobody: the wall as fitted</option>
-      {readers.map(reader => <option key={reader.id} value={reader.id}>{reader.name}</option>)}
+      {readers.map(reader => (
+        <option key={reader.id} value={reader.id}>
+          {reader.name}
+        </option>
+      ))}
       {text && !readers.some(reader => reader.id === text) && <option value={text}>{text}</option>}
     </select>
   );

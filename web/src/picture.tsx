@@ -19,7 +19,10 @@ export function Picture({ path, label }: { path: string; label: string }) {
   const [source, setSource] = useState("");
   useEffect(() => {
     let gone = false;
-    address(path).then(url => !gone && setSource(url), () => undefined);
+    address(path).then(
+      url => !gone && setSource(url),
+      () => undefined,
+    );
     return () => void (gone = true);
   }, [path]);
   return source ? <img src={source} alt={label} /> : <span class="blank" />;

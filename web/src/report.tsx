@@ -67,7 +67,17 @@ function shownOf({ mesh: own, other, fit, polar, distance }: Embedded): Shown {
 /** Without a scan, a voxel that shows nothing. */
 function voxelsOf(region: string | null): Promise<Voxels> {
   if (region) return unpackNifti(Uint8Array.from(atob(region), letter => letter.charCodeAt(0)).buffer);
-  return Promise.resolve(new Voxels([1, 1, 1], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], new Float32Array(1)));
+  return Promise.resolve(
+    new Voxels(
+      [1, 1, 1],
+      [
+        [1, 0, 0, 0],
+        [0, 1, 0, 0],
+        [0, 0, 1, 0],
+      ],
+      new Float32Array(1),
+    ),
+  );
 }
 
 /** Draws `view` in the place that the report keeps for it; pictures of the same are for paper then. */
@@ -84,7 +94,12 @@ function put(place: string, view: ComponentChildren): void {
  * marked.
  */
 function linkSegments(scene: Scene, frame: WallFrame, map: PolarMap): void {
-  const rows = new Map([...document.querySelectorAll<HTMLTableRowElement>("tr[data-segment]")].map(row => [Number(row.dataset["segment"]), row]));
+  const rows = new Map(
+    [...document.querySelectorAll<HTMLTableRowElement>("tr[data-segment]")].map(row => [
+      Number(row.dataset["segment"]),
+      row,
+    ]),
+  );
   for (const [number, row] of rows) {
     const cell = row.cells[0];
     if (!cell) continue;
@@ -114,15 +129,27 @@ async function draw(embedded: Embedded): Promise<void> {
   const { mesh, heart, polar } = shown;
   scene.heart.value = heart;
   scene.cursor.value = shown.middle;
-  if (embedded.region) put("viewer", <Pictures scene={scene} name={embedded.name} shown={shown} other={null} empty="" />);
+  if (embedded.region)
+    put("viewer", <Pictures scene={scene} name={embedded.name} shown={shown} other={null} empty="" />);
   else {
-    put("viewer", (
+    put(
+      "viewer",
       <div class="pictures alone">
         <div class="grid one">
-          <Wall scene={scene} mesh={mesh} inner={shown.otherEdge} other={null} polar={polar} displacement={null} surface={shown.surface} gates={null} figures={[]} />
+          <Wall
+            scene={scene}
+            mesh={mesh}
+            inner={shown.otherEdge}
+            other={null}
+            polar={polar}
+            displacement={null}
+            surface={shown.surface}
+            gates={null}
+            figures={[]}
+          />
         </div>
-      </div>
-    ));
+      </div>,
+    );
   }
   if (polar && heart) {
     put("polar", <PolarView scene={scene} map={polar} mesh={mesh} heart={heart} title="Polar map" />);

@@ -1,7 +1,17 @@
 // Files chosen or dropped by a person: which of them make up one scan, and how far each has been sent.
 
 import { at } from "./base";
-import { type Problem, ProblemError, type Volume, authorization, key, nextKey, page, problemOf, uploadLimit } from "./api";
+import {
+  type Problem,
+  ProblemError,
+  type Volume,
+  authorization,
+  key,
+  nextKey,
+  page,
+  problemOf,
+  uploadLimit,
+} from "./api";
 import { pathOf } from "./drop";
 import { Watched } from "./state";
 import { LEAST_GATES, MOST_GATES, bytes, rememberFileName } from "./words";
@@ -71,7 +81,8 @@ export async function grouped(files: File[]): Promise<Group[]> {
       continue;
     }
     const series = await seriesOf(file);
-    if (series) add(`${series.frames > 1 ? "gates " : ""}series ${series.uid}`, folder.split("/").pop() || file.name, file);
+    if (series)
+      add(`${series.frames > 1 ? "gates " : ""}series ${series.uid}`, folder.split("/").pop() || file.name, file);
     else add(`file ${folder}/${file.name}`, file.name, file);
   }
   const apart = ([id, group]: [string, Group]): Group[] => {
@@ -191,7 +202,12 @@ async function send(upload: Upload): Promise<void> {
     const answer = await attempt(upload);
     if (answer === null) return;
     if (answer.status === 401) {
-      if (key.value === used) await nextKey(used ? "The service no longer accepts the key. Give another one; the upload goes on then." : "This service asks for a key.");
+      if (key.value === used)
+        await nextKey(
+          used
+            ? "The service no longer accepts the key. Give another one; the upload goes on then."
+            : "This service asks for a key.",
+        );
       continue;
     }
     if (answer.status === 200 || answer.status === 201) {
@@ -200,7 +216,8 @@ async function send(upload: Upload): Promise<void> {
       change(upload.id, { state: "stored", volume, existed: answer.status === 200, sent: upload.bytes });
       whenStored(volume);
       const together = uploads.value.filter(other => other.batch === upload.batch);
-      if (together.every(other => other.state === "stored")) whenAllStored(together.flatMap(other => other.volume ?? []));
+      if (together.every(other => other.state === "stored"))
+        whenAllStored(together.flatMap(other => other.volume ?? []));
     } else {
       change(upload.id, { state: "refused", problem: problemOf(answer.status, answer.text) });
     }
@@ -229,7 +246,10 @@ function attempt(upload: Upload): Promise<{ status: number; text: string } | nul
       resolve(null);
     };
     request.onloadend = () => requests.delete(upload.id);
-    request.open("POST", at(`/v1/volumes${keepNames.value ? `?${new URLSearchParams({ labels: `name:${name}` })}` : ""}`));
+    request.open(
+      "POST",
+      at(`/v1/volumes${keepNames.value ? `?${new URLSearchParams({ labels: `name:${name}` })}` : ""}`),
+    );
     for (const [header, value] of Object.entries(authorization())) request.setRequestHeader(header, value);
     request.send(form);
   });

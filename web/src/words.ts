@@ -49,7 +49,12 @@ export function study({ dicom }: Volume, written: (text: string) => string = tex
   const patient = dicom["patient_name"]?.replaceAll("^", " ").trim();
   const date = dicom["study_date"]?.replace(/^(\d{4})(\d\d)(\d\d)$/, "$1-$2-$3");
   const [id, accession] = [dicom["patient_id"], dicom["accession_number"]];
-  const parts = [patient && written(patient), id && `patient ID ${written(id)}`, date && `study of ${date}`, accession && `accession ${written(accession)}`];
+  const parts = [
+    patient && written(patient),
+    id && `patient ID ${written(id)}`,
+    date && `study of ${date}`,
+    accession && `accession ${written(accession)}`,
+  ];
   return parts.filter(Boolean).join(" · ");
 }
 
@@ -149,7 +154,9 @@ export function kindOf(id: string): Kind {
 /** What distinguishes a result from others of the same scan. */
 export function resultName(result: Result): string {
   if (isFit(result.id) || isBeat(result.id)) {
-    const changed = ["center", "axis", "base", "roll", "segments_from"].filter(name => result.parameters[name] != null && result.parameters[name] !== 0);
+    const changed = ["center", "axis", "base", "roll", "segments_from"].filter(
+      name => result.parameters[name] != null && result.parameters[name] !== 0,
+    );
     const model = result.parameters["model"];
     const by = typeof model === "string" && model !== "auto" ? ` of ${model.slice(0, 10)}…` : "";
     const what = isBeat(result.id) ? `beat of ${result.summary.gates} gates` : "fit";

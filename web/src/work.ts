@@ -21,7 +21,12 @@ export async function fileComparison({ stress, rest, normals, parameters }: Pair
   return job;
 }
 
-export async function file(kind: Kind, volume: Volume, parameters: Record<string, ParameterValue>, labels: Record<string, string> = {}): Promise<Job> {
+export async function file(
+  kind: Kind,
+  volume: Volume,
+  parameters: Record<string, ParameterValue>,
+  labels: Record<string, string> = {},
+): Promise<Job> {
   const name = storedNameOf(volume).slice(0, 200);
   const job = await post<Job>("/v1/jobs", { kind, volume: volume.id, parameters, labels: { name, ...labels } });
   put(job);

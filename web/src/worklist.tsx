@@ -5,14 +5,48 @@ import { type Job, type Kind, type Result, type Volume, words } from "./api";
 import { Confirm } from "./confirm";
 import { useDrop } from "./drop";
 import { JobLine, Trouble } from "./jobline";
-import { beats, comparisons, eraseVolume, fits, isActive, jobs, loadAllResults, loadMore, loadResultsOf, loaded, models, more, put, refresh, trouble, volumes } from "./library";
+import {
+  beats,
+  comparisons,
+  eraseVolume,
+  fits,
+  isActive,
+  jobs,
+  loadAllResults,
+  loadMore,
+  loadResultsOf,
+  loaded,
+  models,
+  more,
+  put,
+  refresh,
+  trouble,
+  volumes,
+} from "./library";
 import { offeredPair, pick, picked, statedPair, statedRole, studyKey } from "./pairing";
 import { PickedPair } from "./pairform";
 import { Picture } from "./picture";
 import { open, route } from "./route";
 import { useWatched } from "./state";
 import { type Upload, add, again, dismiss, keepNames, onStored, stop, uploads } from "./upload";
-import { acquisition, bytes, cut, isBeat, isComparison, isFit, isGated, isLabelMap, moment, nameOf, newest, number, resultName, shape, study, titleOf } from "./words";
+import {
+  acquisition,
+  bytes,
+  cut,
+  isBeat,
+  isComparison,
+  isFit,
+  isGated,
+  isLabelMap,
+  moment,
+  nameOf,
+  newest,
+  number,
+  resultName,
+  shape,
+  study,
+  titleOf,
+} from "./words";
 import { file } from "./work";
 
 type Then = "fit" | "model" | "nothing";
@@ -30,24 +64,30 @@ export function WorkList() {
   const [message, setMessage] = useState("");
   useEffect(() => {
     localStorage.setItem(THEN, then);
-    onStored(volume => {
-      volumes.value = [volume, ...volumes.value.filter(other => other.id !== volume.id)];
-      if (then === "nothing" || isLabelMap(volume)) return;
-      const alone = uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
-      file(then === "model" ? "model" : fitOf(volume), volume, {}).then(
-        () => alone && route.value.view === "list" && open(volume.id),
-        error => setMessage(words(error)),
-      );
-    }, together => {
-      const pair = offeredPair(together);
-      if (pair) picked.value = pair.map(volume => volume.id);
-    });
+    onStored(
+      volume => {
+        volumes.value = [volume, ...volumes.value.filter(other => other.id !== volume.id)];
+        if (then === "nothing" || isLabelMap(volume)) return;
+        const alone =
+          uploads.value.filter(upload => upload.state !== "stored").length === 0 && uploads.value.length === 1;
+        file(then === "model" ? "model" : fitOf(volume), volume, {}).then(
+          () => alone && route.value.view === "list" && open(volume.id),
+          error => setMessage(words(error)),
+        );
+      },
+      together => {
+        const pair = offeredPair(together);
+        if (pair) picked.value = pair.map(volume => volume.id);
+      },
+    );
   }, [then]);
   return (
     <div class="list">
       <h1 class="hidden">Scans</h1>
       <Drop then={then} onThen={setThen} />
-      <p class="error" role="status">{message}</p>
+      <p class="error" role="status">
+        {message}
+      </p>
       <Uploads />
       <PickedPair />
       <Scans />
@@ -74,10 +114,31 @@ function Drop({ then, onThen }: { then: Then; onThen: (then: Then) => void }) {
         <span class="quiet">DICOM, NIfTI, .hdr with .img: files, series, folders, zips.</span>
       </div>
       <div class="buttons">
-        <button type="button" class="main" onClick={() => chooser.current?.click()}>Choose files</button>
-        <button type="button" onClick={() => folder.current?.click()}>Choose a folder</button>
-        <input ref={chooser} class="hidden" type="file" multiple tabIndex={-1} aria-label="Files of scans" onChange={event => chosen(event.currentTarget)} />
-        <input ref={folder} class="hidden" type="file" multiple tabIndex={-1} aria-label="Folder of scans" {...{ webkitdirectory: true }} onChange={event => chosen(event.currentTarget)} />
+        <button type="button" class="main" onClick={() => chooser.current?.click()}>
+          Choose files
+        </button>
+        <button type="button" onClick={() => folder.current?.click()}>
+          Choose a folder
+        </button>
+        <input
+          ref={chooser}
+          class="hidden"
+          type="file"
+          multiple
+          tabIndex={-1}
+          aria-label="Files of scans"
+          onChange={event => chosen(event.currentTarget)}
+        />
+        <input
+          ref={folder}
+          class="hidden"
+          type="file"
+          multiple
+          tabIndex={-1}
+          aria-label="Folder of scans"
+          {...{ webkitdirectory: true }}
+          onChange={event => chosen(event.currentTarget)}
+        />
         <label class="inline">
           then
           <select value={then} onChange={event => onThen(event.currentTarget.value as Then)}>
@@ -86,7 +147,10 @@ function Drop({ then, onThen }: { then: Then; onThen: (then: Then) => void }) {
             <option value="nothing">only store</option>
           </select>
         </label>
-        <label class="inline"><input type="checkbox" checked={named} onChange={event => (keepNames.value = event.currentTarget.checked)} /> keep file names</label>
+        <label class="inline">
+          <input type="checkbox" checked={named} onChange={event => (keepNames.value = event.currentTarget.checked)} />{" "}
+          keep file names
+        </label>
       </div>
     </section>
   );
@@ -112,17 +176,52 @@ function Uploads() {
           const underway = upload.state === "waiting" || upload.state === "sending" || upload.state === "reading";
           return (
             <li key={upload.id} class={upload.state}>
-              <span class="name" title={upload.group.name}>{cut(upload.group.name)}</span>
-              <span class="quiet">{bytes(upload.bytes)}{upload.group.files.length > 1 && `, ${upload.group.files.length} files`}</span>
-              {upload.state === "sending" && <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />}
-              <span role="status" class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
-                {upload.problem ? <Trouble problem={upload.problem} /> : upload.existed ? "was stored before" : STATES[upload.state]}
+              <span class="name" title={upload.group.name}>
+                {cut(upload.group.name)}
+              </span>
+              <span class="quiet">
+                {bytes(upload.bytes)}
+                {upload.group.files.length > 1 && `, ${upload.group.files.length} files`}
+              </span>
+              {upload.state === "sending" && (
+                <progress value={upload.sent} max={upload.bytes || 1} aria-label={`Sending ${upload.group.name}`} />
+              )}
+              <span
+                role="status"
+                class={upload.state === "refused" || upload.state === "interrupted" ? "error" : "state"}>
+                {upload.problem ? (
+                  <Trouble problem={upload.problem} />
+                ) : upload.existed ? (
+                  "was stored before"
+                ) : (
+                  STATES[upload.state]
+                )}
               </span>
               <span class="end">
-                {underway && <button type="button" class="plain" onClick={() => stop(upload)}>Cancel</button>}
-                {(upload.state === "refused" || upload.state === "interrupted" || upload.state === "cancelled") && <button type="button" onClick={() => again(upload)}>Send again</button>}
-                {upload.volume && <button type="button" onClick={() => upload.volume && open(upload.volume.id)}>Open</button>}
-                {!underway && <button type="button" class="plain" aria-label={`Take ${upload.group.name} off this list`} onClick={() => dismiss(upload)}>✕</button>}
+                {underway && (
+                  <button type="button" class="plain" onClick={() => stop(upload)}>
+                    Cancel
+                  </button>
+                )}
+                {(upload.state === "refused" || upload.state === "interrupted" || upload.state === "cancelled") && (
+                  <button type="button" onClick={() => again(upload)}>
+                    Send again
+                  </button>
+                )}
+                {upload.volume && (
+                  <button type="button" onClick={() => upload.volume && open(upload.volume.id)}>
+                    Open
+                  </button>
+                )}
+                {!underway && (
+                  <button
+                    type="button"
+                    class="plain"
+                    aria-label={`Take ${upload.group.name} off this list`}
+                    onClick={() => dismiss(upload)}>
+                    ✕
+                  </button>
+                )}
               </span>
             </li>
           );
@@ -160,7 +259,9 @@ function Scans() {
       volume,
       results: results.filter(result => result.volume === volume.id),
       open: allJobs.filter(job => job.volume === volume.id && job.state !== "succeeded" && job.kind !== "normals"),
-      compared: allComparisons.filter(made => made.volume === volume.id || made.parameters["rest"] === volume.id).sort(newest),
+      compared: allComparisons
+        .filter(made => made.volume === volume.id || made.parameters["rest"] === volume.id)
+        .sort(newest),
     }));
   }, [all, allFits, allModels, allBeats, allJobs, allComparisons]);
   // A search looks at everything stored, so the rest of the list is read first.
@@ -172,26 +273,56 @@ function Scans() {
   const shown = byStudy(rows.filter(row => matches(row, search) && passes(row, show)).sort(COMPARE[order]));
   useEffect(() => setAt(0), [search, show, order]);
   const part = shown.slice(at, at + SHOWN);
-  if (!isLoaded) return problem ? <p class="error pad">{problem} <button type="button" onClick={() => void refresh()}>Try again</button></p> : <p class="quiet pad">Reading the list …</p>;
+  if (!isLoaded)
+    return problem ? (
+      <p class="error pad">
+        {problem}{" "}
+        <button type="button" onClick={() => void refresh()}>
+          Try again
+        </button>
+      </p>
+    ) : (
+      <p class="quiet pad">Reading the list …</p>
+    );
   if (all.length === 0) {
     return (
       <section class="welcome">
         <h2>From scan to ventricle</h2>
         <ol>
-          <li><b>Drop a scan.</b> It is stored on this service and nowhere else.</li>
-          <li><b>The left ventricle is found and fitted</b>, usually within two seconds.</li>
-          <li><b>Of a gated scan, all gates are fitted together</b>: the wall beats, with its volumes and ejection fraction.</li>
-          <li><b>Look at slices, wall and polar map together</b>; correct axis and centre by hand, compare, download.</li>
-          <li><b>Drop a patient’s scans at stress and at rest together</b> to compare them: slices above each other, what is reversible, TID.</li>
+          <li>
+            <b>Drop a scan.</b> It is stored on this service and nowhere else.
+          </li>
+          <li>
+            <b>The left ventricle is found and fitted</b>, usually within two seconds.
+          </li>
+          <li>
+            <b>Of a gated scan, all gates are fitted together</b>: the wall beats, with its volumes and ejection
+            fraction.
+          </li>
+          <li>
+            <b>Look at slices, wall and polar map together</b>; correct axis and centre by hand, compare, download.
+          </li>
+          <li>
+            <b>Drop a patient’s scans at stress and at rest together</b> to compare them: slices above each other, what
+            is reversible, TID.
+          </li>
         </ol>
-        <p class="quiet">No scan at hand? <code>ventriform phantom</code> simulates one.</p>
+        <p class="quiet">
+          No scan at hand? <code>ventriform phantom</code> simulates one.
+        </p>
       </section>
     );
   }
   return (
     <section aria-label="Stored scans">
       <div class="tools">
-        <input type="search" aria-label="Search name, id or label" placeholder="Search name, id or label" value={search} onInput={event => setSearch(event.currentTarget.value)} />
+        <input
+          type="search"
+          aria-label="Search name, id or label"
+          placeholder="Search name, id or label"
+          value={search}
+          onInput={event => setSearch(event.currentTarget.value)}
+        />
         <label class="inline">
           Show
           <select value={show} onChange={event => setShow(event.currentTarget.value as Show)}>
@@ -212,20 +343,40 @@ function Scans() {
             <option value="largest">largest first</option>
           </select>
         </label>
-        <span class="quiet" role="status">{shown.length}{next ? "+" : ""} {shown.length === 1 ? "scan" : "scans"}</span>
+        <span class="quiet" role="status">
+          {shown.length}
+          {next ? "+" : ""} {shown.length === 1 ? "scan" : "scans"}
+        </span>
       </div>
-      {problem && <p class="error" role="alert">{problem}</p>}
-      <ul class="scans">{groupsOf(part).map(group => <StudyRow key={group[0]!.volume.id} group={group} />)}</ul>
+      {problem && (
+        <p class="error" role="alert">
+          {problem}
+        </p>
+      )}
+      <ul class="scans">
+        {groupsOf(part).map(group => (
+          <StudyRow key={group[0]!.volume.id} group={group} />
+        ))}
+      </ul>
       {shown.length === 0 && <p class="quiet pad">Nothing matches.</p>}
       {(at > 0 || shown.length > at + SHOWN || next) && (
         <nav class="paging" aria-label="Pages of the list">
-          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>Previous</button>
-          <span>{at + 1} to {at + part.length}</span>
-          <button type="button" disabled={shown.length <= at + SHOWN && !next} onClick={() => {
-            const go = () => setAt(at + SHOWN);
-            if (shown.length <= at + SHOWN) void loadMore().then(go);
-            else go();
-          }}>Next</button>
+          <button type="button" disabled={at === 0} onClick={() => setAt(Math.max(0, at - SHOWN))}>
+            Previous
+          </button>
+          <span>
+            {at + 1} to {at + part.length}
+          </span>
+          <button
+            type="button"
+            disabled={shown.length <= at + SHOWN && !next}
+            onClick={() => {
+              const go = () => setAt(at + SHOWN);
+              if (shown.length <= at + SHOWN) void loadMore().then(go);
+              else go();
+            }}>
+            Next
+          </button>
         </nav>
       )}
     </section>
@@ -236,19 +387,36 @@ function matches({ volume, results, compared }: Row, search: string): boolean {
   const text = search.trim().toLowerCase();
   if (!text) return true;
   const labels = Object.entries(volume.labels).map(([name, value]) => `${name}:${value}`);
-  const all = [nameOf(volume), volume.id, volume.external_id ?? "", volume.format, study(volume), ...labels, ...acquisition(volume), statedRole(volume) ?? "", ...[...results, ...compared].map(result => result.id)];
+  const all = [
+    nameOf(volume),
+    volume.id,
+    volume.external_id ?? "",
+    volume.format,
+    study(volume),
+    ...labels,
+    ...acquisition(volume),
+    statedRole(volume) ?? "",
+    ...[...results, ...compared].map(result => result.id),
+  ];
   return all.some(word => word.toLowerCase().includes(text));
 }
 
 function passes(row: Row, show: Show): boolean {
   switch (show) {
-    case "fits": return row.results.some(result => isFit(result.id));
-    case "beats": return row.results.some(result => isBeat(result.id));
-    case "models": return row.results.some(result => !isFit(result.id) && !isBeat(result.id));
-    case "comparisons": return row.compared.length > 0;
-    case "nothing": return row.results.length === 0 && row.compared.length === 0;
-    case "failed": return row.open.some(job => job.state === "failed");
-    case "all": return true;
+    case "fits":
+      return row.results.some(result => isFit(result.id));
+    case "beats":
+      return row.results.some(result => isBeat(result.id));
+    case "models":
+      return row.results.some(result => !isFit(result.id) && !isBeat(result.id));
+    case "comparisons":
+      return row.compared.length > 0;
+    case "nothing":
+      return row.results.length === 0 && row.compared.length === 0;
+    case "failed":
+      return row.open.some(job => job.state === "failed");
+    case "all":
+      return true;
   }
 }
 
@@ -287,30 +455,62 @@ function StudyRow({ group }: { group: Row[] }) {
   if (group.length === 1) return <ScanRow row={first} compared={first.compared} alone />;
   const ids = new Set(group.map(row => row.volume.id));
   const inside = (made: Result) => ids.has(made.volume) && ids.has(String(made.parameters["rest"]));
-  const compared = [...new Map(group.flatMap(row => row.compared).filter(inside).map(made => [made.id, made])).values()];
+  const compared = [
+    ...new Map(
+      group
+        .flatMap(row => row.compared)
+        .filter(inside)
+        .map(made => [made.id, made]),
+    ).values(),
+  ];
   const pair = statedPair(group.map(row => row.volume));
   const whose = study(first.volume, cut);
   return (
     <li class="study">
       <div class="study-head">
         <h2 title={study(first.volume)}>{whose || "One study"}</h2>
-        {compared.map(made => <ComparisonLink key={made.id} made={made} />)}
-        {pair && <button type="button" class={compared.length ? "" : "main"} onClick={() => {
-          picked.value = pair.map(volume => volume.id);
-          document.querySelector(".drop")?.scrollIntoView();
-        }}>{compared.length ? "Compare again" : "Compare rest and stress"}</button>}
+        {compared.map(made => (
+          <ComparisonLink key={made.id} made={made} />
+        ))}
+        {pair && (
+          <button
+            type="button"
+            class={compared.length ? "" : "main"}
+            onClick={() => {
+              picked.value = pair.map(volume => volume.id);
+              document.querySelector(".drop")?.scrollIntoView();
+            }}>
+            {compared.length ? "Compare again" : "Compare rest and stress"}
+          </button>
+        )}
       </div>
-      <ul class="scans">{group.map(row => <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !inside(made))} />)}</ul>
+      <ul class="scans">
+        {group.map(row => (
+          <ScanRow key={row.volume.id} row={row} compared={row.compared.filter(made => !inside(made))} />
+        ))}
+      </ul>
     </li>
   );
 }
 
 function ComparisonLink({ made }: { made: Result }) {
-  return <a class="result" href={`#/comparison/${made.id}`}><b>{resultName(made)}</b> {figures(made)}</a>;
+  return (
+    <a class="result" href={`#/comparison/${made.id}`}>
+      <b>{resultName(made)}</b> {figures(made)}
+    </a>
+  );
 }
 
 /** `alone`: no other scan of its study is beside it, so that it says whose it is. */
-function ScanRow({ row: { volume, results, open: openJobs }, compared, alone = false }: { row: Row; compared: Result[]; alone?: boolean }) {
+function ScanRow({
+  row: { volume, results, open: openJobs },
+  compared,
+  alone = false,
+}: {
+  row: Row;
+  compared: Result[];
+  alone?: boolean;
+}) {
   const chosen = useWatched(picked).includes(volume.id);
   const role = statedRole(volume);
   const [problem, setProblem] = useState("");
@@ -324,10 +524,14 @@ function ScanRow({ row: { volume, results, open: openJobs }, compared, alone = f
   };
   return (
     <li class="scan">
-      <a class="thumb" href={`#/scan/${volume.id}`} tabIndex={-1} aria-hidden="true"><Picture path={volume.links.preview} label="" /></a>
+      <a class="thumb" href={`#/scan/${volume.id}`} tabIndex={-1} aria-hidden="true">
+        <Picture path={volume.links.preview} label="" />
+      </a>
       <div class="what">
         <span class="title">
-          <a class="name" href={`#/scan/${volume.id}`} title={name}>{cut(titleOf(volume))}</a>
+          <a class="name" href={`#/scan/${volume.id}`} title={name}>
+            {cut(titleOf(volume))}
+          </a>
           {role && <span class={`role ${role}`}>{role}</span>}
         </span>
         {alone && study(volume) && <span title={study(volume)}>{study(volume, cut)}</span>}
@@ -337,34 +541,85 @@ function ScanRow({ row: { volume, results, open: openJobs }, compared, alone = f
           {isLabelMap(volume) && " · label map"}
           {volume.legal_hold ? " · on legal hold" : ""}
         </span>
-        {labels.length > 0 && <span class="labels">{labels.map(([label, value]) => <span key={label} title={value}>{label}: {cut(value)}</span>)}</span>}
+        {labels.length > 0 && (
+          <span class="labels">
+            {labels.map(([label, value]) => (
+              <span key={label} title={value}>
+                {label}: {cut(value)}
+              </span>
+            ))}
+          </span>
+        )}
         {volume.warnings.length > 0 && <span class="warning">{volume.warnings.join(" ")}</span>}
       </div>
       <div class="results">
-        {openJobs.map(job => <JobLine key={job.id} job={job} />)}
-        {compared.slice(0, 2).map(made => <ComparisonLink key={made.id} made={made} />)}
+        {openJobs.map(job => (
+          <JobLine key={job.id} job={job} />
+        ))}
+        {compared.slice(0, 2).map(made => (
+          <ComparisonLink key={made.id} made={made} />
+        ))}
         {results.slice(0, 4).map(result => (
           <a key={result.id} class="result" href={`#/scan/${volume.id}/${result.id}`}>
             <b>{resultName(result)}</b> {figures(result)}
           </a>
         ))}
-        {results.length > 4 && <a class="result" href={`#/scan/${volume.id}`}>and {results.length - 4} more</a>}
-        {results.length === 0 && compared.length === 0 && !openJobs.some(isActive) && <span class="quiet">no result yet</span>}
+        {results.length > 4 && (
+          <a class="result" href={`#/scan/${volume.id}`}>
+            and {results.length - 4} more
+          </a>
+        )}
+        {results.length === 0 && compared.length === 0 && !openJobs.some(isActive) && (
+          <span class="quiet">no result yet</span>
+        )}
         {problem && <span class="error">{problem}</span>}
-        {state && <span class="quiet" role="status">{state}</span>}
+        {state && (
+          <span class="quiet" role="status">
+            {state}
+          </span>
+        )}
       </div>
       <div class="actions">
-        <button type="button" onClick={start(fitOf(volume))} aria-label={`Fit ${isGated(volume) ? "the beat" : "the ventricle"} of ${name}`}>Fit</button>
-        <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>Model</button>
-        {!isLabelMap(volume) && <button type="button" class="plain" aria-pressed={chosen} aria-label={`Pick ${name} to compare rest and stress`} onClick={() => pick(volume.id)}>{chosen ? "Picked" : "Pick"}</button>}
-        <button type="button" class="plain" aria-label={`Download all of ${name} as zip`} onClick={() => {
-          setProblem("");
-          void import("./bundle").then(bundle => bundle.saveScan(volume, setState)).catch((error: unknown) => {
-            setState("");
-            setProblem(words(error));
-          });
-        }}>Zip</button>
-        <Confirm label={`Erase ${name}`} question="Erase the scan and all that was made of it?" act={() => eraseVolume(volume.id)}>Erase</Confirm>
+        <button
+          type="button"
+          onClick={start(fitOf(volume))}
+          aria-label={`Fit ${isGated(volume) ? "the beat" : "the ventricle"} of ${name}`}>
+          Fit
+        </button>
+        <button type="button" onClick={start("model")} aria-label={`Make a model of ${name}`}>
+          Model
+        </button>
+        {!isLabelMap(volume) && (
+          <button
+            type="button"
+            class="plain"
+            aria-pressed={chosen}
+            aria-label={`Pick ${name} to compare rest and stress`}
+            onClick={() => pick(volume.id)}>
+            {chosen ? "Picked" : "Pick"}
+          </button>
+        )}
+        <button
+          type="button"
+          class="plain"
+          aria-label={`Download all of ${name} as zip`}
+          onClick={() => {
+            setProblem("");
+            void import("./bundle")
+              .then(bundle => bundle.saveScan(volume, setState))
+              .catch((error: unknown) => {
+                setState("");
+                setProblem(words(error));
+              });
+          }}>
+          Zip
+        </button>
+        <Confirm
+          label={`Erase ${name}`}
+          question="Erase the scan and all that was made of it?"
+          act={() => eraseVolume(volume.id)}>
+          Erase
+        </Confirm>
       </div>
     </li>
   );
@@ -374,20 +629,47 @@ function figures(result: Result) {
   const { summary } = result;
   if (isComparison(result.id)) {
     const { sss, sds, ef_change_points: change } = summary;
-    return <><span>TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}{sss != null && `, SSS ${sss}, SDS ${sds}`}{change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}</span><Doubts count={summary.flags?.length ?? 0} /></>;
+    return (
+      <>
+        <span>
+          TID {number(summary.tid, 2)}, reversible {number(summary.reversible_percent, 0, "%")}
+          {sss != null && `, SSS ${sss}, SDS ${sds}`}
+          {change != null && `, EF ${change > 0 ? "+" : ""}${number(change, 0, "points")}`}
+        </span>
+        <Doubts count={summary.flags?.length ?? 0} />
+      </>
+    );
   }
-  if (isBeat(result.id)) return <><span>EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV {number(summary.esv_ml, 0, "ml")}</span><Doubts count={summary.flags?.length ?? 0} /></>;
+  if (isBeat(result.id))
+    return (
+      <>
+        <span>
+          EF {number(summary.ef_percent, 0, "%")}, EDV {number(summary.edv_ml, 0, "ml")}, ESV{" "}
+          {number(summary.esv_ml, 0, "ml")}
+        </span>
+        <Doubts count={summary.flags?.length ?? 0} />
+      </>
+    );
   if (!isFit(result.id)) return <span>distance {number(summary.distance_mean_mm, 2, "mm")}</span>;
   const given = summary.volumes_ml;
   const volumesMl = given?.anatomical ?? given;
   return (
     <>
-      <span>cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}</span>
+      <span>
+        cavity {number(volumesMl?.cavity, 0, "ml")}, wall {number(volumesMl?.wall, 0, "ml")}
+      </span>
       <Doubts count={summary.flags?.length ?? 0} />
     </>
   );
 }
 
 function Doubts({ count }: { count: number }) {
-  return count > 0 ? <><span>{" · "}</span><span class="warning">{count} {count === 1 ? "doubt" : "doubts"}</span></> : null;
+  return count > 0 ? (
+    <>
+      <span>{" · "}</span>
+      <span class="warning">
+        {count} {count === 1 ? "doubt" : "doubts"}
+      </span>
+    </>
+  ) : null;
 }

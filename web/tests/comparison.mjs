@@ -8,7 +8,12 @@ import { gated, nm } from "./nm.mjs";
 
 /** Mid and apical segments of the LAD, which lack uptake at stress. */
 const LAD = [7, 8, 13, 14];
-const FIGURES = [["1440-light", 1440, false], ["1440-dark", 1440, true], ["400-light", 400, false], ["400-dark", 400, true]];
+const FIGURES = [
+  ["1440-light", 1440, false],
+  ["1440-dark", 1440, true],
+  ["400-light", 400, false],
+  ["400-dark", 400, true],
+];
 
 /** Simulated scans of one patient, as NIfTI and as NM files of one study, and normal limits of simulated people. */
 function made({ PROGRAM, SCREENSHOTS }) {
@@ -37,7 +42,14 @@ function made({ PROGRAM, SCREENSHOTS }) {
     copyFileSync(at(role, "spect.nii.gz"), join(files.folder, role, "spect.nii.gz"));
   }
   files.other = at("other.dcm");
-  writeFileSync(files.other, nm(readFileSync(at("rest", "spect.nii.gz")), "Other^Olga", "PH10", { number: 7, description: "Cardiac rest", tracer: "Tetrofosmin Tc-99m" }));
+  writeFileSync(
+    files.other,
+    nm(readFileSync(at("rest", "spect.nii.gz")), "Other^Olga", "PH10", {
+      number: 7,
+      description: "Cardiac rest",
+      tracer: "Tetrofosmin Tc-99m",
+    }),
+  );
   run("phantom", "-o", at("healthy"), "--normal", "--cases", "13", "--size", "52", "--spacing", "5", "--seed", "5");
   files.limits = at("healthy limits.json");
   run("normals", "build", at("healthy"), "-o", files.limits, "--mixed");
@@ -51,50 +63,52 @@ const displayed = async page => {
 };
 
 /** Whether a canvas shows something: so many colours. */
-const isDrawn = canvas => canvas.evaluate(element => {
-  const copy = Object.assign(document.createElement("canvas"), { width: element.width, height: element.height });
-  const context = copy.getContext("2d");
-  context.drawImage(element, 0, 0);
-  return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
-});
+const isDrawn = canvas =>
+  canvas.evaluate(element => {
+    const copy = Object.assign(document.createElement("canvas"), { width: element.width, height: element.height });
+    const context = copy.getContext("2d");
+    context.drawImage(element, 0, 0);
+    return new Set(new Uint32Array(context.getImageData(0, 0, copy.width, copy.height).data.buffer)).size;
+  });
 
 /**
  * The least correlation of a slice on the page with the same one in the service's picture: green, which rises with the
  * uptake in the colours of both.
  */
-const likeness = (page, path) => page.evaluate(async path => {
-  const picture = await createImageBitmap(await (await fetch(path)).blob());
-  const shown = document.querySelector(".compared-slices");
-  // As `comparedslices.tsx` and `runs/rest_stress/slices.rs` lay their cells.
-  const [aside, above, ratio] = [46, 19, shown.width / shown.clientWidth];
-  const cell = Math.min((shown.clientWidth - aside) / 8, (shown.clientHeight - 3 * above) / 6);
-  const left = aside + (shown.clientWidth - aside - 8 * cell) / 2;
-  const cut = (source, x, y, size) => {
-    const context = Object.assign(document.createElement("canvas"), { width: 22, height: 22 }).getContext("2d");
-    context.imageSmoothingQuality = "high";
-    // Without the border, which marks the chosen slice.
-    context.drawImage(source, x + 0.06 * size, y + 0.06 * size, 0.88 * size, 0.88 * size, 0, 0, 22, 22);
-    return context.getImageData(0, 0, 22, 22).data.filter((_, n) => n % 4 === 1);
-  };
-  let least = 1;
-  for (let row = 0; row < 6; row++) {
-    for (let n = 0; n < 8; n++) {
-      const kind = Math.floor(row / 2);
-      const a = cut(shown, (left + n * cell) * ratio, ((kind + 1) * above + row * cell) * ratio, cell * ratio);
-      const b = cut(picture, 84 + n * 88, row * 88 + kind * 10, 88);
-      const mean = values => values.reduce((sum, value) => sum + value, 0) / values.length;
-      const [p, q] = [mean(a), mean(b)];
-      let [both, one, other] = [0, 0, 0];
-      for (let at = 0; at < a.length; at++) {
-        both += (a[at] - p) * (b[at] - q);
-        one += (a[at] - p) ** 2;
-        other += (b[at] - q) ** 2;
+const likeness = (page, path) =>
+  page.evaluate(async path => {
+    const picture = await createImageBitmap(await (await fetch(path)).blob());
+    const shown = document.querySelector(".compared-slices");
+    // As `comparedslices.tsx` and `runs/rest_stress/slices.rs` lay their cells.
+    const [aside, above, ratio] = [46, 19, shown.width / shown.clientWidth];
+    const cell = Math.min((shown.clientWidth - aside) / 8, (shown.clientHeight - 3 * above) / 6);
+    const left = aside + (shown.clientWidth - aside - 8 * cell) / 2;
+    const cut = (source, x, y, size) => {
+      const context = Object.assign(document.createElement("canvas"), { width: 22, height: 22 }).getContext("2d");
+      context.imageSmoothingQuality = "high";
+      // Without the border, which marks the chosen slice.
+      context.drawImage(source, x + 0.06 * size, y + 0.06 * size, 0.88 * size, 0.88 * size, 0, 0, 22, 22);
+      return context.getImageData(0, 0, 22, 22).data.filter((_, n) => n % 4 === 1);
+    };
+    let least = 1;
+    for (let row = 0; row < 6; row++) {
+      for (let n = 0; n < 8; n++) {
+        const kind = Math.floor(row / 2);
+        const a = cut(shown, (left + n * cell) * ratio, ((kind + 1) * above + row * cell) * ratio, cell * ratio);
+        const b = cut(picture, 84 + n * 88, row * 88 + kind * 10, 88);
+        const mean = values => values.reduce((sum, value) => sum + value, 0) / values.length;
+        const [p, q] = [mean(a), mean(b)];
+        let [both, one, other] = [0, 0, 0];
+        for (let at = 0; at < a.length; at++) {
+          both += (a[at] - p) * (b[at] - q);
+          one += (a[at] - p) ** 2;
+          other += (b[at] - q) ** 2;
+        }
+        least = Math.min(least, both / Math.sqrt(one * other));
       }
-      least = Math.min(least, both / Math.sqrt(one * other));
     }
-  }
-  return least;
-}, path);
+    return least;
+  }, path);
 
 /** The height of what is printed that its pages cut off, px. */
 async function cutOff(page) {
@@ -103,7 +117,9 @@ async function cutOff(page) {
   await page.setViewportSize({ width: 703, height: 1040 });
   await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
   await page.waitForTimeout(300);
-  const cut = await page.evaluate(() => Math.max(...[...document.querySelectorAll(".paper")].map(paper => paper.scrollHeight - paper.clientHeight)));
+  const cut = await page.evaluate(() =>
+    Math.max(...[...document.querySelectorAll(".paper")].map(paper => paper.scrollHeight - paper.clientHeight)),
+  );
   await page.evaluate(() => dispatchEvent(new Event("afterprint")));
   await page.emulateMedia({ media: null });
   await page.setViewportSize(before);
@@ -130,7 +146,10 @@ export async function comparisons(tools) {
       await page.waitForSelector(".drop");
       if (name === "1440-light") {
         // A click, a choice of both files, and a press: headers say which is stress.
-        const [chooser] = await Promise.all([page.waitForEvent("filechooser"), page.getByRole("button", { name: "Choose files" }).click()]);
+        const [chooser] = await Promise.all([
+          page.waitForEvent("filechooser"),
+          page.getByRole("button", { name: "Choose files" }).click(),
+        ]);
         await chooser.setFiles([stress, rest]);
         await page.waitForSelector(".pair-form");
         assert.match(await page.textContent(".pair-form"), /headers say which is which/);
@@ -157,13 +176,22 @@ export async function comparisons(tools) {
         assert.ok(alike > 0.98, `${alike}`);
       }
       const shown = await page.textContent(".compared-headlines");
-      for (const figure of [`TID${number(report.tid, 2)}`, `Reversible${number(report.reversible_percent, 0, "%")}`, `Fixed${number(report.fixed_percent, 0, "%")}`]) assert.ok(shown.includes(figure), `${figure} in ${shown}`);
+      for (const figure of [
+        `TID${number(report.tid, 2)}`,
+        `Reversible${number(report.reversible_percent, 0, "%")}`,
+        `Fixed${number(report.fixed_percent, 0, "%")}`,
+      ])
+        assert.ok(shown.includes(figure), `${figure} in ${shown}`);
       const words = await page.textContent(".verdict");
       for (const { reason } of report.flags) assert.ok(words.toLowerCase().includes(reason.toLowerCase()), reason);
       const territories = page.locator(".particulars summary", { hasText: "Territories" });
       await territories.click();
       const lad = report.territories.find(one => one.name === "LAD");
-      assert.ok((await page.locator(".particulars tr", { hasText: "LAD" }).first().textContent()).includes(number(lad.reversible_percent, 0, "%")));
+      assert.ok(
+        (await page.locator(".particulars tr", { hasText: "LAD" }).first().textContent()).includes(
+          number(lad.reversible_percent, 0, "%"),
+        ),
+      );
       await page.locator(".particulars summary", { hasText: "Segments" }).click();
 
       // A press on the map takes the cursor to all maps and slices; arrows choose another level.
@@ -173,7 +201,9 @@ export async function comparisons(tools) {
       await map.click({ position: { x: box.width * 0.5, y: box.height * 0.2 } });
       await page.waitForFunction(() => /7 mid anterior/.test(document.querySelector(".readout").textContent));
       const mid = report.segments.find(one => one.segment === 7);
-      assert.ok((await page.textContent(".readout")).includes(`Reversible part${number(mid.reversible_percent, 0, "%")}`));
+      assert.ok(
+        (await page.textContent(".readout")).includes(`Reversible part${number(mid.reversible_percent, 0, "%")}`),
+      );
       const slices = page.locator(".compared-slices");
       await slices.focus();
       assert.equal(await slices.getAttribute("aria-valuetext"), "Short axis, slice 4 of 8");
@@ -181,7 +211,8 @@ export async function comparisons(tools) {
       await page.keyboard.press("ArrowDown");
       assert.equal(await slices.getAttribute("aria-valuetext"), "Vertical long axis, slice 5 of 8");
       assert.ok((await isDrawn(slices)) > 200, "slices are drawn");
-      for (const wall of await page.locator(".heart-wall canvas[role=slider]").all()) assert.ok((await isDrawn(wall)) > 50, "walls are drawn");
+      for (const wall of await page.locator(".heart-wall canvas[role=slider]").all())
+        assert.ok((await isDrawn(wall)) > 50, "walls are drawn");
       await page.getByLabel("On the maps").selectOption("numbers");
       await look(page, `comparison-${name}`);
       await page.getByRole("button", { name: "Slice, large" }).click();
@@ -203,42 +234,53 @@ export async function comparisons(tools) {
     await own.stop();
   });
 
-  await check("rest and stress: scans are picked from the list, names are only a guess, slips are said in words", async () => {
-    const { stress, other, folder } = data();
-    const own = await service();
-    const { page, faults, close } = await tab(browser, own.address, { width: 1440, height: 900, expected: [/status of 4\d\d/] });
-    await page.waitForSelector(".drop");
-    await page.getByLabel("then").selectOption("nothing");
-    // Files of one name in two folders are told apart by these.
-    await page.setInputFiles("input[aria-label='Folder of scans']", folder);
-    await page.waitForSelector(".pair-form");
-    assert.match(await page.textContent(".pair-form"), /Guessed from the names/);
-    assert.match(await page.textContent(".pair-choice:has(:checked)"), /^stress spect\.nii\.gz/);
-    await page.getByRole("button", { name: "Not now" }).click();
-    // Scans of two patients are named, and compared once the person says that they are one.
-    await choose(page, stress, other);
-    await page.waitForFunction(() => /name two patients/.test(document.querySelector(".pair-form")?.textContent ?? ""));
-    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
-    await page.waitForFunction(() => /Patient ID/.test(document.querySelector(".working [role=alert]")?.textContent ?? ""));
-    await look(page, "two-patients-1440");
-    await page.getByLabel("These are scans of one patient").check();
-    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
-    await displayed(page);
-    assert.match(await page.textContent(".verdict"), /not comparable as they are/);
-    assert.equal(await cutOff(page), 0, "nothing is cut off");
-    // Picked by hand, the other way round: the flag says so.
-    await page.goto(`${own.address}/#/`);
-    await page.getByRole("button", { name: /^Pick stress spect/ }).click();
-    await page.getByRole("button", { name: /^Pick rest spect/ }).click();
-    await page.waitForSelector(".pair-form");
-    await page.locator(".pair-choice", { hasText: "rest spect" }).locator("input").check();
-    await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
-    await displayed(page);
-    assert.match(await page.textContent(".comparison header"), /stress\s*rest spect/);
-    assert.deepEqual(faults, []);
-    await close();
-    await own.stop();
-  });
+  await check(
+    "rest and stress: scans are picked from the list, names are only a guess, slips are said in words",
+    async () => {
+      const { stress, other, folder } = data();
+      const own = await service();
+      const { page, faults, close } = await tab(browser, own.address, {
+        width: 1440,
+        height: 900,
+        expected: [/status of 4\d\d/],
+      });
+      await page.waitForSelector(".drop");
+      await page.getByLabel("then").selectOption("nothing");
+      // Files of one name in two folders are told apart by these.
+      await page.setInputFiles("input[aria-label='Folder of scans']", folder);
+      await page.waitForSelector(".pair-form");
+      assert.match(await page.textContent(".pair-form"), /Guessed from the names/);
+      assert.match(await page.textContent(".pair-choice:has(:checked)"), /^stress spect\.nii\.gz/);
+      await page.getByRole("button", { name: "Not now" }).click();
+      // Scans of two patients are named, and compared once the person says that they are one.
+      await choose(page, stress, other);
+      await page.waitForFunction(() =>
+        /name two patients/.test(document.querySelector(".pair-form")?.textContent ?? ""),
+      );
+      await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+      await page.waitForFunction(() =>
+        /Patient ID/.test(document.querySelector(".working [role=alert]")?.textContent ?? ""),
+      );
+      await look(page, "two-patients-1440");
+      await page.getByLabel("These are scans of one patient").check();
+      await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+      await displayed(page);
+      assert.match(await page.textContent(".verdict"), /not comparable as they are/);
+      assert.equal(await cutOff(page), 0, "nothing is cut off");
+      // Picked by hand, the other way round: the flag says so.
+      await page.goto(`${own.address}/#/`);
+      await page.getByRole("button", { name: /^Pick stress spect/ }).click();
+      await page.getByRole("button", { name: /^Pick rest spect/ }).click();
+      await page.waitForSelector(".pair-form");
+      await page.locator(".pair-choice", { hasText: "rest spect" }).locator("input").check();
+      await page.getByRole("button", { name: "Compare rest and stress", exact: true }).first().click();
+      await displayed(page);
+      assert.match(await page.textContent(".comparison header"), /stress\s*rest spect/);
+      assert.deepEqual(faults, []);
+      await close();
+      await own.stop();
+    },
+  );
 
   await check("rest and stress of gated scans: the change of the ejection fraction", async () => {
     const { "gated stress": gatedStress, "gated rest": gatedRest } = data();
@@ -255,7 +297,11 @@ export async function comparisons(tools) {
     const shown = await page.textContent(".compared-headlines");
     const both = `${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`;
     assert.ok(shown.includes(`EF, change${points > 0 ? "+" : ""}${points}points: ${both}`), shown);
-    assert.ok((await page.textContent(".particulars")).includes(`End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}${number(beat.rest_edv_ml, 0, "ml")}`));
+    assert.ok(
+      (await page.textContent(".particulars")).includes(
+        `End-diastolic volume${number(beat.stress_edv_ml, 0, "ml")}${number(beat.rest_edv_ml, 0, "ml")}`,
+      ),
+    );
     await page.locator(".particulars summary", { hasText: "Segments" }).click();
     const moved = Math.abs(segments[6].motion_change_mm).toFixed(1);
     assert.ok((await page.locator(".particulars tr", { hasText: "7 mid anterior" }).textContent()).includes(moved));
@@ -270,16 +316,28 @@ export async function comparisons(tools) {
     const { "plain stress": plainStress, "plain rest": plainRest, limits } = data();
     const own = await service();
     for (const [name, width, dark] of FIGURES) {
-      const { page, faults, close } = await tab(browser, `${own.address}/#/limits`, { width, height: 900, dark, expected: [/status of 422/] });
+      const { page, faults, close } = await tab(browser, `${own.address}/#/limits`, {
+        width,
+        height: 900,
+        dark,
+        expected: [/status of 422/],
+      });
       await page.waitForSelector(".limits h1");
       if (name === "1440-light") {
         await look(page, "limits-empty");
-        await page.setInputFiles("input[aria-label='File of normal limits']", { name: "no.json", mimeType: "application/json", buffer: Buffer.from("{\"format\": \"else\"}") });
+        await page.setInputFiles("input[aria-label='File of normal limits']", {
+          name: "no.json",
+          mimeType: "application/json",
+          buffer: Buffer.from('{"format": "else"}'),
+        });
         await page.waitForSelector(".limits [role=alert]");
         await page.setInputFiles("input[aria-label='File of normal limits']", limits);
       }
       await page.waitForSelector(".limits-item");
-      assert.match(await page.textContent(".limits-item"), /healthy limits.*simulated people, not patients.*men and women together.*phantom.*13/);
+      assert.match(
+        await page.textContent(".limits-item"),
+        /healthy limits.*simulated people, not patients.*men and women together.*phantom.*13/,
+      );
       await look(page, `limits-${name}`);
       await page.goto(`${own.address}/#/`);
       await page.waitForSelector(".drop");
@@ -297,11 +355,14 @@ export async function comparisons(tools) {
       const id = await page.evaluate(() => location.hash.split("/").pop());
       const report = await reportOf(own.address, id);
       const shown = await page.textContent(".compared-headlines");
-      for (const score of ["sss", "srs", "sds"]) assert.ok(shown.includes(`${score.toUpperCase()}${report[score]}`), `${score} ${report[score]} in ${shown}`);
+      for (const score of ["sss", "srs", "sds"])
+        assert.ok(shown.includes(`${score.toUpperCase()}${report[score]}`), `${score} ${report[score]} in ${shown}`);
       assert.ok(report.sss > report.srs, `${report.sss} and ${report.srs}`);
       assert.match(await page.textContent(".simulated-note"), /simulated people, not patients/);
       assert.equal(await page.locator(".compared-maps .polar").count(), 7);
-      assert.ok((await page.textContent(".particulars")).includes(number(report.stress.perfusion.deficit_percent, 1, "%")));
+      assert.ok(
+        (await page.textContent(".particulars")).includes(number(report.stress.perfusion.deficit_percent, 1, "%")),
+      );
       await page.getByLabel("On the maps").selectOption("scores");
       await look(page, `scored-${name}`);
       if (width === 1440) {
@@ -309,7 +370,10 @@ export async function comparisons(tools) {
         assert.equal(await cutOff(page), 0, "nothing is cut off");
       }
       // No word of a category or a diagnosis.
-      assert.doesNotMatch(await page.textContent(".comparison"), /abnormal|ischa?emia|infarct|probable|low risk|high risk/i);
+      assert.doesNotMatch(
+        await page.textContent(".comparison"),
+        /abnormal|ischa?emia|infarct|probable|low risk|high risk/i,
+      );
 
       // A fit beside the same limits.
       await page.locator(".comparison header a").first().click();
@@ -322,9 +386,16 @@ export async function comparisons(tools) {
       }
       await page.waitForSelector(".perfusion .maps canvas");
       const [fit] = (await read(own.address, "/v1/segmentations")).segmentations;
-      const { perfusion } = await (await fetch(own.address + fit.links.report, { headers: { accept: "application/json" } })).json();
+      const { perfusion } = await (
+        await fetch(own.address + fit.links.report, { headers: { accept: "application/json" } })
+      ).json();
       const words = await page.textContent(".perfusion");
-      for (const figure of [number(perfusion.deficit_percent, 1, "%"), `${perfusion.summed_score} (`, "simulated people, not patients"]) assert.ok(words.includes(figure), `${figure} in ${words}`);
+      for (const figure of [
+        number(perfusion.deficit_percent, 1, "%"),
+        `${perfusion.summed_score} (`,
+        "simulated people, not patients",
+      ])
+        assert.ok(words.includes(figure), `${figure} in ${words}`);
       await look(page, `fit-limits-${name}`);
       if (width === 1440) assert.equal(await printed(page, `fit-limits-${name}`), 2, "pages on paper");
       if (width === 1440) assert.equal(await cutOff(page), 0, "nothing is cut off");

@@ -11,7 +11,8 @@ function element(tag, vr, value) {
   let body;
   if (Buffer.isBuffer(value)) body = value;
   else if (vr === "US") body = Buffer.concat([value].flat().map(n => Buffer.from(Uint16Array.of(n).buffer)));
-  else if (vr === "AT") body = Buffer.concat([value].flat().map(tag => Buffer.from(Uint16Array.of(tag >>> 16, tag & 0xffff).buffer)));
+  else if (vr === "AT")
+    body = Buffer.concat([value].flat().map(tag => Buffer.from(Uint16Array.of(tag >>> 16, tag & 0xffff).buffer)));
   else body = Buffer.from([value].flat().join("\\"), "utf8");
   if (body.length % 2) body = Buffer.concat([body, Buffer.from(vr === "UI" ? "\0" : " ")]);
   const head = Buffer.alloc(LONG.has(vr) ? 12 : 8);
@@ -74,10 +75,19 @@ function image([nx, ny], steps) {
 /** `series`: number, description and tracer of one series of several in a study. */
 export function nm(nifti, patient, id = "PH7", series = null) {
   const scan = scanOf(nifti);
-  return nmFile({ ...scan, id, series }, patient, "RECON TOMO", [
-    element(0x00280008, "IS", scan.shape[2]),
-    element(0x00280009, "AT", 0x00540080),
-  ], [element(0x00540080, "US", Array.from({ length: scan.shape[2] }, (_, n) => n + 1))]);
+  return nmFile(
+    { ...scan, id, series },
+    patient,
+    "RECON TOMO",
+    [element(0x00280008, "IS", scan.shape[2]), element(0x00280009, "AT", 0x00540080)],
+    [
+      element(
+        0x00540080,
+        "US",
+        Array.from({ length: scan.shape[2] }, (_, n) => n + 1),
+      ),
+    ],
+  );
 }
 
 /** An NM file with the elements that say how its frames are counted, and those of each frame. */
@@ -107,7 +117,11 @@ function nmFile({ shape, pixels, steps, origin, id = "PH7", series = null }, pat
     ...counted,
     ...image(shape, steps),
     ...(series ? [element(0x00540016, "SQ", item(element(0x00180031, "LO", series.tracer)))] : []),
-    element(0x00540022, "SQ", item(element(0x00200032, "DS", origin.map(number)), element(0x00200037, "DS", sides.map(number)))),
+    element(
+      0x00540022,
+      "SQ",
+      item(element(0x00200032, "DS", origin.map(number)), element(0x00200037, "DS", sides.map(number))),
+    ),
     ...vectors,
     element(0x7fe00010, "OW", pixels),
   ]);
@@ -119,30 +133,32 @@ export function series(nifti, patient) {
   const kind = "1.2.840.10008.5.1.4.1.1.128";
   const size = 2 * shape[0] * shape[1];
   const sides = [Math.sign(steps[0]), 0, 0, 0, Math.sign(steps[1]), 0];
-  return Array.from({ length: shape[2] }, (_, n) => Buffer.concat([
-    ...head(kind, `${ROOT}.8.3.${n + 1}`),
-    element(0x00080005, "CS", "ISO_IR 192"),
-    element(0x00080008, "CS", ["ORIGINAL", "PRIMARY"]),
-    element(0x00080016, "UI", kind),
-    element(0x00080018, "UI", `${ROOT}.8.3.${n + 1}`),
-    element(0x00080020, "DA", "20250116"),
-    element(0x00080060, "CS", "PT"),
-    element(0x00100010, "PN", patient),
-    element(0x00100020, "LO", "PH8"),
-    element(0x00180050, "DS", number(Math.abs(steps[2]))),
-    element(0x0020000d, "UI", `${ROOT}.8.1`),
-    element(0x0020000e, "UI", `${ROOT}.8.2`),
-    element(0x00200013, "IS", n + 1),
-    element(0x00200032, "DS", [origin[0], origin[1], origin[2] + n * steps[2]].map(number)),
-    element(0x00200037, "DS", sides.map(number)),
-    element(0x00200052, "UI", `${ROOT}.8.4`),
-    element(0x00280002, "US", 1),
-    element(0x00280004, "CS", "MONOCHROME2"),
-    ...image(shape, steps),
-    element(0x00281052, "DS", 0),
-    element(0x00281053, "DS", 1),
-    element(0x7fe00010, "OW", pixels.subarray(n * size, (n + 1) * size)),
-  ]));
+  return Array.from({ length: shape[2] }, (_, n) =>
+    Buffer.concat([
+      ...head(kind, `${ROOT}.8.3.${n + 1}`),
+      element(0x00080005, "CS", "ISO_IR 192"),
+      element(0x00080008, "CS", ["ORIGINAL", "PRIMARY"]),
+      element(0x00080016, "UI", kind),
+      element(0x00080018, "UI", `${ROOT}.8.3.${n + 1}`),
+      element(0x00080020, "DA", "20250116"),
+      element(0x00080060, "CS", "PT"),
+      element(0x00100010, "PN", patient),
+      element(0x00100020, "LO", "PH8"),
+      element(0x00180050, "DS", number(Math.abs(steps[2]))),
+      element(0x0020000d, "UI", `${ROOT}.8.1`),
+      element(0x0020000e, "UI", `${ROOT}.8.2`),
+      element(0x00200013, "IS", n + 1),
+      element(0x00200032, "DS", [origin[0], origin[1], origin[2] + n * steps[2]].map(number)),
+      element(0x00200037, "DS", sides.map(number)),
+      element(0x00200052, "UI", `${ROOT}.8.4`),
+      element(0x00280002, "US", 1),
+      element(0x00280004, "CS", "MONOCHROME2"),
+      ...image(shape, steps),
+      element(0x00281052, "DS", 0),
+      element(0x00281053, "DS", 1),
+      element(0x7fe00010, "OW", pixels.subarray(n * size, (n + 1) * size)),
+    ]),
+  );
 }
 
 /** The same scan as a pair of a header and an image. */
@@ -168,7 +184,9 @@ function beat(nifti, truth, gates) {
   const count = nx * ny * nz;
   const start = file.readFloatLE(108);
   const [slope, intercept] = [112, 116].map(at => file.readFloatLE(at));
-  const voxels = Float32Array.from({ length: count }, (_, n) => Math.max(0, slope * file.readInt16LE(start + 2 * n) + intercept));
+  const voxels = Float32Array.from({ length: count }, (_, n) =>
+    Math.max(0, slope * file.readInt16LE(start + 2 * n) + intercept),
+  );
   const mask = gunzipSync(truth);
   const first = mask.readFloatLE(108);
   const size = mask.readInt16LE(72) / 8;
@@ -185,11 +203,13 @@ function beat(nifti, truth, gates) {
     const way = turns < SYSTOLE ? turns / SYSTOLE : (1 - turns) / (1 - SYSTOLE);
     const scale = 1 - (SHRINKAGE * (1 - Math.cos(Math.PI * way))) / 2;
     // For each axis, the voxel before a place and the share of the next.
-    const places = [nx, ny, nz].map((length, axis) => Array.from({ length }, (_, at) => {
-      const place = Math.max(0, Math.min(length - 1, middle[axis] + (at - middle[axis]) / scale));
-      const before = Math.min(length - 2, Math.floor(place));
-      return [before, place - before];
-    }));
+    const places = [nx, ny, nz].map((length, axis) =>
+      Array.from({ length }, (_, at) => {
+        const place = Math.max(0, Math.min(length - 1, middle[axis] + (at - middle[axis]) / scale));
+        const before = Math.min(length - 2, Math.floor(place));
+        return [before, place - before];
+      }),
+    );
     const out = new Int16Array(count);
     for (let k = 0, n = 0; k < nz; k++) {
       const [c, w] = places[2][k];
@@ -223,21 +243,44 @@ export function gated(nifti, truth, gates, rr = 900) {
 /** The same beat as a gated NM file. */
 export function gatedNm(nifti, truth, gates, patient, rr = 900) {
   const scan = scanOf(nifti);
-  const frames = Array.from({ length: gates * scan.shape[2] }, (_, n) => [Math.floor(n / scan.shape[2]) + 1, (n % scan.shape[2]) + 1]);
-  const pixels = Buffer.concat(beat(nifti, truth, gates).map(voxels => Buffer.from(Uint16Array.from(voxels).buffer)));
-  const timing = item(element(0x00181062, "IS", rr), element(0x00181063, "DS", number(rr / gates)), element(0x00181083, "IS", 400), element(0x00181084, "IS", 12));
-  return nmFile({ ...scan, pixels }, patient, "RECON GATED TOMO", [
-    element(0x00280008, "IS", frames.length),
-    element(0x00280009, "AT", [0x00540060, 0x00540070, 0x00540080]),
-  ], [
-    element(0x00540060, "US", frames.map(() => 1)),
-    element(0x00540061, "US", 1),
-    element(0x00540062, "SQ", item(element(0x00540063, "SQ", timing))),
-    element(0x00540070, "US", frames.map(([gate]) => gate)),
-    element(0x00540071, "US", gates),
-    element(0x00540080, "US", frames.map(([, slice]) => slice)),
-    element(0x00540081, "US", scan.shape[2]),
+  const frames = Array.from({ length: gates * scan.shape[2] }, (_, n) => [
+    Math.floor(n / scan.shape[2]) + 1,
+    (n % scan.shape[2]) + 1,
   ]);
+  const pixels = Buffer.concat(beat(nifti, truth, gates).map(voxels => Buffer.from(Uint16Array.from(voxels).buffer)));
+  const timing = item(
+    element(0x00181062, "IS", rr),
+    element(0x00181063, "DS", number(rr / gates)),
+    element(0x00181083, "IS", 400),
+    element(0x00181084, "IS", 12),
+  );
+  return nmFile(
+    { ...scan, pixels },
+    patient,
+    "RECON GATED TOMO",
+    [element(0x00280008, "IS", frames.length), element(0x00280009, "AT", [0x00540060, 0x00540070, 0x00540080])],
+    [
+      element(
+        0x00540060,
+        "US",
+        frames.map(() => 1),
+      ),
+      element(0x00540061, "US", 1),
+      element(0x00540062, "SQ", item(element(0x00540063, "SQ", timing))),
+      element(
+        0x00540070,
+        "US",
+        frames.map(([gate]) => gate),
+      ),
+      element(0x00540071, "US", gates),
+      element(
+        0x00540080,
+        "US",
+        frames.map(([, slice]) => slice),
+      ),
+      element(0x00540081, "US", scan.shape[2]),
+    ],
+  );
 }
 
 /** A NIfTI-1 volume of 8 x 8 x (7 + n) voxels of 1 mm, which count up from n. */

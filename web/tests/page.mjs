@@ -46,7 +46,20 @@ async function service(...flags) {
 }
 
 /** A tab that fails the check if anything is wrong behind the view. */
-async function tab(browser, address, { width = 1280, height = width > 600 ? 800 : 850, dark = false, expected = [], script, scripts = true, ratio = 1, motion = true } = {}) {
+async function tab(
+  browser,
+  address,
+  {
+    width = 1280,
+    height = width > 600 ? 800 : 850,
+    dark = false,
+    expected = [],
+    script,
+    scripts = true,
+    ratio = 1,
+    motion = true,
+  } = {},
+) {
   const context = await browser.newContext({
     viewport: { width, height },
     colorScheme: dark ? "dark" : "light",
@@ -62,14 +75,20 @@ async function tab(browser, address, { width = 1280, height = width > 600 ? 800 
   // The software renderer of this browser reports its own slowness.
   const usual = [/GL Driver Message/, /software WebGL/, ...expected];
   page.on("console", message => {
-    if (["error", "warning"].includes(message.type()) && !usual.some(words => words.test(message.text()))) faults.push(`console: ${message.text()}`);
+    if (["error", "warning"].includes(message.type()) && !usual.some(words => words.test(message.text())))
+      faults.push(`console: ${message.text()}`);
   });
   page.on("pageerror", error => faults.push(`error: ${error.stack}`));
   page.on("request", request => {
     const url = request.url();
-    if (url !== address && !url.startsWith(new URL(address).origin) && !/^(blob|data):/.test(url)) faults.push(`leaves the host: ${url}`);
+    if (url !== address && !url.startsWith(new URL(address).origin) && !/^(blob|data):/.test(url))
+      faults.push(`leaves the host: ${url}`);
   });
-  await page.addInitScript(() => document.addEventListener("securitypolicyviolation", event => console.error("policy", event.violatedDirective, event.blockedURI)));
+  await page.addInitScript(() =>
+    document.addEventListener("securitypolicyviolation", event =>
+      console.error("policy", event.violatedDirective, event.blockedURI),
+    ),
+  );
   if (script) await page.addInitScript(script);
   await page.goto(address);
   tabs.set(page, faults);
@@ -83,9 +102,13 @@ async function tab(browser, address, { width = 1280, height = width > 600 ? 800 
 /** Says what the tabs of a failed check show, keeps pictures of them, and closes them. */
 async function examine(name) {
   for (const [page, faults] of tabs) {
-    const text = await page.evaluate(() => `${location.href}\n${document.body.innerText}`).catch(error => error.message);
+    const text = await page
+      .evaluate(() => `${location.href}\n${document.body.innerText}`)
+      .catch(error => error.message);
     console.log(`the tab shows: ${text.slice(0, 2000)}\n${faults.join("\n")}`);
-    await page.screenshot({ path: join(SCREENSHOTS, `failed ${name}.png`), timeout: 10_000 }).catch(error => console.log(error.message));
+    await page
+      .screenshot({ path: join(SCREENSHOTS, `failed ${name}.png`), timeout: 10_000 })
+      .catch(error => console.log(error.message));
     await page.context().close();
   }
   tabs.clear();
@@ -102,13 +125,20 @@ async function look(page, name) {
   const { frameTree } = await session.send("Page.getFrameTree");
   const { executionContextId } = await session.send("Page.createIsolatedWorld", { frameId: frameTree.frame.id });
   const run = async expression => {
-    const { result, exceptionDetails } = await session.send("Runtime.evaluate", { contextId: executionContextId, expression, awaitPromise: true, returnByValue: true });
+    const { result, exceptionDetails } = await session.send("Runtime.evaluate", {
+      contextId: executionContextId,
+      expression,
+      awaitPromise: true,
+      returnByValue: true,
+    });
     if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
     return result.value;
   };
   await run(AXE);
-  const text = await run("axe.run().then(r => JSON.stringify(r.violations" +
-      ".map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))");
+  const text = await run(
+    "axe.run().then(r => JSON.stringify(r.violations" +
+      ".map(v => [v.id, v.nodes.slice(0, 3).map(n => n.html.slice(0, 160))])))",
+  );
   assert.deepEqual(JSON.parse(text), [], name);
   await session.detach();
 }
@@ -212,7 +242,11 @@ async function typedWhileJobsBegin(page, field) {
     const volume = /vol_\w+/.exec(location.hash)[0];
     const file = async seed => {
       const order = { volume, kind: "model", parameters: { points: 3000, starts: 4, method: "paper", seed } };
-      const answer = await fetch("/v1/jobs", { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(order) });
+      const answer = await fetch("/v1/jobs", {
+        method: "POST",
+        headers: { "content-type": "application/json" },
+        body: JSON.stringify(order),
+      });
       return (await answer.json()).links.self;
     };
     return Promise.all(Array.from({ length: 24 }, (_, n) => file(n + 1)));
@@ -220,23 +254,36 @@ async function typedWhileJobsBegin(page, field) {
   await page.waitForSelector(".job.queued, .job.running");
   assert.equal(await field.inputValue(), typed);
   await field.press("Tab");
-  await page.waitForFunction(() => /Changed: base/.test(document.querySelector(".correction [role=status]").textContent));
+  await page.waitForFunction(() =>
+    /Changed: base/.test(document.querySelector(".correction [role=status]").textContent),
+  );
   await page.evaluate(jobs => Promise.all(jobs.map(job => fetch(job, { method: "DELETE" }))), filed);
   await page.waitForFunction(() => !document.querySelector(".job.queued, .job.running"));
   await page.getByRole("button", { name: "Undo changes" }).click();
 }
 
 async function main() {
-  const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--enable-unsafe-swiftshader"] });
+  const browser = await chromium.launch({
+    executablePath: CHROMIUM,
+    args: ["--no-sandbox", "--enable-unsafe-swiftshader"],
+  });
   ends.push(() => browser.close());
   const { address } = await service();
 
   await check("packed files hold what the plain ones do", async () => {
-    const read = async (path, coding) => Buffer.from(await (await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })).arrayBuffer());
-    const names = [...(await read("/", "identity")).toString().matchAll(/"[.\/]*(assets\/[^"]+)"/g)].map(match => `/${match[1]}`);
+    const read = async (path, coding) =>
+      Buffer.from(
+        await (
+          await fetch(address + path, { headers: { accept: "text/html", "accept-encoding": coding } })
+        ).arrayBuffer(),
+      );
+    const names = [...(await read("/", "identity")).toString().matchAll(/"[./]*(assets\/[^"]+)"/g)].map(
+      match => `/${match[1]}`,
+    );
     const program = names.find(name => name.endsWith(".js"));
     const folder = program.slice(0, program.lastIndexOf("/") + 1);
-    for (const [, chunk] of (await read(program, "identity")).toString().matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g)) names.push(folder + chunk);
+    for (const [, chunk] of (await read(program, "identity")).toString().matchAll(/["'`]\.\/([\w-]+\.js)["'`]/g))
+      names.push(folder + chunk);
     assert.ok(names.some(name => name.includes("viewer")) && names.some(name => name.includes("docs")), names.join());
     for (const name of ["/", ...names]) {
       // fetch unpacks what it is sent.
@@ -248,9 +295,16 @@ async function main() {
   await check("the first view is small", async () => {
     const { page, faults, close } = await tab(browser, address);
     await page.waitForSelector(".welcome");
-    const sizes = await page.evaluate(() => performance.getEntriesByType("resource").concat(performance.getEntriesByType("navigation")).map(entry => [entry.name, entry.encodedBodySize]));
+    const sizes = await page.evaluate(() =>
+      performance
+        .getEntriesByType("resource")
+        .concat(performance.getEntriesByType("navigation"))
+        .map(entry => [entry.name, entry.encodedBodySize]),
+    );
     const whole = sizes.filter(([name]) => !name.includes("/v1/")).reduce((sum, [, size]) => sum + size, 0);
-    const painted = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? 0);
+    const painted = await page.evaluate(
+      () => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? 0,
+    );
     console.log(`  first view: ${whole} bytes, ${Math.round(painted)} ms to the first paint`);
     assert.ok(whole > 5_000 && whole < 400_000, `${whole} bytes`);
     assert.ok(!sizes.some(([name]) => name.includes("viewer")), "the viewer is loaded when it is needed");
@@ -259,13 +313,21 @@ async function main() {
     await close();
   });
 
-  for (const [width, dark] of [[1280, false], [1280, true], [400, false], [400, true]]) {
+  for (const [width, dark] of [
+    [1280, false],
+    [1280, true],
+    [400, false],
+    [400, true],
+  ]) {
     const name = `${width}-${dark ? "dark" : "light"}`;
     await check(`upload, model, view, fit, correct, compare, download at ${name}`, async () => {
       // The browser reports the answer to the parameter that is out of range.
       const { page, faults, close } = await tab(browser, address, { width, dark, expected: [/status of 422/] });
       // A newcomer: a click and a choice of files, two actions, lead to a fitted ventricle on the screen.
-      const [chooser] = await Promise.all([page.waitForEvent("filechooser"), page.getByRole("button", { name: "Choose files" }).click()]);
+      const [chooser] = await Promise.all([
+        page.waitForEvent("filechooser"),
+        page.getByRole("button", { name: "Choose files" }).click(),
+      ]);
       await chooser.setFiles(SCAN);
       await drawn(page);
       await page.waitForSelector(".wall canvas");
@@ -276,7 +338,10 @@ async function main() {
       const colours = page.getByLabel("Colour of the wall");
       for (const figure of await colours.locator("option").allTextContents()) await colours.selectOption(figure);
       if (name === "1280-light") await look(page, "shape-1280-light");
-      assert.ok((await colours.locator("option").allTextContents()).some(figure => figure.startsWith("Uncertainty")), "uncertainty");
+      assert.ok(
+        (await colours.locator("option").allTextContents()).some(figure => figure.startsWith("Uncertainty")),
+        "uncertainty",
+      );
       await colours.selectOption("Uptake");
       if (width === 1280) assert.equal(await printed(page, `fit-${name}`), 2, "pages on paper");
 
@@ -285,7 +350,10 @@ async function main() {
       await slice.focus();
       const before = await slice.getAttribute("aria-valuenow");
       for (let n = 0; n < 4; n++) await page.keyboard.press("PageUp");
-      await page.waitForFunction(([old]) => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old, [before]);
+      await page.waitForFunction(
+        ([old]) => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old,
+        [before],
+      );
       await page.getByRole("button", { name: "Patient" }).click();
       await look(page, `patient-${name}`);
       await page.getByRole("button", { name: "Heart" }).click();
@@ -336,7 +404,10 @@ async function main() {
       await page.waitForFunction(old => document.querySelector(".correction input").value !== old, centre);
       const base = page.locator(".correction label", { hasText: "Base" }).locator("input");
       await base.fill(String(Number(await base.inputValue()) + 8));
-      await page.locator(".correction label", { hasText: "Turn" }).locator("input").fill(width === 400 ? "10" : "5");
+      await page
+        .locator(".correction label", { hasText: "Turn" })
+        .locator("input")
+        .fill(width === 400 ? "10" : "5");
       await look(page, `correct-${name}`);
       await page.getByRole("button", { name: "Fit from here" }).click();
       // The new fit is shown beside the one it came from.
@@ -347,19 +418,28 @@ async function main() {
       await page.locator(".layers label", { hasText: "difference" }).locator("input").check();
       await look(page, `compare-${name}`);
 
-      const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+      const [zip] = await Promise.all([
+        page.waitForEvent("download"),
+        page.getByRole("button", { name: "Everything as zip" }).click(),
+      ]);
       const bytes = readFileSync(await zip.path());
       writeFileSync(join(SCREENSHOTS, `result-${name}.zip`), bytes);
       assert.match(namesIn(join(SCREENSHOTS, `result-${name}.zip`)), /mesh\.glb[^]*report\.html/);
       if (width === 1280) assert.equal(await printed(page, `compare-${name}`), 2, "pages on paper");
       // Otherwise its download may be taken for the next one.
-      const [picture] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Screenshot" }).click()]);
+      const [picture] = await Promise.all([
+        page.waitForEvent("download"),
+        page.getByRole("button", { name: "Screenshot" }).click(),
+      ]);
       assert.equal(readFileSync(await picture.path()).toString("latin1", 1, 4), "PNG");
       await page.goto(`${address}/#/`);
       await page.waitForSelector(".scan");
       await look(page, `list-${name}`);
       if (name === "1280-light") {
-        const [whole] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Download all of" }).first().click()]);
+        const [whole] = await Promise.all([
+          page.waitForEvent("download"),
+          page.getByRole("button", { name: "Download all of" }).first().click(),
+        ]);
         assert.match(namesIn(await whole.path()), /scan\/[^]*mesh\.vtp[^]*report\.html/);
       }
       assert.deepEqual(faults, []);
@@ -381,7 +461,13 @@ async function main() {
           return clearRect.apply(this, all);
         },
         fillText(text, x, y, ...rest) {
-          this.canvas.marks?.texts.push({ text, x, y, width: this.measureText(text).width, height: parseFloat(/([\d.]+)px/.exec(this.font)[1]) * 0.7 });
+          this.canvas.marks?.texts.push({
+            text,
+            x,
+            y,
+            width: this.measureText(text).width,
+            height: parseFloat(/([\d.]+)px/.exec(this.font)[1]) * 0.7,
+          });
           return fillText.call(this, text, x, y, ...rest);
         },
         arc(x, y, radius, ...rest) {
@@ -390,7 +476,12 @@ async function main() {
         },
       });
     };
-    for (const [width, dark] of [[1440, false], [1440, true], [400, false], [400, true]]) {
+    for (const [width, dark] of [
+      [1440, false],
+      [1440, true],
+      [400, false],
+      [400, true],
+    ]) {
       const name = `${width}-${dark ? "dark" : "light"}`;
       const { page, faults, close } = await tab(browser, own.address, { width, height: 900, dark, script });
       await page.waitForSelector(".drop");
@@ -401,7 +492,12 @@ async function main() {
       // Identifiers are said to be such, and whole on the view of the scan.
       const head = await page.textContent(".side header");
       assert.ok(head.includes(`patient ID ${id}`) && head.includes("accession ACC7"), head);
-      assert.ok(await page.evaluate(() => [...document.querySelectorAll(".side, .facts")].every(part => part.scrollWidth <= part.clientWidth)), "nothing sticks out");
+      assert.ok(
+        await page.evaluate(() =>
+          [...document.querySelectorAll(".side, .facts")].every(part => part.scrollWidth <= part.clientWidth),
+        ),
+        "nothing sticks out",
+      );
       if (width === 1440) {
         for (const label of ["Report", "Print"]) {
           const box = await page.locator(".facts .takeaways").getByText(label, { exact: true }).boundingBox();
@@ -415,7 +511,8 @@ async function main() {
       assert.match(await page.textContent(".verdict details"), /in 100 agree with a reader/);
       await look(page, `reader-${name}`);
       assert.equal(await page.getByLabel("Colours of polar map and wall").inputValue(), "Inferno");
-      for (const slice of await page.locator(".slice canvas").all()) assert.match(await slice.getAttribute("aria-valuetext"), /value (none|-?\d+|-?0?\.\d{1,3}|-?\d\.\d)$/);
+      for (const slice of await page.locator(".slice canvas").all())
+        assert.match(await slice.getAttribute("aria-valuetext"), /value (none|-?\d+|-?0?\.\d{1,3}|-?\d\.\d)$/);
       // Wherever the cursor is, it covers no number, and nothing is above all.
       const map = page.locator(".polar canvas").first();
       await map.scrollIntoViewIfNeeded();
@@ -427,8 +524,14 @@ async function main() {
         await page.waitForTimeout(80);
         const { texts, ring } = await marks();
         assert.ok(ring && Math.hypot(ring.x - place.x, ring.y - place.y) < 25, "the cursor is where the press was");
-        for (const one of texts) assert.ok(Math.abs(one.x - ring.x) > 6 + one.width / 2 || Math.abs(one.y - ring.y) > 6 + one.height / 2, `${one.text} lies under the cursor`);
-        const [segment, here = 0] = [...(await page.textContent(".polar .at")).matchAll(/(\d+)\u2009%/g)].map(match => Number(match[1]));
+        for (const one of texts)
+          assert.ok(
+            Math.abs(one.x - ring.x) > 6 + one.width / 2 || Math.abs(one.y - ring.y) > 6 + one.height / 2,
+            `${one.text} lies under the cursor`,
+          );
+        const [segment, here = 0] = [...(await page.textContent(".polar .at")).matchAll(/(\d+)\u2009%/g)].map(match =>
+          Number(match[1]),
+        );
         assert.ok(segment <= 100 && here <= 100, `${segment} %, here ${here} %`);
       }
       await look(page, `reader-cursor-${name}`);
@@ -450,21 +553,29 @@ async function main() {
     await choose(page, SCAN);
     await drawn(page);
     const all = async kind => (await (await fetch(`${own.address}/v1/${kind}`)).json())[kind];
-    const read = async (result, name) => (await fetch(own.address + result.files.find(one => one.name === name).href)).json();
+    const read = async (result, name) =>
+      (await fetch(own.address + result.files.find(one => one.name === name).href)).json();
     const [first] = await all("segmentations");
     const correct = async (field, change) => {
       const before = (await all("segmentations")).length;
-      if (!(await page.locator(".correction").count())) await page.getByRole("button", { name: "Correct by hand" }).click();
+      if (!(await page.locator(".correction").count()))
+        await page.getByRole("button", { name: "Correct by hand" }).click();
       const input = page.locator(".correction label", { hasText: field }).locator("input");
       await input.fill(String(Number(await input.inputValue()) + change));
       await input.press("Tab");
       await page.getByRole("button", { name: "Fit from here" }).click();
       await page.waitForFunction(count => document.querySelectorAll(".choices li").length === count, before + 1);
-      await page.waitForFunction(() => /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent));
+      await page.waitForFunction(() =>
+        /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent),
+      );
       return (await all("segmentations"))[0];
     };
     const turned = await correct("Turn", 60);
-    assert.deepEqual((await read(turned, "mesh.json")).vertices, (await read(first, "mesh.json")).vertices, "the same wall");
+    assert.deepEqual(
+      (await read(turned, "mesh.json")).vertices,
+      (await read(first, "mesh.json")).vertices,
+      "the same wall",
+    );
     const [old, now] = [await read(first, "report.json"), await read(turned, "report.json")];
     assert.equal(now.template, old.template);
     assert.equal(turned.parameters.kept_model, old.template);
@@ -489,17 +600,26 @@ async function main() {
   await comparisons({ PROGRAM, SCREENSHOTS, browser, service, tab, check, look, printed, choose });
 
   await check("the documentation of the API", async () => {
-    for (const [width, dark] of [[1280, false], [400, true]]) {
+    for (const [width, dark] of [
+      [1280, false],
+      [400, true],
+    ]) {
       const { page, faults, close } = await tab(browser, `${address}/docs`, { width, dark });
       await page.waitForSelector(".operation");
       await page.fill("input[type=search]", "volumes");
       await page.locator(".operation summary").first().click();
       await page.locator(".operation", { hasText: "Upload a volume" }).locator("summary").first().click();
       await page.getByRole("button", { name: "Send" }).first().click();
-      await page.waitForFunction(() => /next_cursor|"volumes"/.test(document.querySelector("pre[aria-label=Answer]")?.textContent ?? ""));
+      await page.waitForFunction(() =>
+        /next_cursor|"volumes"/.test(document.querySelector("pre[aria-label=Answer]")?.textContent ?? ""),
+      );
       await look(page, `docs-${width}`);
       await page.fill("input[type=search]", "distance.json");
-      await page.locator(".operation", { hasText: "Download one of a model's files" }).locator("summary").first().click();
+      await page
+        .locator(".operation", { hasText: "Download one of a model's files" })
+        .locator("summary")
+        .first()
+        .click();
       await page.getByRole("rowheader", { name: "distance.json" }).waitFor();
       assert.deepEqual(faults, []);
       await close();
@@ -509,7 +629,8 @@ async function main() {
   await check("names of files are shown by the tab that sent them, and stored if a person asks for it", async () => {
     const own = await service();
     const { page, faults, close } = await tab(browser, own.address);
-    const stored = async () => (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes.map(volume => volume.labels.name);
+    const stored = async () =>
+      (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes.map(volume => volume.labels.name);
     const shown = () => page.locator(".scan .name").allTextContents();
     await page.waitForSelector(".welcome");
     await page.getByLabel("then").selectOption("fit");
@@ -563,7 +684,13 @@ async function main() {
     const volume = (await (await fetch(`${own.address}/v1/volumes`)).json()).volumes[0].id;
     const made = [];
     for (const points of [70, 140]) {
-      let job = await (await fetch(`${own.address}/v1/jobs`, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ kind: "model", volume, parameters: { points } }) })).json();
+      let job = await (
+        await fetch(`${own.address}/v1/jobs`, {
+          method: "POST",
+          headers: { "content-type": "application/json" },
+          body: JSON.stringify({ kind: "model", volume, parameters: { points } }),
+        })
+      ).json();
       while (["queued", "running"].includes(job.state)) {
         await page.waitForTimeout(100);
         job = await (await fetch(`${own.address}/v1/jobs/${job.id}`)).json();
@@ -581,7 +708,10 @@ async function main() {
     const before = await seen(0);
     await walls.nth(0).focus();
     for (let n = 0; n < 12; n++) await page.keyboard.press("ArrowLeft");
-    await page.waitForFunction(old => document.querySelector(".pair .wall canvas").getAttribute("aria-valuetext") !== old, before);
+    await page.waitForFunction(
+      old => document.querySelector(".pair .wall canvas").getAttribute("aria-valuetext") !== old,
+      before,
+    );
     await page.waitForTimeout(300);
     assert.equal(await seen(1), await seen(0), "both are seen from the same side");
     await look(page, "two-models-1280");
@@ -598,7 +728,10 @@ async function main() {
     await drawn(page);
     await page.waitForSelector(".wall canvas");
     await look(page, "dicom-1280");
-    const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+    const [zip] = await Promise.all([
+      page.waitForEvent("download"),
+      page.getByRole("button", { name: "Everything as zip" }).click(),
+    ]);
     const packed = namesIn(await zip.path());
     assert.match(packed, /\.dcm/);
     assert.doesNotMatch(packed, /left_out/);
@@ -616,11 +749,18 @@ async function main() {
     writeFileSync(nifti, gated(scan, truth, 8));
     writeFileSync(dicom, gatedNm(scan, truth, 16, "Beat^Berta"));
     writeFileSync(dynamic, gated(scan, truth, 8, 480_000));
-    const played = page => page.waitForFunction(() => document.querySelector(".player") && !document.querySelector(".player [role=status]"));
+    const played = page =>
+      page.waitForFunction(() => document.querySelector(".player") && !document.querySelector(".player [role=status]"));
     const gate = page => page.getByLabel("Gate", { exact: true }).inputValue().then(Number);
     const moment = page => page.locator(".beat-chart .now line").getAttribute("x1");
-    const moves = (page, from) => page.waitForFunction(old => document.querySelector(".beat-chart .now line").getAttribute("x1") !== old, from);
-    for (const [width, dark, file, gates] of [[1280, false, nifti, 8], [1280, true, dicom, 16], [400, false, dicom, 16], [400, true, nifti, 8]]) {
+    const moves = (page, from) =>
+      page.waitForFunction(old => document.querySelector(".beat-chart .now line").getAttribute("x1") !== old, from);
+    for (const [width, dark, file, gates] of [
+      [1280, false, nifti, 8],
+      [1280, true, dicom, 16],
+      [400, false, dicom, 16],
+      [400, true, nifti, 8],
+    ]) {
       const name = `${width}-${dark ? "dark" : "light"}`;
       const motion = width === 1280;
       const own = await service();
@@ -652,7 +792,11 @@ async function main() {
       await page.getByLabel("Speed").selectOption("0.25");
       await button.click();
       // At end systole the slices show another gate than at end diastole.
-      const picture = () => page.locator(".slice canvas").first().evaluate(canvas => canvas.toDataURL());
+      const picture = () =>
+        page
+          .locator(".slice canvas")
+          .first()
+          .evaluate(canvas => canvas.toDataURL());
       const at = wanted => page.getByLabel("Gate", { exact: true }).fill(String(wanted));
       const report = await page.evaluate(async () => {
         const { beats } = await (await fetch("/v1/beats")).json();
@@ -681,7 +825,9 @@ async function main() {
       await map.scrollIntoViewIfNeeded();
       const box = await map.boundingBox();
       await map.click({ position: { x: box.width * 0.5, y: box.height * 0.2 } });
-      await page.waitForFunction(() => /anterior/.test(document.querySelector(".maps figure:last-child figcaption").textContent));
+      await page.waitForFunction(() =>
+        /anterior/.test(document.querySelector(".maps figure:last-child figcaption").textContent),
+      );
       await page.locator(".beat-maps details summary").click();
       assert.equal(await page.locator(".beat-maps tbody tr").count(), 17);
       await look(page, `beat-${name}`);
@@ -694,15 +840,23 @@ async function main() {
       await look(page, `beat-correct-${name}`);
       await page.getByRole("button", { name: "Fit from here" }).click();
       await page.waitForSelector(".choices .other");
-      assert.match(await page.textContent(".choices .current"), /Corrected beat of \d+ gates[^]*by hand: base; from the fit of/);
-      const again = await page.evaluate(async () => (await (await fetch("/v1/beats")).json()).beats[0].parameters.kept_model);
+      assert.match(
+        await page.textContent(".choices .current"),
+        /Corrected beat of \d+ gates[^]*by hand: base; from the fit of/,
+      );
+      const again = await page.evaluate(
+        async () => (await (await fetch("/v1/beats")).json()).beats[0].parameters.kept_model,
+      );
       assert.equal(again, report.template, "the beat keeps its heart");
       await page.waitForFunction(() => document.querySelectorAll(".figures thead th").length >= 2);
       await played(page);
       await look(page, `beat-compare-${name}`);
       if (width === 1280) {
         assert.equal(await printed(page, `beat-compare-${name}`), 1, "pages on paper");
-        const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: "Everything as zip" }).click()]);
+        const [zip] = await Promise.all([
+          page.waitForEvent("download"),
+          page.getByRole("button", { name: "Everything as zip" }).click(),
+        ]);
         assert.match(namesIn(await zip.path()), /beat\.json[^]*mesh\.glb/);
       }
       await page.goto(`${own.address}/#/`);
@@ -729,14 +883,19 @@ async function main() {
     await choose(dropped.page, SCAN, ...apart.reverse());
     await dropped.page.waitForFunction(() => document.querySelectorAll(".scan").length === 2);
     const { volumes } = await (await fetch(`${several.address}/v1/volumes`)).json();
-    assert.deepEqual(volumes.map(volume => [volume.files, volume.gates?.number ?? null]).sort(), [[1, null], [8, 8]]);
+    assert.deepEqual(volumes.map(volume => [volume.files, volume.gates?.number ?? null]).sort(), [
+      [1, null],
+      [8, 8],
+    ]);
     await dropped.close();
     await several.stop();
     // Frames that last minutes are no gates: said in words, and the first of them is shown.
     const { page, close } = await tab(browser, address, { expected: [/status of 4\d\d/] });
     await page.waitForSelector(".drop");
     await choose(page, dynamic);
-    await page.waitForFunction(() => /no gates of one heart beat/.test(document.querySelector(".job.failed")?.textContent ?? ""));
+    await page.waitForFunction(() =>
+      /no gates of one heart beat/.test(document.querySelector(".job.failed")?.textContent ?? ""),
+    );
     await page.waitForSelector(".slice canvas");
     assert.equal(await page.locator(".stage [role=alert]").count(), 0);
     await look(page, "dynamic-1280");
@@ -781,7 +940,9 @@ async function main() {
       socket.on("error", fail);
       socket.on("close", () => done(text));
       const { host } = new URL(small.address);
-      socket.write(`POST /v1/volumes HTTP/1.1\r\nhost: ${host}\r\ncontent-length: 3000000000\r\nconnection: close\r\n\r\n`);
+      socket.write(
+        `POST /v1/volumes HTTP/1.1\r\nhost: ${host}\r\ncontent-length: 3000000000\r\nconnection: close\r\n\r\n`,
+      );
     });
     assert.match(answer, /^HTTP\/1.1 413 [^]*The body is larger than 1 ?MiB, the limit of this service/);
     assert.deepEqual(faults, []);
@@ -839,15 +1000,22 @@ async function main() {
     };
     // Names and sizes ascend, the time of arrival descends.
     for (let n = count; n > 0; n--) {
-      const answer = await fetch(`${own.address}/v1/volumes?labels=name:scan%20${n}`, { method: "POST", body: form(n) });
+      const answer = await fetch(`${own.address}/v1/volumes?labels=name:scan%20${n}`, {
+        method: "POST",
+        body: form(n),
+      });
       assert.equal(answer.status, 201, await answer.text());
     }
     const { page, faults, close } = await tab(browser, own.address);
     const shown = () => page.locator(".scan .name").allTextContents();
-    const awaited = (first, length) => page.waitForFunction(([first, length]) => {
-      const names = [...document.querySelectorAll(".scan .name")].map(name => name.textContent);
-      return names[0] === first && names.length === length;
-    }, [first, length]);
+    const awaited = (first, length) =>
+      page.waitForFunction(
+        ([first, length]) => {
+          const names = [...document.querySelectorAll(".scan .name")].map(name => name.textContent);
+          return names[0] === first && names.length === length;
+        },
+        [first, length],
+      );
     const scans = (...from) => from.map(n => `scan ${n}`);
     const ascending = Array.from({ length: count }, (_, n) => n + 1);
     await awaited("scan 1", 30);
@@ -880,11 +1048,15 @@ async function main() {
     await page.waitForSelector(".welcome");
     let go;
     const told = new Promise(resolve => (go = resolve));
-    await page.route(/\/v1\/(volumes|segmentations)\?limit=(30|100)$/, async route => {
-      const response = await route.fetch();
-      await told;
-      await route.fulfill({ response });
-    }, { times: 2 });
+    await page.route(
+      /\/v1\/(volumes|segmentations)\?limit=(30|100)$/,
+      async route => {
+        const response = await route.fetch();
+        await told;
+        await route.fulfill({ response });
+      },
+      { times: 2 },
+    );
     await page.reload();
     await page.waitForSelector(".drop");
     await choose(page, SCAN);
@@ -910,7 +1082,8 @@ async function main() {
     await page.waitForSelector(".welcome");
     const session = await page.context().newCDPSession(page);
     const data = { items: [], files: [folder, TRUTH], dragOperationsMask: 1 };
-    for (const type of ["dragEnter", "dragOver"]) await session.send("Input.dispatchDragEvent", { type, x: 600, y: 400, data });
+    for (const type of ["dragEnter", "dragOver"])
+      await session.send("Input.dispatchDragEvent", { type, x: 600, y: 400, data });
     await page.waitForSelector(".drop.over");
     await look(page, "drop-1280");
     await session.send("Input.dispatchDragEvent", { type: "drop", x: 600, y: 400, data });
@@ -932,11 +1105,18 @@ async function main() {
     await choose(page, SCAN);
     await page.waitForSelector(".uploads .stored");
     const volume = (await (await fetch(`${one.address}/v1/volumes`)).json()).volumes[0].id;
-    const job = points => fetch(`${one.address}/v1/jobs`, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ kind: "model", volume, parameters: { points } }) });
+    const job = points =>
+      fetch(`${one.address}/v1/jobs`, {
+        method: "POST",
+        headers: { "content-type": "application/json" },
+        body: JSON.stringify({ kind: "model", volume, parameters: { points } }),
+      });
     for (const points of [30000, 30001, 30002]) await job(points);
     await page.reload();
     await page.waitForSelector(".job.running progress");
-    await page.waitForFunction(() => /1st in the queue/.test(document.body.textContent) && /2nd in the queue/.test(document.body.textContent));
+    await page.waitForFunction(
+      () => /1st in the queue/.test(document.body.textContent) && /2nd in the queue/.test(document.body.textContent),
+    );
     await look(page, "queue-1280");
     await page.locator(".job.queued").first().getByRole("button", { name: "Cancel" }).click();
     await page.waitForSelector(".job.cancelled");
@@ -953,9 +1133,15 @@ async function main() {
     await page.getByLabel("Show").selectOption("fits");
     await page.waitForFunction(() => document.querySelectorAll(".scan").length === 0);
     await page.getByLabel("Show").selectOption("all");
-    await page.getByRole("button", { name: /^Erase/ }).first().click();
+    await page
+      .getByRole("button", { name: /^Erase/ })
+      .first()
+      .click();
     await page.getByRole("button", { name: "Keep" }).click();
-    await page.getByRole("button", { name: /^Erase/ }).first().click();
+    await page
+      .getByRole("button", { name: /^Erase/ })
+      .first()
+      .click();
     await page.locator(".ask .danger").click();
     await page.waitForSelector(".welcome");
     assert.deepEqual(faults, []);
@@ -969,7 +1155,8 @@ async function main() {
     await drawn(page);
     await page.waitForTimeout(500);
     const session = await page.context().newCDPSession(page);
-    const touch = (type, ...points) => session.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+    const touch = (type, ...points) =>
+      session.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
     const slices = page.locator(".slice canvas");
     const picture = n => slices.nth(n).evaluate(canvas => canvas.toDataURL());
     const place = await slices.nth(0).boundingBox();
@@ -979,7 +1166,10 @@ async function main() {
     await touch("touchStart", [x, y]);
     await touch("touchMove", [x + 25, y]);
     await touch("touchEnd");
-    await page.waitForFunction(old => document.querySelectorAll(".slice canvas")[2].getAttribute("aria-valuenow") !== old, before);
+    await page.waitForFunction(
+      old => document.querySelectorAll(".slice canvas")[2].getAttribute("aria-valuenow") !== old,
+      before,
+    );
     // Two fingers zoom every slice.
     const old = await picture(1);
     await touch("touchStart", [x - 20, y], [x + 20, y]);
@@ -994,7 +1184,10 @@ async function main() {
     await touch("touchStart", [box.x + 60, box.y + 60]);
     for (const d of [40, 80, 110]) await touch("touchMove", [box.x + 60 + d, box.y + 60]);
     await touch("touchEnd");
-    await page.waitForFunction(was => document.querySelector(".wall canvas").getAttribute("aria-valuetext") !== was, seen);
+    await page.waitForFunction(
+      was => document.querySelector(".wall canvas").getAttribute("aria-valuetext") !== was,
+      seen,
+    );
     await look(page, "touched-400");
     assert.deepEqual(faults, []);
     await close();
@@ -1002,21 +1195,48 @@ async function main() {
 
   await check("an evaluation is browsed without sending anything", async () => {
     const cohort = join(SCREENSHOTS, "cohort");
-    for (const [name, seed] of [["t1", 3], ["p1", 4], ["p2", 5]]) {
-      assert.equal(spawnSync(PROGRAM, ["phantom", "-o", join(cohort, name), "--size", "64", "--spacing", "5", "--seed", String(seed)]).status, 0);
+    for (const [name, seed] of [
+      ["t1", 3],
+      ["p1", 4],
+      ["p2", 5],
+    ]) {
+      assert.equal(
+        spawnSync(PROGRAM, [
+          "phantom",
+          "-o",
+          join(cohort, name),
+          "--size",
+          "64",
+          "--spacing",
+          "5",
+          "--seed",
+          String(seed),
+        ]).status,
+        0,
+      );
       cpSync(join(cohort, name, "lv_truth.nii.gz"), join(cohort, name, "lv_expert_img.nii.gz"));
     }
     const folder = join(SCREENSHOTS, "evaluation");
-    const made = spawnSync(PROGRAM, ["evaluate", cohort, "--points", "67,110", "--reference-points", "67", "--output", folder], { encoding: "utf8" });
+    const made = spawnSync(
+      PROGRAM,
+      ["evaluate", cohort, "--points", "67,110", "--reference-points", "67", "--output", folder],
+      { encoding: "utf8" },
+    );
     assert.equal(made.status, 0, made.stderr);
-    for (const [width, dark] of [[1280, false], [400, true]]) {
+    for (const [width, dark] of [
+      [1280, false],
+      [400, true],
+    ]) {
       const { page, faults, close } = await tab(browser, address, { width, dark });
       await page.getByRole("link", { name: "Evaluation" }).click();
       // The list has a place to drop files, too, and goes on loading its pictures.
       await page.waitForSelector("input[aria-label='Folder of an evaluation']", { state: "attached" });
       await page.waitForLoadState("networkidle");
       const asked = [];
-      page.on("request", request => !/^blob:/.test(request.url()) && asked.push(`${request.method()} ${request.url()}`));
+      page.on(
+        "request",
+        request => !/^blob:/.test(request.url()) && asked.push(`${request.method()} ${request.url()}`),
+      );
       const open = chosen => page.setInputFiles("input[aria-label='Folder of an evaluation']", chosen);
       await open(cohort);
       await page.waitForSelector("[role=alert]");
@@ -1032,7 +1252,10 @@ async function main() {
       assert.equal(await page.locator(".chart polyline").count(), 5);
       await page.waitForTimeout(300);
       await look(page, `evaluation-${width}`);
-      assert.deepEqual(asked.filter(one => !/GET .*\/v1\/jobs/.test(one)), []);
+      assert.deepEqual(
+        asked.filter(one => !/GET .*\/v1\/jobs/.test(one)),
+        [],
+      );
       assert.deepEqual(faults, []);
       await close();
     }
@@ -1048,9 +1271,15 @@ async function main() {
         return put.apply(this, all);
       };
     };
-    for (const [size, spacing] of [[64, 6.4], [128, 3.2]]) {
+    for (const [size, spacing] of [
+      [64, 6.4],
+      [128, 3.2],
+    ]) {
       const folder = join(SCREENSHOTS, `refit-${size}`);
-      assert.equal(spawnSync(PROGRAM, ["phantom", "-o", folder, "--size", String(size), "--spacing", String(spacing)]).status, 0);
+      assert.equal(
+        spawnSync(PROGRAM, ["phantom", "-o", folder, "--size", String(size), "--spacing", String(spacing)]).status,
+        0,
+      );
       const { page, faults, close } = await tab(browser, address, { script });
       await page.waitForSelector(".drop");
       await choose(page, join(folder, "spect.nii.gz"));
@@ -1062,21 +1291,29 @@ async function main() {
       for (let n = 0; n < 5; n++) {
         await base.fill(String(Number(await base.inputValue()) + 2 - 4 * (n % 2)));
         await base.press("Tab");
-        await page.waitForFunction(() => /Changed: base/.test(document.querySelector(".correction [role=status]").textContent));
+        await page.waitForFunction(() =>
+          /Changed: base/.test(document.querySelector(".correction [role=status]").textContent),
+        );
         // From the press to the second frame after the views were given the new fit: by then its contours are drawn.
-        const time = await page.evaluate(() => new Promise(done => {
-          const shown = () => document.querySelector(".downloads a.button")?.getAttribute("href");
-          const before = shown();
-          const start = performance.now();
-          window.painted = 0;
-          const frame = act => requestAnimationFrame(act);
-          const look = () => (shown() && shown() !== before ? frame(() => frame(() => done(performance.now() - start))) : frame(look));
-          [...document.querySelectorAll("button")].find(button => button.textContent === "Fit from here").click();
-          look();
-        }));
+        const time = await page.evaluate(
+          () =>
+            new Promise(done => {
+              const shown = () => document.querySelector(".downloads a.button")?.getAttribute("href");
+              const before = shown();
+              const start = performance.now();
+              window.painted = 0;
+              const frame = act => requestAnimationFrame(act);
+              const look = () =>
+                shown() && shown() !== before ? frame(() => frame(() => done(performance.now() - start))) : frame(look);
+              [...document.querySelectorAll("button")].find(button => button.textContent === "Fit from here").click();
+              look();
+            }),
+        );
         times.push(time);
         painted.push(await page.evaluate(() => window.painted));
-        await page.waitForFunction(() => /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent));
+        await page.waitForFunction(() =>
+          /Nothing changed/.test(document.querySelector(".correction [role=status]").textContent),
+        );
       }
       times.sort((a, b) => a - b);
       const [least, , median, , most] = times.map(time => time.toFixed(0));
@@ -1091,7 +1328,10 @@ async function main() {
 
   await check("self-contained reports are touched, and are whole without a script", async () => {
     const { fit, model } = reports(PROGRAM, join(SCREENSHOTS, "report"));
-    for (const [width, dark] of [[1280, false], [400, true]]) {
+    for (const [width, dark] of [
+      [1280, false],
+      [400, true],
+    ]) {
       const name = `${width}-${dark ? "dark" : "light"}`;
       const { page, faults, close } = await tab(browser, fit, { width, dark, ratio: 2 });
       await page.waitForSelector("#polar canvas");
@@ -1103,7 +1343,10 @@ async function main() {
       const before = await slice.getAttribute("aria-valuenow");
       await slice.focus();
       for (let n = 0; n < 3; n++) await page.keyboard.press("PageUp");
-      await page.waitForFunction(old => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old, before);
+      await page.waitForFunction(
+        old => document.querySelector(".slice canvas").getAttribute("aria-valuenow") !== old,
+        before,
+      );
       // Table, polar map and slices show the same place.
       await page.locator("tr[data-segment='7'] button").click();
       await page.waitForFunction(() => /mid anterior/i.test(document.querySelector("#polar .at").textContent));
@@ -1117,7 +1360,10 @@ async function main() {
       assert.deepEqual(faults, []);
       await close();
     }
-    for (const [address, name] of [[fit, "fit"], [model, "model"]]) {
+    for (const [address, name] of [
+      [fit, "fit"],
+      [model, "model"],
+    ]) {
       const { page, faults, close } = await tab(browser, address, { scripts: false });
       assert.ok(await page.locator(".verdict").isVisible());
       for (const picture of await page.locator("img").all()) assert.ok(await picture.isVisible());
@@ -1132,7 +1378,10 @@ async function main() {
     await wall.focus();
     const seen = await wall.getAttribute("aria-valuetext");
     for (let n = 0; n < 8; n++) await page.keyboard.press("ArrowLeft");
-    await page.waitForFunction(old => document.querySelector(".wall canvas").getAttribute("aria-valuetext") !== old, seen);
+    await page.waitForFunction(
+      old => document.querySelector(".wall canvas").getAttribute("aria-valuetext") !== old,
+      seen,
+    );
     assert.equal(await page.locator("#viewer select").first().inputValue(), "Distance to the surface");
     await look(page, "report-model-1280");
     assert.deepEqual(faults, []);
@@ -1141,7 +1390,8 @@ async function main() {
 
   await check("a key is asked for, and again when it has expired", async () => {
     const closed = await service();
-    const keys = (...words) => spawnSync(PROGRAM, ["keys", ...words, "--data-dir", closed.data], { encoding: "utf8" }).stdout;
+    const keys = (...words) =>
+      spawnSync(PROGRAM, ["keys", ...words, "--data-dir", closed.data], { encoding: "utf8" }).stdout;
     const make = name => /vf_\S+|[A-Za-z0-9_-]{30,}/.exec(keys("create", "--name", name, "--scope", "submit"))[0];
     const first = make("first");
     const { page, close } = await tab(browser, closed.address, { expected: [/401/] });
@@ -1173,7 +1423,9 @@ async function main() {
     await page.waitForSelector(".sign-in");
     await page.fill(".sign-in input", make("third"));
     await page.keyboard.press("Enter");
-    await page.waitForFunction(() => /lv_truth[^]*stored/.test(document.querySelector(".uploads .stored")?.textContent ?? ""));
+    await page.waitForFunction(() =>
+      /lv_truth[^]*stored/.test(document.querySelector(".uploads .stored")?.textContent ?? ""),
+    );
     await close();
   });
 
@@ -1194,7 +1446,10 @@ async function main() {
     await page.waitForFunction(() => {
       const canvas = document.querySelector(".wall canvas");
       // Of a copy: Chromium warns of a canvas that is read twice, which it is if its picture is late.
-      const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height }).getContext("2d");
+      const copy = Object.assign(document.createElement("canvas"), {
+        width: canvas.width,
+        height: canvas.height,
+      }).getContext("2d");
       copy.drawImage(canvas, 0, 0);
       const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
       return new Set(new Uint32Array(data.buffer)).size > 50;

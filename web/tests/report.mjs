@@ -45,7 +45,11 @@ export async function samePolarMap(page) {
     const paths = [...svg.querySelectorAll("path")].slice(0, map.rows * map.columns);
     const isHatched = n => map.states[Math.floor(n / map.columns)][n % map.columns] === "valve_plane";
     const middles = paths.map(path => {
-      const corners = path.getAttribute("d").slice(1, -1).split("L").map(text => text.split(" ").map(Number));
+      const corners = path
+        .getAttribute("d")
+        .slice(1, -1)
+        .split("L")
+        .map(text => text.split(" ").map(Number));
       return place([0, 1].map(n => corners.reduce((sum, corner) => sum + corner[n], 0) / corners.length));
     });
     const fills = paths.map((path, n) => apart(at(middles[n]), rgb(path.getAttribute("fill"))));
@@ -56,7 +60,8 @@ export async function samePolarMap(page) {
       .map(([x1, y1, x2, y2]) => place([(x1 + x2) / 2, (y1 + y2) / 2]))
       .filter(([x]) => x < size);
     const near = ([x, y], reach, test) => {
-      for (let dy = -reach; dy <= reach; dy++) for (let dx = -reach; dx <= reach; dx++) if (test([x + dx, y + dy])) return true;
+      for (let dy = -reach; dy <= reach; dy++)
+        for (let dx = -reach; dx <= reach; dx++) if (test([x + dx, y + dy])) return true;
       return false;
     };
     const hatches = middles.filter((_, n) => isHatched(n));
@@ -89,14 +94,22 @@ export async function samePolarMap(page) {
   });
   const { tiles, hatches, hatched, lines, covered, drawn, stray } = found;
   const quantile = share => tiles[Math.floor(share * tiles.length)];
-  console.log(`  polar map: colours apart by ${quantile(0.5)} (half of the ${tiles.length} places), ${quantile(0.9)} (nine tenths); ` +
-    `${covered} of ${lines} parts of the contour, ${stray} of ${drawn} pixels beside it`);
+  console.log(
+    `  polar map: colours apart by ${quantile(0.5)} (half of the ${tiles.length} places), ${quantile(0.9)} (nine tenths); ` +
+      `${covered} of ${lines} parts of the contour, ${stray} of ${drawn} pixels beside it`,
+  );
   // A tenth lies under lines and numbers.
-  assert.ok(tiles.length + hatches === 1920 && quantile(0.5) <= 2 && quantile(0.9) <= 6, "the colours are those of the picture");
+  assert.ok(
+    tiles.length + hatches === 1920 && quantile(0.5) <= 2 && quantile(0.9) <= 6,
+    "the colours are those of the picture",
+  );
   console.log(`  valve plane: ${hatched} of ${hatches} places hatched`);
   assert.ok(hatches > 20 && hatched >= 0.9 * hatches, "the valve plane is hatched as in the picture");
   assert.ok(lines > 20 && covered >= 0.9 * lines && stray <= 0.02 * drawn, "the contour is that of the picture");
   assert.deepEqual(found.texts, found.means, "the segments have the numbers of the picture");
-  assert.deepEqual(found.numbers, Array.from({ length: 17 }, (_, n) => n + 1));
+  assert.deepEqual(
+    found.numbers,
+    Array.from({ length: 17 }, (_, n) => n + 1),
+  );
   for (const name of found.names) assert.ok(found.label.includes(name), name);
 }

@@ -1,7 +1,8 @@
 """Upload, make a model and a beat, wait, download, and meet an error, by a generated Python client.
 
-    SERVICE_URL=... PYTHONPATH=<folder of ventriform_client> python try_client.py scan.nii.gz gated.nii.gz
+SERVICE_URL=... PYTHONPATH=<folder of ventriform_client> python try_client.py scan.nii.gz gated.nii.gz
 """
+
 import importlib
 import io
 import os
@@ -15,8 +16,21 @@ from ventriform_client.api.beats import get_beat, get_beat_file, get_beat_report
 from ventriform_client.api.jobs import create_job, get_job
 from ventriform_client.api.models import get_model, get_model_file, get_model_report, list_models
 from ventriform_client.api.volumes import create_volume, get_volume
-from ventriform_client.models import (Beat, BeatJobRequest, BeatParameters, BeatReport, Job, JobState, Model, ModelFileName, ModelJobRequest,
-                                      ModelParameters, ModelReport, Problem, Volume)
+from ventriform_client.models import (
+    Beat,
+    BeatJobRequest,
+    BeatParameters,
+    BeatReport,
+    Job,
+    JobState,
+    Model,
+    ModelFileName,
+    ModelJobRequest,
+    ModelParameters,
+    ModelReport,
+    Problem,
+    Volume,
+)
 from ventriform_client.types import File
 
 # Every module of the client can be imported.
@@ -28,6 +42,7 @@ for name in modules:
 JOB_SECONDS = 600
 
 client = Client(base_url=os.environ["SERVICE_URL"])
+
 
 def stored(path):
     """The volume of a file."""

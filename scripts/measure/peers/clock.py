@@ -5,6 +5,7 @@ A contestant is a function of the round's number that does its work once and ret
 that other load on the machine affects all of them alike. Ratios are taken within a round; their median
 is reported.
 """
+
 import json
 import os
 import statistics
@@ -18,7 +19,8 @@ class Ours:
     def __init__(self, binary, threads=1):
         environment = dict(os.environ, RAYON_NUM_THREADS=str(threads))
         self.process = subprocess.Popen(
-            [binary], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)
+            [binary], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
 
     def ask(self, *words):
         """Sends a command. Returns the answer, with `cpu_ms`, the processor time of all threads."""
@@ -50,11 +52,13 @@ class Ours:
     def turn(self, *words, without=()):
         """A contestant that sends the command `words`, which may contain functions of the round's
         number. The time of the stages `without` is subtracted; the process must have one thread."""
+
         def run(number):
             asked = [w(number) if callable(w) else w for w in words]
             answer = self.ask(*asked)
             off = sum(answer["stages_ms"][stage] for stage in without)
             return answer["wall_ms"] - off, answer["cpu_ms"] - off
+
         return run
 
     def close(self):
@@ -64,10 +68,12 @@ class Ours:
 
 def timed(work):
     """A contestant that calls a Python function without arguments."""
+
     def run(_):
         wall, cpu = time.perf_counter(), time.process_time()
         work()
         return 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - cpu)
+
     return run
 
 
@@ -100,5 +106,8 @@ def show(title, result):
     print(f"\n{title}")
     print(f"  {'':34} {'wall ms':>9} {'least':>9} {'cpu ms':>9} {'ratio':>7} {'by cpu':>7}")
     for name, r in result.items():
-        print(f"  {name:34} {r['wall_ms']:9.2f} {r['wall_ms_least']:9.2f} {r['cpu_ms']:9.2f}"
-              f" {r['wall_ratio']:7.2f} {r['cpu_ratio']:7.2f}", flush=True)
+        print(
+            f"  {name:34} {r['wall_ms']:9.2f} {r['wall_ms_least']:9.2f} {r['cpu_ms']:9.2f}"
+            f" {r['wall_ratio']:7.2f} {r['cpu_ratio']:7.2f}",
+            flush=True,
+        )

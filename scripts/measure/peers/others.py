@@ -1,4 +1,5 @@
 """Other tools for the same jobs, each as a function of data in memory."""
+
 import ctypes
 import warnings
 
@@ -67,9 +68,12 @@ class Remesher:
     def __call__(self, surface, target):
         vertices, triangles = arrays(surface)
         made = self.call(
-            vertices.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(vertices)),
-            triangles.ctypes.data_as(ctypes.c_void_p), ctypes.c_int64(len(triangles)),
-            ctypes.c_double(target))
+            vertices.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_int64(len(vertices)),
+            triangles.ctypes.data_as(ctypes.c_void_p),
+            ctypes.c_int64(len(triangles)),
+            ctypes.c_double(target),
+        )
         if made <= 0:
             raise RuntimeError("remesh returned no vertices")
         return made

@@ -19,36 +19,96 @@ export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & 
   const heart = shown.heart ?? scene.heart.value;
   const planes = heart ? heartPlanes(heart) : PATIENT;
   const gates = report.gates.length;
-  const ends = [["End diastole", report.end_diastole_gate], ["End systole", report.end_systole_gate]] as const;
-  const maps = [...(shown.polar ? [{ name: "Uptake, all gates", map: uptakeMap(shown.polar), lut: null }] : []), ...mapsOf(shown, beat)];
+  const ends = [
+    ["End diastole", report.end_diastole_gate],
+    ["End systole", report.end_systole_gate],
+  ] as const;
+  const maps = [
+    ...(shown.polar ? [{ name: "Uptake, all gates", map: uptakeMap(shown.polar), lut: null }] : []),
+    ...mapsOf(shown, beat),
+  ];
   const { phase } = report;
   return (
     <section class="paper beat-paper">
-      <Head volume={volume} title="Left ventricle: beat">{resultName(shown.result)} of {moment(shown.result.created_at)}</Head>
+      <Head volume={volume} title="Left ventricle: beat">
+        {resultName(shown.result)} of {moment(shown.result.created_at)}
+      </Head>
       <dl class="headlines">
-        {headlines(shown).map(([name, value, interval]) => <div key={name}><dt>{name}</dt><dd>{value}{interval && <span class="interval">90 %: {interval}</span>}</dd></div>)}
+        {headlines(shown).map(([name, value, interval]) => (
+          <div key={name}>
+            <dt>{name}</dt>
+            <dd>
+              {value}
+              {interval && <span class="interval">90 %: {interval}</span>}
+            </dd>
+          </div>
+        ))}
       </dl>
       <div class="beside">
-        <figure><VolumeCurve report={report} scene={null} /><figcaption>Volume of the cavity, ml</figcaption></figure>
-        <figure><PhaseHistogram report={report} /><figcaption>Phases of the wall: SD {number(phase.sd_degrees, 0, "°")}, bandwidth {number(phase.bandwidth_degrees, 0, "°")}{phase.reliable ? "" : "; not reliable"}</figcaption></figure>
+        <figure>
+          <VolumeCurve report={report} scene={null} />
+          <figcaption>Volume of the cavity, ml</figcaption>
+        </figure>
+        <figure>
+          <PhaseHistogram report={report} />
+          <figcaption>
+            Phases of the wall: SD {number(phase.sd_degrees, 0, "°")}, bandwidth{" "}
+            {number(phase.bandwidth_degrees, 0, "°")}
+            {phase.reliable ? "" : "; not reliable"}
+          </figcaption>
+        </figure>
       </div>
       <div class="six">
-        {ends.flatMap(([name, gate]) => planes.map(plane => (
-          <figure key={name + plane.name}>
-            <Drawn width={SLICE} height={SLICE} name={`${plane.name}, ${name}`} draw={element => drawSlice(element, scene.at((gate - 0.5) / gates), plane, { width: SLICE, height: SLICE, ratio: RATIO, letters: true, cursor: false })} />
-            <figcaption>{name}</figcaption>
-          </figure>
-        )))}
+        {ends.flatMap(([name, gate]) =>
+          planes.map(plane => (
+            <figure key={name + plane.name}>
+              <Drawn
+                width={SLICE}
+                height={SLICE}
+                name={`${plane.name}, ${name}`}
+                draw={element =>
+                  drawSlice(element, scene.at((gate - 0.5) / gates), plane, {
+                    width: SLICE,
+                    height: SLICE,
+                    ratio: RATIO,
+                    letters: true,
+                    cursor: false,
+                  })
+                }
+              />
+              <figcaption>{name}</figcaption>
+            </figure>
+          )),
+        )}
       </div>
       <div class="beside maps-and-words">
         <div class="three">
           {maps.map(({ name, map, lut }) => (
             <figure key={name}>
-              <Drawn width={MAP} height={MAP} name={name} draw={element => {
-                const context = element.getContext("2d");
-                if (context) drawPolar(context, map, MAP, RATIO, { lut: lut ?? scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
-              }} />
-              <figcaption><span>{name}</span><ColourBar lut={lut ?? scene.wallLut.value} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} /></figcaption>
+              <Drawn
+                width={MAP}
+                height={MAP}
+                name={name}
+                draw={element => {
+                  const context = element.getContext("2d");
+                  if (context)
+                    drawPolar(context, map, MAP, RATIO, {
+                      lut: lut ?? scene.wallLut.value,
+                      segments: false,
+                      threshold: true,
+                      territories: false,
+                      cursor: null,
+                    });
+                }}
+              />
+              <figcaption>
+                <span>{name}</span>
+                <ColourBar
+                  lut={lut ?? scene.wallLut.value}
+                  low={String(map.range[0])}
+                  high={`${map.range[1]} ${map.unit}`}
+                />
+              </figcaption>
             </figure>
           ))}
         </div>
@@ -57,7 +117,9 @@ export function BeatSheet({ scene, volume, shown, beat, parameters }: Printed & 
           <p class="quiet">
             {volume.format}, {shape(volume)}, <code>{volume.id}</code>; beat <code>{shown.result.id}</code>.{" "}
             {report.rr_ms ? `R-R interval ${number(report.rr_ms, 0, "ms")}. ` : ""}
-            {parameters.length === 0 ? "All parameters had their defaults." : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
+            {parameters.length === 0
+              ? "All parameters had their defaults."
+              : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
           </p>
         </div>
       </div>

@@ -9,7 +9,17 @@ import { PhaseHistogram, VolumeCurve } from "./charts";
 import type { Lut } from "./colours";
 import { FiguresBeside, LimitsUsed, PerfusionTable, SegmentScores } from "./comparedfacts";
 import type { Loaded, LoadedBeat } from "./loaded";
-import { type DrawnMap, FIGURES, WallFrame, drawPolar, figureLut, figureMap, placeOnMap, segmentAt, uptakeMap } from "./polar";
+import {
+  type DrawnMap,
+  FIGURES,
+  WallFrame,
+  drawPolar,
+  figureLut,
+  figureMap,
+  placeOnMap,
+  segmentAt,
+  uptakeMap,
+} from "./polar";
 import type { Scene } from "./scene";
 import { ColourBar } from "./wall";
 
@@ -22,8 +32,17 @@ export interface NamedMap {
 
 /** Uptake of end diastole and end systole, motion, thickening and phase. */
 export function mapsOf({ figures }: Loaded, { ends }: LoadedBeat): NamedMap[] {
-  const uptake = ends ? ["Uptake, end diastole", "Uptake, end systole"].map((name, n): NamedMap => ({ name, map: uptakeMap(ends[n]!), lut: null })) : [];
-  return [...uptake, ...figures.filter(map => !ofLimits(map)).map((map): NamedMap => ({ name: FIGURES[map.figure].name, map: figureMap(map), lut: figureLut(map.figure) }))];
+  const uptake = ends
+    ? ["Uptake, end diastole", "Uptake, end systole"].map(
+        (name, n): NamedMap => ({ name, map: uptakeMap(ends[n]!), lut: null }),
+      )
+    : [];
+  return [
+    ...uptake,
+    ...figures
+      .filter(map => !ofLimits(map))
+      .map((map): NamedMap => ({ name: FIGURES[map.figure].name, map: figureMap(map), lut: figureLut(map.figure) })),
+  ];
 }
 
 /** Whether a map shows the uptake beside normal limits. */
@@ -33,7 +52,13 @@ function ofLimits({ figure }: PolarFigure): boolean {
 
 /** The maps of the uptake beside normal limits; none without them. */
 export function limitMapsOf({ figures }: Pick<Loaded, "figures">): NamedMap[] {
-  return figures.filter(ofLimits).map((map): NamedMap => ({ name: map.figure === "z" ? "z" : "Score", map: figureMap(map), lut: figureLut(map.figure) }));
+  return figures.filter(ofLimits).map(
+    (map): NamedMap => ({
+      name: map.figure === "z" ? "z" : "Score",
+      map: figureMap(map),
+      lut: figureLut(map.figure),
+    }),
+  );
 }
 
 /** What was measured against normal limits: figures, both maps, and of whom the limits are. */
@@ -46,7 +71,18 @@ export function PerfusionView({ scene, shown }: { scene: Scene; shown: Loaded })
     <section class="perfusion figures" aria-label="Beside normal limits">
       <h2>Beside normal limits</h2>
       <PerfusionTable of={[["this scan", perfusion]]} />
-      {heart && <div class="maps">{maps.map(one => <SmallMap key={one.name} scene={scene} named={one} frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)} />)}</div>}
+      {heart && (
+        <div class="maps">
+          {maps.map(one => (
+            <SmallMap
+              key={one.name}
+              scene={scene}
+              named={one}
+              frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)}
+            />
+          ))}
+        </div>
+      )}
       <LimitsUsed perfusion={perfusion} />
       <details>
         <summary>Scores of the segments</summary>
@@ -79,7 +115,18 @@ export function BeatMaps({ scene, shown, beat }: { scene: Scene; shown: Loaded; 
   const { heart, mesh } = shown;
   return (
     <section class="beat-maps" aria-label="Maps of the beat">
-      {heart && <div class="maps">{maps.map(one => <SmallMap key={one.name} scene={scene} named={one} frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)} />)}</div>}
+      {heart && (
+        <div class="maps">
+          {maps.map(one => (
+            <SmallMap
+              key={one.name}
+              scene={scene}
+              named={one}
+              frame={new WallFrame(mesh, heart, one.map.rows, one.map.columns)}
+            />
+          ))}
+        </div>
+      )}
       <details>
         <summary>Segments</summary>
         <SegmentTable report={beat.report} />
@@ -92,11 +139,21 @@ export function SegmentTable({ report }: { report: BeatReport }) {
   return (
     <table class="segments">
       <caption class="hidden">Motion, thickening and phase of the segments</caption>
-      <thead><tr><th scope="col">Segment</th><th scope="col">mm</th><th scope="col">thickens</th><th scope="col">by counts</th><th scope="col">phase</th></tr></thead>
+      <thead>
+        <tr>
+          <th scope="col">Segment</th>
+          <th scope="col">mm</th>
+          <th scope="col">thickens</th>
+          <th scope="col">by counts</th>
+          <th scope="col">phase</th>
+        </tr>
+      </thead>
       <tbody>
         {report.segments.map(one => (
           <tr key={one.segment}>
-            <th scope="row">{one.segment} {one.name}</th>
+            <th scope="row">
+              {one.segment} {one.name}
+            </th>
             <td>{number(one.motion_mm, 1)}</td>
             <td>{number(one.thickening_percent, 0, "%")}</td>
             <td>{number(one.thickening_counts_percent, 0, "%")}</td>
@@ -117,20 +174,34 @@ function SmallMap({ scene, named: { name, map, lut }, frame }: { scene: Scene; n
   const onWall = rows >= 0 && rows <= map.rows + 1;
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
-    if (context) drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, { lut: colours, segments: false, threshold: true, territories: false, cursor: onWall ? [rows, columns] : null });
+    if (context)
+      drawPolar(context, map, element.clientWidth, element.width / element.clientWidth, {
+        lut: colours,
+        segments: false,
+        threshold: true,
+        territories: false,
+        cursor: onWall ? [rows, columns] : null,
+      });
   };
   const { canvas } = useCanvas(draw, () => () => undefined, map);
   const segment = onWall ? segmentAt(map, rows, columns) : undefined;
   return (
     <figure class="polar">
-      <canvas ref={canvas} role="img" aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, map.digits, map.unit)}`).join(", ")}`} onPointerDown={event => {
-        const place = placeOnMap(map, event.offsetX, event.offsetY, event.currentTarget.clientWidth);
-        if (place) scene.cursor.value = frame.at(...place);
-      }} />
+      <canvas
+        ref={canvas}
+        role="img"
+        aria-label={`${name}: ${map.segments.map(one => `${one.name} ${number(one.mean, map.digits, map.unit)}`).join(", ")}`}
+        onPointerDown={event => {
+          const place = placeOnMap(map, event.offsetX, event.offsetY, event.currentTarget.clientWidth);
+          if (place) scene.cursor.value = frame.at(...place);
+        }}
+      />
       <figcaption>
         <b>{name}</b>
         <ColourBar lut={colours} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />
-        <span class="quiet">{segment ? `${segment.name} ${number(segment.mean, map.digits, map.unit)}` : "\u00a0"}</span>
+        <span class="quiet">
+          {segment ? `${segment.name} ${number(segment.mean, map.digits, map.unit)}` : "\u00a0"}
+        </span>
       </figcaption>
     </figure>
   );

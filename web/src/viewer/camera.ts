@@ -74,4 +74,3 @@ export function boundsOf(mesh: Mesh): { middle: Vec; reach: number } {
   const reach = Math.max(...mesh.vertices.map(vertex => Math.hypot(...sub(vertex, middle))));
   return { middle, reach };
 }
-

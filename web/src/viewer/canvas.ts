@@ -13,7 +13,11 @@ function fit(element: HTMLCanvasElement): void {
  * A canvas that is drawn after its component or its size has changed and when `watch` calls, at most once a frame. It
  * is watched anew when `source` is another one.
  */
-export function useCanvas(draw: (element: HTMLCanvasElement) => void, watch: (act: () => void) => () => void, source: unknown) {
+export function useCanvas(
+  draw: (element: HTMLCanvasElement) => void,
+  watch: (act: () => void) => () => void,
+  source: unknown,
+) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const latest = useRef(draw);
   latest.current = draw;

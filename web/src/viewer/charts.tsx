@@ -35,19 +35,31 @@ function Frame({ name, highest, unit, below, onPick, children }: FrameProps) {
   const count = Math.ceil(highest / step - 1e-9);
   const up = (value: number) => AREA.bottom - ((AREA.bottom - AREA.top) * value) / (count * step);
   return (
-    <svg class="chart beat-chart" viewBox={`0 0 ${WIDTH} ${HEIGHT}`} role="img" aria-label={name} onPointerDown={event => {
-      const box = event.currentTarget.getBoundingClientRect();
-      const degrees = ((((event.clientX - box.left) / box.width) * WIDTH - AREA.left) / (AREA.right - AREA.left)) * 360;
-      if (degrees >= 0 && degrees < 360) onPick?.(degrees);
-    }}>
+    <svg
+      class="chart beat-chart"
+      viewBox={`0 0 ${WIDTH} ${HEIGHT}`}
+      role="img"
+      aria-label={name}
+      onPointerDown={event => {
+        const box = event.currentTarget.getBoundingClientRect();
+        const degrees =
+          ((((event.clientX - box.left) / box.width) * WIDTH - AREA.left) / (AREA.right - AREA.left)) * 360;
+        if (degrees >= 0 && degrees < 360) onPick?.(degrees);
+      }}>
       {Array.from({ length: count + 1 }, (_, n) => n * step).map(value => (
         <g key={value}>
           <line class="grid-line" x1={AREA.left} x2={AREA.right} y1={up(value)} y2={up(value)} />
-          <text x={AREA.left - 5} y={up(value) + 4} text-anchor="end">{value}</text>
+          <text x={AREA.left - 5} y={up(value) + 4} text-anchor="end">
+            {value}
+          </text>
         </g>
       ))}
-      <text x={4} y={10}>{unit}</text>
-      <text x={(AREA.left + AREA.right) / 2} y={HEIGHT - 4} text-anchor="middle">{below}</text>
+      <text x={4} y={10}>
+        {unit}
+      </text>
+      <text x={(AREA.left + AREA.right) / 2} y={HEIGHT - 4} text-anchor="middle">
+        {below}
+      </text>
       {children(up)}
     </svg>
   );
@@ -64,7 +76,10 @@ function volumeAt({ curve }: BeatReport, turns: number): number {
 export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Scene | null }) {
   const { curve, gates } = report;
   const width = 360 / gates.length;
-  const marks = [["ED", report.end_diastole_degrees, report.edv_ml], ["ES", report.end_systole_degrees, report.esv_ml]] as const;
+  const marks = [
+    ["ED", report.end_diastole_degrees, report.edv_ml],
+    ["ES", report.end_systole_degrees, report.esv_ml],
+  ] as const;
   const points = [...curve, { degrees: 360, cavity_ml: curve[0]?.cavity_ml ?? 0 }];
   const few = gates.length <= 16;
   return (
@@ -73,21 +88,40 @@ export function VolumeCurve({ report, scene }: { report: BeatReport; scene: Scen
       highest={Math.max(...points.map(point => point.cavity_ml), ...gates.map(gate => gate.cavity_ml))}
       unit="ml"
       below="gate"
-      onPick={degrees => scene?.hold(degrees / 360, gates.length)}
-    >
+      onPick={degrees => scene?.hold(degrees / 360, gates.length)}>
       {up => (
         <>
           {gates.map(({ gate, cavity_ml }) => (
             <g key={gate}>
-              <line class="gate-line" x1={across(width * (gate - 1)) + 1.5} x2={across(width * gate) - 1.5} y1={up(cavity_ml)} y2={up(cavity_ml)} />
-              {(few || gate % 4 === 1) && <text x={across(width * (gate - 0.5))} y={AREA.bottom + 14} text-anchor="middle">{gate}</text>}
+              <line
+                class="gate-line"
+                x1={across(width * (gate - 1)) + 1.5}
+                x2={across(width * gate) - 1.5}
+                y1={up(cavity_ml)}
+                y2={up(cavity_ml)}
+              />
+              {(few || gate % 4 === 1) && (
+                <text x={across(width * (gate - 0.5))} y={AREA.bottom + 14} text-anchor="middle">
+                  {gate}
+                </text>
+              )}
             </g>
           ))}
-          <polyline points={points.map(point => `${across(point.degrees).toFixed(1)},${up(point.cavity_ml).toFixed(1)}`).join(" ")} />
+          <polyline
+            points={points
+              .map(point => `${across(point.degrees).toFixed(1)},${up(point.cavity_ml).toFixed(1)}`)
+              .join(" ")}
+          />
           {marks.map(([name, degrees, ml]) => (
             <g key={name}>
               <circle cx={across(degrees)} cy={up(ml)} r={3.5} />
-              <text class="mark" x={Math.max(AREA.left + 10, Math.min(AREA.right - 10, across(degrees)))} y={name === "ED" ? up(ml) - 8 : Math.min(AREA.bottom - 3, up(ml) + 15)} text-anchor="middle">{name}</text>
+              <text
+                class="mark"
+                x={Math.max(AREA.left + 10, Math.min(AREA.right - 10, across(degrees)))}
+                y={name === "ED" ? up(ml) - 8 : Math.min(AREA.bottom - 3, up(ml) + 15)}
+                text-anchor="middle">
+                {name}
+              </text>
             </g>
           ))}
           {scene && <Now scene={scene} report={report} up={up} />}
@@ -117,12 +151,26 @@ export function PhaseHistogram({ report: { phase } }: { report: BeatReport }) {
       name={`Phases of the wall: mean ${number(phase.mean_degrees, 0, "°")}, standard deviation ${number(phase.sd_degrees, 0, "°")}, bandwidth ${number(phase.bandwidth_degrees, 0, "°")}${phase.reliable ? "" : "; not reliable"}`}
       highest={100 * Math.max(0.01, ...phase.histogram)}
       unit="% of the wall"
-      below="degrees of the cycle"
-    >
+      below="degrees of the cycle">
       {up => (
         <>
-          {phase.histogram.map((share, bin) => share > 0 && <rect key={bin} x={across(phase.bin_degrees * bin) + 0.3} width={width - 0.6} y={up(100 * share)} height={AREA.bottom - up(100 * share)} />)}
-          {[0, 90, 180, 270, 360].map(degrees => <text key={degrees} x={across(degrees)} y={AREA.bottom + 14} text-anchor="middle">{degrees}</text>)}
+          {phase.histogram.map(
+            (share, bin) =>
+              share > 0 && (
+                <rect
+                  key={bin}
+                  x={across(phase.bin_degrees * bin) + 0.3}
+                  width={width - 0.6}
+                  y={up(100 * share)}
+                  height={AREA.bottom - up(100 * share)}
+                />
+              ),
+          )}
+          {[0, 90, 180, 270, 360].map(degrees => (
+            <text key={degrees} x={across(degrees)} y={AREA.bottom + 14} text-anchor="middle">
+              {degrees}
+            </text>
+          ))}
         </>
       )}
     </Frame>

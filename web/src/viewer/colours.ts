@@ -10,11 +10,16 @@ function ramp(anchors: [number, string][]): Lut {
   const rgb = (hex: string) => [1, 3, 5].map(at => parseInt(hex.slice(at, at + 2), 16));
   for (let n = 0; n < 256; n++) {
     const share = n / 255;
-    const next = Math.max(1, anchors.findIndex(([at]) => at >= share));
+    const next = Math.max(
+      1,
+      anchors.findIndex(([at]) => at >= share),
+    );
     const [from, low] = anchors[next - 1]!;
     const [to, high] = anchors[next]!;
     const t = (share - from) / (to - from || 1);
-    rgb(low).forEach((value, channel) => (lut[3 * n + channel] = Math.round(value + t * (rgb(high)[channel]! - value))));
+    rgb(low).forEach(
+      (value, channel) => (lut[3 * n + channel] = Math.round(value + t * (rgb(high)[channel]! - value))),
+    );
   }
   return lut;
 }
@@ -33,24 +38,62 @@ function hex(rgb: number[]): string {
   return `#${rgb.map(part => part.toString(16).padStart(2, "0")).join("")}`;
 }
 
-const RAINBOW: [number, string][] = [[0, "#05051a"], [0.2, "#1b2a9c"], [0.4, "#0090d0"], [0.55, "#00b050"], [0.7, "#c8d400"], [0.82, "#ffb800"], [0.92, "#ff6a00"], [1, "#d80c00"]];
+const RAINBOW: [number, string][] = [
+  [0, "#05051a"],
+  [0.2, "#1b2a9c"],
+  [0.4, "#0090d0"],
+  [0.55, "#00b050"],
+  [0.7, "#c8d400"],
+  [0.82, "#ffb800"],
+  [0.92, "#ff6a00"],
+  [1, "#d80c00"],
+];
 
 export const LUTS: Record<string, Lut> = {
-  "Hot iron": ramp([[0, "#000000"], [0.4, "#c01000"], [0.75, "#ffb000"], [1, "#ffffff"]]),
-  "Perfusion": ramp(RAINBOW),
+  "Hot iron": ramp([
+    [0, "#000000"],
+    [0.4, "#c01000"],
+    [0.75, "#ffb000"],
+    [1, "#ffffff"],
+  ]),
+  Perfusion: ramp(RAINBOW),
   "Perfusion, 10 steps": stepped(ramp(RAINBOW), 10),
-  "Inferno": ramp(uptake.colours.map((rgb, n): [number, string] => [n / (uptake.colours.length - 1), hex(rgb)])),
-  "Grey": ramp([[0, "#000000"], [1, "#ffffff"]]),
-  "Inverse grey": ramp([[0, "#ffffff"], [1, "#000000"]]),
-  "Viridis": ramp([[0, "#440154"], [0.25, "#3b528b"], [0.5, "#21918c"], [0.75, "#5ec962"], [1, "#fde725"]]),
-  "Cool": ramp([[0, "#00161f"], [0.5, "#00798c"], [1, "#e8ffff"]]),
+  Inferno: ramp(uptake.colours.map((rgb, n): [number, string] => [n / (uptake.colours.length - 1), hex(rgb)])),
+  Grey: ramp([
+    [0, "#000000"],
+    [1, "#ffffff"],
+  ]),
+  "Inverse grey": ramp([
+    [0, "#ffffff"],
+    [1, "#000000"],
+  ]),
+  Viridis: ramp([
+    [0, "#440154"],
+    [0.25, "#3b528b"],
+    [0.5, "#21918c"],
+    [0.75, "#5ec962"],
+    [1, "#fde725"],
+  ]),
+  Cool: ramp([
+    [0, "#00161f"],
+    [0.5, "#00798c"],
+    [1, "#e8ffff"],
+  ]),
 };
 
 /** For what has a middle: distances and differences. */
-export const DIVERGING = ramp([[0, "#2166ac"], [0.25, "#92c5de"], [0.5, "#f7f7f7"], [0.75, "#f4a582"], [1, "#b2182b"]]);
+export const DIVERGING = ramp([
+  [0, "#2166ac"],
+  [0.25, "#92c5de"],
+  [0.5, "#f7f7f7"],
+  [0.75, "#f4a582"],
+  [1, "#b2182b"],
+]);
 
 /** Round the cycle of a beat. */
-export const CYCLE = ramp([...figures.cycle, figures.cycle[0]!].map((rgb, n): [number, string] => [n / figures.cycle.length, hex(rgb)]));
+export const CYCLE = ramp(
+  [...figures.cycle, figures.cycle[0]!].map((rgb, n): [number, string] => [n / figures.cycle.length, hex(rgb)]),
+);
 
 /** More uptake at stress than at rest, as much, less. */
 export const DIFFERENCE = ramp(figures.difference.map((rgb, n): [number, string] => [n / 2, hex(rgb)]));

@@ -65,9 +65,23 @@ export async function loadComparison(result: Result): Promise<Compared> {
     ]);
     if (!mesh) throw new Error(`This comparison has no mesh of the heart at ${scan}.`);
     const own = report[scan];
-    return { scan, report: own, mesh, region, polar, z, score, heart: axisOf(own, scan === "stress" ? report.turn_degrees : 0), oriented: (polar?.orientation ?? "unknown") !== "unknown" };
+    return {
+      scan,
+      report: own,
+      mesh,
+      region,
+      polar,
+      z,
+      score,
+      heart: axisOf(own, scan === "stress" ? report.turn_degrees : 0),
+      oriented: (polar?.orientation ?? "unknown") !== "unknown",
+    };
   };
-  const [stress, rest, difference] = await Promise.all([heart("stress"), heart("rest"), json<PolarFigure>("polar_difference.json")]);
+  const [stress, rest, difference] = await Promise.all([
+    heart("stress"),
+    heart("rest"),
+    json<PolarFigure>("polar_difference.json"),
+  ]);
   return { result, report, stress, rest, difference };
 }
 
@@ -105,7 +119,10 @@ export function sliceAt(heart: Axis, kind: number, number: number): { plane: Pla
     return { plane: short, origin: mix(heart.apex, heart.base, along) };
   }
   const aside = (2 * share - 1) * LONG_ENDS_SHARE * length;
-  return { plane: kind === 1 ? vertical : horizontal, origin: add(middle, scale(kind === 1 ? lateral : anterior, aside)) };
+  return {
+    plane: kind === 1 ? vertical : horizontal,
+    origin: add(middle, scale(kind === 1 ? lateral : anterior, aside)),
+  };
 }
 
 /** Millimetres between neighbouring slices of a kind. */
@@ -134,10 +151,41 @@ export interface NamedMap {
 /** The map of every figure, in the order in which they are shown. */
 export function mapsOf({ stress, rest, difference }: Compared): NamedMap[] {
   const maps: NamedMap[] = [];
-  for (const one of [stress, rest]) if (one.polar) maps.push({ name: `Uptake, ${one.scan}`, short: one.scan === "stress" ? "Stress" : "Rest", map: uptakeMap(one.polar), scan: one.scan, figure: "uptake" });
-  if (difference) maps.push({ name: "Rest less stress", short: "Rest less stress", map: figureMap(difference), scan: null, figure: "difference" });
-  for (const one of [stress, rest]) if (one.z) maps.push({ name: `z, ${one.scan}`, short: `z, ${one.scan}`, map: figureMap(one.z), scan: one.scan, figure: "z" });
-  for (const one of [stress, rest]) if (one.score) maps.push({ name: `Score, ${one.scan}`, short: `Score, ${one.scan}`, map: figureMap(one.score), scan: one.scan, figure: "score" });
+  for (const one of [stress, rest])
+    if (one.polar)
+      maps.push({
+        name: `Uptake, ${one.scan}`,
+        short: one.scan === "stress" ? "Stress" : "Rest",
+        map: uptakeMap(one.polar),
+        scan: one.scan,
+        figure: "uptake",
+      });
+  if (difference)
+    maps.push({
+      name: "Rest less stress",
+      short: "Rest less stress",
+      map: figureMap(difference),
+      scan: null,
+      figure: "difference",
+    });
+  for (const one of [stress, rest])
+    if (one.z)
+      maps.push({
+        name: `z, ${one.scan}`,
+        short: `z, ${one.scan}`,
+        map: figureMap(one.z),
+        scan: one.scan,
+        figure: "z",
+      });
+  for (const one of [stress, rest])
+    if (one.score)
+      maps.push({
+        name: `Score, ${one.scan}`,
+        short: `Score, ${one.scan}`,
+        map: figureMap(one.score),
+        scan: one.scan,
+        figure: "score",
+      });
   return maps;
 }
 

@@ -22,16 +22,35 @@ export function lutOf({ figure }: NamedMap, chosen: Lut): Lut {
 /** A map of uptake with the scores of its segments written on it. */
 function withScores({ scan, map, figure }: NamedMap, { segments }: ComparisonReport): DrawnMap {
   if (figure !== "uptake") return map;
-  return { ...map, segments: map.segments.map(one => {
-    const found = segments.find(other => other.segment === one.number);
-    return { ...one, mean: (scan === "stress" ? found?.stress_score : found?.rest_score) ?? null };
-  }) };
+  return {
+    ...map,
+    segments: map.segments.map(one => {
+      const found = segments.find(other => other.segment === one.number);
+      return { ...one, mean: (scan === "stress" ? found?.stress_score : found?.rest_score) ?? null };
+    }),
+  };
 }
 
 /** What is drawn of a map, and what is written on it. */
-export function drawMap(context: CanvasRenderingContext2D, named: NamedMap, report: ComparisonReport, written: Written, lut: Lut, size: number, ratio: number, cursor: [number, number] | null): void {
+export function drawMap(
+  context: CanvasRenderingContext2D,
+  named: NamedMap,
+  report: ComparisonReport,
+  written: Written,
+  lut: Lut,
+  size: number,
+  ratio: number,
+  cursor: [number, number] | null,
+): void {
   const map = written === "scores" ? withScores(named, report) : named.map;
-  drawPolar(context, map, size, ratio, { lut: lutOf(named, lut), segments: false, threshold: true, territories: false, cursor, labels: written === "scores" ? "means" : written });
+  drawPolar(context, map, size, ratio, {
+    lut: lutOf(named, lut),
+    segments: false,
+    threshold: true,
+    territories: false,
+    cursor,
+    labels: written === "scores" ? "means" : written,
+  });
 }
 
 /** The places of a colour bar's ends in words. */
@@ -45,30 +64,54 @@ export function ComparedMaps({ compared, scene }: { compared: Compared; scene: C
   const written = useWatched(scene.written);
   const lut = useWatched(scene.lut);
   const hasScores = compared.report.sss != null;
-  const choices: [Written, string][] = [["means", "per cent"], ...(hasScores ? [["scores", "scores"] as [Written, string]] : []), ["numbers", "segments"], ["nothing", "nothing"]];
+  const choices: [Written, string][] = [
+    ["means", "per cent"],
+    ...(hasScores ? [["scores", "scores"] as [Written, string]] : []),
+    ["numbers", "segments"],
+    ["nothing", "nothing"],
+  ];
   return (
     <section class="compared-maps" aria-label="Polar maps">
       <div class="toolbar" role="toolbar" aria-label="Polar maps">
-        <label class="inline">On the maps
+        <label class="inline">
+          On the maps
           <select value={written} onChange={event => (scene.written.value = event.currentTarget.value as Written)}>
-            {choices.map(([value, text]) => <option key={value} value={value}>{text}</option>)}
+            {choices.map(([value, text]) => (
+              <option key={value} value={value}>
+                {text}
+              </option>
+            ))}
           </select>
         </label>
         <label class="inline">
-          <select aria-label="Colours of uptake" value={Object.keys(LUTS).find(name => LUTS[name] === lut)} onChange={event => {
-            scene.lut.value = LUTS[event.currentTarget.value]!;
-            keep(WALL_LUT, event.currentTarget.value);
-          }}>
-            {Object.keys(LUTS).map(name => <option key={name}>{name}</option>)}
+          <select
+            aria-label="Colours of uptake"
+            value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
+            onChange={event => {
+              scene.lut.value = LUTS[event.currentTarget.value]!;
+              keep(WALL_LUT, event.currentTarget.value);
+            }}>
+            {Object.keys(LUTS).map(name => (
+              <option key={name}>{name}</option>
+            ))}
           </select>
         </label>
       </div>
       <div class={`maps${maps.length > 3 ? "" : " few"}`}>
-        {maps.slice(0, 3).map(named => <OneMap key={named.name} named={named} compared={compared} scene={scene} />)}
+        {maps.slice(0, 3).map(named => (
+          <OneMap key={named.name} named={named} compared={compared} scene={scene} />
+        ))}
         <Readout compared={compared} scene={scene} maps={maps} />
-        {maps.slice(3).map(named => <OneMap key={named.name} named={named} compared={compared} scene={scene} />)}
+        {maps.slice(3).map(named => (
+          <OneMap key={named.name} named={named} compared={compared} scene={scene} />
+        ))}
       </div>
-      {!(compared.stress.oriented && compared.rest.oriented) && <p class="warning">Nothing tells which side is anterior: segments have no names, and both hearts may be turned against each other.</p>}
+      {!(compared.stress.oriented && compared.rest.oriented) && (
+        <p class="warning">
+          Nothing tells which side is anterior: segments have no names, and both hearts may be turned against each
+          other.
+        </p>
+      )}
     </section>
   );
 }
@@ -87,7 +130,8 @@ function OneMap({ named, compared, scene }: { named: NamedMap; compared: Compare
   const { canvas } = useCanvas(draw, () => () => undefined, map);
   const go = (event: { offsetX: number; offsetY: number; currentTarget: HTMLCanvasElement }) => {
     const size = event.currentTarget.clientWidth;
-    if (placeOnMap(map, event.offsetX, event.offsetY, size)) scene.cursor.value = [event.offsetX / size, event.offsetY / size];
+    if (placeOnMap(map, event.offsetX, event.offsetY, size))
+      scene.cursor.value = [event.offsetX / size, event.offsetY / size];
   };
   return (
     <figure class="polar">
@@ -102,7 +146,12 @@ function OneMap({ named, compared, scene }: { named: NamedMap; compared: Compare
         }}
         onPointerMove={event => event.buttons && go(event)}
         onKeyDown={event => {
-          const ways: Record<string, [number, number]> = { ArrowUp: [0, -1], ArrowDown: [0, 1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
+          const ways: Record<string, [number, number]> = {
+            ArrowUp: [0, -1],
+            ArrowDown: [0, 1],
+            ArrowLeft: [-1, 0],
+            ArrowRight: [1, 0],
+          };
           const way = ways[event.key];
           if (!way) return;
           event.preventDefault();
@@ -126,7 +175,9 @@ function Readout({ compared, scene, maps }: { compared: Compared; scene: Compare
     const { short, map } = named;
     const place = cursor && placeOnMap(map, cursor[0], cursor[1], 1);
     if (!place) return [];
-    const here = isInValvePlane(map, ...place) ? "valve plane" : number(valueAt(map, ...place), named.figure === "uptake" || named.figure === "difference" ? 0 : 1, map.unit);
+    const here = isInValvePlane(map, ...place)
+      ? "valve plane"
+      : number(valueAt(map, ...place), named.figure === "uptake" || named.figure === "difference" ? 0 : 1, map.unit);
     return [[short, here]];
   });
   const first = maps[0];
@@ -137,13 +188,27 @@ function Readout({ compared, scene, maps }: { compared: Compared; scene: Compare
     <div class="readout" role="status" aria-label="At the cursor">
       {segment ? (
         <>
-          <b>{segment.number} {segment.name}</b>
+          <b>
+            {segment.number} {segment.name}
+          </b>
           <dl>
-            {rows.map(([name, here]) => <div key={name}><dt>{name}</dt><dd>{here}</dd></div>)}
-            {found && <div><dt>Reversible part</dt><dd>{number(found.reversible_percent, 0, "%")}</dd></div>}
+            {rows.map(([name, here]) => (
+              <div key={name}>
+                <dt>{name}</dt>
+                <dd>{here}</dd>
+              </div>
+            ))}
+            {found && (
+              <div>
+                <dt>Reversible part</dt>
+                <dd>{number(found.reversible_percent, 0, "%")}</dd>
+              </div>
+            )}
           </dl>
         </>
-      ) : <p class="quiet">Press on a map or a slice to read all of them there.</p>}
+      ) : (
+        <p class="quiet">Press on a map or a slice to read all of them there.</p>
+      )}
     </div>
   );
 }

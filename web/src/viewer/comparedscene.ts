@@ -26,7 +26,14 @@ export class ComparedScene {
 
   /** Everything that changes a slice. */
   watch(act: () => void): () => void {
-    const all: { watch(act: () => void): () => void }[] = [this.lut, this.brightest, this.smooth, this.contours, this.chosen, this.cursor];
+    const all: { watch(act: () => void): () => void }[] = [
+      this.lut,
+      this.brightest,
+      this.smooth,
+      this.contours,
+      this.chosen,
+      this.cursor,
+    ];
     const ends = all.map(watched => watched.watch(act));
     return () => ends.forEach(end => end());
   }

@@ -2,7 +2,16 @@
 
 import { useWatched } from "../state";
 import { useCanvas } from "./canvas";
-import { type Compared, type ComparedHeart, KINDS, SLICES, SLICE_MM, sliceAt, spacingOf, wallFrameOf } from "./compared";
+import {
+  type Compared,
+  type ComparedHeart,
+  KINDS,
+  SLICES,
+  SLICE_MM,
+  sliceAt,
+  spacingOf,
+  wallFrameOf,
+} from "./compared";
 import type { ComparedScene } from "./comparedscene";
 import { contours, label, paintVoxels } from "./drawing";
 import { placeOnMap, onMap } from "./polar";
@@ -40,7 +49,13 @@ function cursorPlace(one: ComparedHeart, cursor: [number, number] | null): Vec |
 /** Per cent of each scan's own reference, in which both are shown. */
 function look(one: ComparedHeart, scene: Pick<ComparedScene, "lut" | "brightest" | "smooth">) {
   const reference = one.polar?.reference ?? one.report.polar?.reference ?? one.region?.highest ?? 1;
-  return { voxels: one.region!, lut: scene.lut.value, low: 0, high: (reference * scene.brightest.value) / 100, smooth: scene.smooth.value };
+  return {
+    voxels: one.region!,
+    lut: scene.lut.value,
+    low: 0,
+    high: (reference * scene.brightest.value) / 100,
+    smooth: scene.smooth.value,
+  };
 }
 
 export interface SlicesStyle {
@@ -51,7 +66,12 @@ export interface SlicesStyle {
   marks: boolean;
 }
 
-export function drawSlices(element: HTMLCanvasElement, compared: Compared, scene: ComparedScene, { width, height, ratio, marks }: SlicesStyle): void {
+export function drawSlices(
+  element: HTMLCanvasElement,
+  compared: Compared,
+  scene: ComparedScene,
+  { width, height, ratio, marks }: SlicesStyle,
+): void {
   const context = element.getContext("2d");
   if (!context) return;
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -61,7 +81,14 @@ export function drawSlices(element: HTMLCanvasElement, compared: Compared, scene
   const factor = cell / SLICE_MM;
   const small = width < 500;
   for (const [kind, { name, short, way }] of KINDS.entries()) {
-    label(context, small ? `${short}: ${way}` : `${name}: ${way}`, left, top(kind, 0) - ABOVE / 2, "left", small ? 10 : 12);
+    label(
+      context,
+      small ? `${short}: ${way}` : `${name}: ${way}`,
+      left,
+      top(kind, 0) - ABOVE / 2,
+      "left",
+      small ? 10 : 12,
+    );
     for (const [row, one] of [compared.stress, compared.rest].entries()) {
       const { heart, region } = one;
       const y = top(kind, row);
@@ -78,7 +105,15 @@ export function drawSlices(element: HTMLCanvasElement, compared: Compared, scene
         context.clip();
         paintVoxels(context, seen, plane, origin, box, factor);
         context.translate(box.x + box.width / 2, box.y + box.height / 2);
-        if (scene.contours.value) contours(context, [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }], plane, origin, factor, SLICE_MM / 2);
+        if (scene.contours.value)
+          contours(
+            context,
+            [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }],
+            plane,
+            origin,
+            factor,
+            SLICE_MM / 2,
+          );
         if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(heart, kind) / 2) {
           const from = sub(place, origin);
           ring(context, dot(from, plane.right) * factor, dot(from, plane.down) * factor, Math.max(3, cell / 22));
@@ -95,7 +130,10 @@ export function drawSlices(element: HTMLCanvasElement, compared: Compared, scene
 }
 
 function ring(context: CanvasRenderingContext2D, x: number, y: number, radius: number): void {
-  for (const [width, stroke] of [[3, "#000"], [1.5, MARK]] as const) {
+  for (const [width, stroke] of [
+    [3, "#000"],
+    [1.5, MARK],
+  ] as const) {
     context.lineWidth = width;
     context.strokeStyle = stroke;
     context.beginPath();
@@ -105,7 +143,14 @@ function ring(context: CanvasRenderingContext2D, x: number, y: number, radius: n
 }
 
 /** Takes the cursor to the wall of a heart nearest to a place in one of its slices. */
-function goTo(scene: ComparedScene, one: ComparedHeart, kind: number, number: number, right: number, down: number): void {
+function goTo(
+  scene: ComparedScene,
+  one: ComparedHeart,
+  kind: number,
+  number: number,
+  right: number,
+  down: number,
+): void {
   const frame = wallFrameOf(one);
   if (!one.heart || !one.polar || !frame) return;
   const { plane, origin } = sliceAt(one.heart, kind, number);
@@ -114,7 +159,13 @@ function goTo(scene: ComparedScene, one: ComparedHeart, kind: number, number: nu
 
 export function ComparedSlices({ compared, scene }: { compared: Compared; scene: ComparedScene }) {
   const { kind, number } = useWatched(scene.chosen);
-  const draw = (element: HTMLCanvasElement) => drawSlices(element, compared, scene, { width: element.clientWidth, height: element.clientHeight, ratio: element.width / element.clientWidth, marks: true });
+  const draw = (element: HTMLCanvasElement) =>
+    drawSlices(element, compared, scene, {
+      width: element.clientWidth,
+      height: element.clientHeight,
+      ratio: element.width / element.clientWidth,
+      marks: true,
+    });
   const { canvas } = useCanvas(draw, act => scene.watch(act), compared);
   const press = (event: PointerEvent & { currentTarget: HTMLCanvasElement }) => {
     const { clientWidth: width, clientHeight: height } = event.currentTarget;
@@ -132,7 +183,10 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
     }
   };
   const move = (along: number, over: number) => {
-    const next = { kind: Math.max(0, Math.min(KINDS.length - 1, kind + over)), number: Math.max(0, Math.min(SLICES - 1, number + along)) };
+    const next = {
+      kind: Math.max(0, Math.min(KINDS.length - 1, kind + over)),
+      number: Math.max(0, Math.min(SLICES - 1, number + along)),
+    };
     scene.chosen.value = next;
   };
   return (
@@ -148,7 +202,14 @@ export function ComparedSlices({ compared, scene }: { compared: Compared; scene:
       aria-valuetext={`${KINDS[kind]!.name}, slice ${number + 1} of ${SLICES}`}
       onPointerDown={press}
       onKeyDown={event => {
-        const by: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1], PageUp: [1, 0], PageDown: [-1, 0] };
+        const by: Record<string, [number, number]> = {
+          ArrowLeft: [-1, 0],
+          ArrowRight: [1, 0],
+          ArrowUp: [0, -1],
+          ArrowDown: [0, 1],
+          PageUp: [1, 0],
+          PageDown: [-1, 0],
+        };
         const step = by[event.key];
         if (!step) return;
         event.preventDefault();
@@ -163,12 +224,24 @@ export function LargePair({ compared, scene }: { compared: Compared; scene: Comp
   const { kind, number } = useWatched(scene.chosen);
   return (
     <div class="pair">
-      {[compared.stress, compared.rest].map(one => <Large key={one.scan} one={one} scene={scene} kind={kind} number={number} />)}
+      {[compared.stress, compared.rest].map(one => (
+        <Large key={one.scan} one={one} scene={scene} kind={kind} number={number} />
+      ))}
     </div>
   );
 }
 
-function Large({ one, scene, kind, number }: { one: ComparedHeart; scene: ComparedScene; kind: number; number: number }) {
+function Large({
+  one,
+  scene,
+  kind,
+  number,
+}: {
+  one: ComparedHeart;
+  scene: ComparedScene;
+  kind: number;
+  number: number;
+}) {
   const title = one.scan === "stress" ? "Stress" : "Rest";
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
@@ -184,7 +257,15 @@ function Large({ one, scene, kind, number }: { one: ComparedHeart; scene: Compar
     paintVoxels(context, look(one, scene), plane, origin, { x: 0, y: 0, width, height }, factor);
     context.save();
     context.translate(width / 2, height / 2);
-    if (scene.contours.value) contours(context, [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }], plane, origin, factor, SLICE_MM);
+    if (scene.contours.value)
+      contours(
+        context,
+        [{ name: "wall", colour: "#3dffa8", shown: true, mesh: one.mesh }],
+        plane,
+        origin,
+        factor,
+        SLICE_MM,
+      );
     const place = cursorPlace(one, scene.cursor.value);
     if (place && Math.abs(dot(sub(place, origin), plane.normal)) <= spacingOf(one.heart, kind) / 2) {
       const from = sub(place, origin);
@@ -202,11 +283,16 @@ function Large({ one, scene, kind, number }: { one: ComparedHeart; scene: Compar
   const { canvas } = useCanvas(draw, act => scene.watch(act), one);
   return (
     <figure class="slice">
-      <canvas ref={canvas} role="img" aria-label={`${title}: ${KINDS[kind]!.name}, slice ${number + 1} of ${SLICES}`} onPointerDown={event => {
-        const { clientWidth: width, clientHeight: height } = event.currentTarget;
-        const factor = Math.min(width, height) / SLICE_MM;
-        goTo(scene, one, kind, number, (event.offsetX - width / 2) / factor, (event.offsetY - height / 2) / factor);
-      }} />
+      <canvas
+        ref={canvas}
+        role="img"
+        aria-label={`${title}: ${KINDS[kind]!.name}, slice ${number + 1} of ${SLICES}`}
+        onPointerDown={event => {
+          const { clientWidth: width, clientHeight: height } = event.currentTarget;
+          const factor = Math.min(width, height) / SLICE_MM;
+          goTo(scene, one, kind, number, (event.offsetX - width / 2) / factor, (event.offsetY - height / 2) / factor);
+        }}
+      />
     </figure>
   );
 }

@@ -3,7 +3,15 @@
 import type { Volume } from "../api";
 import { moment, nameOf, number } from "../words";
 import { type Compared, type ComparedHeart, type NamedMap, mapsOf } from "./compared";
-import { Headlines, LimitsUsed, PerfusionTable, Reasons, SimulatedNote, TerritoryTable, madeWith } from "./comparedfacts";
+import {
+  Headlines,
+  LimitsUsed,
+  PerfusionTable,
+  Reasons,
+  SimulatedNote,
+  TerritoryTable,
+  madeWith,
+} from "./comparedfacts";
 import { drawMap, endsOf, lutOf } from "./comparedmaps";
 import type { ComparedScene } from "./comparedscene";
 import { drawSlices } from "./comparedslices";
@@ -32,44 +40,92 @@ export function ComparisonSheet({ compared, scene, scans }: Props) {
   const wall = (one: ComparedHeart, n: number) => {
     const named = uptake[n];
     if (!one.heart || !named) return null;
-    const colours = coloursOf(byMap(one.mesh, named.map, one.heart), { lut, range: named.map.range, below: named.map.below });
-    return <Drawn width={WALL} height={WALL} name={`The wall at ${one.scan}`} draw={element => drawWall(element, one, colours, scene.seen.value, WALL, RATIO)} />;
+    const colours = coloursOf(byMap(one.mesh, named.map, one.heart), {
+      lut,
+      range: named.map.range,
+      below: named.map.below,
+    });
+    return (
+      <Drawn
+        width={WALL}
+        height={WALL}
+        name={`The wall at ${one.scan}`}
+        draw={element => drawWall(element, one, colours, scene.seen.value, WALL, RATIO)}
+      />
+    );
   };
   const map = (named: NamedMap) => (
     <figure key={named.name}>
-      <Drawn width={MAP} height={MAP} name={named.name} draw={element => {
-        const context = element.getContext("2d");
-        if (context) drawMap(context, named, report, scene.written.value, lut, MAP, RATIO, null);
-      }} />
-      <figcaption><span>{named.short}</span><ColourBar lut={lutOf(named, lut)} low={endsOf(named)[0]} high={endsOf(named)[1]} /></figcaption>
+      <Drawn
+        width={MAP}
+        height={MAP}
+        name={named.name}
+        draw={element => {
+          const context = element.getContext("2d");
+          if (context) drawMap(context, named, report, scene.written.value, lut, MAP, RATIO, null);
+        }}
+      />
+      <figcaption>
+        <span>{named.short}</span>
+        <ColourBar lut={lutOf(named, lut)} low={endsOf(named)[0]} high={endsOf(named)[1]} />
+      </figcaption>
     </figure>
   );
   return (
     <section class="paper comparison-paper">
-      <Head volume={scans.stress} title="Left ventricle: rest and stress">Compared {moment(result.created_at)}</Head>
-      <div class="scans-line">{(["stress", "rest"] as const).map(scan => <span key={scan}><b>{scan === "stress" ? "Stress" : "Rest"}</b> {nameOf(scans[scan])}{madeWith(report[scan]) && ` · ${madeWith(report[scan])}`}</span>)}<SimulatedNote report={report} /></div>
+      <Head volume={scans.stress} title="Left ventricle: rest and stress">
+        Compared {moment(result.created_at)}
+      </Head>
+      <div class="scans-line">
+        {(["stress", "rest"] as const).map(scan => (
+          <span key={scan}>
+            <b>{scan === "stress" ? "Stress" : "Rest"}</b> {nameOf(scans[scan])}
+            {madeWith(report[scan]) && ` · ${madeWith(report[scan])}`}
+          </span>
+        ))}
+        <SimulatedNote report={report} />
+      </div>
       <Headlines report={report} />
-      <Drawn width={WIDTH} height={HEIGHT} name="Slices of stress above those of rest" draw={element => drawSlices(element, compared, scene, { width: WIDTH, height: HEIGHT, ratio: RATIO, marks: false })} />
+      <Drawn
+        width={WIDTH}
+        height={HEIGHT}
+        name="Slices of stress above those of rest"
+        draw={element =>
+          drawSlices(element, compared, scene, { width: WIDTH, height: HEIGHT, ratio: RATIO, marks: false })
+        }
+      />
       <div class={beside.length > 0 ? "sheet-lower" : ""}>
         <div class={`sheet-maps${maps.length > 3 ? " many" : ""}`}>
           {maps.slice(0, 3).map(map)}
-          {[stress, rest].slice(0, maps.length > 3 ? 1 : 2).map((one, n) => <figure key={one.scan}>{wall(one, n)}<figcaption>{one.scan === "stress" ? "Stress" : "Rest"}, wall</figcaption></figure>)}
+          {[stress, rest].slice(0, maps.length > 3 ? 1 : 2).map((one, n) => (
+            <figure key={one.scan}>
+              {wall(one, n)}
+              <figcaption>{one.scan === "stress" ? "Stress" : "Rest"}, wall</figcaption>
+            </figure>
+          ))}
           {maps.slice(3).map(map)}
         </div>
         {beside.length > 0 && (
           <div class="figures">
             <PerfusionTable of={beside} />
-            {beside.slice(0, 1).map(([scan, perfusion]) => <LimitsUsed key={scan} perfusion={{ ...perfusion, flags: [] }} />)}
+            {beside.slice(0, 1).map(([scan, perfusion]) => (
+              <LimitsUsed key={scan} perfusion={{ ...perfusion, flags: [] }} />
+            ))}
           </div>
         )}
       </div>
       <div class={beside.length > 0 ? "sheet-reasons" : "sheet-words"}>
         <Reasons report={report} />
-        {beside.length === 0 && <div class="figures"><TerritoryTable report={report} /></div>}
+        {beside.length === 0 && (
+          <div class="figures">
+            <TerritoryTable report={report} />
+          </div>
+        )}
       </div>
       <p class="quiet">
-        Uptake in per cent of the hottest quarter of each scan’s own wall; where stress is compared with rest, it was scaled by {number(1 / report.scale, 2)} over {number(report.matched_percent, 0, "%")} of the wall.{" "}
-        Comparison <code>{result.id}</code>; stress <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
+        Uptake in per cent of the hottest quarter of each scan’s own wall; where stress is compared with rest, it was
+        scaled by {number(1 / report.scale, 2)} over {number(report.matched_percent, 0, "%")} of the wall. Comparison{" "}
+        <code>{result.id}</code>; stress <code>{scans.stress.id}</code>, rest <code>{scans.rest.id}</code>.
       </p>
       <Foot page={1} of={1} />
     </section>

@@ -12,7 +12,20 @@ import { home } from "../route";
 import { useWatched } from "../state";
 import { cut, moment, nameOf, study } from "../words";
 import { type Compared, type NamedMap, loadComparison, mapsOf } from "./compared";
-import { BeatTable, Headlines, LimitsUsed, MatchTable, PerfusionTable, Reasons, SegmentChanges, SegmentScores, SimulatedNote, TerritoryTable, areNotComparable, madeWith } from "./comparedfacts";
+import {
+  BeatTable,
+  Headlines,
+  LimitsUsed,
+  MatchTable,
+  PerfusionTable,
+  Reasons,
+  SegmentChanges,
+  SegmentScores,
+  SimulatedNote,
+  TerritoryTable,
+  areNotComparable,
+  madeWith,
+} from "./comparedfacts";
 import { ComparedMaps, lutOf } from "./comparedmaps";
 import { ComparedScene } from "./comparedscene";
 import { ComparedSlices, LargePair } from "./comparedslices";
@@ -31,13 +44,20 @@ export function ComparisonView({ id }: { id: string }) {
 function Working({ id }: { id: string }) {
   const known = useWatched(jobs).find(job => job.id === id);
   const [problem, setProblem] = useState("");
-  const [again, setAgain] = useState<{ pair: [Volume, Volume]; draft: Draft; problem: { field: string | null; text: string } | null } | null>(null);
+  const [again, setAgain] = useState<{
+    pair: [Volume, Volume];
+    draft: Draft;
+    problem: { field: string | null; text: string } | null;
+  } | null>(null);
   useEffect(() => {
     if (known) return;
-    get<Job>(`/v1/jobs/${id}`).then(job => {
-      put(job);
-      watchActive();
-    }, error => setProblem(words(error)));
+    get<Job>(`/v1/jobs/${id}`).then(
+      job => {
+        put(job);
+        watchActive();
+      },
+      error => setProblem(words(error)),
+    );
   }, [id]);
   const made = known?.state === "succeeded" ? known.comparison : null;
   useEffect(() => {
@@ -50,15 +70,32 @@ function Working({ id }: { id: string }) {
     const parameters = ended.parameters as unknown as Parameters;
     const [stress, rest] = [ended.volume, parameters["rest"]];
     if (!stress || typeof rest !== "string") return;
-    Promise.all([get<Volume>(`/v1/volumes/${stress}`), get<Volume>(`/v1/volumes/${rest}`), parameterSpecs()]).then(([atStress, atRest, specs]) => {
-      const text = ended.error ? sentences(ended.error).join(" ").trim() : "";
-      const field = ended.error?.field?.split(/[./]/).pop() ?? null;
-      // What no field of the form is wrong with is said once, above it.
-      const ofForm = specs.comparison.some(spec => spec.name === field);
-      setAgain({ pair: [atStress, atRest], draft: draftOf(parameters, specs.comparison), problem: text && ofForm ? { field, text } : null });
-    }, () => undefined);
+    Promise.all([get<Volume>(`/v1/volumes/${stress}`), get<Volume>(`/v1/volumes/${rest}`), parameterSpecs()]).then(
+      ([atStress, atRest, specs]) => {
+        const text = ended.error ? sentences(ended.error).join(" ").trim() : "";
+        const field = ended.error?.field?.split(/[./]/).pop() ?? null;
+        // What no field of the form is wrong with is said once, above it.
+        const ofForm = specs.comparison.some(spec => spec.name === field);
+        setAgain({
+          pair: [atStress, atRest],
+          draft: draftOf(parameters, specs.comparison),
+          problem: text && ofForm ? { field, text } : null,
+        });
+      },
+      () => undefined,
+    );
   }, [ended?.id]);
-  if (problem) return <div class="pad"><p class="error" role="alert">{problem}</p><button type="button" onClick={home}>Back to the list</button></div>;
+  if (problem)
+    return (
+      <div class="pad">
+        <p class="error" role="alert">
+          {problem}
+        </p>
+        <button type="button" onClick={home}>
+          Back to the list
+        </button>
+      </div>
+    );
   if (!known) return <p class="quiet pad">Looking for the comparison …</p>;
   const otherPatient = ended?.error?.type.endsWith("other-patient");
   return (
@@ -67,11 +104,27 @@ function Working({ id }: { id: string }) {
       {!ended && <JobLine job={known} />}
       {ended && (
         <section class="picked" aria-label="What can be changed">
-          {ended.state === "cancelled" ? <p>The comparison was cancelled.</p> : <p role="alert"><Trouble problem={otherPatient && ended.error ? { ...ended.error, fix: null } : ended.error} /></p>}
-          {again && <PairForm pair={again.pair} stress={again.pair[0].id} draft={again.draft} problem={again.problem} otherPatient={otherPatient ?? false} />}
+          {ended.state === "cancelled" ? (
+            <p>The comparison was cancelled.</p>
+          ) : (
+            <p role="alert">
+              <Trouble problem={otherPatient && ended.error ? { ...ended.error, fix: null } : ended.error} />
+            </p>
+          )}
+          {again && (
+            <PairForm
+              pair={again.pair}
+              stress={again.pair[0].id}
+              draft={again.draft}
+              problem={again.problem}
+              otherPatient={otherPatient ?? false}
+            />
+          )}
         </section>
       )}
-      <button type="button" onClick={home}>Back to the list</button>
+      <button type="button" onClick={home}>
+        Back to the list
+      </button>
     </div>
   );
 }
@@ -87,7 +140,11 @@ function Shown({ id }: { id: string }) {
       const found = find(id) ?? (await loadResult(id));
       if (!found) throw new Error("This comparison was erased.");
       const rest = String(found.parameters["rest"]);
-      const [atStress, atRest, loaded] = await Promise.all([get<Volume>(`/v1/volumes/${found.volume}`), get<Volume>(`/v1/volumes/${rest}`), loadComparison(found)]);
+      const [atStress, atRest, loaded] = await Promise.all([
+        get<Volume>(`/v1/volumes/${found.volume}`),
+        get<Volume>(`/v1/volumes/${rest}`),
+        loadComparison(found),
+      ]);
       if (gone) return;
       setResult(found);
       setScans({ stress: atStress, rest: atRest });
@@ -96,7 +153,17 @@ function Shown({ id }: { id: string }) {
     read().catch(error => !gone && setProblem(words(error)));
     return () => void (gone = true);
   }, [id]);
-  if (problem) return <div class="pad"><p class="error" role="alert">{problem}</p><button type="button" onClick={home}>Back to the list</button></div>;
+  if (problem)
+    return (
+      <div class="pad">
+        <p class="error" role="alert">
+          {problem}
+        </p>
+        <button type="button" onClick={home}>
+          Back to the list
+        </button>
+      </div>
+    );
   if (!result || !compared || !scans) return <p class="quiet pad">Opening the comparison …</p>;
   return <Comparison compared={compared} scans={scans} />;
 }
@@ -108,7 +175,10 @@ interface ComparisonProps {
 
 function Comparison({ compared, scans }: ComparisonProps) {
   const scene = useMemo(() => new ComparedScene(), [compared]);
-  useEffect(() => printsAs(() => <ComparisonSheet compared={compared} scene={scene} scans={scans} />), [compared, scene, scans]);
+  useEffect(
+    () => printsAs(() => <ComparisonSheet compared={compared} scene={scene} scans={scans} />),
+    [compared, scene, scans],
+  );
   return (
     <div class="comparison">
       <aside class="facts" aria-label="Figures">
@@ -124,7 +194,9 @@ function Comparison({ compared, scans }: ComparisonProps) {
         <p class="research foot">Research software, not a medical device. Measurements are no diagnosis.</p>
       </aside>
       <Stage compared={compared} scene={scene} name={nameOf(scans.stress)} />
-      <div class="pictures maps-side"><ComparedMaps compared={compared} scene={scene} /></div>
+      <div class="pictures maps-side">
+        <ComparedMaps compared={compared} scene={scene} />
+      </div>
     </div>
   );
 }
@@ -133,12 +205,18 @@ function Head({ compared: { report }, scans }: ComparisonProps) {
   return (
     <header>
       <h1>Rest and stress</h1>
-      {study(scans.stress) && <p><b>{study(scans.stress)}</b></p>}
+      {study(scans.stress) && (
+        <p>
+          <b>{study(scans.stress)}</b>
+        </p>
+      )}
       {(["stress", "rest"] as const).map(scan => (
         <p key={scan}>
           <span class={`role ${scan}`}>{scan}</span>{" "}
-          <a href={`#/scan/${scans[scan].id}`} title={nameOf(scans[scan])}>{cut(nameOf(scans[scan]))}</a>
-          {madeWith(report[scan]) && <span class="quiet">{" "}{madeWith(report[scan])}</span>}
+          <a href={`#/scan/${scans[scan].id}`} title={nameOf(scans[scan])}>
+            {cut(nameOf(scans[scan]))}
+          </a>
+          {madeWith(report[scan]) && <span class="quiet"> {madeWith(report[scan])}</span>}
         </p>
       ))}
     </header>
@@ -157,16 +235,58 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
         <details open>
           <summary>Beside normal limits</summary>
           <PerfusionTable of={beside} />
-          {beside.slice(0, 1).map(([scan, perfusion]) => <LimitsUsed key={scan} perfusion={{ ...perfusion, flags: [] }} />)}
-          {beside.map(([scan, perfusion]) => <details key={scan}><summary>Scores at {scan}</summary><div class="wide" tabIndex={0} role="region" aria-label={`Scores at ${scan}`}><SegmentScores perfusion={perfusion} /></div></details>)}
+          {beside.slice(0, 1).map(([scan, perfusion]) => (
+            <LimitsUsed key={scan} perfusion={{ ...perfusion, flags: [] }} />
+          ))}
+          {beside.map(([scan, perfusion]) => (
+            <details key={scan}>
+              <summary>Scores at {scan}</summary>
+              <div class="wide" tabIndex={0} role="region" aria-label={`Scores at ${scan}`}>
+                <SegmentScores perfusion={perfusion} />
+              </div>
+            </details>
+          ))}
         </details>
       )}
-      {report.beat && <details open><summary>The beat</summary><BeatTable report={report} /></details>}
-      {(report.no_beat ?? []).length > 0 && <p class="quiet">{report.beat ? "No ejection fractions" : "No beats"} were compared: {(report.no_beat ?? []).map(({ reason }) => reason).join("; ")}.</p>}
-      {report.territories.length > 0 && <details><summary>Territories</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Territories"><TerritoryTable report={report} /></div></details>}
-      <details><summary>Segments</summary><p class="quiet">Per cent; stress is scaled to rest.</p><div class="wide" tabIndex={0} role="region" aria-label="Segments"><SegmentChanges report={report} /></div></details>
-      <details><summary>How both were matched</summary><MatchTable report={report} /></details>
-      {(["stress", "rest"] as const).flatMap(scan => report[scan].warnings.map(text => <p key={scan + text} class="warning">{scan === "stress" ? "Stress" : "Rest"}: {text}</p>))}
+      {report.beat && (
+        <details open>
+          <summary>The beat</summary>
+          <BeatTable report={report} />
+        </details>
+      )}
+      {(report.no_beat ?? []).length > 0 && (
+        <p class="quiet">
+          {report.beat ? "No ejection fractions" : "No beats"} were compared:{" "}
+          {(report.no_beat ?? []).map(({ reason }) => reason).join("; ")}.
+        </p>
+      )}
+      {report.territories.length > 0 && (
+        <details>
+          <summary>Territories</summary>
+          <p class="quiet">Per cent; stress is scaled to rest.</p>
+          <div class="wide" tabIndex={0} role="region" aria-label="Territories">
+            <TerritoryTable report={report} />
+          </div>
+        </details>
+      )}
+      <details>
+        <summary>Segments</summary>
+        <p class="quiet">Per cent; stress is scaled to rest.</p>
+        <div class="wide" tabIndex={0} role="region" aria-label="Segments">
+          <SegmentChanges report={report} />
+        </div>
+      </details>
+      <details>
+        <summary>How both were matched</summary>
+        <MatchTable report={report} />
+      </details>
+      {(["stress", "rest"] as const).flatMap(scan =>
+        report[scan].warnings.map(text => (
+          <p key={scan + text} class="warning">
+            {scan === "stress" ? "Stress" : "Rest"}: {text}
+          </p>
+        )),
+      )}
     </section>
   );
 }
@@ -174,12 +294,25 @@ function Particulars({ compared: { report } }: { compared: Compared }) {
 /** Other comparisons of the same scans, and erasing this one. */
 function Others({ compared: { result } }: { compared: Compared }) {
   const scans = [result.volume, String(result.parameters["rest"])];
-  const others = useWatched(comparisons).filter(other => other.id !== result.id && (scans.includes(other.volume) || scans.includes(String(other.parameters["rest"]))));
+  const others = useWatched(comparisons).filter(
+    other =>
+      other.id !== result.id && (scans.includes(other.volume) || scans.includes(String(other.parameters["rest"]))),
+  );
   return (
     <section class="others" aria-label="Other comparisons">
-      {others.slice(0, 4).map(other => <a key={other.id} class="result" href={`#/comparison/${other.id}`}><b>Compared {moment(other.created_at)}</b>{other.parameters["normals"] ? " with normal limits" : ""}</a>)}
+      {others.slice(0, 4).map(other => (
+        <a key={other.id} class="result" href={`#/comparison/${other.id}`}>
+          <b>Compared {moment(other.created_at)}</b>
+          {other.parameters["normals"] ? " with normal limits" : ""}
+        </a>
+      ))}
       <Again result={result} />
-      <Confirm label="Erase this comparison" question="Erase this comparison? The scans stay." act={() => eraseResult(result.id).then(home)}>Erase</Confirm>
+      <Confirm
+        label="Erase this comparison"
+        question="Erase this comparison? The scans stay."
+        act={() => eraseResult(result.id).then(home)}>
+        Erase
+      </Confirm>
     </section>
   );
 }
@@ -189,13 +322,29 @@ function Again({ result }: { result: Result }) {
   const [form, setForm] = useState<{ pair: [Volume, Volume]; draft: Draft } | null>(null);
   const [problem, setProblem] = useState("");
   const opened = () => {
-    Promise.all([get<Volume>(`/v1/volumes/${result.volume}`), get<Volume>(`/v1/volumes/${String(result.parameters["rest"])}`), parameterSpecs()])
-      .then(([stress, rest, specs]) => setForm({ pair: [stress, rest], draft: draftOf(result.parameters, specs.comparison) }), error => setProblem(words(error)));
+    Promise.all([
+      get<Volume>(`/v1/volumes/${result.volume}`),
+      get<Volume>(`/v1/volumes/${String(result.parameters["rest"])}`),
+      parameterSpecs(),
+    ]).then(
+      ([stress, rest, specs]) => setForm({ pair: [stress, rest], draft: draftOf(result.parameters, specs.comparison) }),
+      error => setProblem(words(error)),
+    );
   };
   return (
     <>
-      {form ? <PairForm pair={form.pair} stress={form.pair[0].id} draft={form.draft} onClose={() => setForm(null)} /> : <button type="button" onClick={opened}>Compare again …</button>}
-      {problem && <p class="error" role="alert">{problem}</p>}
+      {form ? (
+        <PairForm pair={form.pair} stress={form.pair[0].id} draft={form.draft} onClose={() => setForm(null)} />
+      ) : (
+        <button type="button" onClick={opened}>
+          Compare again …
+        </button>
+      )}
+      {problem && (
+        <p class="error" role="alert">
+          {problem}
+        </p>
+      )}
     </>
   );
 }
@@ -212,22 +361,61 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
       <div class="toolbar" role="toolbar" aria-label="How to look">
         <label class="inline brightness">
           <ColourBar lut={lut} low="0" high={`${brightest}\u2009%`} />
-          <input type="range" aria-label="Uptake of the brightest colour, per cent" min={40} max={160} step={5} value={brightest} onInput={event => (scene.brightest.value = Number(event.currentTarget.value))} />
+          <input
+            type="range"
+            aria-label="Uptake of the brightest colour, per cent"
+            min={40}
+            max={160}
+            step={5}
+            value={brightest}
+            onInput={event => (scene.brightest.value = Number(event.currentTarget.value))}
+          />
         </label>
-        <label class="inline"><input type="checkbox" checked={outlined} onChange={event => (scene.contours.value = event.currentTarget.checked)} /> contours</label>
-        <label class="inline"><input type="checkbox" checked={smooth} onChange={event => (scene.smooth.value = event.currentTarget.checked)} /> smooth</label>
+        <label class="inline">
+          <input
+            type="checkbox"
+            checked={outlined}
+            onChange={event => (scene.contours.value = event.currentTarget.checked)}
+          />{" "}
+          contours
+        </label>
+        <label class="inline">
+          <input
+            type="checkbox"
+            checked={smooth}
+            onChange={event => (scene.smooth.value = event.currentTarget.checked)}
+          />{" "}
+          smooth
+        </label>
         <span class="end">
           <span class="choice" role="group" aria-label="Below the slices">
-            <button type="button" aria-pressed={below === "walls"} onClick={() => setBelow("walls")}>Walls in 3-D</button>
-            <button type="button" aria-pressed={below === "slices"} onClick={() => setBelow("slices")}>Slice, large</button>
+            <button type="button" aria-pressed={below === "walls"} onClick={() => setBelow("walls")}>
+              Walls in 3-D
+            </button>
+            <button type="button" aria-pressed={below === "slices"} onClick={() => setBelow("slices")}>
+              Slice, large
+            </button>
           </span>
-          <button type="button" class="plain" aria-label="Screenshot" title="Screenshot" onClick={() => stage.current && screenshot(stage.current, `${name} rest and stress`)}>
-            <svg class="icon" viewBox="0 0 20 20" aria-hidden="true"><path d="M3 6h3l1-2h6l1 2h3v10H3zM10 8a3 3 0 1 0 .01 0" /></svg>
+          <button
+            type="button"
+            class="plain"
+            aria-label="Screenshot"
+            title="Screenshot"
+            onClick={() => stage.current && screenshot(stage.current, `${name} rest and stress`)}>
+            <svg class="icon" viewBox="0 0 20 20" aria-hidden="true">
+              <path d="M3 6h3l1-2h6l1 2h3v10H3zM10 8a3 3 0 1 0 .01 0" />
+            </svg>
           </button>
         </span>
       </div>
       <ComparedSlices compared={compared} scene={scene} />
-      <div class="below">{below === "walls" ? <Walls compared={compared} scene={scene} /> : <LargePair compared={compared} scene={scene} />}</div>
+      <div class="below">
+        {below === "walls" ? (
+          <Walls compared={compared} scene={scene} />
+        ) : (
+          <LargePair compared={compared} scene={scene} />
+        )}
+      </div>
     </section>
   );
 }
@@ -235,7 +423,12 @@ function Stage({ compared, scene, name }: { compared: Compared; scene: ComparedS
 /** The figures by which walls are coloured: what is known of both. */
 function paintsOf(compared: Compared): { name: string; of: [NamedMap, NamedMap] }[] {
   const maps = mapsOf(compared);
-  const names: Partial<Record<NamedMap["figure"], string>> = { uptake: "Uptake", difference: "Rest less stress", z: "z", score: "Score" };
+  const names: Partial<Record<NamedMap["figure"], string>> = {
+    uptake: "Uptake",
+    difference: "Rest less stress",
+    z: "z",
+    score: "Score",
+  };
   return (["uptake", "difference", "z", "score"] as const).flatMap(figure => {
     const [one, other = one] = maps.filter(map => map.figure === figure);
     return one && other ? [{ name: names[figure] ?? figure, of: [one, other] as [NamedMap, NamedMap] }] : [];
@@ -247,22 +440,53 @@ function Walls({ compared, scene }: { compared: Compared; scene: ComparedScene }
   const [chosen, setChosen] = useState("Uptake");
   const lut = useWatched(scene.lut);
   const paint = paints.find(one => one.name === chosen) ?? paints[0];
-  const coloured = useMemo(() => paint && [compared.stress, compared.rest].map((one, n) => {
-    const named = paint.of[n]!;
-    return one.heart ? coloursOf(byMap(one.mesh, named.map, one.heart), { lut: lutOf(named, lut), range: named.map.range, below: named.map.below }) : null;
-  }), [compared, paint, lut]);
+  const coloured = useMemo(
+    () =>
+      paint &&
+      [compared.stress, compared.rest].map((one, n) => {
+        const named = paint.of[n]!;
+        return one.heart
+          ? coloursOf(byMap(one.mesh, named.map, one.heart), {
+              lut: lutOf(named, lut),
+              range: named.map.range,
+              below: named.map.below,
+            })
+          : null;
+      }),
+    [compared, paint, lut],
+  );
   if (!paint || !coloured) return <p class="off">There is no map to colour the walls by.</p>;
   const [low, high] = paint.of[0].map.range;
   return (
     <>
       <div class="pair">
-        {[compared.stress, compared.rest].map((one, n) => coloured[n] && <HeartWall key={one.scan} one={one} scene={scene} colours={coloured[n]!} title={n === 0 ? "Stress" : "Rest"} />)}
+        {[compared.stress, compared.rest].map(
+          (one, n) =>
+            coloured[n] && (
+              <HeartWall
+                key={one.scan}
+                one={one}
+                scene={scene}
+                colours={coloured[n]!}
+                title={n === 0 ? "Stress" : "Rest"}
+              />
+            ),
+        )}
       </div>
       <div class="layers">
-        <select aria-label="Colour of the walls" value={paint.name} onChange={event => setChosen(event.currentTarget.value)}>
-          {paints.map(one => <option key={one.name}>{one.name}</option>)}
+        <select
+          aria-label="Colour of the walls"
+          value={paint.name}
+          onChange={event => setChosen(event.currentTarget.value)}>
+          {paints.map(one => (
+            <option key={one.name}>{one.name}</option>
+          ))}
         </select>
-        <ColourBar lut={lutOf(paint.of[0], lut)} low={String(low)} high={`${high}${paint.of[0].map.unit && ` ${paint.of[0].map.unit}`}`} />
+        <ColourBar
+          lut={lutOf(paint.of[0], lut)}
+          low={String(low)}
+          high={`${high}${paint.of[0].map.unit && ` ${paint.of[0].map.unit}`}`}
+        />
         <span class="quiet">Drag turns both.</span>
       </div>
     </>

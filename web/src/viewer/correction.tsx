@@ -32,7 +32,13 @@ function start(scene: Scene, shown: Loaded | null): Edit {
     return { base, apex: heart.apex, center, roll: 0, changed: new Set() };
   }
   const center = scene.cursor.value;
-  return { center, base: sub(center, scale(USUAL, HALF_LENGTH)), apex: add(center, scale(USUAL, HALF_LENGTH)), roll: 0, changed: new Set(["center"]) };
+  return {
+    center,
+    base: sub(center, scale(USUAL, HALF_LENGTH)),
+    apex: add(center, scale(USUAL, HALF_LENGTH)),
+    roll: 0,
+    changed: new Set(["center"]),
+  };
 }
 
 export function Correction({ scene, volume, shown }: Props) {
@@ -56,19 +62,34 @@ export function Correction({ scene, volume, shown }: Props) {
   const axis = unit(sub(edit.apex, edit.base));
   const centreTo = (center: Vec) => {
     const way = sub(center, edit.center);
-    scene.edit.value = { ...edit, center, base: add(edit.base, way), apex: add(edit.apex, way), changed: new Set(edit.changed).add("center") };
+    scene.edit.value = {
+      ...edit,
+      center,
+      base: add(edit.base, way),
+      apex: add(edit.apex, way),
+      changed: new Set(edit.changed).add("center"),
+    };
   };
   /** The base so far from the centre, along the axis. */
   const baseTo = (distance: number) => {
     if (!(distance > 5 && distance < 120)) return;
-    scene.edit.value = { ...edit, base: sub(edit.center, scale(axis, distance)), changed: new Set(edit.changed).add("base") };
+    scene.edit.value = {
+      ...edit,
+      base: sub(edit.center, scale(axis, distance)),
+      changed: new Set(edit.changed).add("base"),
+    };
   };
   const axisTo = (wanted: Vec) => {
     if (!(Math.hypot(...wanted) > 1e-6)) return;
     const way = unit(wanted);
     const length = Math.hypot(...sub(edit.apex, edit.base));
     const base = sub(edit.center, scale(way, 0.45 * length));
-    scene.edit.value = { ...edit, base, apex: add(base, scale(way, length)), changed: new Set(edit.changed).add("axis") };
+    scene.edit.value = {
+      ...edit,
+      base,
+      apex: add(base, scale(way, length)),
+      changed: new Set(edit.changed).add("axis"),
+    };
   };
   const send = async () => {
     setProblem(null);
@@ -93,9 +114,15 @@ export function Correction({ scene, volume, shown }: Props) {
         // The wall that now stands on top is anterior. Only names follow it: the fit starts from the orientation that
         // it had.
         const { axis: way, anterior } = frameOf(scene.heart.value);
-        next["segments_from"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(value => Math.round(value * 1e4) / 1e4);
+        next["segments_from"] = turned(anterior, way, (edit.roll * Math.PI) / 180).map(
+          value => Math.round(value * 1e4) / 1e4,
+        );
       }
-      const changed = [...edit.changed, ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []), ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : [])];
+      const changed = [
+        ...edit.changed,
+        ...(reader !== (shown?.result.parameters["reader"] ?? "") ? ["reader"] : []),
+        ...(edge !== (shown?.result.parameters["edge"] ?? "apparent") ? ["edge"] : []),
+      ];
       const labels: Record<string, string> = { changed: changed.join(" ") || "nothing" };
       if (corrected) labels["parent"] = corrected.result.id;
       await file(kind, volume, next, labels);
@@ -106,35 +133,83 @@ export function Correction({ scene, volume, shown }: Props) {
   };
   return (
     <div class="panel correction" role="group" aria-label="Correct by hand">
-      <p class="quiet">Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so that it points to the anterior wall: turning only renames segments. {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.</p>
-      <TripleField name="Centre, mm (L, P, S)" value={edit.center} digits={1} wrong={problem?.field === "center"} onValue={centreTo} />
-      <button type="button" onClick={() => centreTo(cursor)}>Centre at the cursor</button>
-      <TripleField name="Axis, base to apex" value={axis} digits={3} wrong={problem?.field === "axis"} onValue={axisTo} />
+      <p class="quiet">
+        Drag <b>centre</b>, <b>apex</b> and <b>base</b> in the long-axis slices, and <b>turn</b> in the short axis so
+        that it points to the anterior wall: turning only renames segments.{" "}
+        {kind === "beat" && "All gates are fitted again. "}The new fit is kept beside this one and names it.
+      </p>
+      <TripleField
+        name="Centre, mm (L, P, S)"
+        value={edit.center}
+        digits={1}
+        wrong={problem?.field === "center"}
+        onValue={centreTo}
+      />
+      <button type="button" onClick={() => centreTo(cursor)}>
+        Centre at the cursor
+      </button>
+      <TripleField
+        name="Axis, base to apex"
+        value={axis}
+        digits={3}
+        wrong={problem?.field === "axis"}
+        onValue={axisTo}
+      />
       <label class="field">
         Base, mm from the centre
-        <NumberInput step={1} text={dot(sub(edit.center, edit.base), axis).toFixed(0)} aria-invalid={problem?.field === "base" || undefined} onNumber={baseTo} />
+        <NumberInput
+          step={1}
+          text={dot(sub(edit.center, edit.base), axis).toFixed(0)}
+          aria-invalid={problem?.field === "base" || undefined}
+          onNumber={baseTo}
+        />
       </label>
       <label class="field">
         Turn about the axis, °
-        <input type="number" step={5} value={edit.roll} onInput={event => (scene.edit.value = { ...edit, roll: Number(event.currentTarget.value) || 0, changed: new Set(edit.changed).add("roll") })} />
+        <input
+          type="number"
+          step={5}
+          value={edit.roll}
+          onInput={event =>
+            (scene.edit.value = {
+              ...edit,
+              roll: Number(event.currentTarget.value) || 0,
+              changed: new Set(edit.changed).add("roll"),
+            })
+          }
+        />
       </label>
-      {kind === "segmentation" && <label class="field">
-        Wall shown
-        <select value={edge} onChange={event => setEdge(event.currentTarget.value)}>
-          <option value="apparent">apparent: as the image shows it</option>
-          <option value="anatomical">anatomical: without blur</option>
-        </select>
-      </label>}
-      {kind === "segmentation" && <label class="field">
-        Drawn as by
-        <ReaderChoice common={{ id: "correction-reader" }} text={reader} onText={setReader} />
-      </label>}
-      {problem && <p class="error" role="alert">{problem.text}</p>}
+      {kind === "segmentation" && (
+        <label class="field">
+          Wall shown
+          <select value={edge} onChange={event => setEdge(event.currentTarget.value)}>
+            <option value="apparent">apparent: as the image shows it</option>
+            <option value="anatomical">anatomical: without blur</option>
+          </select>
+        </label>
+      )}
+      {kind === "segmentation" && (
+        <label class="field">
+          Drawn as by
+          <ReaderChoice common={{ id: "correction-reader" }} text={reader} onText={setReader} />
+        </label>
+      )}
+      {problem && (
+        <p class="error" role="alert">
+          {problem.text}
+        </p>
+      )}
       <div class="buttons">
-        <button type="button" class="main" disabled={sending} onClick={() => void send()}>Fit from here</button>
-        <button type="button" class="plain" onClick={() => (scene.edit.value = start(scene, shown))}>Undo changes</button>
+        <button type="button" class="main" disabled={sending} onClick={() => void send()}>
+          Fit from here
+        </button>
+        <button type="button" class="plain" onClick={() => (scene.edit.value = start(scene, shown))}>
+          Undo changes
+        </button>
       </div>
-      <p class="quiet" role="status">{edit.changed.size ? `Changed: ${[...edit.changed].join(", ")}` : "Nothing changed yet"}</p>
+      <p class="quiet" role="status">
+        {edit.changed.size ? `Changed: ${[...edit.changed].join(", ")}` : "Nothing changed yet"}
+      </p>
     </div>
   );
 }

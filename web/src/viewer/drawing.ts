@@ -62,10 +62,21 @@ export interface Box {
 }
 
 /** Paints the slice through `origin` into a rectangle of the context; `tint` changes the pixels of its grid. */
-export function paintVoxels(context: CanvasRenderingContext2D, { voxels, lut, low, high, smooth }: Look, plane: Plane, origin: Vec, box: Box, factor: number, tint?: (pixels: Uint8ClampedArray, grid: Grid) => void): void {
+export function paintVoxels(
+  context: CanvasRenderingContext2D,
+  { voxels, lut, low, high, smooth }: Look,
+  plane: Plane,
+  origin: Vec,
+  box: Box,
+  factor: number,
+  tint?: (pixels: Uint8ClampedArray, grid: Grid) => void,
+): void {
   const finest = voxels.spacing / (smooth ? 3 : 1);
   const step = Math.max(finest, 1 / factor);
-  const [nx, ny] = [Math.max(1, Math.ceil(box.width / factor / step)), Math.max(1, Math.ceil(box.height / factor / step))];
+  const [nx, ny] = [
+    Math.max(1, Math.ceil(box.width / factor / step)),
+    Math.max(1, Math.ceil(box.height / factor / step)),
+  ];
   const values = sample(voxels, plane, origin, nx, ny, step);
   const image = new ImageData(nx, ny);
   const gain = 255 / (high - low || 1);
@@ -80,33 +91,75 @@ export function paintVoxels(context: CanvasRenderingContext2D, { voxels, lut, lo
     pixels[4 * n + 3] = 255;
   }
   tint?.(pixels, { nx, ny, step });
-  if (scratch.width < nx || scratch.height < ny) Object.assign(scratch, { width: Math.max(nx, scratch.width), height: Math.max(ny, scratch.height) });
+  if (scratch.width < nx || scratch.height < ny)
+    Object.assign(scratch, { width: Math.max(nx, scratch.width), height: Math.max(ny, scratch.height) });
   scratch.getContext("2d")?.putImageData(image, 0, 0);
   context.imageSmoothingEnabled = smooth;
   const [width, height] = [nx * step * factor, ny * step * factor];
-  context.drawImage(scratch, 0, 0, nx, ny, box.x + (box.width - width) / 2, box.y + (box.height - height) / 2, width, height);
+  context.drawImage(
+    scratch,
+    0,
+    0,
+    nx,
+    ny,
+    box.x + (box.width - width) / 2,
+    box.y + (box.height - height) / 2,
+    width,
+    height,
+  );
 }
 
 /** Paints the slice of a scene. */
-export function paint(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, origin: Vec, box: Box, factor: number): void {
+export function paint(
+  context: CanvasRenderingContext2D,
+  scene: Scene,
+  plane: Plane,
+  origin: Vec,
+  box: Box,
+  factor: number,
+): void {
   const look = { voxels: scene.voxels, lut: scene.lut.value, ...scene.windowNow, smooth: scene.smooth.value };
   const difference = scene.difference.value;
-  paintVoxels(context, look, plane, origin, box, factor, difference ? (pixels, { nx, ny, step }) => {
-    const [fit, other] = [difference.fit, difference.other].map(voxels => sample(voxels, plane, origin, nx, ny, step));
-    for (let n = 0; n < nx * ny; n++) {
-      const [a, b] = [fit![n]! > 0.5, other![n]! > 0.5];
-      if (a === b) continue;
-      const tint = a ? [255, 140, 0] : [40, 170, 255];
-      for (let channel = 0; channel < 3; channel++) pixels[4 * n + channel] = 0.4 * pixels[4 * n + channel]! + 0.6 * tint[channel]!;
-    }
-  } : undefined);
+  paintVoxels(
+    context,
+    look,
+    plane,
+    origin,
+    box,
+    factor,
+    difference
+      ? (pixels, { nx, ny, step }) => {
+          const [fit, other] = [difference.fit, difference.other].map(voxels =>
+            sample(voxels, plane, origin, nx, ny, step),
+          );
+          for (let n = 0; n < nx * ny; n++) {
+            const [a, b] = [fit![n]! > 0.5, other![n]! > 0.5];
+            if (a === b) continue;
+            const tint = a ? [255, 140, 0] : [40, 170, 255];
+            for (let channel = 0; channel < 3; channel++)
+              pixels[4 * n + channel] = 0.4 * pixels[4 * n + channel]! + 0.6 * tint[channel]!;
+          }
+        }
+      : undefined,
+  );
 }
 
 /** Strokes the contours of the layers; the context's origin is the slice's, in CSS pixels. */
-export function contours(context: CanvasRenderingContext2D, layers: Layer[], plane: Plane, origin: Vec, factor: number, reach: number): void {
+export function contours(
+  context: CanvasRenderingContext2D,
+  layers: Layer[],
+  plane: Plane,
+  origin: Vec,
+  factor: number,
+  reach: number,
+): void {
   for (const layer of layers) {
     if (!layer.shown) continue;
-    const ends = layer.mesh ? outline(layer.mesh, plane, origin) : layer.mask ? marched(layer.mask, plane, origin, reach) : null;
+    const ends = layer.mesh
+      ? outline(layer.mesh, plane, origin)
+      : layer.mask
+        ? marched(layer.mask, plane, origin, reach)
+        : null;
     if (!ends?.length) continue;
     context.beginPath();
     for (let n = 0; n < ends.length; n += 4) {
@@ -135,7 +188,12 @@ function marched(mask: Voxels, plane: Plane, origin: Vec, reach: number): Float3
   const at = (x: number) => (x + 0.5 - n / 2) * step;
   for (let y = 0; y + 1 < n; y++) {
     for (let x = 0; x + 1 < n; x++) {
-      const corners: [number, number, number][] = [[x, y, value(x, y)], [x + 1, y, value(x + 1, y)], [x + 1, y + 1, value(x + 1, y + 1)], [x, y + 1, value(x, y + 1)]];
+      const corners: [number, number, number][] = [
+        [x, y, value(x, y)],
+        [x + 1, y, value(x + 1, y)],
+        [x + 1, y + 1, value(x + 1, y + 1)],
+        [x, y + 1, value(x, y + 1)],
+      ];
       const ends: number[] = [];
       for (let e = 0; e < 4; e++) {
         const [a, b] = [corners[e]!, corners[(e + 1) % 4]!];
@@ -150,7 +208,14 @@ function marched(mask: Voxels, plane: Plane, origin: Vec, reach: number): Float3
   return new Float32Array(out);
 }
 
-export function label(context: CanvasRenderingContext2D, text: string, x: number, y: number, align: CanvasTextAlign = "center", size = 12): void {
+export function label(
+  context: CanvasRenderingContext2D,
+  text: string,
+  x: number,
+  y: number,
+  align: CanvasTextAlign = "center",
+  size = 12,
+): void {
   context.font = `600 ${size}px system-ui, sans-serif`;
   context.textAlign = align;
   context.textBaseline = "middle";
@@ -183,11 +248,17 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
     context.strokeStyle = "rgba(77,227,255,.75)";
     context.lineWidth = 1;
     context.beginPath();
-    for (const [a, b] of [[-width, x - 9], [x + 9, width]] as const) {
+    for (const [a, b] of [
+      [-width, x - 9],
+      [x + 9, width],
+    ] as const) {
       context.moveTo(a, y);
       context.lineTo(b, y);
     }
-    for (const [a, b] of [[-height, y - 9], [y + 9, height]] as const) {
+    for (const [a, b] of [
+      [-height, y - 9],
+      [y + 9, height],
+    ] as const) {
       context.moveTo(x, a);
       context.lineTo(x, b);
     }
@@ -196,8 +267,15 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
   if (style.cursor && scene.edit.value && scene.tool.value === "correct") handles(context, scene, plane, flat);
   context.restore();
   if (!style.letters) return;
-  const [left, right, top, bottom] = plane.sides ?? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)];
-  const patient = plane.sides ? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)] : ["", "", "", ""];
+  const [left, right, top, bottom] = plane.sides ?? [
+    letters(scale(plane.right, -1)),
+    letters(plane.right),
+    letters(scale(plane.down, -1)),
+    letters(plane.down),
+  ];
+  const patient = plane.sides
+    ? [letters(scale(plane.right, -1)), letters(plane.right), letters(scale(plane.down, -1)), letters(plane.down)]
+    : ["", "", "", ""];
   label(context, left, 8, height / 2, "left");
   label(context, right, width - 8, height / 2, "right");
   label(context, top, width / 2, 11);
@@ -227,13 +305,21 @@ export function drawSlice(element: HTMLCanvasElement, scene: Scene, plane: Plane
 /** Half the length of the line that stands for the plane of the base, mm. */
 const HALF_BASE = 32;
 
-function handles(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, flat: (place: Vec) => [number, number]): void {
+function handles(
+  context: CanvasRenderingContext2D,
+  scene: Scene,
+  plane: Plane,
+  flat: (place: Vec) => [number, number],
+): void {
   const edit = scene.edit.value;
   if (!edit) return;
   const knob = rollKnob(scene, plane);
   const [base, apex, center] = [flat(edit.base), flat(edit.apex), flat(edit.center)];
   const line = (a: [number, number], b: [number, number]) => {
-    for (const [stroke, width] of [["rgba(0,0,0,.7)", 4], ["#ffe45c", 2]] as const) {
+    for (const [stroke, width] of [
+      ["rgba(0,0,0,.7)", 4],
+      ["#ffe45c", 2],
+    ] as const) {
       context.strokeStyle = stroke;
       context.lineWidth = width;
       context.beginPath();
@@ -262,7 +348,9 @@ function handles(context: CanvasRenderingContext2D, scene: Scene, plane: Plane, 
     const along = [dot(axis, plane.right), dot(axis, plane.down)] as const;
     const length = Math.hypot(...along);
     if (length > 0.2) {
-      const half = HALF_BASE * (Math.hypot(apex[0] - base[0], apex[1] - base[1]) / length / Math.hypot(...sub(edit.apex, edit.base)));
+      const half =
+        HALF_BASE *
+        (Math.hypot(apex[0] - base[0], apex[1] - base[1]) / length / Math.hypot(...sub(edit.apex, edit.base)));
       const [x, y] = [(-along[1] / length) * half, (along[0] / length) * half];
       line([base[0] - x, base[1] - y], [base[0] + x, base[1] + y]);
     }

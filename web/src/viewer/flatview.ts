@@ -21,7 +21,10 @@ export class FlatView implements MeshPainter {
   camera: Camera = usualCamera();
 
   /** `ground` is the colour behind the meshes; none if it is empty. */
-  constructor(readonly canvas: HTMLCanvasElement, private readonly ground = "#090d0f") {}
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly ground = "#090d0f",
+  ) {}
 
   setSurface(name: string, mesh: Mesh, colours: Float32Array): void {
     const corner = (at: number): Corner => ({
@@ -71,17 +74,23 @@ export class FlatView implements MeshPainter {
     const depth = (place: Vec) => dot(place, camera.toward);
     const strokes: [number, () => void][] = [];
     for (const corners of [...this.surfaces.values()].flat()) {
-      strokes.push([corners.reduce((sum, { place }) => sum + depth(place), 0) / 3, () => {
-        const normal = unit(corners.reduce<Vec>((sum, corner) => add(sum, corner.normal), [0, 0, 0]));
-        const colour = corners.reduce<Vec>((sum, corner) => add(sum, corner.colour), [0, 0, 0]);
-        context.fillStyle = rgb(scale(colour, light(camera, normal) / 3));
-        // A thin line of the same colour closes the seams between neighbours.
-        context.strokeStyle = context.fillStyle;
-        context.lineWidth = 1;
-        outline(context, corners.map(({ place }) => flat(place)));
-        context.fill();
-        context.stroke();
-      }]);
+      strokes.push([
+        corners.reduce((sum, { place }) => sum + depth(place), 0) / 3,
+        () => {
+          const normal = unit(corners.reduce<Vec>((sum, corner) => add(sum, corner.normal), [0, 0, 0]));
+          const colour = corners.reduce<Vec>((sum, corner) => add(sum, corner.colour), [0, 0, 0]);
+          context.fillStyle = rgb(scale(colour, light(camera, normal) / 3));
+          // A thin line of the same colour closes the seams between neighbours.
+          context.strokeStyle = context.fillStyle;
+          context.lineWidth = 1;
+          outline(
+            context,
+            corners.map(({ place }) => flat(place)),
+          );
+          context.fill();
+          context.stroke();
+        },
+      ]);
     }
     for (const { mesh, colour } of this.wires.values()) {
       for (const triangle of mesh.triangles) {
@@ -89,12 +98,15 @@ export class FlatView implements MeshPainter {
         const [p, q, r] = corners as [Vec, Vec, Vec];
         if (depth(cross(sub(q, p), sub(r, p))) <= 0) continue;
         // After every part of its own triangle, before what hides it.
-        strokes.push([Math.max(...corners.map(depth)), () => {
-          context.strokeStyle = rgb(colour);
-          context.lineWidth = Math.max(0.5, Math.min(1.5, height / 300));
-          outline(context, corners.map(flat));
-          context.stroke();
-        }]);
+        strokes.push([
+          Math.max(...corners.map(depth)),
+          () => {
+            context.strokeStyle = rgb(colour);
+            context.lineWidth = Math.max(0.5, Math.min(1.5, height / 300));
+            outline(context, corners.map(flat));
+            context.stroke();
+          },
+        ]);
       }
     }
     strokes.sort((a, b) => a[0] - b[0]);
@@ -125,5 +137,10 @@ function quartered([a, b, c]: [Corner, Corner, Corner]): [Corner, Corner, Corner
     colour: mix(p.colour, q.colour, 0.5),
   });
   const [ab, bc, ca] = [between(a, b), between(b, c), between(c, a)];
-  return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+  return [
+    [a, ab, ca],
+    [ab, b, bc],
+    [ca, bc, c],
+    [ab, bc, ca],
+  ];
 }

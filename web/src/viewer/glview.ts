@@ -42,7 +42,10 @@ export class MeshView implements MeshPainter {
     if (!gl) throw new Error("no WebGL");
     this.gl = gl;
     const program = gl.createProgram();
-    for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]] as const) {
+    for (const [type, source] of [
+      [gl.VERTEX_SHADER, VERTEX],
+      [gl.FRAGMENT_SHADER, FRAGMENT],
+    ] as const) {
       const shader = gl.createShader(type);
       if (!shader || !program) throw new Error("no WebGL");
       gl.shaderSource(shader, source);
@@ -56,8 +59,15 @@ export class MeshView implements MeshPainter {
 
   setSurface(name: string, mesh: Mesh, colours: Float32Array): void {
     const corners = mesh.triangles.flat();
-    const gather = (value: (at: number) => ArrayLike<number>) => Float32Array.from(corners.flatMap(at => Array.from(value(at))));
-    this.put(name, "triangles", gather(at => mesh.vertices[at]!), gather(at => mesh.normals[at]!), gather(at => colours.subarray(3 * at, 3 * at + 3)));
+    const gather = (value: (at: number) => ArrayLike<number>) =>
+      Float32Array.from(corners.flatMap(at => Array.from(value(at))));
+    this.put(
+      name,
+      "triangles",
+      gather(at => mesh.vertices[at]!),
+      gather(at => mesh.normals[at]!),
+      gather(at => colours.subarray(3 * at, 3 * at + 3)),
+    );
   }
 
   setWire(name: string, mesh: Mesh, colour: Vec): void {
@@ -86,7 +96,13 @@ export class MeshView implements MeshPainter {
       this.gl.bufferData(this.gl.ARRAY_BUFFER, data, this.gl.STATIC_DRAW);
       return made as WebGLBuffer;
     };
-    this.parts.set(name, { mode, count: place.length / 3, place: buffer(place), normal: buffer(normal), colour: buffer(colour) });
+    this.parts.set(name, {
+      mode,
+      count: place.length / 3,
+      place: buffer(place),
+      normal: buffer(normal),
+      colour: buffer(colour),
+    });
   }
 
   draw(): void {
@@ -100,7 +116,11 @@ export class MeshView implements MeshPainter {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.useProgram(this.program);
-    const rows: [Vec, number][] = [[right, 2 / (height * ratio)], [up, 2 / height], [toward, -1 / 400]];
+    const rows: [Vec, number][] = [
+      [right, 2 / (height * ratio)],
+      [up, 2 / height],
+      [toward, -1 / 400],
+    ];
     const view = new Float32Array(16);
     rows.forEach(([axis, factor], row) => {
       for (let column = 0; column < 3; column++) view[4 * column + row] = axis[column]! * factor;
@@ -121,7 +141,11 @@ export class MeshView implements MeshPainter {
         gl.vertexAttribPointer(at, 3, gl.FLOAT, false, 0, 0);
       }
       if (part.mode === "points") gl.disable(gl.DEPTH_TEST);
-      gl.drawArrays(part.mode === "triangles" ? gl.TRIANGLES : part.mode === "lines" ? gl.LINES : gl.POINTS, 0, part.count);
+      gl.drawArrays(
+        part.mode === "triangles" ? gl.TRIANGLES : part.mode === "lines" ? gl.LINES : gl.POINTS,
+        0,
+        part.count,
+      );
       gl.enable(gl.DEPTH_TEST);
     }
   }

@@ -18,7 +18,11 @@ import { type Vec, add, dot, scale, sub } from "./vector";
 /** The side of the picture by the diameter of the sphere that holds the wall: letters stand beside it. */
 const MARGIN = 1.22;
 /** A segment in the middle of each artery's territory. */
-const TERRITORIES = [["LAD", 7], ["LCX", 12], ["RCA", 10]] as const;
+const TERRITORIES = [
+  ["LAD", 7],
+  ["LCX", 12],
+  ["RCA", 10],
+] as const;
 
 /** The cosine of the angle to the eye from which a side counts as the far one. */
 const FAR_SIDE = -0.35;
@@ -37,12 +41,21 @@ function lettersOf(one: ComparedHeart): Letter[] {
   if (!one.heart || !one.oriented || !frame || !one.polar) return [];
   const { axis, anterior, lateral } = frameOf(one.heart);
   const base = frame.base;
-  const widest = Math.max(...one.mesh.vertices.map(vertex => {
-    const from = sub(vertex, base);
-    return Math.hypot(...sub(from, scale(axis, dot(from, axis))));
-  }));
-  const sides: [string, Vec][] = [["A", anterior], ["S", scale(lateral, -1)], ["L", lateral], ["I", scale(anterior, -1)]];
-  const letters = sides.map(([text, side]): Letter => ({ text, place: add(base, scale(side, widest + 7)), outward: side, size: 14 }));
+  const widest = Math.max(
+    ...one.mesh.vertices.map(vertex => {
+      const from = sub(vertex, base);
+      return Math.hypot(...sub(from, scale(axis, dot(from, axis))));
+    }),
+  );
+  const sides: [string, Vec][] = [
+    ["A", anterior],
+    ["S", scale(lateral, -1)],
+    ["L", lateral],
+    ["I", scale(anterior, -1)],
+  ];
+  const letters = sides.map(
+    ([text, side]): Letter => ({ text, place: add(base, scale(side, widest + 7)), outward: side, size: 14 }),
+  );
   for (const [text, segment] of TERRITORIES) {
     const [rows, columns] = middleOfSegment(one.polar, segment);
     const place = frame.at(rows, columns);
@@ -59,12 +72,19 @@ export function cameraOf({ mesh, heart }: ComparedHeart, seen: { toward: Vec; up
   const span = 2 * reach * MARGIN;
   if (!heart) return { ...usualCamera(), target, span };
   const frame: Frame = frameOf(heart);
-  const inPatient = ([x, y, z]: Vec): Vec => add(add(scale(frame.lateral, x), scale(frame.anterior, y)), scale(frame.axis, z));
+  const inPatient = ([x, y, z]: Vec): Vec =>
+    add(add(scale(frame.lateral, x), scale(frame.anterior, y)), scale(frame.axis, z));
   return { toward: inPatient(seen.toward), up: inPatient(seen.up), target, span };
 }
 
 /** Writes the letters over a drawn wall; those of the far side are hidden with it. */
-function write(context: CanvasRenderingContext2D, one: ComparedHeart, camera: Camera, width: number, height: number): void {
+function write(
+  context: CanvasRenderingContext2D,
+  one: ComparedHeart,
+  camera: Camera,
+  width: number,
+  height: number,
+): void {
   for (const { text, place, outward, size } of lettersOf(one)) {
     const facing = dot(outward, camera.toward);
     // A territory's name lies on the wall, a side's letter beside it.
@@ -75,7 +95,14 @@ function write(context: CanvasRenderingContext2D, one: ComparedHeart, camera: Ca
 }
 
 /** Draws wall and letters on paper. */
-export function drawWall(element: HTMLCanvasElement, one: ComparedHeart, colours: Float32Array, seen: { toward: Vec; up: Vec }, size: number, ratio: number): void {
+export function drawWall(
+  element: HTMLCanvasElement,
+  one: ComparedHeart,
+  colours: Float32Array,
+  seen: { toward: Vec; up: Vec },
+  size: number,
+  ratio: number,
+): void {
   const view = new FlatView(element, "#0a0e11");
   view.camera = cameraOf(one, seen);
   view.setSurface("wall", one.mesh, colours);
@@ -104,7 +131,8 @@ export function HeartWall({ one, scene, colours, title }: Props) {
     if (!made || !letters) return;
     made.camera = cameraOf(one, scene.seen.value);
     made.draw();
-    if (letters.width !== element.width || letters.height !== element.height) Object.assign(letters, { width: element.width, height: element.height });
+    if (letters.width !== element.width || letters.height !== element.height)
+      Object.assign(letters, { width: element.width, height: element.height });
     const context = letters.getContext("2d");
     if (!context) return;
     const ratio = element.width / element.clientWidth;
@@ -144,7 +172,12 @@ export function HeartWall({ one, scene, colours, title }: Props) {
       pointercancel: () => (before = null),
       dblclick: () => (scene.seen.value = FROM_FRONT),
       keydown: event => {
-        const ways: Record<string, [number, number]> = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
+        const ways: Record<string, [number, number]> = {
+          ArrowLeft: [-12, 0],
+          ArrowRight: [12, 0],
+          ArrowUp: [0, -12],
+          ArrowDown: [0, 12],
+        };
         const way = ways[event.key];
         if (!way) return;
         event.preventDefault();
@@ -164,7 +197,15 @@ export function HeartWall({ one, scene, colours, title }: Props) {
   }, [one, colours, plain]);
   return (
     <figure class="wall heart-wall">
-      <canvas key={plain} ref={canvas} tabIndex={0} role="slider" aria-label={`The wall in three dimensions, ${title}; arrow keys turn both`} aria-valuenow={0} aria-valuetext="turned with the other" />
+      <canvas
+        key={plain}
+        ref={canvas}
+        tabIndex={0}
+        role="slider"
+        aria-label={`The wall in three dimensions, ${title}; arrow keys turn both`}
+        aria-valuenow={0}
+        aria-valuetext="turned with the other"
+      />
       <canvas ref={over} class="letters" aria-hidden="true" />
       <p class="tag">{title}</p>
     </figure>

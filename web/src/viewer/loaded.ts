@@ -62,7 +62,11 @@ export function voxelsOf(volume: Pick<Volume, "id" | "frames">, frame: number | 
 }
 
 /** The voxels of every gate of a volume, one after the other; `told` has those that were read. */
-export async function readGates({ id }: Pick<Volume, "id">, gates: number, told: (read: (Voxels | null)[]) => boolean): Promise<void> {
+export async function readGates(
+  { id }: Pick<Volume, "id">,
+  gates: number,
+  told: (read: (Voxels | null)[]) => boolean,
+): Promise<void> {
   const read: (Voxels | null)[] = new Array<null>(gates).fill(null);
   for (let gate = 0; gate < gates; gate++) {
     read[gate] = await loadVoxels(`/v1/volumes/${id}/voxels.nii.gz?frame=${gate}`);
@@ -75,7 +79,9 @@ async function loadBeat(result: Result): Promise<Loaded> {
   const report = await json<BeatReport>("beat.json");
   if (!report) throw new Error("This beat has no report.");
   const [meshes, polar, ed, es, ...figures] = await Promise.all([
-    Promise.all(report.gates.map(({ gate }) => get<Mesh>(file(`mesh_gate${String(gate).padStart(2, "0")}.json`)?.href ?? ""))),
+    Promise.all(
+      report.gates.map(({ gate }) => get<Mesh>(file(`mesh_gate${String(gate).padStart(2, "0")}.json`)?.href ?? "")),
+    ),
     json<PolarMap>("polar.json"),
     json<PolarMap>("polar_ed.json"),
     json<PolarMap>("polar_es.json"),

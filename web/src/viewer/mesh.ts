@@ -23,7 +23,12 @@ export function withNormals(vertices: Vec[], triangles: Mesh["triangles"]): Mesh
 
 /** The mean of meshes with the same triangles. */
 export function meanOf(meshes: Mesh[]): Mesh {
-  const vertices = meshes[0]!.vertices.map((_, at) => scale(meshes.reduce<Vec>((sum, mesh) => add(sum, mesh.vertices[at]!), [0, 0, 0]), 1 / meshes.length));
+  const vertices = meshes[0]!.vertices.map((_, at) =>
+    scale(
+      meshes.reduce<Vec>((sum, mesh) => add(sum, mesh.vertices[at]!), [0, 0, 0]),
+      1 / meshes.length,
+    ),
+  );
   return withNormals(vertices, meshes[0]!.triangles);
 }
 
@@ -33,7 +38,11 @@ export function between(gates: Mesh[], turns: number): Mesh {
   const [from, to] = [Math.floor(place), Math.floor(place) + 1].map(n => gates[n % gates.length]!) as [Mesh, Mesh];
   const share = place - Math.floor(place);
   const mixed = (a: Vec[], b: Vec[]) => a.map((one, at) => mix(one, b[at]!, share));
-  return { vertices: mixed(from.vertices, to.vertices), triangles: from.triangles, normals: mixed(from.normals, to.normals).map(unit) };
+  return {
+    vertices: mixed(from.vertices, to.vertices),
+    triangles: from.triangles,
+    normals: mixed(from.normals, to.normals).map(unit),
+  };
 }
 
 /** Where the mesh cuts the plane through `origin`: pairs of points in the plane's own millimetres. */
@@ -55,7 +64,10 @@ export function outline(mesh: Mesh, plane: Plane, origin: Vec): Float32Array {
       const [p, q] = [side[a]!, side[b]!];
       if (p < 0 === q < 0) continue;
       const t = p / (p - q);
-      ends.push(flat[2 * a]! + t * (flat[2 * b]! - flat[2 * a]!), flat[2 * a + 1]! + t * (flat[2 * b + 1]! - flat[2 * a + 1]!));
+      ends.push(
+        flat[2 * a]! + t * (flat[2 * b]! - flat[2 * a]!),
+        flat[2 * a + 1]! + t * (flat[2 * b + 1]! - flat[2 * a + 1]!),
+      );
     }
     if (ends.length === 4) out.push(...ends);
   }
@@ -125,7 +137,11 @@ export function apart(mesh: Mesh, other: Mesh): Float32Array {
 /** The point of a triangle that is nearest to `x` (Ericson, Real-Time Collision Detection, 5.1.5). */
 function nearest(x: Vec, a: Vec, b: Vec, c: Vec): Vec {
   const [ab, ac, ap] = [sub(b, a), sub(c, a), sub(x, a)];
-  const at = (v: number, w: number): Vec => [a[0] + ab[0] * v + ac[0] * w, a[1] + ab[1] * v + ac[1] * w, a[2] + ab[2] * v + ac[2] * w];
+  const at = (v: number, w: number): Vec => [
+    a[0] + ab[0] * v + ac[0] * w,
+    a[1] + ab[1] * v + ac[1] * w,
+    a[2] + ab[2] * v + ac[2] * w,
+  ];
   const [d1, d2] = [dot(ab, ap), dot(ac, ap)];
   if (d1 <= 0 && d2 <= 0) return a;
   const bp = sub(x, b);

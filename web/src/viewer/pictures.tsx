@@ -43,7 +43,10 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
   // Each result brings its contours and its axis; the cursor goes to the heart the first time.
   useEffect(() => {
     const before = new Map(scene.layers.value.map(layer => [layer.name, layer.shown]));
-    scene.layers.value = layersOf(shown, other).map(layer => ({ ...layer, shown: before.get(layer.name) ?? layer.shown }));
+    scene.layers.value = layersOf(shown, other).map(layer => ({
+      ...layer,
+      shown: before.get(layer.name) ?? layer.shown,
+    }));
     scene.difference.value = null;
     const first = scene.heart.value === null;
     scene.heart.value = shown?.heart ?? other?.heart ?? scene.heart.value;
@@ -59,13 +62,16 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
   const aligned = heart && heartAligned;
   const planes = useMemo(() => (aligned ? heartPlanes(heart) : PATIENT), [aligned, heart]);
   const short = useMemo(() => (heart ? heartPlanes(heart)[0]! : null), [heart]);
-  const toggle = (name: string) => (scene.layers.value = layers.map(layer => (layer.name === name ? { ...layer, shown: !layer.shown } : layer)));
-  const masks = shown?.mask && (other?.mask ?? shown.expert) ? { fit: shown.mask, other: (other?.mask ?? shown.expert)! } : null;
+  const toggle = (name: string) =>
+    (scene.layers.value = layers.map(layer => (layer.name === name ? { ...layer, shown: !layer.shown } : layer)));
+  const masks =
+    shown?.mask && (other?.mask ?? shown.expert) ? { fit: shown.mask, other: (other?.mask ?? shown.expert)! } : null;
 
   useEffect(() => {
     const press = (event: KeyboardEvent) => {
       const target = event.target as HTMLElement;
-      if (event.ctrlKey || event.metaKey || event.altKey || ["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName)) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || ["INPUT", "SELECT", "TEXTAREA"].includes(target.tagName))
+        return;
       const keys: Record<string, () => void> = {
         h: () => setHeartAligned(now => !now),
         c: () => {
@@ -85,33 +91,87 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
   }, [scene]);
 
   const range = scene.still.highest - Math.min(0, scene.still.lowest);
-  const tools: [Tool, string][] = [["cursor", "Point"], ["window", "Window"], ["move", "Move"]];
+  const tools: [Tool, string][] = [
+    ["cursor", "Point"],
+    ["window", "Window"],
+    ["move", "Move"],
+  ];
   return (
     <div class="pictures" ref={stage}>
       <div class="toolbar" role="toolbar" aria-label="How to look">
         <span class="choice" role="group" aria-label="Planes">
-          <button type="button" aria-pressed={Boolean(aligned)} disabled={!heart} onClick={() => setHeartAligned(true)}>Heart</button>
-          <button type="button" aria-pressed={!aligned} onClick={() => setHeartAligned(false)}>Patient</button>
+          <button type="button" aria-pressed={Boolean(aligned)} disabled={!heart} onClick={() => setHeartAligned(true)}>
+            Heart
+          </button>
+          <button type="button" aria-pressed={!aligned} onClick={() => setHeartAligned(false)}>
+            Patient
+          </button>
         </span>
         <span class="choice" role="group" aria-label="What a drag does">
-          {tools.map(([name, text]) => <button key={name} type="button" aria-pressed={tool === name || (name === "cursor" && tool === "correct")} onClick={() => (scene.tool.value = name === "cursor" && edit ? "correct" : name)}>{text}</button>)}
+          {tools.map(([name, text]) => (
+            <button
+              key={name}
+              type="button"
+              aria-pressed={tool === name || (name === "cursor" && tool === "correct")}
+              onClick={() => (scene.tool.value = name === "cursor" && edit ? "correct" : name)}>
+              {text}
+            </button>
+          ))}
         </span>
         <label class="inline">
-          <select aria-label="Colours" value={Object.keys(LUTS).find(name => LUTS[name] === lut)} onChange={event => {
-            scene.lut.value = LUTS[event.currentTarget.value]!;
-            keep(LUT, event.currentTarget.value);
-          }}>
-            {Object.keys(LUTS).map(name => <option key={name}>{name}</option>)}
+          <select
+            aria-label="Colours"
+            value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
+            onChange={event => {
+              scene.lut.value = LUTS[event.currentTarget.value]!;
+              keep(LUT, event.currentTarget.value);
+            }}>
+            {Object.keys(LUTS).map(name => (
+              <option key={name}>{name}</option>
+            ))}
           </select>
         </label>
         <label class="inline brightness">
           <ColourBar lut={lut} low={counts(window_.low)} high={counts(window_.high)} />
-          <input type="range" aria-label="Brightest value" min={1} max={130} value={Math.round((100 * window_.high) / (range || 1))} onInput={event => (scene.window.value = { low: window_.low, high: (range * Number(event.currentTarget.value)) / 100 })} />
+          <input
+            type="range"
+            aria-label="Brightest value"
+            min={1}
+            max={130}
+            value={Math.round((100 * window_.high) / (range || 1))}
+            onInput={event =>
+              (scene.window.value = { low: window_.low, high: (range * Number(event.currentTarget.value)) / 100 })
+            }
+          />
         </label>
         <span class="end">
-          <button type="button" class="plain" title="Screenshot" aria-label="Screenshot" onClick={() => stage.current && screenshot(stage.current, name)}><Icon d="M3 6h3l1-2h6l1 2h3v10H3zM10 8a3 3 0 1 0 .01 0" /></button>
-          <button type="button" class="plain" onClick={() => void (document.fullscreenElement ? document.exitFullscreen() : stage.current?.requestFullscreen())} title="Full screen" aria-label="Full screen"><Icon d="M3 8V3h5M12 3h5v5M17 12v5h-5M8 17H3v-5" /></button>
-          <button type="button" class="plain" title="Keys and mouse" aria-label="Keys and mouse" aria-expanded={help} onClick={() => setHelp(!help)}>?</button>
+          <button
+            type="button"
+            class="plain"
+            title="Screenshot"
+            aria-label="Screenshot"
+            onClick={() => stage.current && screenshot(stage.current, name)}>
+            <Icon d="M3 6h3l1-2h6l1 2h3v10H3zM10 8a3 3 0 1 0 .01 0" />
+          </button>
+          <button
+            type="button"
+            class="plain"
+            onClick={() =>
+              void (document.fullscreenElement ? document.exitFullscreen() : stage.current?.requestFullscreen())
+            }
+            title="Full screen"
+            aria-label="Full screen">
+            <Icon d="M3 8V3h5M12 3h5v5M17 12v5h-5M8 17H3v-5" />
+          </button>
+          <button
+            type="button"
+            class="plain"
+            title="Keys and mouse"
+            aria-label="Keys and mouse"
+            aria-expanded={help}
+            onClick={() => setHelp(!help)}>
+            ?
+          </button>
         </span>
       </div>
       {help && <Keys />}
@@ -126,25 +186,53 @@ export function Pictures({ scene, name, shown, other, empty, children }: Props) 
           ))}
           {masks && (
             <label class="inline">
-              <input type="checkbox" checked={difference !== null} onChange={event => (scene.difference.value = event.currentTarget.checked ? masks : null)} />
-              difference <span class="quiet"><span class="only here" /> only here <span class="only there" /> only {other?.mask ? "compared" : "expert"}</span>
+              <input
+                type="checkbox"
+                checked={difference !== null}
+                onChange={event => (scene.difference.value = event.currentTarget.checked ? masks : null)}
+              />
+              difference{" "}
+              <span class="quiet">
+                <span class="only here" /> only here <span class="only there" /> only{" "}
+                {other?.mask ? "compared" : "expert"}
+              </span>
             </label>
           )}
-          {other && <label class="inline"><input type="checkbox" checked={aside} onChange={event => setAside(event.currentTarget.checked)} /> walls side by side</label>}
-          <label class="inline"><input type="checkbox" checked={smooth} onChange={event => (scene.smooth.value = event.currentTarget.checked)} /> smooth</label>
+          {other && (
+            <label class="inline">
+              <input type="checkbox" checked={aside} onChange={event => setAside(event.currentTarget.checked)} /> walls
+              side by side
+            </label>
+          )}
+          <label class="inline">
+            <input
+              type="checkbox"
+              checked={smooth}
+              onChange={event => (scene.smooth.value = event.currentTarget.checked)}
+            />{" "}
+            smooth
+          </label>
         </div>
       )}
       {children}
       <div class={`grid${big === null ? "" : " one"}`}>
-        {planes.map((plane, n) => (big === null || big === n) && <Slice key={n} scene={scene} plane={plane} onBig={() => setBig(big === n ? null : n)} />)}
-        {(big === null || big === 3) && (shown && other && aside ? (
-          <div class="pair">
-            <Wall scene={scene} {...wallOf(shown)} other={null} title="shown" />
-            <Wall scene={scene} {...wallOf(other)} other={null} title="compared" follows />
-          </div>
-        ) : shown ? (
-          <Wall scene={scene} {...wallOf(shown)} other={other?.mesh ?? null} />
-        ) : <div class="off">{empty}</div>)}
+        {planes.map(
+          (plane, n) =>
+            (big === null || big === n) && (
+              <Slice key={n} scene={scene} plane={plane} onBig={() => setBig(big === n ? null : n)} />
+            ),
+        )}
+        {(big === null || big === 3) &&
+          (shown && other && aside ? (
+            <div class="pair">
+              <Wall scene={scene} {...wallOf(shown)} other={null} title="shown" />
+              <Wall scene={scene} {...wallOf(other)} other={null} title="compared" follows />
+            </div>
+          ) : shown ? (
+            <Wall scene={scene} {...wallOf(shown)} other={other?.mesh ?? null} />
+          ) : (
+            <div class="off">{empty}</div>
+          ))}
       </div>
       {short && <Stack scene={scene} plane={short} />}
     </div>
@@ -156,11 +244,27 @@ function wallOf({ mesh, gates, figures, otherEdge, polar, displacement, surface 
 }
 
 function Swatch({ layer }: { layer: Layer }) {
-  return <svg class="swatch" viewBox="0 0 18 6" aria-hidden="true"><line x1="1" y1="3" x2="17" y2="3" stroke={layer.colour} stroke-width="3" stroke-dasharray={layer.dashed ? "3 3" : undefined} /></svg>;
+  return (
+    <svg class="swatch" viewBox="0 0 18 6" aria-hidden="true">
+      <line
+        x1="1"
+        y1="3"
+        x2="17"
+        y2="3"
+        stroke={layer.colour}
+        stroke-width="3"
+        stroke-dasharray={layer.dashed ? "3 3" : undefined}
+      />
+    </svg>
+  );
 }
 
 function Icon({ d }: { d: string }) {
-  return <svg class="icon" viewBox="0 0 20 20" aria-hidden="true"><path d={d} /></svg>;
+  return (
+    <svg class="icon" viewBox="0 0 20 20" aria-hidden="true">
+      <path d={d} />
+    </svg>
+  );
 }
 
 function Keys() {
@@ -178,5 +282,14 @@ function Keys() {
     ["F", "full screen"],
     ["Space, arrows outside of the views", "a beat: play and pause, gate by gate"],
   ];
-  return <dl class="keys">{rows.map(([key, what]) => <div key={key}><dt>{key}</dt><dd>{what}</dd></div>)}</dl>;
+  return (
+    <dl class="keys">
+      {rows.map(([key, what]) => (
+        <div key={key}>
+          <dt>{key}</dt>
+          <dd>{what}</dd>
+        </div>
+      ))}
+    </dl>
+  );
 }

@@ -51,17 +51,43 @@ export function frameOf({ base, apex, superior }: Axis): Frame {
 export function heartPlanes(heart: Axis): Plane[] {
   const { axis, anterior, lateral } = frameOf(heart);
   const known = heart.superior !== null;
-  const sides = (names: [string, string, string, string]): { sides?: [string, string, string, string] } => (known ? { sides: names } : {});
+  const sides = (names: [string, string, string, string]): { sides?: [string, string, string, string] } =>
+    known ? { sides: names } : {};
   return [
-    { name: "Short axis", short: "SA", right: lateral, down: scale(anterior, -1), normal: axis, ...sides(["Sept", "Lat", "Ant", "Inf"]) },
-    { name: "Horizontal long axis", short: "HLA", right: lateral, down: scale(axis, -1), normal: anterior, ...sides(["Sept", "Lat", "Apex", "Base"]) },
-    { name: "Vertical long axis", short: "VLA", right: axis, down: scale(anterior, -1), normal: lateral, ...sides(["Base", "Apex", "Ant", "Inf"]) },
+    {
+      name: "Short axis",
+      short: "SA",
+      right: lateral,
+      down: scale(anterior, -1),
+      normal: axis,
+      ...sides(["Sept", "Lat", "Ant", "Inf"]),
+    },
+    {
+      name: "Horizontal long axis",
+      short: "HLA",
+      right: lateral,
+      down: scale(axis, -1),
+      normal: anterior,
+      ...sides(["Sept", "Lat", "Apex", "Base"]),
+    },
+    {
+      name: "Vertical long axis",
+      short: "VLA",
+      right: axis,
+      down: scale(anterior, -1),
+      normal: lateral,
+      ...sides(["Base", "Apex", "Ant", "Inf"]),
+    },
   ];
 }
 
 /** The patient's letters for a direction: the main one, and a second if it counts as well. */
 export function letters(direction: Vec): string {
-  const names = [["L", "R"], ["P", "A"], ["S", "I"]];
+  const names = [
+    ["L", "R"],
+    ["P", "A"],
+    ["S", "I"],
+  ];
   return direction
     .map((part, axis): [number, string] => [Math.abs(part), names[axis]![part < 0 ? 1 : 0]!])
     .filter(([size]) => size > 0.4)

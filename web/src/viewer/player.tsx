@@ -44,7 +44,10 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
   }, [scene, report]);
   // Whoever shows another moment, as a press on the curve does, stops the beat there; so does whoever moves the heart.
   useEffect(() => {
-    const ends = [scene.held.watch(() => setPlaying(false)), scene.edit.watch(() => scene.edit.value && setPlaying(false))];
+    const ends = [
+      scene.held.watch(() => setPlaying(false)),
+      scene.edit.watch(() => scene.edit.value && setPlaying(false)),
+    ];
     return () => ends.forEach(end => end());
   }, [scene]);
 
@@ -77,20 +80,44 @@ export function Player({ scene, report }: { scene: Scene; report: BeatReport }) 
   const name = nameOfGate(report, gate);
   return (
     <div class="toolbar player" role="group" aria-label="Beat">
-      <button type="button" class="main" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
+      <button type="button" class="main" onClick={() => setPlaying(!playing)}>
+        {playing ? "Pause" : "Play"}
+      </button>
       <span class="choice">
-        <button type="button" aria-label="Gate before" onClick={() => step(-1)}>◀</button>
-        <button type="button" aria-label="Next gate" onClick={() => step(1)}>▶</button>
+        <button type="button" aria-label="Gate before" onClick={() => step(-1)}>
+          ◀
+        </button>
+        <button type="button" aria-label="Next gate" onClick={() => step(1)}>
+          ▶
+        </button>
       </span>
-      <input type="range" aria-label="Gate" min={1} max={gates} value={gate} aria-valuetext={`${gate} of ${gates}${name && `, ${name}`}`} onInput={event => goTo(Number(event.currentTarget.value))} />
-      <span class="gate">gate {gate} of {gates} <b>{name}</b></span>
+      <input
+        type="range"
+        aria-label="Gate"
+        min={1}
+        max={gates}
+        value={gate}
+        aria-valuetext={`${gate} of ${gates}${name && `, ${name}`}`}
+        onInput={event => goTo(Number(event.currentTarget.value))}
+      />
+      <span class="gate">
+        gate {gate} of {gates} <b>{name}</b>
+      </span>
       <label class="inline end">
         Speed
         <select value={speed} onChange={event => setSpeed(Number(event.currentTarget.value))}>
-          {SPEEDS.map(one => <option key={one} value={one}>{one} ×</option>)}
+          {SPEEDS.map(one => (
+            <option key={one} value={one}>
+              {one} ×
+            </option>
+          ))}
         </select>
       </label>
-      {read < gates && <span class="quiet" role="status">reading gate {read + 1} …</span>}
+      {read < gates && (
+        <span class="quiet" role="status">
+          reading gate {read + 1} …
+        </span>
+      )}
     </div>
   );
 }

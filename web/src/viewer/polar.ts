@@ -1,14 +1,26 @@
 // The polar map of the service, drawn, and the places of the wall that its pixels show.
 
 import type { PolarFigure, PolarMap, WallFigure } from "../generated/openapi";
-import { CYCLE, DIFFERENCE, LUTS, type Lut, NO_WALL, OUTWARD, UPTAKE, VALVE_PLANE, colour, thresholdOn } from "./colours";
+import {
+  CYCLE,
+  DIFFERENCE,
+  LUTS,
+  type Lut,
+  NO_WALL,
+  OUTWARD,
+  UPTAKE,
+  VALVE_PLANE,
+  colour,
+  thresholdOn,
+} from "./colours";
 import { number } from "../words";
 import type { Mesh } from "./mesh";
 import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
 /** The place of every pixel of a map. */
-type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings"> & Partial<Pick<PolarMap, "states">>;
+type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings"> &
+  Partial<Pick<PolarMap, "states">>;
 
 /** A map of one figure of the wall. */
 export interface DrawnMap extends Laid {
@@ -47,7 +59,16 @@ export function figureMap(map: PolarFigure): DrawnMap {
   const cyclic = map.figure === "phase";
   const [least = 0, most = 1] = map.range;
   const segments = map.segments.map(({ number, name, mean }) => ({ number, name, mean: mean ?? null }));
-  return { ...map, segments, range: [least, most], unit: FIGURES[map.figure].unit, threshold: null, below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null, cyclic, digits: map.figure === "z" ? 1 : 0 };
+  return {
+    ...map,
+    segments,
+    range: [least, most],
+    unit: FIGURES[map.figure].unit,
+    threshold: null,
+    below: ["motion", "thickening"].includes(map.figure) ? OUTWARD : null,
+    cyclic,
+    digits: map.figure === "z" ? 1 : 0,
+  };
 }
 
 /**
@@ -61,7 +82,12 @@ export function uptakeMap(map: PolarMap): DrawnMap {
   return {
     ...map,
     values: map.values_percent.map(row => row.map(value => shown(value))),
-    segments: map.segments.map(({ number, name, mean_percent, territory }) => ({ number, name, mean: shown(mean_percent), territory: territory ?? "" })),
+    segments: map.segments.map(({ number, name, mean_percent, territory }) => ({
+      number,
+      name,
+      mean: shown(mean_percent),
+      territory: territory ?? "",
+    })),
     threshold: map.threshold_percent,
     range: [0, 100],
     unit: "%",
@@ -87,7 +113,11 @@ function isValvePlane(map: Laid, row: number, column: number): boolean {
 }
 
 /** The colour of a value; grey where there is no wall. */
-export function colourOn({ range: [low, high], below }: Pick<DrawnMap, "range" | "below">, lut: Lut, value: number): [number, number, number] {
+export function colourOn(
+  { range: [low, high], below }: Pick<DrawnMap, "range" | "below">,
+  lut: Lut,
+  value: number,
+): [number, number, number] {
   if (Number.isNaN(value)) return NO_WALL;
   return below && value < low ? below : colour(lut, (value - low) / (high - low));
 }
@@ -125,14 +155,21 @@ function columnAt(map: Laid, columns: number): number {
 
 /** The value between the rays; NaN where there is no wall. */
 export function valueAt(map: DrawnMap, rows: number, columns: number): number {
-  if (map.cyclic) return map.values[Math.max(0, Math.min(map.rows - 1, Math.floor(rows)))]![columnAt(map, columns)] ?? NaN;
+  if (map.cyclic)
+    return map.values[Math.max(0, Math.min(map.rows - 1, Math.floor(rows)))]![columnAt(map, columns)] ?? NaN;
   const row = Math.max(0, Math.min(map.rows - 1, rows - 0.5));
   const column = (((columns - 0.5) % map.columns) + map.columns) % map.columns;
   const [r, c] = [Math.floor(row), Math.floor(column)];
   const [fr, fc] = [row - r, column - c];
   let [sum, weight] = [0, 0];
-  for (const [dr, wr] of [[0, 1 - fr], [1, fr]] as const) {
-    for (const [dc, wc] of [[0, 1 - fc], [1, fc]] as const) {
+  for (const [dr, wr] of [
+    [0, 1 - fr],
+    [1, fr],
+  ] as const) {
+    for (const [dc, wc] of [
+      [0, 1 - fc],
+      [1, fc],
+    ] as const) {
       const value = map.values[Math.min(map.rows - 1, r + dr)]![(c + dc) % map.columns];
       if (value == null) continue;
       sum += value * wr * wc;
@@ -150,7 +187,12 @@ export class WallFrame {
   private readonly apex: number;
   readonly radius: number;
 
-  constructor(mesh: Mesh, axis: Axis, private readonly rows: number, private readonly columns: number) {
+  constructor(
+    mesh: Mesh,
+    axis: Axis,
+    private readonly rows: number,
+    private readonly columns: number,
+  ) {
     this.frame = frameOf(axis);
     const sectors = new Array<number>(12).fill(Infinity);
     let [apex, radius] = [-Infinity, 0];
@@ -193,7 +235,10 @@ export class WallFrame {
   /** Rows from the apex and columns from lateral of a place. */
   place(place: Vec): [number, number] {
     const [along, angle, across] = this.parts(place);
-    const way = along > this.focus ? Math.atan2(across, along - this.focus) * (this.apex - this.focus) : this.arc + this.focus - along;
+    const way =
+      along > this.focus
+        ? Math.atan2(across, along - this.focus) * (this.apex - this.focus)
+        : this.arc + this.focus - along;
     return [way / this.spacing, (angle / (2 * Math.PI)) * this.columns];
   }
 
@@ -236,7 +281,11 @@ export function placeOnMap(map: Laid, x: number, y: number, size: number): [numb
   return [rowsAt(map, radius, columnAt(map, columns)), columns];
 }
 
-export function segmentAt<T extends { number: number }>(map: Laid & { segments: T[] }, rows: number, columns: number): T | undefined {
+export function segmentAt<T extends { number: number }>(
+  map: Laid & { segments: T[] },
+  rows: number,
+  columns: number,
+): T | undefined {
   const row = Math.max(0, Math.min(map.rows - 1, Math.floor(rows)));
   const number = map.segment_of[row]![columnAt(map, columns)];
   return map.segments.find(segment => segment.number === number);
@@ -259,7 +308,13 @@ export type PolarLabels = "means" | "numbers" | "nothing";
 const TERRITORY: Record<string, string> = { LAD: "#7ee0ff", LCX: "#b6ff8a", RCA: "#ffb3f0" };
 
 /** Draws the map into a square of `size` CSS pixels. */
-export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size: number, ratio: number, style: PolarStyle): void {
+export function drawPolar(
+  context: CanvasRenderingContext2D,
+  map: DrawnMap,
+  size: number,
+  ratio: number,
+  style: PolarStyle,
+): void {
   const pixels = Math.round(size * ratio);
   const image = context.createImageData(pixels, pixels);
   const means = new Map(map.segments.map(segment => [segment.number, segment.mean]));
@@ -283,7 +338,10 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   const middle = size / 2;
   const full = size / 2 - MARGIN * size;
-  const at = (radius: number, turns: number): [number, number] => [middle + full * radius * Math.cos(2 * Math.PI * turns), middle - full * radius * Math.sin(2 * Math.PI * turns)];
+  const at = (radius: number, turns: number): [number, number] => [
+    middle + full * radius * Math.cos(2 * Math.PI * turns),
+    middle - full * radius * Math.sin(2 * Math.PI * turns),
+  ];
   const oriented = map.orientation !== "unknown";
   context.lineWidth = 1;
   context.strokeStyle = VALVE_PLANE;
@@ -344,7 +402,8 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   }
   if (style.territories && oriented) {
     const territory = new Map(map.segments.map(segment => [segment.number, segment.territory]));
-    const of = (row: number, column: number) => territory.get(map.segment_of[row]![(column + map.columns) % map.columns]!);
+    const of = (row: number, column: number) =>
+      territory.get(map.segment_of[row]![(column + map.columns) % map.columns]!);
     context.lineWidth = 3;
     for (let row = 0; row < map.rows; row++) {
       for (let column = 0; column < map.columns; column++) {
@@ -377,16 +436,29 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
   for (const [n, segment] of (labels === "nothing" ? [] : map.segments).entries()) {
     const others = places.filter((_, other) => other !== n);
     const [x, y] = cursor ? besideRing(places[n]!, cursor, others, text) : places[n]!;
-    write(labels === "numbers" ? String(segment.number) : number(segment.mean, map.digits), x, y, `600 ${text}px system-ui, sans-serif`);
+    write(
+      labels === "numbers" ? String(segment.number) : number(segment.mean, map.digits),
+      x,
+      y,
+      `600 ${text}px system-ui, sans-serif`,
+    );
   }
   if (oriented) {
-    for (const [name, turns] of [["A", 0.25], ["S", 0.5], ["I", 0.75], ["L", 0]] as const) {
+    for (const [name, turns] of [
+      ["A", 0.25],
+      ["S", 0.5],
+      ["I", 0.75],
+      ["L", 0],
+    ] as const) {
       write(name, ...at(1.075, turns), `600 ${text}px system-ui, sans-serif`);
     }
   }
   if (cursor) {
     const [x, y] = cursor;
-    for (const [width, stroke] of [[4, "#000"], [2, "#4de3ff"]] as const) {
+    for (const [width, stroke] of [
+      [4, "#000"],
+      [2, "#4de3ff"],
+    ] as const) {
       context.lineWidth = width;
       context.strokeStyle = stroke;
       context.beginPath();
@@ -400,19 +472,34 @@ export function drawPolar(context: CanvasRenderingContext2D, map: DrawnMap, size
 const CURSOR_RADIUS = 6;
 
 /** Where the cursor is drawn. */
-function cursorOn(map: Laid, [rows, columns]: [number, number], at: (radius: number, turns: number) => [number, number]): [number, number] {
+function cursorOn(
+  map: Laid,
+  [rows, columns]: [number, number],
+  at: (radius: number, turns: number) => [number, number],
+): [number, number] {
   return at(Math.min(1, radiusOf(map, Math.max(0, rows), columnAt(map, columns))), columns / map.columns);
 }
 
 /**
  * The place of a number of this height, moved where the cursor's ring would cover it: to the side with the most room.
  */
-function besideRing(place: [number, number], [x, y]: [number, number], others: [number, number][], height: number): [number, number] {
+function besideRing(
+  place: [number, number],
+  [x, y]: [number, number],
+  others: [number, number][],
+  height: number,
+): [number, number] {
   const [aside, above] = [CURSOR_RADIUS + 4 + height, CURSOR_RADIUS + 2 + height / 2];
   if (Math.abs(place[0] - x) >= aside || Math.abs(place[1] - y) >= above) return place;
-  const sides: [number, number][] = [[x + aside, y], [x - aside, y], [x, y - above], [x, y + above]];
+  const sides: [number, number][] = [
+    [x + aside, y],
+    [x - aside, y],
+    [x, y - above],
+    [x, y + above],
+  ];
   // A number is about twice as wide as high.
-  const room = (side: [number, number]) => Math.min(...others.map(other => Math.max(Math.abs(other[0] - side[0]) / 2, Math.abs(other[1] - side[1]))));
+  const room = (side: [number, number]) =>
+    Math.min(...others.map(other => Math.max(Math.abs(other[0] - side[0]) / 2, Math.abs(other[1] - side[1]))));
   return sides.reduce((best, side) => (room(side) > room(best) ? side : best));
 }
 

@@ -7,7 +7,17 @@ import { useCanvas } from "./canvas";
 import { LUTS, WALL_LUT, keep } from "./colours";
 import type { Mesh } from "./mesh";
 import type { PolarMap } from "../generated/openapi";
-import { WallFrame, drawPolar, hasValvePlane, isInValvePlane, placeOnMap, segmentAt, shown, uptakeMap, valueAt } from "./polar";
+import {
+  WallFrame,
+  drawPolar,
+  hasValvePlane,
+  isInValvePlane,
+  placeOnMap,
+  segmentAt,
+  shown,
+  uptakeMap,
+  valueAt,
+} from "./polar";
 import type { Axis } from "./plane";
 import type { Scene } from "./scene";
 import { ColourBar } from "./wall";
@@ -32,7 +42,14 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
   const onWall = rows >= 0 && rows <= map.rows + 1;
   const draw = (element: HTMLCanvasElement) => {
     const context = element.getContext("2d");
-    if (context) drawPolar(context, drawnMap, element.clientWidth, element.width / element.clientWidth, { lut, segments, threshold, territories, cursor: onWall ? [rows, columns] : null });
+    if (context)
+      drawPolar(context, drawnMap, element.clientWidth, element.width / element.clientWidth, {
+        lut,
+        segments,
+        threshold,
+        territories,
+        cursor: onWall ? [rows, columns] : null,
+      });
   };
   const { canvas } = useCanvas(draw, () => () => undefined, map);
   const segment = onWall ? segmentAt(map, rows, columns) : undefined;
@@ -53,7 +70,12 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
         }}
         onPointerMove={event => event.buttons && go(event.offsetX, event.offsetY, event.currentTarget.clientWidth)}
         onKeyDown={event => {
-          const step: Record<string, [number, number]> = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
+          const step: Record<string, [number, number]> = {
+            ArrowUp: [-1, 0],
+            ArrowDown: [1, 0],
+            ArrowLeft: [0, 1],
+            ArrowRight: [0, -1],
+          };
           const by = step[event.key];
           if (!by) return;
           event.preventDefault();
@@ -62,25 +84,58 @@ export function PolarView({ scene, map, mesh, heart, title }: Props) {
       />
       <figcaption>
         <p class="at">
-          {segment ? <><b>{segment.name}</b> {number(shown(segment.mean_percent), 0, "%")}, here {isInValvePlane(map, rows, columns) ? "valve plane" : number(valueAt(drawnMap, rows, columns), 0, "%")}</> : "Cursor off the wall"}
+          {segment ? (
+            <>
+              <b>{segment.name}</b> {number(shown(segment.mean_percent), 0, "%")}, here{" "}
+              {isInValvePlane(map, rows, columns) ? "valve plane" : number(valueAt(drawnMap, rows, columns), 0, "%")}
+            </>
+          ) : (
+            "Cursor off the wall"
+          )}
         </p>
         <span class="inline">
           <ColourBar lut={lut} low="0" high="100 %" />
-          <select aria-label="Colours of polar map and wall" value={Object.keys(LUTS).find(name => LUTS[name] === lut)} onChange={event => {
-            scene.wallLut.value = LUTS[event.currentTarget.value]!;
-            keep(WALL_LUT, event.currentTarget.value);
-          }}>
-            {Object.keys(LUTS).map(name => <option key={name}>{name}</option>)}
+          <select
+            aria-label="Colours of polar map and wall"
+            value={Object.keys(LUTS).find(name => LUTS[name] === lut)}
+            onChange={event => {
+              scene.wallLut.value = LUTS[event.currentTarget.value]!;
+              keep(WALL_LUT, event.currentTarget.value);
+            }}>
+            {Object.keys(LUTS).map(name => (
+              <option key={name}>{name}</option>
+            ))}
           </select>
         </span>
         <div class="options">
-          <label class="inline"><input type="checkbox" checked={threshold} onChange={event => setThreshold(event.currentTarget.checked)} /> below {number(map.threshold_percent, 0, "%")}</label>
-          <label class="inline"><input type="checkbox" checked={segments} onChange={event => setSegments(event.currentTarget.checked)} /> segment means</label>
-          {map.orientation !== "unknown" && <label class="inline"><input type="checkbox" checked={territories} onChange={event => setTerritories(event.currentTarget.checked)} /> territories</label>}
+          <label class="inline">
+            <input type="checkbox" checked={threshold} onChange={event => setThreshold(event.currentTarget.checked)} />{" "}
+            below {number(map.threshold_percent, 0, "%")}
+          </label>
+          <label class="inline">
+            <input type="checkbox" checked={segments} onChange={event => setSegments(event.currentTarget.checked)} />{" "}
+            segment means
+          </label>
+          {map.orientation !== "unknown" && (
+            <label class="inline">
+              <input
+                type="checkbox"
+                checked={territories}
+                onChange={event => setTerritories(event.currentTarget.checked)}
+              />{" "}
+              territories
+            </label>
+          )}
         </div>
         {hasValvePlane(map) && <p class="quiet">Hatched: valve plane, in no figure.</p>}
-        {territories && <p class="quiet">{map.territories.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(" · ")}</p>}
-        {map.orientation === "unknown" && <p class="warning">Nothing tells which side is anterior: segments have no names.</p>}
+        {territories && (
+          <p class="quiet">
+            {map.territories.map(one => `${one.name} ${number(one.mean_percent, 0, "%")}`).join(" · ")}
+          </p>
+        )}
+        {map.orientation === "unknown" && (
+          <p class="warning">Nothing tells which side is anterior: segments have no names.</p>
+        )}
       </figcaption>
     </figure>
   );

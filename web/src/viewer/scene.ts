@@ -75,7 +75,11 @@ export class Scene {
   readonly gates = new Watched<(Voxels | null)[]>([]);
 
   /** `still` are the voxels that are shown where no gate is. */
-  constructor(readonly still: Voxels, lut: Lut, wallLut: Lut) {
+  constructor(
+    readonly still: Voxels,
+    lut: Lut,
+    wallLut: Lut,
+  ) {
     const { voxels } = this;
     this.cursor = new Watched<Vec>(voxels.middle);
     // A scale with an intercept may miss its zero by a rounding error.
@@ -87,7 +91,20 @@ export class Scene {
 
   /** Everything that changes a slice. */
   watch(act: () => void): () => void {
-    const all: { watch(act: () => void): () => void }[] = [this.cursor, this.window, this.lut, this.layers, this.gate, this.gates, this.heart, this.edit, this.tool, this.view, this.difference, this.smooth];
+    const all: { watch(act: () => void): () => void }[] = [
+      this.cursor,
+      this.window,
+      this.lut,
+      this.layers,
+      this.gate,
+      this.gates,
+      this.heart,
+      this.edit,
+      this.tool,
+      this.view,
+      this.difference,
+      this.smooth,
+    ];
     const ends = all.map(watched => watched.watch(act));
     return () => ends.forEach(end => end());
   }
@@ -126,7 +143,10 @@ export class Scene {
   /** The same views at another moment of the beat, whatever happens to this one. */
   at(turns: number): Scene {
     const scene = Object.create(this) as Scene;
-    return Object.defineProperties(scene, { gate: { value: new Watched<number | null>(turns) }, moment: { value: new Watched<number | null>(turns) } });
+    return Object.defineProperties(scene, {
+      gate: { value: new Watched<number | null>(turns) },
+      moment: { value: new Watched<number | null>(turns) },
+    });
   }
 
   /** The middle of what slices show. */
@@ -134,7 +154,7 @@ export class Scene {
     const { middle } = this.view.value;
     if (middle) return middle;
     const heart = this.heart.value;
-    return heart ? [0, 1, 2].map(n => (heart.base[n]! + heart.apex[n]!) / 2) as unknown as Vec : this.voxels.middle;
+    return heart ? ([0, 1, 2].map(n => (heart.base[n]! + heart.apex[n]!) / 2) as unknown as Vec) : this.voxels.middle;
   }
 }
 

@@ -20,6 +20,13 @@ export function screenshot(stage: HTMLElement, name: string): void {
     const place = canvas.getBoundingClientRect();
     context.drawImage(canvas, place.left - box.left, place.top - box.top - top, place.width, place.height);
   }
-  label(context, `${name} · ventriform, research software, not a medical device · ${new Date().toLocaleString()}`, 8, bottom - top + 14, "left", 12);
+  label(
+    context,
+    `${name} · ventriform, research software, not a medical device · ${new Date().toLocaleString()}`,
+    8,
+    bottom - top + 14,
+    "left",
+    12,
+  );
   out.toBlob(blob => blob && saveBlob(blob, `${name}.png`));
 }

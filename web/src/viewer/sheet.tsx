@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { counts, isFit, moment, number, resultName, shape } from "../words";
 import { BeatSheet } from "./beatsheet";
-import { type Camera } from "./camera";
+import type { Camera } from "./camera";
 import { DIVERGING, LUTS, UPTAKE } from "./colours";
 import { drawSlice } from "./drawing";
 import { Figures, Verdict, headlines } from "./figures";
@@ -36,19 +36,42 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
         <div class="beside">
           {polar && (
             <figure>
-              <Drawn width={360} height={360} name="Polar map" draw={element => {
-                const context = element.getContext("2d");
-                if (context) drawPolar(context, uptakeMap(polar), 360, RATIO, { lut: scene.wallLut.value, segments: false, threshold: true, territories: false, cursor: null });
-              }} />
+              <Drawn
+                width={360}
+                height={360}
+                name="Polar map"
+                draw={element => {
+                  const context = element.getContext("2d");
+                  if (context)
+                    drawPolar(context, uptakeMap(polar), 360, RATIO, {
+                      lut: scene.wallLut.value,
+                      segments: false,
+                      threshold: true,
+                      territories: false,
+                      cursor: null,
+                    });
+                }}
+              />
               <figcaption>
-                <span>Uptake; the line encloses what is below {number(polar.threshold_percent, 0, "%")}{hasValvePlane(polar) && "; hatched: valve plane, in no figure"}</span>
+                <span>
+                  Uptake; the line encloses what is below {number(polar.threshold_percent, 0, "%")}
+                  {hasValvePlane(polar) && "; hatched: valve plane, in no figure"}
+                </span>
                 <ColourBar lut={scene.wallLut.value} low="0" high="100 %" />
               </figcaption>
             </figure>
           )}
           <div>
             <dl class="headlines">
-              {headlines(shown).map(([name, value, interval]) => <div key={name}><dt>{name}</dt><dd>{value}{interval && <span class="interval">90 %: {interval}</span>}</dd></div>)}
+              {headlines(shown).map(([name, value, interval]) => (
+                <div key={name}>
+                  <dt>{name}</dt>
+                  <dd>
+                    {value}
+                    {interval && <span class="interval">90 %: {interval}</span>}
+                  </dd>
+                </div>
+              ))}
             </dl>
             {shown.report && <Verdict shown={shown} open />}
           </div>
@@ -56,11 +79,33 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
         <div class="three">
           {planes.map(plane => (
             <figure key={plane.name}>
-              <Drawn width={230} height={230} name={plane.name} draw={element => drawSlice(element, scene, plane, { width: 230, height: 230, ratio: RATIO, letters: true, cursor: false })} />
+              <Drawn
+                width={230}
+                height={230}
+                name={plane.name}
+                draw={element =>
+                  drawSlice(element, scene, plane, {
+                    width: 230,
+                    height: 230,
+                    ratio: RATIO,
+                    letters: true,
+                    cursor: false,
+                  })
+                }
+              />
             </figure>
           ))}
         </div>
-        {heart && <Drawn width={690} height={88} name="Short axis from apex to base" draw={element => drawStack(element, scene, heartPlanes(heart)[0]!, { width: 690, height: 88, ratio: RATIO, cursor: false })} />}
+        {heart && (
+          <Drawn
+            width={690}
+            height={88}
+            name="Short axis from apex to base"
+            draw={element =>
+              drawStack(element, scene, heartPlanes(heart)[0]!, { width: 690, height: 88, ratio: RATIO, cursor: false })
+            }
+          />
+        )}
         <Legend scene={scene} />
         <BesideLimits shown={shown} />
         <Foot page={1} />
@@ -73,10 +118,30 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
             {polar && (
               <table class="segments">
                 <caption>Segments of the American Heart Association</caption>
-                <thead><tr><th scope="col">Segment</th><th scope="col">uptake</th><th scope="col">below {number(polar.threshold_percent, 0, "%")}</th></tr></thead>
+                <thead>
+                  <tr>
+                    <th scope="col">Segment</th>
+                    <th scope="col">uptake</th>
+                    <th scope="col">below {number(polar.threshold_percent, 0, "%")}</th>
+                  </tr>
+                </thead>
                 <tbody>
-                  {polar.segments.map(one => <tr key={one.number}><th scope="row">{one.number} {one.name}</th><td>{number(one.mean_percent, 0, "%")}</td><td>{number(one.extent_percent, 0, "%")}</td></tr>)}
-                  {polar.territories.map(one => <tr key={one.name}><th scope="row">{one.name}</th><td>{number(one.mean_percent, 0, "%")}</td><td>{number(one.extent_percent, 0, "%")}</td></tr>)}
+                  {polar.segments.map(one => (
+                    <tr key={one.number}>
+                      <th scope="row">
+                        {one.number} {one.name}
+                      </th>
+                      <td>{number(one.mean_percent, 0, "%")}</td>
+                      <td>{number(one.extent_percent, 0, "%")}</td>
+                    </tr>
+                  ))}
+                  {polar.territories.map(one => (
+                    <tr key={one.name}>
+                      <th scope="row">{one.name}</th>
+                      <td>{number(one.mean_percent, 0, "%")}</td>
+                      <td>{number(one.extent_percent, 0, "%")}</td>
+                    </tr>
+                  ))}
                 </tbody>
               </table>
             )}
@@ -86,12 +151,27 @@ function Sheet({ scene, volume, shown, other, parameters }: Printed) {
         <Walls scene={scene} shown={shown} />
         <h2>How it was made</h2>
         <p>
-          {volume.format}, {shape(volume)}, stored {moment(volume.created_at)} as <code>{volume.id}</code>. Result <code>{shown.result.id}</code>
-          {typeof parent === "string" && <>, model <code>{parent}</code></>}.{" "}
-          {parameters.length === 0 ? "All parameters had their defaults." : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
+          {volume.format}, {shape(volume)}, stored {moment(volume.created_at)} as <code>{volume.id}</code>. Result{" "}
+          <code>{shown.result.id}</code>
+          {typeof parent === "string" && (
+            <>
+              , model <code>{parent}</code>
+            </>
+          )}
+          .{" "}
+          {parameters.length === 0
+            ? "All parameters had their defaults."
+            : `Parameters other than the defaults: ${parameters.map(([name, value]) => `${name} = ${value}`).join("; ")}.`}
         </p>
-        {other && <p>Compared with {resultName(other.result)} of {moment(other.result.created_at)}, <code>{other.result.id}</code>.</p>}
-        {(shown.report?.warnings ?? []).map(text => <p key={text}>{text}</p>)}
+        {other && (
+          <p>
+            Compared with {resultName(other.result)} of {moment(other.result.created_at)},{" "}
+            <code>{other.result.id}</code>.
+          </p>
+        )}
+        {(shown.report?.warnings ?? []).map(text => (
+          <p key={text}>{text}</p>
+        ))}
         <Foot page={2} />
       </section>
     </>
@@ -111,7 +191,15 @@ function Walls({ scene, shown }: { scene: Scene; shown: Loaded }) {
   if (heart) {
     const { anterior, lateral, axis } = frameOf(heart);
     far.toward = unit(add(add(scale(lateral, -0.65), scale(anterior, -0.55)), scale(axis, 0.52)));
-    far.up = unit(add(scale(axis, -1), scale(far.toward, axis.reduce((sum, part, n) => sum + part * far.toward[n]!, 0))));
+    far.up = unit(
+      add(
+        scale(axis, -1),
+        scale(
+          far.toward,
+          axis.reduce((sum, part, n) => sum + part * far.toward[n]!, 0),
+        ),
+      ),
+    );
   }
   const draw = (camera: Camera) => (element: HTMLCanvasElement) => {
     const view = new FlatView(element, "#ffffff");
@@ -124,7 +212,10 @@ function Walls({ scene, shown }: { scene: Scene; shown: Loaded }) {
       <Drawn width={270} height={270} name="The wall" draw={draw(near)} />
       <Drawn width={270} height={270} name="The wall from the other side" draw={draw(far)} />
       <figcaption>
-        <span>{heart ? "From anterior and lateral; from inferior and septal" : "From in front; from behind"}{byDistance ? ": distance to the surface" : ""}</span>
+        <span>
+          {heart ? "From anterior and lateral; from inferior and septal" : "From in front; from behind"}
+          {byDistance ? ": distance to the surface" : ""}
+        </span>
         <ColourBar lut={paint.lut} low={String(paint.range[0])} high={`${paint.range[1]} ${byDistance ? "mm" : "%"}`} />
       </figcaption>
     </figure>
@@ -136,7 +227,22 @@ function Legend({ scene }: { scene: Scene }) {
   const layers = scene.layers.value.filter(layer => layer.shown);
   return (
     <p class="legend">
-      {layers.map(layer => <span key={layer.name}><svg viewBox="0 0 18 6" aria-hidden="true"><line x1="1" y1="3" x2="17" y2="3" stroke={layer.colour} stroke-width="3" stroke-dasharray={layer.dashed ? "3 3" : undefined} /></svg> {layer.name}</span>)}
+      {layers.map(layer => (
+        <span key={layer.name}>
+          <svg viewBox="0 0 18 6" aria-hidden="true">
+            <line
+              x1="1"
+              y1="3"
+              x2="17"
+              y2="3"
+              stroke={layer.colour}
+              stroke-width="3"
+              stroke-dasharray={layer.dashed ? "3 3" : undefined}
+            />
+          </svg>{" "}
+          {layer.name}
+        </span>
+      ))}
       <ColourBar lut={scene.lut.value} low={counts(low)} high={counts(high)} />
     </p>
   );

@@ -48,13 +48,27 @@ export function printsAs(printed: () => ComponentChildren): () => void {
   };
 }
 
-export function Drawn({ width, height, name, draw }: { width: number; height: number; name: string; draw: (element: HTMLCanvasElement) => void }) {
+export function Drawn({
+  width,
+  height,
+  name,
+  draw,
+}: {
+  width: number;
+  height: number;
+  name: string;
+  draw: (element: HTMLCanvasElement) => void;
+}) {
   return (
-    <canvas role="img" aria-label={name} ref={element => {
-      if (!element) return;
-      Object.assign(element, { width: width * RATIO, height: height * RATIO });
-      draw(element);
-    }} />
+    <canvas
+      role="img"
+      aria-label={name}
+      ref={element => {
+        if (!element) return;
+        Object.assign(element, { width: width * RATIO, height: height * RATIO });
+        draw(element);
+      }}
+    />
   );
 }
 
@@ -66,11 +80,26 @@ export function BesideLimits({ shown }: { shown: Loaded }) {
     <div class="beside-limits">
       {limitMapsOf(shown).map(({ name, map, lut }) => (
         <figure key={name}>
-          <Drawn width={180} height={180} name={name} draw={element => {
-            const context = element.getContext("2d");
-            if (context && lut) drawPolar(context, map, 180, RATIO, { lut, segments: false, threshold: false, territories: false, cursor: null });
-          }} />
-          <figcaption><span>{name}</span>{lut && <ColourBar lut={lut} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />}</figcaption>
+          <Drawn
+            width={180}
+            height={180}
+            name={name}
+            draw={element => {
+              const context = element.getContext("2d");
+              if (context && lut)
+                drawPolar(context, map, 180, RATIO, {
+                  lut,
+                  segments: false,
+                  threshold: false,
+                  territories: false,
+                  cursor: null,
+                });
+            }}
+          />
+          <figcaption>
+            <span>{name}</span>
+            {lut && <ColourBar lut={lut} low={String(map.range[0])} high={`${map.range[1]} ${map.unit}`} />}
+          </figcaption>
         </figure>
       ))}
       <div class="figures">
@@ -85,12 +114,20 @@ export function Head({ volume, title, children }: { volume: Volume; title: strin
   return (
     <header>
       <h1>{title}</h1>
-      <p><b>{study(volume) || nameOf(volume)}</b>{study(volume) && ` · ${nameOf(volume)}`}</p>
+      <p>
+        <b>{study(volume) || nameOf(volume)}</b>
+        {study(volume) && ` · ${nameOf(volume)}`}
+      </p>
       {children && <p class="quiet">{children}</p>}
     </header>
   );
 }
 
 export function Foot({ page, of = 2 }: { page: number; of?: number }) {
-  return <footer>ventriform: research software, not a medical device. Measurements are no diagnosis. Printed {moment(new Date().toISOString())}. Page {page} of {of}</footer>;
+  return (
+    <footer>
+      ventriform: research software, not a medical device. Measurements are no diagnosis. Printed{" "}
+      {moment(new Date().toISOString())}. Page {page} of {of}
+    </footer>
+  );
 }

@@ -44,7 +44,14 @@ export interface Shown {
 export function heartOf({ fit, posture, polar }: Placed): Axis | null {
   const axis = fit.long_axis;
   const known = polar?.orientation !== "unknown";
-  return axis ? { base: axis.base as Triple, apex: axis.apex as Triple, superior: (known && (posture?.superior as Triple)) || null, roll: 0 } : null;
+  return axis
+    ? {
+        base: axis.base as Triple,
+        apex: axis.apex as Triple,
+        superior: (known && (posture?.superior as Triple)) || null,
+        roll: 0,
+      }
+    : null;
 }
 
 /** The middle of the heart's axis, or else of the vertices. */
@@ -86,7 +93,15 @@ export function layersOf(shown: Shown | null, other: Shown | null): Layer[] {
     if (shown.mask) layers.push({ name: "mask", colour: "#ffd24d", shown: false, mask: shown.mask });
     if (shown.expert) layers.push({ name: "expert", colour: "#4db8ff", shown: true, mask: shown.expert });
   }
-  if (other) layers.push({ name: "compared", colour: "#d6a6ff", dashed: true, shown: true, mesh: other.mesh, ...gatesOf(other) });
+  if (other)
+    layers.push({
+      name: "compared",
+      colour: "#d6a6ff",
+      dashed: true,
+      shown: true,
+      mesh: other.mesh,
+      ...gatesOf(other),
+    });
   return layers;
 }
 

@@ -28,13 +28,26 @@ export function Slice({ scene, plane, onBig }: Props) {
   useEffect(() => (canvas.current ? listen(canvas.current, scene, () => latest.current) : undefined), [scene]);
   return (
     <figure class="slice">
-      <canvas ref={canvas} tabIndex={0} role="slider" aria-label={`${plane.name} slice`} aria-valuenow={0} onDblClick={onBig} />
+      <canvas
+        ref={canvas}
+        tabIndex={0}
+        role="slider"
+        aria-label={`${plane.name} slice`}
+        aria-valuenow={0}
+        onDblClick={onBig}
+      />
     </figure>
   );
 }
 
 function style(element: HTMLCanvasElement): SliceStyle {
-  return { width: element.clientWidth, height: element.clientHeight, ratio: element.width / Math.max(1, element.clientWidth), letters: true, cursor: true };
+  return {
+    width: element.clientWidth,
+    height: element.clientHeight,
+    ratio: element.width / Math.max(1, element.clientWidth),
+    letters: true,
+    cursor: true,
+  };
 }
 
 function describe(element: HTMLCanvasElement, scene: Scene, plane: Plane): void {
@@ -45,7 +58,10 @@ function describe(element: HTMLCanvasElement, scene: Scene, plane: Plane): void 
   set("aria-valuemin", low.toFixed(0));
   set("aria-valuemax", high.toFixed(0));
   set("aria-valuenow", now.toFixed(0));
-  set("aria-valuetext", `${now.toFixed(0)} mm towards ${letters(plane.normal)}, value ${Number.isNaN(value) ? "none" : counts(value)}`);
+  set(
+    "aria-valuetext",
+    `${now.toFixed(0)} mm towards ${letters(plane.normal)}, value ${Number.isNaN(value) ? "none" : counts(value)}`,
+  );
 }
 
 const STEP_OF_WHEEL = 40;
@@ -59,7 +75,12 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
   const placeAt = (event: { clientX: number; clientY: number }): Vec => {
     const box = element.getBoundingClientRect();
     const { origin, scale: factor } = sliceOrigin(scene, plane(), box.width, box.height);
-    return point(plane(), origin, (event.clientX - box.left - box.width / 2) / factor, (event.clientY - box.top - box.height / 2) / factor);
+    return point(
+      plane(),
+      origin,
+      (event.clientX - box.left - box.width / 2) / factor,
+      (event.clientY - box.top - box.height / 2) / factor,
+    );
   };
   const factor = () => {
     const box = element.getBoundingClientRect();
@@ -133,7 +154,8 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
   };
   const press = (event: KeyboardEvent) => {
     const size = event.shiftKey ? 5 : 1;
-    const shift = (way: Vec, by: number) => (scene.cursor.value = add(scene.cursor.value, scale(way, by * Math.max(1, scene.voxels.spacing))));
+    const shift = (way: Vec, by: number) =>
+      (scene.cursor.value = add(scene.cursor.value, scale(way, by * Math.max(1, scene.voxels.spacing))));
     const keys: Record<string, () => void> = {
       ArrowLeft: () => shift(plane().right, -size),
       ArrowRight: () => shift(plane().right, size),
@@ -155,7 +177,15 @@ function listen(element: HTMLCanvasElement, scene: Scene, plane: () => Plane): (
     act();
   };
   const quiet = (event: Event) => event.preventDefault();
-  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press, contextmenu: quiet });
+  return handleEvents(element, {
+    pointerdown: down,
+    pointermove: move,
+    pointerup: up,
+    pointercancel: up,
+    wheel,
+    keydown: press,
+    contextmenu: quiet,
+  });
 }
 
 /** The handle of the correction near a place, as seen in this plane. */
@@ -163,10 +193,16 @@ function handleAt(scene: Scene, plane: Plane, place: Vec, reach: number): Handle
   const edit = scene.edit.value;
   if (!edit) return null;
   const flat = (v: Vec) => Math.hypot(dot(sub(v, place), plane.right), dot(sub(v, place), plane.down));
-  const candidates: [Handle, Vec][] = [["apex", edit.apex], ["base", edit.base], ["center", edit.center]];
+  const candidates: [Handle, Vec][] = [
+    ["apex", edit.apex],
+    ["base", edit.base],
+    ["center", edit.center],
+  ];
   const knob = rollKnob(scene, plane);
   if (knob) candidates.unshift(["roll", knob]);
-  const near = candidates.map(([name, at]): [Handle, number] => [name, flat(at)]).filter(([, distance]) => distance < reach);
+  const near = candidates
+    .map(([name, at]): [Handle, number] => [name, flat(at)])
+    .filter(([, distance]) => distance < reach);
   return near.sort((a, b) => a[1] - b[1])[0]?.[0] ?? null;
 }
 
@@ -190,7 +226,11 @@ function drag(scene: Scene, plane: Plane, handle: Handle, place: Vec): void {
     const axis = unit(sub(edit.apex, edit.base));
     const way = sub(inPlane(edit.center), edit.center);
     const top = scale(plane.down, -1);
-    const side = [axis[1] * top[2] - axis[2] * top[1], axis[2] * top[0] - axis[0] * top[2], axis[0] * top[1] - axis[1] * top[0]] as Vec;
+    const side = [
+      axis[1] * top[2] - axis[2] * top[1],
+      axis[2] * top[0] - axis[0] * top[2],
+      axis[0] * top[1] - axis[1] * top[0],
+    ] as Vec;
     next.roll = Math.round((Math.atan2(dot(way, side), dot(way, top)) * 180) / Math.PI);
     next.changed.add("roll");
   } else {

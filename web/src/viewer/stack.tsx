@@ -75,7 +75,12 @@ function nearest(scene: Scene, all: Vec[], plane: Plane): number {
 }
 
 /** Draws the row of slices; the answer is their number. */
-export function drawStack(element: HTMLCanvasElement, scene: Scene, plane: Plane, { width, height, ratio, cursor }: Omit<SliceStyle, "letters">): number {
+export function drawStack(
+  element: HTMLCanvasElement,
+  scene: Scene,
+  plane: Plane,
+  { width, height, ratio, cursor }: Omit<SliceStyle, "letters">,
+): number {
   const context = element.getContext("2d");
   const all = places(scene, width, height);
   if (!context || all.length === 0) return 0;

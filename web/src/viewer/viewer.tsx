@@ -4,7 +4,21 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "preact/hooks"
 import { type Job, type Kind, type Parameters, type Result, type Volume, fieldOf, get, sentences, words } from "../api";
 import { Confirm } from "../confirm";
 import { JobLine } from "../jobline";
-import { beats, comparisons, comparisonsOf, eraseResult, find, fits, isActive, jobs, loadResult, loadScan, madeBy, models, resultsOf } from "../library";
+import {
+  beats,
+  comparisons,
+  comparisonsOf,
+  eraseResult,
+  find,
+  fits,
+  isActive,
+  jobs,
+  loadResult,
+  loadScan,
+  madeBy,
+  models,
+  resultsOf,
+} from "../library";
 import { pick, picked } from "../pairing";
 import { type Draft, ParameterForm, draftOf, parameterSpecs, valuesOf } from "../parameters";
 import { home, isAt, open, openComparison, route } from "../route";
@@ -35,9 +49,25 @@ export function Viewer({ volume: id }: { volume: string }) {
   useEffect(load, [load]);
   const results = useMemo(() => resultsOf(id), [id, known, volume]);
   const jobOfRoute = chosen?.startsWith("job_") ? chosen : null;
-  const current = jobOfRoute ? null : (chosen ?? (results.find(result => isBeat(result.id)) ?? results.find(result => isFit(result.id)) ?? results[0])?.id ?? null);
+  const current = jobOfRoute
+    ? null
+    : (chosen ??
+      (results.find(result => isBeat(result.id)) ?? results.find(result => isFit(result.id)) ?? results[0])?.id ??
+      null);
   if (problem) {
-    return <div class="pad"><p class="error" role="alert">{problem}</p><button type="button" onClick={load}>Try again</button> <button type="button" onClick={home}>Back to the list</button></div>;
+    return (
+      <div class="pad">
+        <p class="error" role="alert">
+          {problem}
+        </p>
+        <button type="button" onClick={load}>
+          Try again
+        </button>{" "}
+        <button type="button" onClick={home}>
+          Back to the list
+        </button>
+      </div>
+    );
   }
   if (!volume) return <p class="quiet pad">Opening the scan …</p>;
   return <Scan volume={volume} results={results} current={current} otherId={other} retry={jobOfRoute} />;
@@ -93,11 +123,14 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
       if (!wanted) return set(null);
       (find(wanted) ? Promise.resolve(find(wanted)) : loadResult(wanted))
         .then(result => (result ? loadLoaded(result) : null))
-        .then(loaded => {
-          if (gone) return;
-          set(loaded);
-          if (!loaded) setProblem("This result was erased.");
-        }, error => !gone && setProblem(words(error)));
+        .then(
+          loaded => {
+            if (gone) return;
+            set(loaded);
+            if (!loaded) setProblem("This result was erased.");
+          },
+          error => !gone && setProblem(words(error)),
+        );
     };
     take(current, setShown);
     take(otherId, setOther);
@@ -107,7 +140,11 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   // A model knows no axis; a fit of the same scan lends it.
   useEffect(() => {
     const fit = scene && !scene.heart.value && shown && resultsOf(volume.id).find(result => isFit(result.id));
-    if (fit) void loadLoaded(fit).then(loaded => (scene.heart.value ??= loaded.heart), () => undefined);
+    if (fit)
+      void loadLoaded(fit).then(
+        loaded => (scene.heart.value ??= loaded.heart),
+        () => undefined,
+      );
   }, [scene, shown]);
 
   const gates = shown?.beat?.report.gates.length ?? 0;
@@ -130,27 +167,64 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
   useEffect(() => printsAs(() => printed.current && sheetOf(printed.current)), []);
   useEffect(() => {
     const result = shown?.result;
-    if (result) void parameterSpecs().then(specs => setChanged(Object.entries(draftOf(result.parameters, specs[kindOf(result.id)]))), () => undefined);
+    if (result)
+      void parameterSpecs().then(
+        specs => setChanged(Object.entries(draftOf(result.parameters, specs[kindOf(result.id)]))),
+        () => undefined,
+      );
   }, [shown]);
 
   // A job tells of its progress many times a second: the pictures are not drawn again for that, which would take the
   // processor from the job.
-  const pictures = useMemo(() => scene && (
-    <Pictures scene={scene} name={nameOf(volume)} shown={shown} other={other} empty={busy ? "The wall appears here when the work is done." : "Fit the ventricle, or make a model, to see the wall here."}>
-      <Busy volume={volume.id} />
-      {shown?.beat && <Player scene={scene} report={shown.beat.report} />}
-    </Pictures>
-  ), [scene, volume, shown, other, busy]);
-  const facts = useMemo(() => shown && scene && <Facts scene={scene} volume={volume} shown={shown} other={other} />, [scene, volume, shown, other]);
+  const pictures = useMemo(
+    () =>
+      scene && (
+        <Pictures
+          scene={scene}
+          name={nameOf(volume)}
+          shown={shown}
+          other={other}
+          empty={
+            busy
+              ? "The wall appears here when the work is done."
+              : "Fit the ventricle, or make a model, to see the wall here."
+          }>
+          <Busy volume={volume.id} />
+          {shown?.beat && <Player scene={scene} report={shown.beat.report} />}
+        </Pictures>
+      ),
+    [scene, volume, shown, other, busy],
+  );
+  const facts = useMemo(
+    () => shown && scene && <Facts scene={scene} volume={volume} shown={shown} other={other} />,
+    [scene, volume, shown, other],
+  );
   return (
     <div class="viewer">
-      <Side volume={volume} results={results} jobs={own} current={current} otherId={otherId} retry={retry} scene={scene} shown={shown} />
+      <Side
+        volume={volume}
+        results={results}
+        jobs={own}
+        current={current}
+        otherId={otherId}
+        retry={retry}
+        scene={scene}
+        shown={shown}
+      />
       <section class="stage" aria-label="Pictures">
-        {problem && <p class="error" role="alert">{problem}</p>}
+        {problem && (
+          <p class="error" role="alert">
+            {problem}
+          </p>
+        )}
         {pictures ?? (!problem && <p class="quiet pad">Reading the voxels …</p>)}
       </section>
       <aside class="facts" aria-label="Measurements">
-        {facts ?? <p class="quiet pad">{current ? "Reading the result …" : "Fit the ventricle to see its measurements and polar map here."}</p>}
+        {facts ?? (
+          <p class="quiet pad">
+            {current ? "Reading the result …" : "Fit the ventricle to see its measurements and polar map here."}
+          </p>
+        )}
       </aside>
     </div>
   );
@@ -159,7 +233,11 @@ function Scan({ volume, results, current, otherId, retry }: ScanProps) {
 /** The work that is under way on a scan. */
 function Busy({ volume }: { volume: string }) {
   const job = useWatched(jobs).find(one => one.volume === volume && isActive(one));
-  return job ? <div class="busy" role="status"><JobLine job={job} /></div> : null;
+  return job ? (
+    <div class="busy" role="status">
+      <JobLine job={job} />
+    </div>
+  ) : null;
 }
 
 interface SideProps {
@@ -194,10 +272,17 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
   };
   useEffect(() => {
     if (!retry) return;
-    void get<Job>(`/v1/jobs/${retry}`).then(job => {
-      repeat(job);
-      if (job.error) setProblem({ field: job.error.field?.split(/[./]/).pop() ?? null, text: sentences(job.error).join(" ").trim() });
-    }, () => undefined);
+    void get<Job>(`/v1/jobs/${retry}`).then(
+      job => {
+        repeat(job);
+        if (job.error)
+          setProblem({
+            field: job.error.field?.split(/[./]/).pop() ?? null,
+            text: sentences(job.error).join(" ").trim(),
+          });
+      },
+      () => undefined,
+    );
   }, [retry]);
   const send = async (event: Event) => {
     event.preventDefault();
@@ -224,46 +309,106 @@ function Side({ volume, results, jobs: own, current, otherId, retry, scene, show
       <header>
         <h1>{titleOf(volume)}</h1>
         {study(volume) && <p>{study(volume)}</p>}
-        <p class="quiet">{volume.format}, {shape(volume)}<br />{moment(volume.created_at)}</p>
-        {volume.warnings.map(text => <p key={text} class="warning">{text}</p>)}
+        <p class="quiet">
+          {volume.format}, {shape(volume)}
+          <br />
+          {moment(volume.created_at)}
+        </p>
+        {volume.warnings.map(text => (
+          <p key={text} class="warning">
+            {text}
+          </p>
+        ))}
       </header>
       <section aria-label="Results">
         <ul class="choices">
           {results.map(result => (
             <li key={result.id} class={result.id === current ? "current" : result.id === otherId ? "other" : ""}>
-              <button type="button" class="pick" aria-pressed={result.id === current} onClick={() => open(volume.id, result.id, otherId === result.id ? null : otherId)}>
+              <button
+                type="button"
+                class="pick"
+                aria-pressed={result.id === current}
+                onClick={() => open(volume.id, result.id, otherId === result.id ? null : otherId)}>
                 <b>{resultName(result)}</b>
                 <span class="quiet">{moment(result.created_at)}</span>
                 <Origin result={result} jobs={own} results={results} />
               </button>
               {current && result.id !== current && (
-                <button type="button" class="plain" aria-pressed={result.id === otherId} aria-label={`Compare with ${resultName(result)} of ${moment(result.created_at)}`} onClick={() => open(volume.id, current, result.id === otherId ? null : result.id)}>{result.id === otherId ? "Stop comparing" : "Compare"}</button>
+                <button
+                  type="button"
+                  class="plain"
+                  aria-pressed={result.id === otherId}
+                  aria-label={`Compare with ${resultName(result)} of ${moment(result.created_at)}`}
+                  onClick={() => open(volume.id, current, result.id === otherId ? null : result.id)}>
+                  {result.id === otherId ? "Stop comparing" : "Compare"}
+                </button>
               )}
-              {result.id === current && <Confirm label={`Erase ${resultName(result)}`} question="Erase this result?" act={() => eraseResult(result.id).then(() => open(volume.id))}>Erase</Confirm>}
+              {result.id === current && (
+                <Confirm
+                  label={`Erase ${resultName(result)}`}
+                  question="Erase this result?"
+                  act={() => eraseResult(result.id).then(() => open(volume.id))}>
+                  Erase
+                </Confirm>
+              )}
             </li>
           ))}
         </ul>
         <Comparisons volume={volume.id} />
-        {own.filter(job => job.state !== "succeeded").slice(0, 5).map(job => <JobLine key={job.id} job={job} onChange={repeat} />)}
+        {own
+          .filter(job => job.state !== "succeeded")
+          .slice(0, 5)
+          .map(job => (
+            <JobLine key={job.id} job={job} onChange={repeat} />
+          ))}
       </section>
       <div class="tabs" role="group" aria-label="What to do">
-        <button type="button" class={results.length ? "" : "main"} aria-expanded={tab === "work"} onClick={() => setTab(tab === "work" ? null : "work")}>New fit or model</button>
-        <button type="button" aria-expanded={tab === "correct"} disabled={!scene} onClick={() => setTab(tab === "correct" ? null : "correct")}>Correct by hand</button>
+        <button
+          type="button"
+          class={results.length ? "" : "main"}
+          aria-expanded={tab === "work"}
+          onClick={() => setTab(tab === "work" ? null : "work")}>
+          New fit or model
+        </button>
+        <button
+          type="button"
+          aria-expanded={tab === "correct"}
+          disabled={!scene}
+          onClick={() => setTab(tab === "correct" ? null : "correct")}>
+          Correct by hand
+        </button>
       </div>
       {tab === "work" && (
         <form class="panel" onSubmit={event => void send(event)} aria-label="New fit or model">
           <span class="choice" role="group" aria-label="Kind of work">
             {WORK.filter(one => one.kind !== "beat" || volume.frames > 1).map(one => (
-              <button key={one.kind} type="button" aria-pressed={kind === one.kind} onClick={() => {
-                setKind(one.kind);
-                setDraft({});
-                setProblem(null);
-              }}>{one.name}</button>
+              <button
+                key={one.kind}
+                type="button"
+                aria-pressed={kind === one.kind}
+                onClick={() => {
+                  setKind(one.kind);
+                  setDraft({});
+                  setProblem(null);
+                }}>
+                {one.name}
+              </button>
             ))}
           </span>
           <ParameterForm kind={kind} volume={volume} draft={draft} onChange={setDraft} problem={problem} />
-          <button class="main" disabled={sending}>{kind === "model" ? "Make the model" : "Fit"}</button>
-          {shown && <button type="button" class="plain" onClick={() => repeat({ kind: kindOf(shown.result.id), parameters: shown.result.parameters as Job["parameters"] })}>Take the parameters of the shown result</button>}
+          <button class="main" disabled={sending}>
+            {kind === "model" ? "Make the model" : "Fit"}
+          </button>
+          {shown && (
+            <button
+              type="button"
+              class="plain"
+              onClick={() =>
+                repeat({ kind: kindOf(shown.result.id), parameters: shown.result.parameters as Job["parameters"] })
+              }>
+              Take the parameters of the shown result
+            </button>
+          )}
         </form>
       )}
       {tab === "correct" && scene && <Correction scene={scene} volume={volume} shown={shown} />}
@@ -277,11 +422,20 @@ function Comparisons({ volume }: { volume: string }) {
   useWatched(comparisons);
   return (
     <>
-      {comparisonsOf(volume).map(made => <a key={made.id} class="result" href={`#/comparison/${made.id}`}><b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span></a>)}
-      <button type="button" class="plain" onClick={() => {
-        if (!picked.value.includes(volume)) pick(volume);
-        home();
-      }}>Compare rest and stress …</button>
+      {comparisonsOf(volume).map(made => (
+        <a key={made.id} class="result" href={`#/comparison/${made.id}`}>
+          <b>Rest and stress</b> <span class="quiet">{moment(made.created_at)}</span>
+        </a>
+      ))}
+      <button
+        type="button"
+        class="plain"
+        onClick={() => {
+          if (!picked.value.includes(volume)) pick(volume);
+          home();
+        }}>
+        Compare rest and stress …
+      </button>
     </>
   );
 }
@@ -292,8 +446,16 @@ function Origin({ result, jobs: own, results }: { result: Result; jobs: Job[]; r
   if (!labels) return null;
   const parent = results.find(other => other.id === labels["parent"]);
   const names: Record<string, string> = { center: "centre", edge: "wall shown", roll: "turn" };
-  const changed = (labels["changed"] ?? "").split(" ").map(name => names[name] ?? name).join(", ");
-  return <span class="quiet">by hand: {changed}{labels["parent"] && `; from ${parent ? `the fit of ${moment(parent.created_at)}` : "a fit that was erased"}`}</span>;
+  const changed = (labels["changed"] ?? "")
+    .split(" ")
+    .map(name => names[name] ?? name)
+    .join(", ");
+  return (
+    <span class="quiet">
+      by hand: {changed}
+      {labels["parent"] && `; from ${parent ? `the fit of ${moment(parent.created_at)}` : "a fit that was erased"}`}
+    </span>
+  );
 }
 
 function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; shown: Loaded; other: Loaded | null }) {
@@ -305,10 +467,18 @@ function Facts({ scene, volume, shown, other }: { scene: Scene; volume: Volume; 
       {shown.polar && shown.heart && (
         <div class="polars">
           {shown.beat && <h2>Uptake, all gates</h2>}
-          <PolarView scene={scene} map={shown.polar} mesh={shown.mesh} heart={shown.heart} title={other?.polar ? "Shown fit" : "Polar map"} />
+          <PolarView
+            scene={scene}
+            map={shown.polar}
+            mesh={shown.mesh}
+            heart={shown.heart}
+            title={other?.polar ? "Shown fit" : "Polar map"}
+          />
           {other?.polar && other.heart && (
             <details open>
-              <summary>Compared: {resultName(other.result)}, {moment(other.result.created_at)}</summary>
+              <summary>
+                Compared: {resultName(other.result)}, {moment(other.result.created_at)}
+              </summary>
               <PolarView scene={scene} map={other.polar} mesh={other.mesh} heart={other.heart} title="Compared fit" />
             </details>
           )}

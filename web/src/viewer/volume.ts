@@ -58,7 +58,7 @@ export class Voxels {
   extent(direction: Vec): [number, number] {
     let [low, high] = [Infinity, -Infinity];
     for (let corner = 0; corner < 8; corner++) {
-      const index = this.shape.map((n, axis) => (corner >> axis & 1 ? n - 1 : 0)) as unknown as Vec;
+      const index = this.shape.map((n, axis) => ((corner >> axis) & 1 ? n - 1 : 0)) as unknown as Vec;
       const [x, y, z] = this.toPlace(index);
       const along = x * direction[0] + y * direction[1] + z * direction[2];
       low = Math.min(low, along);
@@ -90,15 +90,22 @@ export class Voxels {
       const cx = x < 0 ? 0 : x > nx - 1 ? nx - 1 : x;
       const cy = y < 0 ? 0 : y > ny - 1 ? ny - 1 : y;
       const cz = z < 0 ? 0 : z > nz - 1 ? nz - 1 : z;
-      const i = cx | 0, j = cy | 0, k = cz | 0;
-      const fx = cx - i, fy = cy - j, fz = cz - k;
+      const i = cx | 0,
+        j = cy | 0,
+        k = cz | 0;
+      const fx = cx - i,
+        fy = cy - j,
+        fz = cz - k;
       const a = i + sj * j + sk * k;
-      const ix = i + 1 < nx ? 1 : 0, jy = j + 1 < ny ? sj : 0, kz = k + 1 < nz ? sk : 0;
+      const ix = i + 1 < nx ? 1 : 0,
+        jy = j + 1 < ny ? sj : 0,
+        kz = k + 1 < nz ? sk : 0;
       const v00 = values[a]! + fx * (values[a + ix]! - values[a]!);
       const v10 = values[a + jy]! + fx * (values[a + jy + ix]! - values[a + jy]!);
       const v01 = values[a + kz]! + fx * (values[a + kz + ix]! - values[a + kz]!);
       const v11 = values[a + kz + jy]! + fx * (values[a + kz + jy + ix]! - values[a + kz + jy]!);
-      const low = v00 + fy * (v10 - v00), high = v01 + fy * (v11 - v01);
+      const low = v00 + fy * (v10 - v00),
+        high = v01 + fy * (v11 - v01);
       out[offset + n] = low + fz * (high - low);
     }
   }
@@ -107,7 +114,8 @@ export class Voxels {
   percentile(share: number): number {
     const step = Math.max(1, Math.floor(this.values.length / 40_000));
     const sample: number[] = [];
-    for (let n = 0; n < this.values.length; n += step) if (Number.isFinite(this.values[n])) sample.push(this.values[n]!);
+    for (let n = 0; n < this.values.length; n += step)
+      if (Number.isFinite(this.values[n])) sample.push(this.values[n]!);
     sample.sort((a, b) => a - b);
     return sample[Math.min(sample.length - 1, Math.floor(share * sample.length))] ?? 0;
   }
@@ -147,7 +155,11 @@ function placeOf(view: DataView, shape: [number, number, number]): [Row, Row, Ro
   // NIfTI states x to the right and y to anterior.
   const row = (axis: number, ras: number[]): Row => ras.map(part => (axis < 2 ? -unit : unit) * part) as unknown as Row;
   if (view.getInt16(254, true) > 0) {
-    const stated = (axis: number): Row => row(axis, [0, 1, 2, 3].map(column => real(280 + 16 * axis + 4 * column)));
+    const stated = (axis: number): Row =>
+      row(
+        axis,
+        [0, 1, 2, 3].map(column => real(280 + 16 * axis + 4 * column)),
+      );
     return [stated(0), stated(1), stated(2)];
   }
   const [dx, dy, dz] = [80, 84, 88].map(at => Math.abs(real(at))) as [number, number, number];

@@ -70,35 +70,98 @@ export function byMap(mesh: Mesh, map: DrawnMap, heart: Axis): Float32Array {
 }
 
 /** The uptake at every vertex, per cent: of the polar map, or else of the voxels under it. */
-export function uptakeOf(scene: Scene, { mesh, polar, heart }: { mesh: Mesh; polar: PolarMap | null; heart: Axis | null }): Float32Array {
+export function uptakeOf(
+  scene: Scene,
+  { mesh, polar, heart }: { mesh: Mesh; polar: PolarMap | null; heart: Axis | null },
+): Float32Array {
   return polar && heart ? byMap(mesh, uptakeMap(polar), heart) : percent(uptake(scene.voxels, mesh));
 }
 
-function paints({ scene, mesh, inner, other, polar, displacement, surface, figures }: Props, lut: Lut, heart: Axis | null): Paint[] {
+function paints(
+  { scene, mesh, inner, other, polar, displacement, surface, figures }: Props,
+  lut: Lut,
+  heart: Axis | null,
+): Paint[] {
   const list: Paint[] = [];
   const viridis = LUTS["Viridis"]!;
   const seen = polar && heart ? true : scene.voxels.highest > scene.voxels.lowest;
-  if (seen) list.push({ name: "Uptake", unit: "%", lut, range: [0, 100], values: () => uptakeOf(scene, { mesh, polar, heart }) });
+  if (seen)
+    list.push({
+      name: "Uptake",
+      unit: "%",
+      lut,
+      range: [0, 100],
+      values: () => uptakeOf(scene, { mesh, polar, heart }),
+    });
   if (heart) {
-    for (const { figure, drawn } of figures.map(map => ({ figure: map.figure, drawn: figureMap(map) }))) list.push({ name: FIGURES[figure].name, unit: drawn.unit, lut: figureLut(figure), range: drawn.range, below: drawn.below, values: () => byMap(mesh, drawn, heart) });
+    for (const { figure, drawn } of figures.map(map => ({ figure: map.figure, drawn: figureMap(map) })))
+      list.push({
+        name: FIGURES[figure].name,
+        unit: drawn.unit,
+        lut: figureLut(figure),
+        range: drawn.range,
+        below: drawn.below,
+        values: () => byMap(mesh, drawn, heart),
+      });
   }
-  if (surface) list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
+  if (surface)
+    list.push({ name: "Distance to the surface", unit: "mm", lut: DIVERGING, range: [-2, 2], values: () => surface });
   list.push({ name: "Thickness", unit: "mm", lut: viridis, range: [4, 20], values: () => thickness(mesh) });
-  if (inner) list.push({ name: "Distance between the two walls", unit: "mm", lut: DIVERGING, range: [-6, 6], values: () => apart(mesh, inner) });
-  if (other) list.push({ name: "Distance to the compared wall", unit: "mm", lut: DIVERGING, range: [-8, 8], values: () => apart(mesh, other) });
-  if (displacement?.length === mesh.vertices.length) list.push({ name: "Moved by the fit", unit: "mm", lut: viridis, range: [0, 12], values: () => Float32Array.from(displacement) });
+  if (inner)
+    list.push({
+      name: "Distance between the two walls",
+      unit: "mm",
+      lut: DIVERGING,
+      range: [-6, 6],
+      values: () => apart(mesh, inner),
+    });
+  if (other)
+    list.push({
+      name: "Distance to the compared wall",
+      unit: "mm",
+      lut: DIVERGING,
+      range: [-8, 8],
+      values: () => apart(mesh, other),
+    });
+  if (displacement?.length === mesh.vertices.length)
+    list.push({
+      name: "Moved by the fit",
+      unit: "mm",
+      lut: viridis,
+      range: [0, 12],
+      values: () => Float32Array.from(displacement),
+    });
   const sigma = mesh.uncertainty_mm;
-  if (sigma?.length === mesh.vertices.length) list.push({ name: "Uncertainty (1 σ)", unit: "mm", lut: viridis, range: [0, 6], values: () => Float32Array.from(sigma) });
-  list.push({ name: "Triangle shape (2r/R)", unit: "", lut: viridis, range: [0.4, 1], values: () => triangleShape(mesh) });
+  if (sigma?.length === mesh.vertices.length)
+    list.push({
+      name: "Uncertainty (1 σ)",
+      unit: "mm",
+      lut: viridis,
+      range: [0, 6],
+      values: () => Float32Array.from(sigma),
+    });
+  list.push({
+    name: "Triangle shape (2r/R)",
+    unit: "",
+    lut: viridis,
+    range: [0.4, 1],
+    values: () => triangleShape(mesh),
+  });
   return list;
 }
 
 /** The colours of vertices with these values; grey where there is none. */
-export function coloursOf(values: Float32Array, { lut, range, below = null }: Pick<Paint, "lut" | "range" | "below">): Float32Array {
+export function coloursOf(
+  values: Float32Array,
+  { lut, range, below = null }: Pick<Paint, "lut" | "range" | "below">,
+): Float32Array {
   const colours = new Float32Array(3 * values.length);
   values.forEach((value, at) => {
     const rgb = colourOn({ range, below }, lut, value);
-    colours.set(rgb.map(part => part / 255), 3 * at);
+    colours.set(
+      rgb.map(part => part / 255),
+      3 * at,
+    );
   });
   return colours;
 }
@@ -162,7 +225,13 @@ export function Wall(props: Props) {
       return;
     }
     const made = view.current;
-    const end = listen(element, made, () => (scene.turned.value += 1), scene, () => setPlain(true));
+    const end = listen(
+      element,
+      made,
+      () => (scene.turned.value += 1),
+      scene,
+      () => setPlain(true),
+    );
     return () => {
       end();
       made.end();
@@ -189,14 +258,32 @@ export function Wall(props: Props) {
   const [low, high] = paint.range;
   return (
     <figure class="wall">
-      <canvas key={plain} ref={canvas} tabIndex={0} role="slider" aria-label={`The wall in three dimensions${title ? `, ${title}` : ""}; arrow keys turn it`} aria-valuenow={0} />
+      <canvas
+        key={plain}
+        ref={canvas}
+        tabIndex={0}
+        role="slider"
+        aria-label={`The wall in three dimensions${title ? `, ${title}` : ""}; arrow keys turn it`}
+        aria-valuenow={0}
+      />
       {title && <p class="tag">{title}</p>}
-      {plain && <p class="off">This browser offers no WebGL: the wall is drawn plainly and turns more slowly. All else works.</p>}
+      {plain && (
+        <p class="off">
+          This browser offers no WebGL: the wall is drawn plainly and turns more slowly. All else works.
+        </p>
+      )}
       <figcaption>
-        <select aria-label="Colour of the wall" value={paint.name} onChange={event => setChosen(event.currentTarget.value)}>
-          {list.map(one => <option key={one.name}>{one.name}</option>)}
+        <select
+          aria-label="Colour of the wall"
+          value={paint.name}
+          onChange={event => setChosen(event.currentTarget.value)}>
+          {list.map(one => (
+            <option key={one.name}>{one.name}</option>
+          ))}
         </select>
-        <label class="inline"><input type="checkbox" checked={edges} onChange={event => setEdges(event.currentTarget.checked)} /> edges</label>
+        <label class="inline">
+          <input type="checkbox" checked={edges} onChange={event => setEdges(event.currentTarget.checked)} /> edges
+        </label>
         <ColourBar lut={paint.lut} low={`${low}`} high={`${high}${paint.unit && ` ${paint.unit}`}`} />
       </figcaption>
     </figure>
@@ -223,7 +310,13 @@ export function ColourBar({ lut, low, high }: { lut: Lut; low: string; high: str
   );
 }
 
-function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void, scene: Scene, lost: () => void): () => void {
+function listen(
+  element: HTMLCanvasElement,
+  view: MeshPainter,
+  draw: () => void,
+  scene: Scene,
+  lost: () => void,
+): () => void {
   const pointers = new Map<number, PointerEvent>();
   let moved = 0;
   const down = (event: PointerEvent) => {
@@ -275,7 +368,12 @@ function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void,
     zoom(Math.exp(event.deltaY / 500));
   };
   const press = (event: KeyboardEvent) => {
-    const ways: Record<string, [number, number]> = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
+    const ways: Record<string, [number, number]> = {
+      ArrowLeft: [-12, 0],
+      ArrowRight: [12, 0],
+      ArrowUp: [0, -12],
+      ArrowDown: [0, 12],
+    };
     const by = ways[event.key];
     if (by) turn(view.camera, ...by);
     else if (event.key === "+" || event.key === "=") zoom(1 / 1.15);
@@ -284,5 +382,13 @@ function listen(element: HTMLCanvasElement, view: MeshPainter, draw: () => void,
     event.preventDefault();
     draw();
   };
-  return handleEvents(element, { pointerdown: down, pointermove: move, pointerup: up, pointercancel: up, wheel, keydown: press, webglcontextlost: lost });
+  return handleEvents(element, {
+    pointerdown: down,
+    pointermove: move,
+    pointerup: up,
+    pointercancel: up,
+    wheel,
+    keydown: press,
+    webglcontextlost: lost,
+  });
 }
