@@ -183,7 +183,7 @@ if wait "${running[install]}"; then
   start chaos "$PYTHON" scripts/check/chaos.py --program target/debug/ventriform --rounds 10
   start kubernetes scripts/check/kubernetes.sh
   start proxy scripts/check/proxy.sh
-  start pgbouncer scripts/check_pgbouncer.sh
+  start pgbouncer scripts/check/pgbouncer.sh
   start alerts promtool test rules deploy/prometheus/alerts_test.yml
   start commands "$PYTHON" scripts/check/commands.py target/debug/ventriform
   start dependencies "$PYTHON" scripts/release/dependencies.py check
