@@ -19,8 +19,10 @@ import { type Axis, frameOf } from "./plane";
 import { type Vec, add, dot, scale, sub } from "./vector";
 
 /** The place of every pixel of a map. */
-type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings"> &
-  Partial<Pick<PolarMap, "states">>;
+type Laid = Pick<PolarMap, "rows" | "columns" | "segment_of" | "level_ends" | "rings"> & Stated;
+
+/** What lies at every pixel, in maps of uptake. */
+type Stated = Pick<PolarFigure, "states">;
 
 /** A map of one figure of the wall. */
 export interface DrawnMap extends Laid {
@@ -98,7 +100,7 @@ export function uptakeMap(map: PolarMap): DrawnMap {
 }
 
 /** Whether a map has places beyond the muscle's end. */
-export function hasValvePlane({ states }: Partial<Pick<PolarMap, "states">>): boolean {
+export function hasValvePlane({ states }: Stated): boolean {
   return states?.some(row => row.includes("valve_plane")) ?? false;
 }
 
