@@ -1131,7 +1131,8 @@ fn a_beat_beside_normal_limits_is_written_as_dicom() {
     let mut report = heart.report();
     let sha256 = "ab".repeat(32);
     let normals = json!({"sha256": sha256, "simulated": true, "people": "simulated, not patients", "sex": "M",
-        "protocol": "rest", "tracer": "Tc-99m", "attenuation_corrected": false, "cases": 15});
+        "protocol": "rest", "tracer": "Tc-99m", "attenuation_corrected": false, "cases": 15,
+        "program_version": "0.1.0"});
     let segment = json!({"segment": 10, "name": "x", "z": -3.0, "score": 2, "extent_percent": 50.0,
         "deficit_percent": 20.0, "compared_percent": 100.0});
     let perfusion = json!({"normals": normals, "note": "TPD-like", "z_limit": 2.5, "deficit_percent": 6.0,

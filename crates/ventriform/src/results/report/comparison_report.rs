@@ -273,6 +273,7 @@ pub(crate) mod tests {
             "tid": 1.125, "reversible_percent": 12.5, "reversible_points": 12.25, "fixed_percent": 0.0, "scale": 2.0,
             "matched_percent": 70.0, "compared_percent": 95.0, "turn_degrees": 0.0, "correlation": 0.9,
             "segments": segments, "territories": [of("name", "\"LAD\"")],
+            "no_beat": [],
             "stress": scan(80.0), "rest": scan(71.0), "parameters": {},
             "flags": [{"code": "tid_uncertain", "reason": "A large defect blurs the ratio of the cavities."}],
         }))
