@@ -19,7 +19,7 @@ from pathlib import Path
 import nibabel
 import numpy as np
 
-SOURCES = Path(__file__).resolve().parents[2] / "crates/ventriform/src/volume"
+SOURCES = Path(__file__).resolve().parents[2] / "crates/ventriform/src/image/volume"
 BLOCK_MM, FINE_BLOCK_MM = 18, 9
 NARROW_MM, WIDE_MM, CUT, BRIGHT_SHARE, REACH_MM = 15, 30, 3, 0.25, 20
 COUNTS = (6, 7, 8, 12, 16)

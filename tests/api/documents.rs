@@ -49,10 +49,10 @@ fn the_page_of_flags_has_every_flag() {
     let page = std::fs::read_to_string(root.join("docs/flags.md")).unwrap();
     let mut codes = 0;
     for file in [
-        "judge/flags.rs",
-        "beat/flags.rs",
-        "comparison/flags.rs",
-        "normals/flags.rs",
+        "heart/judge/flags.rs",
+        "heart/beat/flags.rs",
+        "heart/comparison/flags.rs",
+        "heart/normals/flags.rs",
     ] {
         let path = root.join("crates/ventriform/src").join(file);
         let source = std::fs::read_to_string(path).unwrap();

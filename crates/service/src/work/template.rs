@@ -1,6 +1,6 @@
 //! From a mesh to a template of the library.
 //!
-//! The mesh may be in any format that [`mesh_files`] reads; it is stored as our own JSON, LPS mm, and in every format.
+//! The mesh may be in any format that [`files`] reads; it is stored as our own JSON, LPS mm, and in every format.
 
 use super::failures::{unknown_organ, unsuitable_mesh};
 use super::files::mesh_file;

@@ -48,7 +48,7 @@ pub(super) fn gate_timings(a: &Attributes) -> Result<Vec<GateTiming>, VolumeErro
 /// The timing that a slice of a gated PET series states.
 ///
 /// # Errors
-/// As for [`of`].
+/// As for [`gate_timings`].
 pub(super) fn of_slice(a: &Attributes) -> Result<GateTiming, VolumeError> {
     let first = |attribute| a.shorts(attribute).first().copied().map(usize::from);
     let slots = first(TIME_SLOTS);
@@ -68,7 +68,7 @@ pub(super) fn of_slice(a: &Attributes) -> Result<GateTiming, VolumeError> {
 /// The timing that the first frame of a gated Enhanced image states.
 ///
 /// # Errors
-/// As for [`of`].
+/// As for [`gate_timings`].
 pub(super) fn of_frames(a: &Attributes) -> Result<GateTiming, VolumeError> {
     let first = Some(0);
     let nominal = a.double(FRAME_RR_NOMINAL, first);
