@@ -162,7 +162,8 @@ class Scans:
                 hashes = {"scan": "a" * 64, "mask": "b" * 64}
                 profile = {
                     "format": "ventriform-reader-profile",
-                    "version": 1,
+                    "version": 2,
+                    "kind": "edge",
                     "edge": "apparent",
                     "masks": 1,
                     "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},

@@ -190,7 +190,10 @@ async fn a_server_that_goes_away_in_the_middle_of_a_start_is_waited_for() {
     assert!(answers > 12, "{answers}");
     let left = futures::future::join_all((1..=answers).map(start_cut_after)).await;
     // How many answers come in one piece differs a little.
-    assert!(left[..answers - 3].iter().all(|left| *left == 0), "{left:?}");
+    assert!(
+        left[..answers - 3].iter().all(|left| *left == 0),
+        "{left:?}"
+    );
 }
 
 #[tokio::test]
