@@ -33,8 +33,8 @@
 //! Where nothing tells which side of the wall is anterior ([`OrientationSource::Unknown`]), the map has its
 //! levels, but neither names of sides nor territories.
 //!
-//! Not guaranteed: there is no normal database; the extent is not a TPD, a summed score or a
-//! diagnosis. Without attenuation correction the base, which lies deeper in the body, is 20 to
+//! Not guaranteed: the extent is not a TPD, a summed score or a diagnosis; [`crate::heart::normals`] compares
+//! with healthy people. Without attenuation correction the base, which lies deeper in the body, is 20 to
 //! 30 % below the apex in a heart of even uptake.
 
 mod base;
