@@ -1579,6 +1579,12 @@ async fn keys_are_kept(on: &Stores) {
     let usage = on.b.usage(&other()).await.unwrap();
     assert_eq!(usage.jobs, 1);
     assert!((3000..4000).contains(&usage.bytes), "{}", usage.bytes);
+    // A key that works closes what the operator has opened, though nothing else says so.
+    let opened = self::event(Activity::AccessOpened);
+    assert!(on.a.open_access(now(), &opened).await.unwrap());
+    assert!(!on.b.is_closed().await.unwrap());
+    assert!(on.tamper("UPDATE api_keys SET revoked_at = NULL").await);
+    assert!(on.b.is_closed().await.unwrap());
 }
 
 async fn keys_of_an_owner_are_revoked_together(on: &Stores) {

@@ -34,6 +34,11 @@ pub(super) async fn stored_bytes(of: &mut Transaction<'_>, tenant: &Tenant) -> S
     Ok(rows::unsigned(row.try_get(0)?))
 }
 
+/// Whether there is a key that was made after the operator opened the service at `$1`, or had not ended then. Making a
+/// key closes the service in the same transaction; a repaired database may have the key without that.
+const KEYS_SINCE_OPENED: &str = "SELECT EXISTS (SELECT 1 FROM api_keys
+    WHERE created_at > $1 OR (revoked_at IS NULL AND (expires_at IS NULL OR expires_at > $1)))";
+
 /// The newest receipt that names a row of the trail which is not there, though no removal by age took it.
 const UNCONFIRMED_RECEIPT: &str = "
     SELECT id, mark AS sequence, mark_hash AS hash FROM (
@@ -105,15 +110,12 @@ impl AccessStore for SqlStore {
     }
 
     async fn is_closed(&self) -> StoreResult<bool> {
-        match self.marks().await?.access {
-            Some(Access::Closed) => Ok(true),
-            // Making a key closes it again.
-            Some(Access::Opened(_)) => Ok(false),
-            Some(Access::Open) | None => {
-                let keys = query("SELECT EXISTS (SELECT 1 FROM api_keys)");
-                keys.fetch_one(&self.readers).await?.try_get(0)
-            }
-        }
+        let keys = match self.marks().await?.access {
+            Some(Access::Closed) => return Ok(true),
+            Some(Access::Opened(at)) => query(KEYS_SINCE_OPENED).bind(at),
+            Some(Access::Open) | None => query("SELECT EXISTS (SELECT 1 FROM api_keys)"),
+        };
+        keys.fetch_one(&self.readers).await?.try_get(0)
     }
 
     async fn close_access(&self) -> StoreResult<()> {
