@@ -6,13 +6,13 @@
 
 use crate::comparisons::person;
 use crate::dicom::{JANE, Patient, nm_of};
-use crate::helpers::{Api, TestApp, closed, heart, key, scan, text};
+use crate::helpers::{Api, TestApp, closed, heart, key, operations, scan, text};
 use crate::readers::profile;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
 use dicom_dictionary_std::StandardDataDictionary;
 use dicom_object::from_reader;
-use reqwest::StatusCode;
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::io::{Read, Write};
@@ -219,17 +219,9 @@ fn paths_in(value: &Value, found: &mut BTreeSet<String>) {
 
 /// Every path that a GET of the document has for the ids, and every path that an answer names.
 async fn all_paths(app: &Api) -> BTreeSet<String> {
-    let document: Value = app
-        .get("/openapi.json")
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
-    let gets = document["paths"].as_object().unwrap().iter();
-    let gets = gets.filter(|(_, item)| item.get("get").is_some());
-    let gets: Vec<String> = gets.map(|(path, _)| path.clone()).collect();
+    let gets = operations().into_iter();
+    let gets = gets.filter(|(method, ..)| method == Method::GET);
+    let gets: Vec<String> = gets.map(|(_, path, _)| path).collect();
     let mut found = BTreeSet::new();
     for path in gets.iter().filter(|path| !path.contains('{')) {
         found.insert(path.clone());

@@ -2,7 +2,7 @@
 
 use crate::s3_server;
 use reqwest::header::{AUTHORIZATION, HeaderValue};
-use reqwest::{Client, RequestBuilder, Response, StatusCode};
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use serde_json::{Map, Value, json};
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
@@ -21,7 +21,7 @@ use ventriform::mesh::TriMesh;
 use ventriform::mesh::files::MeshStatement;
 use ventriform::mesh::shapes::icosphere;
 use ventriform::results::export::{self, Format, Metadata};
-use ventriform_http::{Running, install_cryptography};
+use ventriform_http::{Running, document_json, install_cryptography};
 use ventriform_program::server::start;
 use ventriform_service::base::records::{
     Clock, Cutoff, Failure, Fault, LocalFile, Resource, ScanFields, SystemClock, Timestamp,
@@ -874,6 +874,33 @@ impl Drop for Service {
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
+}
+
+/// Method, path and content of every operation of the OpenAPI document. A path of a result's files stands once for
+/// each of their names, those of gates with the number of the first gate.
+pub fn operations() -> Vec<(Method, String, Value)> {
+    let document: Value = serde_json::from_str(&document_json()).unwrap();
+    let mut all = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            let Ok(method) = method.to_uppercase().parse::<Method>() else {
+                continue;
+            };
+            let mut paths = vec![path.clone()];
+            if path.contains("{file}") {
+                let names = operation["x-files"].as_object().unwrap().keys();
+                let names = names.map(|name| name.replace("gateNN", "gate01"));
+                paths = names.map(|name| path.replace("{file}", &name)).collect();
+            }
+            all.extend(
+                paths
+                    .into_iter()
+                    .map(|path| (method.clone(), path, operation.clone())),
+            );
+        }
+    }
+    assert!(all.len() > 200, "{}", all.len());
+    all
 }
 
 /// If set, the folder below which generated files are written instead of being compared.

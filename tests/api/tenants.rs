@@ -1,13 +1,12 @@
 //! Tenants: what belongs to one does not exist for another. Two of them, each with an API key, use
 //! one service.
 
-use crate::helpers::{TestApp, closed, key, problem, rows_of, text, volume};
+use crate::helpers::{TestApp, closed, key, operations, problem, rows_of, text, volume};
 use crate::receiver::Receiver;
 use crate::scu::nuclear;
 use reqwest::{Method, RequestBuilder, StatusCode};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use ventriform_http::document_json;
 use ventriform_service::base::records::{
     Catalogue, Clock, Filed, Idempotency, JobStore, NewJob, StoredVolume, SystemClock, Tags, Tenant,
 };
@@ -208,28 +207,6 @@ fn nobodys(id: &str) -> String {
     format!("{prefix}{}", other.collect::<String>())
 }
 
-/// Every operation of the document: method, path, with each file of a result by its name.
-fn operations() -> Vec<(Method, String)> {
-    let document: Value = serde_json::from_str(&document_json()).unwrap();
-    let mut all = Vec::new();
-    for (path, item) in document["paths"].as_object().unwrap() {
-        for (method, operation) in item.as_object().unwrap() {
-            let Ok(method) = method.to_uppercase().parse::<Method>() else {
-                continue;
-            };
-            if !path.ends_with("/{file}") {
-                all.push((method, path.clone()));
-            } else {
-                let names = operation["x-files"].as_object().unwrap().keys();
-                let paths =
-                    names.map(|name| path.replace("{file}", &name.replace("gateNN", "gate01")));
-                all.extend(paths.map(|path| (method.clone(), path)));
-            }
-        }
-    }
-    all
-}
-
 fn local(settings: &mut Settings) {
     settings.webhook_allow = "127.0.0.0/8".parse().unwrap();
 }
@@ -260,7 +237,7 @@ async fn no_route_shows_or_changes_what_another_tenant_has() {
         (status, answer.bytes().await.unwrap())
     };
     let (mut tried, mut lists) = (0, 0);
-    for (method, path) in operations() {
+    for (method, path, _) in operations() {
         if !path.starts_with("/v1/") {
             continue;
         }
