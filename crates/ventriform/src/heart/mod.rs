@@ -1,5 +1,6 @@
-//! A model and a volume to what a physician asks: the fitted wall ([`model`], [`deform`], [`judge`], [`fit`]), its uptake
-//! ([`polar`]), its motion ([`beat`]), and each against others ([`normals`], [`comparison`], [`reader`]).
+//! The left ventricle of a patient: a model fitted to the volume ([`model`], [`deform`], [`judge`], [`fit`]), the wall's
+//! uptake ([`polar`]) and motion ([`beat`]), compared with healthy people ([`normals`]), between rest and stress
+//! ([`comparison`]), and drawn as a reader draws it ([`reader`]).
 
 pub mod model;
 

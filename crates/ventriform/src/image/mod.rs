@@ -1,5 +1,5 @@
-//! Files to a heart in an image: voxels with their place ([`grid`]), pictures ([`draw`]), files to voxels and back
-//! ([`volume`]), the heart in them ([`locate`]).
+//! Images: voxels with their place ([`grid`]), pictures of results ([`draw`]), files read and written ([`volume`]), and
+//! where the heart is in a volume ([`locate`]).
 
 pub mod grid;
 

@@ -1,4 +1,4 @@
-//! Meshes and fits to what is handed out: figures and documents ([`report`]), files and DICOM objects ([`export`]).
+//! What users get: figures, documents and pages ([`report`]), mesh files and DICOM objects ([`export`]).
 
 pub mod report;
 

@@ -1,5 +1,5 @@
 //! The stages in order, from files to results: a model ([`pipeline`]), a segmentation, a beat ([`gated`]), rest and
-//! stress, cohorts ([`evaluate`]); whose the DICOM objects of a result are ([`objects`]), and what to do about an error
+//! stress, cohorts ([`evaluate`]); the patient and scan that DICOM objects name ([`objects`]), and the advice for an error
 //! ([`advice`]).
 
 pub mod pipeline;
