@@ -39,6 +39,7 @@ import tomllib
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 from lib import gated_phantom
 from lib.nm import LPS, nm
+from lib.service import reader_profile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LISTED = ROOT / "scripts/check/commands.toml"
@@ -158,18 +159,7 @@ class Scans:
             elif name == "lv.json":
                 self.run("generate", self.phantom(*rest) / "spect.nii.gz", "-o", path)
             elif name == "reader.json":
-                offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
-                hashes = {"scan": "a" * 64, "mask": "b" * 64}
-                profile = {
-                    "format": "ventriform-reader-profile",
-                    "version": 2,
-                    "kind": "edge",
-                    "edge": "apparent",
-                    "masks": 1,
-                    "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},
-                    "learnt_on": [hashes],
-                }
-                path.write_text(json.dumps(profile))
+                path.write_text(json.dumps(reader_profile()))
             elif name == "cohort/":
                 # Of an evaluation: a template and a patient, with masks.
                 for case, flags in (("t1", ["--seed", "5"]), ("p1", ["--seed", "6"])):

@@ -39,6 +39,7 @@ from referencing.jsonschema import DRAFT202012
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 from lib.nifti import nifti
+from lib.service import reader_profile
 
 URL = os.environ["SERVICE_URL"]
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
@@ -497,17 +498,7 @@ def everything(walk, folder):
     call("post", "/v1/templates", expect=200, query="?name=healthy&model=" + template_model)
     call("patch", "/v1/templates/{id}", expect=200, id=added["id"], body={"library": True})
     call("get", "/v1/templates", expect=200)
-    offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
-    hashes = {"scan": "a" * 64, "mask": "b" * 64}
-    profile = {
-        "format": "ventriform-reader-profile",
-        "version": 2,
-        "kind": "edge",
-        "edge": "apparent",
-        "masks": 1,
-        "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},
-        "learnt_on": [hashes],
-    }
+    profile = reader_profile()
     _, reader = call("post", "/v1/readers", expect=201, query="?name=first", body=profile)
     call("post", "/v1/readers", expect=200, query="?name=first", body=profile)
     call("get", "/v1/readers", expect=200)

@@ -32,6 +32,20 @@ def free_port():
         return one.getsockname()[1]
 
 
+def reader_profile():
+    """A reader's profile as the service takes it, by distances from the apparent wall."""
+    offset = {"value": 0.5, "mean": 0.7, "spread": 0.3}
+    return {
+        "format": "ventriform-reader-profile",
+        "version": 2,
+        "kind": "edge",
+        "edge": "apparent",
+        "masks": 1,
+        "offsets_mm": {"endocardium": offset, "epicardium": offset, "rim": offset},
+        "learnt_on": [{"scan": "a" * 64, "mask": "b" * 64}],
+    }
+
+
 class Service:
     """`ventriform serve` on a data folder.
 
