@@ -96,6 +96,10 @@ const COMPARISONS: &[(&str, &str)] = &[
     ("tables/access.rs: expires_at >", "valid keys"),
     // Two stamps of one store.
     (
+        "tables/access.rs: created_at >",
+        "a key from after the operator opened the service",
+    ),
+    (
         "kept.rs: noted_at <=",
         "a note from before the store was opened",
     ),
