@@ -17,12 +17,19 @@ interface Schema {
   minItems?: number;
   maxItems?: number;
   description?: string;
+  "x-title"?: string;
+  "x-group"?: string;
+  "x-unit"?: string;
 }
 
 export interface Spec {
   name: string;
   schema: Schema;
   help: string;
+  /** The name that people read. */
+  title: string;
+  /** The heading that it stands under; empty for those that a form begins with. */
+  group: string;
   unit: string;
 }
 
@@ -71,111 +78,37 @@ export function parameterSpecs(): Promise<Record<Kind, Spec[]>> {
   return specs;
 }
 
-const UNITS: [RegExp, string][] = [
-  [/square millimetres/, "mm²"],
-  [/millimetres|LPS mm/, "mm"],
-  [/degrees/, "°"],
-  [/, g,/, "g"],
-  [/, ms\b/, "ms"],
-  [/, in voxels/, "voxels"],
-];
-
 function read(document: Document, path: string): Spec[] {
   return (document.paths[path]?.post?.parameters ?? []).flatMap(given => {
     const parameter = document.components.parameters[given.$ref?.split("/").pop() ?? ""] ?? given;
     const { name, schema } = parameter;
     if (parameter.in !== "query" || !name || !schema || NOT_OF_THE_WORK.has(name)) return [];
-    const help = parameter.description ?? schema.description ?? "";
-    const numeric = ["number", "integer", "array"].includes(String(schema.type));
-    const unit =
-      numeric && !["axis", "anterior", "segments_from"].includes(name)
-        ? (UNITS.find(([words]) => words.test(help))?.[1] ?? "")
-        : "";
-    return [{ name, schema, help, unit }];
+    return [
+      {
+        name,
+        schema,
+        help: parameter.description ?? schema.description ?? "",
+        title: schema["x-title"] ?? name,
+        group: schema["x-group"] ?? "",
+        unit: schema["x-unit"] ?? "",
+      },
+    ];
   });
 }
 
-const FEW: Record<Kind, string[]> = {
-  model: ["points", "method", "iso"],
-  segmentation: ["model", "edge", "reader", "expert", "frame", "normals"],
-  beat: ["model", "mass_g", "rr_ms", "gated", "normals"],
-  comparison: ["normals"],
-};
-
 /** What chooses the group of the normal limits, once limits are chosen. */
-const GROUP = ["sex", "protocol", "stress_protocol", "rest_protocol", "tracer", "attenuation_corrected"];
+const LIMITS_GROUP = "Group of the normal limits";
 
-const PLACE = [
-  "center",
-  "axis",
-  "base",
-  "seed_point",
-  "box",
-  "roll",
-  "superior",
-  "anterior",
-  "segments_from",
-  "kept_model",
-];
-const EDGE = ["sensor", "blur", "reach", "last_reach", "narrowing", "margin", "resolution"];
-const SPRINGS = [
-  "spring_stiffness",
-  "torsion_stiffness",
-  "body_stiffness",
-  "thickness_stiffness",
-  "mass",
-  "damping",
-  "time_step",
-  "tolerance",
-  "max_iterations",
-];
-
-const GROUPS: Record<Kind, [string, string[]][]> = {
-  model: [
-    ["Repeat and choose", ["seed", "starts", "frame"]],
-    ["Object", ["isolate", "box", "seed_point", "label", "topology", "mask_smoothing", "denoise"]],
-    [
-      "Points",
-      ["adaptive", "adaptive_from", "repulsion_iterations", "repulsion_strength", "geodesics", "relaxation_iterations"],
-    ],
-    ["Fit to the surface", ["fit_*"]],
-    ["Triangles", ["fitness", "w1", "w2", "w3", "w4", "gain", "guard"]],
-  ],
-  segmentation: [
-    ["The expert's mask", ["label", "resample"]],
-    ["Where the heart is", ["organ", ...PLACE]],
-    ["Edge of the wall", EDGE],
-    ["Springs", SPRINGS],
-    ["Polar map", ["polar_*"]],
-  ],
-  beat: [
-    ["Where the heart is", PLACE],
-    ["Edge of the wall", EDGE],
-    ["Springs", SPRINGS],
-    ["Polar map", ["polar_*"]],
-  ],
-  comparison: [
-    ["Both scans", ["same_patient", "gated", "model"]],
-    ["Where the heart is", PLACE],
-    ["Edge of the wall", EDGE],
-    ["Springs", SPRINGS],
-    ["Polar map", ["polar_*"]],
-  ],
-};
-
-function arranged(kind: Kind, all: Spec[]): { few: Spec[]; group: Spec[]; groups: [string, Spec[]][] } {
-  const left = new Map(all.map(spec => [spec.name, spec]));
-  const take = (names: string[]): Spec[] =>
-    names.flatMap(name => {
-      const start = name.endsWith("*") ? name.slice(0, -1) : null;
-      const found = start === null ? [left.get(name)] : [...left.values()].filter(spec => spec.name.startsWith(start));
-      return found.flatMap(spec => (spec && left.delete(spec.name) ? [spec] : []));
-    });
-  const few = take(FEW[kind]);
-  const group = take(GROUP);
-  const groups = GROUPS[kind].map(([title, names]): [string, Spec[]] => [title, take(names)]);
-  if (left.size) groups.push(["Other", [...left.values()]]);
-  return { few, group, groups };
+/** The parameters that a form begins with, those of the limits' group, and the others by their groups. */
+function arranged(all: Spec[]): { main: Spec[]; limits: Spec[]; groups: [string, Spec[]][] } {
+  const groups = new Map<string, Spec[]>();
+  for (const spec of all) groups.set(spec.group, [...(groups.get(spec.group) ?? []), spec]);
+  const take = (group: string) => {
+    const found = groups.get(group) ?? [];
+    groups.delete(group);
+    return found;
+  };
+  return { main: take(""), limits: take(LIMITS_GROUP), groups: [...groups] };
 }
 
 /** What a person has written, by parameter; the text of a field, so that a slip can be corrected. */
@@ -243,7 +176,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
     setPresets(presetsOf(kind));
   }, [kind]);
   if (!all) return <p class="quiet">Reading the parameters …</p>;
-  const { few, group, groups } = arranged(kind, all);
+  const { main, limits, groups } = arranged(all);
   const field = (spec: Spec) => (
     <Field
       key={spec.name}
@@ -254,7 +187,7 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
       onText={text =>
         onChange({
           ...draft,
-          ...(spec.name === "normals" ? Object.fromEntries(GROUP.map(name => [name, ""])) : {}),
+          ...(spec.name === "normals" ? Object.fromEntries(limits.map(({ name }) => [name, ""])) : {}),
           [spec.name]: text,
         })
       }
@@ -268,8 +201,8 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
   return (
     <div class="parameters">
       <div class="fields">
-        {few.filter(spec => spec.name !== "frame" || volume.frames > 1).map(field)}
-        {draft["normals"] && group.map(field)}
+        {main.filter(spec => spec.name !== "frame" || volume.frames > 1).map(field)}
+        {draft["normals"] && limits.map(field)}
       </div>
       <details open={mustShow || undefined}>
         <summary>More{changed(inMore) ? <span class="count">{changed(inMore)} set</span> : null}</summary>
@@ -329,39 +262,13 @@ export function ParameterForm({ kind, volume, draft, onChange, problem }: FormPr
         </div>
       </details>
       {problem &&
-        !all.some(spec => spec.name === problem.field && (draft["normals"] || !GROUP.includes(spec.name))) && (
+        !all.some(spec => spec.name === problem.field && (draft["normals"] || spec.group !== LIMITS_GROUP)) && (
           <p class="error" role="alert">
             {problem.text}
           </p>
         )}
     </div>
   );
-}
-
-const NAMES: Record<string, string> = {
-  iso: "Iso-value",
-  model: "Model to fit",
-  mass_g: "Mass of the muscle",
-  rr_ms: "R-R interval",
-  gated: "Taken for gates",
-  expert: "Expert's mask",
-  reader: "Drawn as by",
-  edge: "Wall shown",
-  center: "Centre",
-  base: "Base plane",
-  w1: "Weight 1",
-  w2: "Weight 2",
-  w3: "Weight 3",
-  w4: "Weight 4",
-  normals: "Normal limits",
-  stress_protocol: "Protocol at stress",
-  rest_protocol: "Protocol at rest",
-  attenuation_corrected: "Attenuation corrected",
-};
-
-function title(name: string): string {
-  const text = name.replaceAll("_", " ");
-  return NAMES[name] ?? text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 interface FieldProps {
@@ -375,7 +282,7 @@ interface FieldProps {
 }
 
 function Field({ spec, volume, text, limits, onText, error }: FieldProps) {
-  const { name, schema, help, unit } = spec;
+  const { name, schema, help, title, unit } = spec;
   const id = `parameter-${name}`;
   const described = `${id}-help${error ? ` ${id}-error` : ""}`;
   const common = { id, "aria-describedby": described, "aria-invalid": error ? true : undefined };
@@ -450,12 +357,12 @@ function Field({ spec, volume, text, limits, onText, error }: FieldProps) {
   return (
     <div class={error ? "field wrong" : "field"}>
       <label for={id}>
-        {title(name)}
+        {title}
         {unit && <span class="unit"> {unit}</span>}
       </label>
       {input}
       <details class="help">
-        <summary aria-label={`About ${title(name)}`}>?</summary>
+        <summary aria-label={`About ${title}`}>?</summary>
         <span>
           {help}
           {range && ` (${range})`}

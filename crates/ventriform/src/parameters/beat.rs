@@ -1,7 +1,7 @@
 //! The parameters of a beat: its own, and those of the fit to the gates' sum.
 
 use super::with_fit::{BesideFit, WithFit};
-use super::{Kind, ParameterError, ParameterSpec, Parameters};
+use super::{Kind, ParameterError, ParameterSpec, Parameters, groups};
 use serde_json::json;
 use std::ops::RangeInclusive;
 
@@ -23,11 +23,6 @@ pub struct BeatChoice {
 }
 
 impl BeatChoice {
-    /// The stated mass of the left ventricle's muscle, g.
-    pub fn stated_muscle_g(&self) -> Option<f64> {
-        self.mass_g
-    }
-
     /// The first parameter that lies outside of its range: name, value, least and greatest.
     pub fn out_of_range(&self) -> Option<(&'static str, f64, [f64; 2])> {
         [
@@ -56,6 +51,9 @@ impl Parameters for BeatChoice {
 pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
     ParameterSpec {
         name: "gated",
+        title: "Taken for gates",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Switch,
         default: "false",
         summary: "Whether the volumes of the file are gates of one heart beat although its header says otherwise",
@@ -67,6 +65,9 @@ pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
     },
     ParameterSpec {
         name: "mass_g",
+        title: "Mass of the muscle",
+        group: groups::MAIN,
+        unit: "g",
         kind: Kind::Number {
             min: *MASS_G.start(),
             max: *MASS_G.end(),
@@ -82,6 +83,9 @@ pub const BEAT_SPECS: &[ParameterSpec<BeatChoice>] = &[
     },
     ParameterSpec {
         name: "rr_ms",
+        title: "R-R interval",
+        group: groups::MAIN,
+        unit: "ms",
         kind: Kind::Number {
             min: *RR_MS.start(),
             max: *RR_MS.end(),

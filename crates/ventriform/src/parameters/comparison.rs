@@ -1,8 +1,9 @@
 //! The parameters of a comparison: its own, and those of the fits to both scans.
 
 use super::fit_specs::{NAME_PATTERN, direction, point, scan_name};
+use super::table::titled;
 use super::with_fit::{BesideFit, WithFit};
-use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters};
+use super::{FitParameters, Kind, ParameterError, ParameterSpec, Parameters, groups};
 use crate::base::geometry::Vec3;
 use crate::heart::comparison::WhichScan;
 use serde_json::{Map, Value, json};
@@ -88,11 +89,14 @@ impl Parameters for ComparisonChoice {
     }
 }
 
-/// A row for a place or a direction in one scan: name, field, how the numbers are read, summary.
+/// A row for a place or a direction in one scan: name, field, how the numbers are read, unit, summary.
 macro_rules! in_scan {
-    ($name:literal, $($field:ident).+, $read:expr, $summary:literal) => {
+    ($name:literal, $($field:ident).+, $read:expr, $unit:literal, $summary:literal) => {
         ParameterSpec {
             name: $name,
+            title: "",
+            group: groups::PLACE,
+            unit: $unit,
             kind: Kind::Numbers { count: 3 },
             default: "",
             summary: $summary,
@@ -114,6 +118,9 @@ fn stated_point(list: &[f64]) -> Result<Vec3, String> {
 pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
     ParameterSpec {
         name: "rest",
+        title: "",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Stored {
             prefixes: &["vol_"],
             word: "",
@@ -129,6 +136,9 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
     },
     ParameterSpec {
         name: "stress_protocol",
+        title: "Protocol at stress",
+        group: groups::LIMITS_GROUP,
+        unit: "",
         kind: Kind::Text {
             pattern: NAME_PATTERN,
             example: "stress",
@@ -144,6 +154,9 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
     },
     ParameterSpec {
         name: "rest_protocol",
+        title: "Protocol at rest",
+        group: groups::LIMITS_GROUP,
+        unit: "",
         kind: Kind::Text {
             pattern: NAME_PATTERN,
             example: "rest",
@@ -158,6 +171,9 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
     },
     ParameterSpec {
         name: "gated",
+        title: "Taken for gates",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Switch,
         default: "false",
         summary: "Whether the volumes of both files are gates of one heart beat although their headers say otherwise",
@@ -169,6 +185,9 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
     },
     ParameterSpec {
         name: "same_patient",
+        title: "",
+        group: groups::BOTH_SCANS,
+        unit: "",
         kind: Kind::Switch,
         default: "false",
         summary: "Whether both scans are of one patient although their headers name two, as after pseudonymisation",
@@ -178,61 +197,93 @@ pub const COMPARISON_SPECS: &[ParameterSpec<ComparisonChoice>] = &[
         },
         write: |p| json!(p.same_patient),
     },
-    in_scan!(
-        "stress_center",
-        stress_correction.center,
-        stated_point,
-        "A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
+    titled(
+        "Centre at stress",
+        in_scan!(
+            "stress_center",
+            stress_correction.center,
+            stated_point,
+            "mm",
+            "A point in the cavity in the scan at stress, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
          Default: the heart is searched for"
+        ),
     ),
-    in_scan!(
-        "stress_axis",
-        stress_correction.axis,
-        direction,
-        "Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 \
+    titled(
+        "Axis at stress",
+        in_scan!(
+            "stress_axis",
+            stress_correction.axis,
+            direction,
+            "",
+            "Direction from base to apex in the scan at stress, x,y,z in LPS, of any length: the search stays within 35 \
          degrees of it"
+        ),
     ),
-    in_scan!(
-        "stress_base",
-        stress_correction.base,
-        stated_point,
-        "A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put \
+    titled(
+        "Base plane at stress",
+        in_scan!(
+            "stress_base",
+            stress_correction.base,
+            stated_point,
+            "mm",
+            "A point of the ventricle's base in the scan at stress, x,y,z in LPS millimetres: the rim of the wall is put \
          there. Default: where image and anatomy put it"
+        ),
     ),
-    in_scan!(
-        "stress_segments_from",
-        stress_correction.segments_from,
-        direction,
-        "Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. \
+    titled(
+        "Segments from, at stress",
+        in_scan!(
+            "stress_segments_from",
+            stress_correction.segments_from,
+            direction,
+            "",
+            "Direction from the long axis to the wall that segments are counted from in the scan at stress, x,y,z in LPS. \
          Default: the anterior wall"
+        ),
     ),
-    in_scan!(
-        "rest_center",
-        rest_correction.center,
-        stated_point,
-        "A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
+    titled(
+        "Centre at rest",
+        in_scan!(
+            "rest_center",
+            rest_correction.center,
+            stated_point,
+            "mm",
+            "A point in the cavity in the scan at rest, x,y,z in LPS millimetres: the search stays within 25 mm of it. \
          Default: the heart is searched for"
+        ),
     ),
-    in_scan!(
-        "rest_axis",
-        rest_correction.axis,
-        direction,
-        "Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 \
+    titled(
+        "Axis at rest",
+        in_scan!(
+            "rest_axis",
+            rest_correction.axis,
+            direction,
+            "",
+            "Direction from base to apex in the scan at rest, x,y,z in LPS, of any length: the search stays within 35 \
          degrees of it"
+        ),
     ),
-    in_scan!(
-        "rest_base",
-        rest_correction.base,
-        stated_point,
-        "A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put \
+    titled(
+        "Base plane at rest",
+        in_scan!(
+            "rest_base",
+            rest_correction.base,
+            stated_point,
+            "mm",
+            "A point of the ventricle's base in the scan at rest, x,y,z in LPS millimetres: the rim of the wall is put \
          there. Default: where image and anatomy put it"
+        ),
     ),
-    in_scan!(
-        "rest_segments_from",
-        rest_correction.segments_from,
-        direction,
-        "Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. \
+    titled(
+        "Segments from, at rest",
+        in_scan!(
+            "rest_segments_from",
+            rest_correction.segments_from,
+            direction,
+            "",
+            "Direction from the long axis to the wall that segments are counted from in the scan at rest, x,y,z in LPS. \
          Default: the anterior wall"
+        ),
     ),
 ];
 

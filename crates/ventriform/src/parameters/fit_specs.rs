@@ -1,7 +1,7 @@
 //! The table of the parameters of a fit.
 
-use super::table::{choice, integer, number, optional};
-use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters};
+use super::table::{choice, integer, number, optional, titled};
+use super::{FitParameters, Kind, MaskGrid, ParameterError, ParameterSpec, Parameters, groups};
 use crate::base::geometry::Vec3;
 use crate::heart::deform::sensors::SensorKind;
 use crate::heart::deform::{Orbit, WallEdge};
@@ -31,6 +31,9 @@ macro_rules! scan_name {
     ($name:literal, $field:ident, $example:literal, $summary:literal) => {
         ParameterSpec {
             name: $name,
+            title: "",
+            group: groups::LIMITS_GROUP,
+            unit: "",
             kind: Kind::Text {
                 pattern: NAME_PATTERN,
                 example: $example,
@@ -50,6 +53,9 @@ macro_rules! scan_name {
 pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     ParameterSpec {
         name: "model",
+        title: "Model to fit",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Stored {
             prefixes: &["mdl_", "tpl_", "seg_"],
             word: FitParameters::AUTO_MODEL,
@@ -68,6 +74,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "kept_model",
+        title: "Model kept",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Text {
             pattern: "^[^\\x00-\\x1f]{1,200}$",
             example: "built-in usual",
@@ -88,6 +97,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "expert",
+        title: "Expert's mask",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Stored {
             prefixes: &["vol_"],
             word: "",
@@ -105,6 +117,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "label",
+        title: "",
+        group: groups::EXPERT_MASK,
+        unit: "",
         kind: Kind::Text {
             pattern: r"^.{1,64}$",
             example: "2, or the name of a DICOM segment",
@@ -130,6 +145,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "resample",
+        title: "",
+        group: groups::EXPERT_MASK,
+        unit: "",
         kind: Kind::Switch,
         default: "false",
         summary: "Whether an expert's mask on another grid of voxels is resampled by the nearest voxel; \
@@ -148,6 +166,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "mesh_unit",
+        title: "",
+        group: groups::EXPERT_MASK,
+        unit: "",
         kind: Kind::Choice(&["mm", "cm", "m"]),
         default: "",
         summary: "Unit of an expert's mask that is a mesh. Default: what its file states; otherwise mm (of glTF m), \
@@ -160,6 +181,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "mesh_frame",
+        title: "",
+        group: groups::EXPERT_MASK,
+        unit: "",
         kind: Kind::Choice(&["lps", "ras"]),
         default: "",
         summary: "Frame of an expert's mask that is a mesh: lps (DICOM, x to the left, y to posterior) or ras \
@@ -173,6 +197,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "reader",
+        title: "Drawn as by",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Stored {
             prefixes: &["rdr_"],
             word: "",
@@ -190,6 +217,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "normals",
+        title: "Normal limits",
+        group: groups::MAIN,
+        unit: "",
         kind: Kind::Stored {
             prefixes: &["nrm_"],
             word: "",
@@ -205,6 +235,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "sex",
+        title: "",
+        group: groups::LIMITS_GROUP,
+        unit: "",
         kind: Kind::Choice(&["F", "M"]),
         default: "",
         summary: "The patient's sex, which chooses the group of the normal limits. Default: that of a DICOM header",
@@ -229,6 +262,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     ),
     ParameterSpec {
         name: "attenuation_corrected",
+        title: "",
+        group: groups::LIMITS_GROUP,
+        unit: "",
         kind: Kind::Choice(&["yes", "no"]),
         default: "",
         summary: "Whether the scan's attenuation was corrected, which chooses the group of the normal limits. Default: \
@@ -244,6 +280,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "frame",
         frame => frame,
         0..=1_000_000,
+        groups::MAIN,
+        "",
         "Frame of a 4-D volume or gate, counted from 0 (0 is the first); without it, the gates of a \
          heart beat are summed"
     ),
@@ -251,6 +289,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "organ",
         organ,
         "left_ventricle",
+        groups::PLACE,
         "Organ that the model shows. All but the left ventricle are searched for as the largest \
          bright region and have no polar map",
         "left_ventricle" => Organ::LeftVentricle,
@@ -260,6 +299,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     ),
     ParameterSpec {
         name: "center",
+        title: "Centre",
+        group: groups::PLACE,
+        unit: "mm",
         kind: Kind::Numbers { count: 3 },
         default: "",
         summary: "A point in the cavity, x,y,z in LPS millimetres: the search stays within 25 mm of \
@@ -273,6 +315,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "seed_point",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Integers { count: 3 },
         default: "",
         summary: "Voxel i,j,k (counted from 0) in the cavity; use this or center",
@@ -285,6 +330,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "axis",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Numbers { count: 3 },
         default: "",
         summary: "Direction from base to apex, x,y,z in LPS, of any length: the search stays within \
@@ -297,6 +345,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "box",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Integers { count: 6 },
         default: "",
         summary: "Box of voxels that contains the centre of the organ: i0,j0,k0,i1,j1,k1, counted \
@@ -315,11 +366,16 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.roll,
         -360.0..=360.0,
         "0",
+        groups::PLACE,
+        "°",
         "Rotation of the model about the long axis, in degrees, in addition to the smallest \
          rotation that aligns the axes"
     ),
     ParameterSpec {
         name: "superior",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Direction(&["body", "frame"]),
         default: "body",
         summary: "Which direction is superior in the patient, from which the segments of the polar map \
@@ -343,6 +399,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "anterior",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Numbers { count: 3 },
         default: "",
         summary: "Direction from the long axis to the anterior wall, x,y,z in the LPS frame of the volume: \
@@ -356,6 +415,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "segments_from",
+        title: "",
+        group: groups::PLACE,
+        unit: "",
         kind: Kind::Numbers { count: 3 },
         default: "",
         summary: "Direction from the long axis to the wall that segments are counted from as the anterior one, x,y,z \
@@ -369,6 +431,9 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
     },
     ParameterSpec {
         name: "base",
+        title: "Base plane",
+        group: groups::PLACE,
+        unit: "mm",
         kind: Kind::Numbers { count: 3 },
         default: "",
         summary: "A point of the ventricle's base, x,y,z in LPS millimetres: the rim of the wall is put there \
@@ -384,6 +449,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "sensor",
         deform.sensor,
         "half_maximum",
+        groups::EDGE,
         "What the sensors detect: half_maximum (the point half-way down the steepest outward fall), \
          gradient (the steepest point of that fall), unsigned (the steepest change in either \
          direction) or level (the crossing of half of the organ's uptake)",
@@ -397,6 +463,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.blur,
         0.0..=10.0,
         "3",
+        groups::EDGE,
+        "mm",
         "Sigma of the Gaussian that smooths the image for the sensors, millimetres"
     ),
     number!(
@@ -404,6 +472,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.reach,
         2.0..=30.0,
         "10",
+        groups::EDGE,
+        "mm",
         "Initial search range of the sensors, millimetres to either side"
     ),
     number!(
@@ -411,6 +481,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.last_reach,
         1.0..=30.0,
         "6",
+        groups::EDGE,
+        "mm",
         "Final search range of the sensors, millimetres to either side"
     ),
     number!(
@@ -418,6 +490,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.narrowing,
         0.1..=0.99,
         "0.85",
+        groups::EDGE,
+        "",
         "Factor by which the search range shrinks from step to step"
     ),
     number!(
@@ -425,33 +499,45 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.margin,
         -5.0..=5.0,
         "0",
+        groups::EDGE,
+        "mm",
         "How far outside the detected edge the contour is drawn, millimetres"
     ),
-    choice!(
-        "edge",
-        deform.edge,
-        "apparent",
-        "Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred \
-         image) or anatomical (the wall itself, without the thickness that blur adds). The report \
-         has the volumes of both",
-        "apparent" => WallEdge::Apparent,
-        "anatomical" => WallEdge::Anatomical,
+    titled(
+        "Wall shown",
+        choice!(
+            "edge",
+            deform.edge,
+            "apparent",
+            groups::MAIN,
+            "Which wall of a ventricle mask, mesh and measures show: apparent (as it looks in the blurred \
+             image) or anatomical (the wall itself, without the thickness that blur adds). The report \
+             has the volumes of both",
+            "apparent" => WallEdge::Apparent,
+            "anatomical" => WallEdge::Anatomical,
+        ),
     ),
-    choice!(
-        "mask_grid",
-        mask_grid,
-        "scan",
-        "Grid of the masks and labels that are written: scan (the scan's own) or orthogonal (of a scan whose \
-         axes are not at right angles, as of a tilted gantry, a grid at right angles that covers it; \
-         NIfTI's qform and ITK know no other)",
-        "scan" => MaskGrid::Scan,
-        "orthogonal" => MaskGrid::Orthogonal,
+    titled(
+        "Grid of the masks",
+        choice!(
+            "mask_grid",
+            mask_grid,
+            "scan",
+            groups::IMAGE,
+            "Grid of the masks and labels that are written: scan (the scan's own) or orthogonal (of a scan whose \
+             axes are not at right angles, as of a tilted gantry, a grid at right angles that covers it; \
+             NIfTI's qform and ITK know no other)",
+            "scan" => MaskGrid::Scan,
+            "orthogonal" => MaskGrid::Orthogonal,
+        ),
     ),
     optional!(
         Number f64,
         "resolution",
         deform.resolution => deform.resolution,
         0.0..=30.0,
+        groups::IMAGE,
+        "mm",
         "Resolution of the image, if it is known: full width at half maximum of a point, including \
          motion and filters, millimetres. The anatomical wall is as much thinner as this blur makes \
          a wall look thicker. Default: by calibration on simulated hearts"
@@ -460,6 +546,7 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         "orbit",
         deform.orbit,
         "auto",
+        groups::IMAGE,
         "How far the camera turned about the patient, degrees: 180, 360, or none (it saw all angles at once, so that \
          motion of the patient cannot be told from the image and is not flagged). auto: as a DICOM header says (Scan \
          Arc (0018,1143); PET: none); where it does not, motion is flagged only from a chance of one half on",
@@ -473,6 +560,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.stiffness.spring,
         0.0..=1e6,
         "2.5",
+        groups::SPRINGS,
+        "mm²",
         "Stiffness that keeps the length of edges, square millimetres"
     ),
     number!(
@@ -480,6 +569,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.stiffness.torsion,
         0.0..=1e6,
         "7.5",
+        groups::SPRINGS,
+        "mm²",
         "Stiffness that keeps each node's position among its neighbours, square millimetres"
     ),
     number!(
@@ -487,6 +578,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.stiffness.body,
         0.0..=1e6,
         "6",
+        groups::SPRINGS,
+        "mm²",
         "Stiffness that keeps the shape of the whole model, square millimetres"
     ),
     number!(
@@ -494,6 +587,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.stiffness.thickness,
         0.0..=1e6,
         "0.02",
+        groups::SPRINGS,
+        "",
         "Stiffness that keeps the thickness of the wall"
     ),
     number!(
@@ -501,6 +596,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.mass,
         1e-6..=1e6,
         "0.1",
+        groups::SPRINGS,
+        "",
         "Mass of the whole model relative to a sensor force of 1 per millimetre"
     ),
     number!(
@@ -508,6 +605,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.damping,
         0.0..=1e6,
         "1",
+        groups::SPRINGS,
+        "",
         "Damping of the motion per time step"
     ),
     number!(
@@ -515,6 +614,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.time_step,
         1e-3..=1e3,
         "1",
+        groups::SPRINGS,
+        "",
         "Length of one time step of the motion"
     ),
     number!(
@@ -522,6 +623,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.tolerance,
         1e-6..=1.0,
         "0.04",
+        groups::SPRINGS,
+        "mm",
         "Largest displacement of a node per step at which the model counts as at rest, millimetres"
     ),
     integer!(
@@ -529,6 +632,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         deform.motion.max_iterations,
         1..=10_000,
         "100",
+        groups::SPRINGS,
+        "",
         "Maximum number of time steps"
     ),
     number!(
@@ -536,6 +641,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         polar.threshold,
         0.0..=1.0,
         "0.6",
+        groups::POLAR_MAP,
+        "",
         "Share of the wall's reference uptake below which a sample counts as a defect"
     ),
     number!(
@@ -543,6 +650,8 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         polar.extension,
         0.0..=10.0,
         "3",
+        groups::POLAR_MAP,
+        "mm",
         "How far the samples of the polar map extend beyond the wall on both sides, millimetres"
     ),
     number!(
@@ -550,12 +659,15 @@ pub const FIT_SPECS: &[ParameterSpec<FitParameters>] = &[
         polar.blur,
         0.0..=10.0,
         "3",
+        groups::POLAR_MAP,
+        "mm",
         "Sigma of the Gaussian that smooths the image for the polar map, millimetres"
     ),
     choice!(
         "polar_projection",
         polar.projection,
         "standard",
+        groups::POLAR_MAP,
         "How wide the levels of the polar map are drawn: standard (rings of equal width) or area (each \
          level has the share of the map that it has of the wall)",
         "standard" => Projection::Standard,

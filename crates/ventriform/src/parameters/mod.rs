@@ -13,6 +13,7 @@ mod checks;
 mod comparison;
 mod fit;
 mod fit_specs;
+mod groups;
 mod input;
 mod kind;
 mod model;

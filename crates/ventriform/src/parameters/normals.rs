@@ -1,7 +1,7 @@
 //! The parameters of normal limits that are built: their own, and those of the fits to the scans.
 
 use super::with_fit::{BesideFit, WithFit};
-use super::{Kind, ParameterError, ParameterSpec, Parameters};
+use super::{Kind, ParameterError, ParameterSpec, Parameters, groups};
 use crate::heart::normals::Sex;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -26,6 +26,9 @@ impl Parameters for NormalsChoice {
 /// Every parameter that only normal limits have.
 pub const NORMALS_SPECS: &[ParameterSpec<NormalsChoice>] = &[ParameterSpec {
     name: "mixed",
+    title: "",
+    group: groups::MAIN,
+    unit: "",
     kind: Kind::Switch,
     default: "false",
     summary: "Whether men and women are one group, where there are too few of each",

@@ -7,6 +7,7 @@ use super::{
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use utoipa::openapi::RefOr;
+use utoipa::openapi::extensions::{Extensions, ExtensionsBuilder};
 use utoipa::openapi::schema::{
     AdditionalProperties, ArrayBuilder, Object, ObjectBuilder, Schema, Type,
 };
@@ -101,10 +102,11 @@ fn object_with(
     Schema::from(object.build()).into()
 }
 
-/// The schema of one parameter: type, range or words, default and help.
+/// The schema of one parameter: type, range or words, default and help; `x-title`, `x-group` and `x-unit` for forms.
 pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
     let object = ObjectBuilder::new()
         .description(Some(spec.summary))
+        .extensions(Some(form_facts(spec)))
         .default(default_of(spec));
     match spec.kind {
         Kind::Integer { min, max } => {
@@ -136,8 +138,8 @@ pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
                 .examples([spec.default, "0,0,1"])
                 .into()
         }
-        Kind::Integers { count } => list_of(Type::Integer, count, spec.summary),
-        Kind::Numbers { count } => list_of(Type::Number, count, spec.summary),
+        Kind::Integers { count } => list_of(Type::Integer, count, spec),
+        Kind::Numbers { count } => list_of(Type::Number, count, spec),
         Kind::Stored {
             prefixes,
             word,
@@ -162,10 +164,21 @@ pub fn schema_of<P: Parameters>(spec: &ParameterSpec<P>) -> Schema {
     }
 }
 
-fn list_of(kind: Type, count: usize, summary: &str) -> Schema {
+/// What forms show beside the value.
+fn form_facts<P: Parameters>(spec: &ParameterSpec<P>) -> Extensions {
+    let facts = [("x-group", spec.group), ("x-unit", spec.unit)];
+    let facts = facts.into_iter().filter(|(_, text)| !text.is_empty());
+    let builder = ExtensionsBuilder::new().add("x-title", spec.shown_name());
+    facts
+        .fold(builder, |builder, (name, text)| builder.add(name, text))
+        .build()
+}
+
+fn list_of<P: Parameters>(kind: Type, count: usize, spec: &ParameterSpec<P>) -> Schema {
     Schema::Array(
         ArrayBuilder::new()
-            .description(Some(summary))
+            .description(Some(spec.summary))
+            .extensions(Some(form_facts(spec)))
             .items(Object::with_type(kind))
             .min_items(Some(count))
             .max_items(Some(count))

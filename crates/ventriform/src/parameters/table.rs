@@ -9,6 +9,12 @@ use serde_json::{Map, Value};
 pub struct ParameterSpec<P: Parameters> {
     /// The name in queries, in JSON and on the command line (there also with `-` for `_`).
     pub name: &'static str,
+    /// The name that people read; empty for `name` in words.
+    pub title: &'static str,
+    /// The heading that forms put it under ([`groups`](super::groups)).
+    pub group: &'static str,
+    /// The unit of its numbers; empty for none.
+    pub unit: &'static str,
     /// Type and range.
     pub kind: Kind,
     /// The default as a user would write it; empty if there is no fixed default.
@@ -21,15 +27,27 @@ pub struct ParameterSpec<P: Parameters> {
     pub(super) write: fn(&P) -> Value,
 }
 
+/// `row` with a name that people read other than its own in words.
+pub(super) const fn titled<P: Parameters>(
+    title: &'static str,
+    mut row: ParameterSpec<P>,
+) -> ParameterSpec<P> {
+    row.title = title;
+    row
+}
+
 /// A row for one number: its kind and getter, name, field of the parameters (and of their draft),
-/// range, default and summary.
+/// range, default, group, unit and summary.
 macro_rules! plain {
     (
         $kind:ident $getter:ident, $name:literal, $($field:ident).+ $([$index:literal])?,
-        $min:literal..=$max:literal, $default:literal, $summary:literal
+        $min:literal..=$max:literal, $default:literal, $group:path, $unit:literal, $summary:literal
     ) => {
         ParameterSpec {
             name: $name,
+            title: "",
+            group: $group,
+            unit: $unit,
             kind: Kind::$kind {
                 min: $min,
                 max: $max,
@@ -59,14 +77,17 @@ macro_rules! integer {
 pub(super) use integer;
 
 /// A row for a number without a fixed default: its kind and getter, name, field of the draft,
-/// field of the parameters, range and summary.
+/// field of the parameters, range, group, unit and summary.
 macro_rules! optional {
     (
         $kind:ident $getter:ident, $name:literal, $($draft:ident).+ => $($field:ident).+,
-        $min:literal..=$max:literal, $summary:literal
+        $min:literal..=$max:literal, $group:path, $unit:literal, $summary:literal
     ) => {
         ParameterSpec {
             name: $name,
+            title: "",
+            group: $group,
+            unit: $unit,
             kind: Kind::$kind {
                 min: $min,
                 max: $max,
@@ -83,15 +104,18 @@ macro_rules! optional {
 }
 pub(super) use optional;
 
-/// A row for a choice between words: name, field of the draft and of the parameters, default, summary,
+/// A row for a choice between words: name, field of the draft and of the parameters, default, group, summary,
 /// the value of each word, and what the draft stores of a value.
 macro_rules! words {
     (
-        $name:literal, $($draft:ident).+ => $($field:ident).+, $default:literal, $summary:literal,
+        $name:literal, $($draft:ident).+ => $($field:ident).+, $default:literal, $group:path, $summary:literal,
         [$($word:literal => $value:path),+], $store:expr
     ) => {
         ParameterSpec {
             name: $name,
+            title: "",
+            group: $group,
+            unit: "",
             kind: Kind::Choice(&[$($word),+]),
             default: $default,
             summary: $summary,
@@ -115,11 +139,11 @@ pub(super) use words;
 /// A row for a choice between words: name, field, default, summary, and the value of each word.
 macro_rules! choice {
     (
-        $name:literal, $($field:ident).+, $default:literal, $summary:literal,
+        $name:literal, $($field:ident).+, $default:literal, $group:path, $summary:literal,
         $($word:literal => $value:path),+ $(,)?
     ) => {
         $crate::parameters::table::words!(
-            $name, $($field).+ => $($field).+, $default, $summary, [$($word => $value),+],
+            $name, $($field).+ => $($field).+, $default, $group, $summary, [$($word => $value),+],
             std::convert::identity
         )
     };
@@ -130,11 +154,11 @@ pub(super) use choice;
 /// summary, and the value of each word.
 macro_rules! optional_choice {
     (
-        $name:literal, $($draft:ident).+ => $($field:ident).+, $summary:literal,
+        $name:literal, $($draft:ident).+ => $($field:ident).+, $group:path, $summary:literal,
         $($word:literal => $value:path),+ $(,)?
     ) => {
         $crate::parameters::table::words!(
-            $name, $($draft).+ => $($field).+, "", $summary, [$($word => $value),+], Some
+            $name, $($draft).+ => $($field).+, "", $group, $summary, [$($word => $value),+], Some
         )
     };
 }
@@ -218,6 +242,16 @@ pub(super) fn from_inputs<'a, P: Parameters>(
 }
 
 impl<P: Parameters> ParameterSpec<P> {
+    /// The name that people read.
+    pub fn shown_name(&self) -> String {
+        if !self.title.is_empty() {
+            return self.title.to_owned();
+        }
+        let words = self.name.replace('_', " ");
+        let (first, rest) = words.split_at(1);
+        first.to_uppercase() + rest
+    }
+
     /// A sentence with the valid values.
     fn fix(&self) -> String {
         let range = match self.kind {

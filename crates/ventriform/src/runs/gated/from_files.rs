@@ -87,7 +87,7 @@ pub fn from_files(
     };
     let density = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML;
     let beat_parameters = BeatParameters {
-        muscle_ml: order.choice.stated_muscle_g().map(|mass| mass / density),
+        muscle_ml: order.choice.mass_g.map(|mass| mass / density),
         ..BeatParameters::default()
     };
     let fitted = beat::fit(
@@ -153,7 +153,7 @@ impl GatedHeart {
     /// Reasons to look closer by what the file says of the beats, and by what the caller says of the wall.
     fn stated_flags(&self) -> Vec<BeatFlag> {
         let found_g = SegmentationReport::MYOCARDIAL_DENSITY_G_PER_ML * self.beat.mean_wall_ml();
-        let given = self.choice.stated_muscle_g();
+        let given = self.choice.mass_g;
         let rejected = (self.reading.timing.rejected_share()).and_then(BeatFlag::of_rejected);
         let mass = given.and_then(|given_g| BeatFlag::of_mass(given_g, found_g));
         rejected.into_iter().chain(mass).collect()
