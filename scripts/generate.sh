@@ -7,7 +7,7 @@
 # Parts, in this order (all, if none is named):
 #   examples   crates/http/src/openapi/examples.json, recorded from a service; checked: they and every answer of the service
 #              are what the OpenAPI document says
-#   documents  openapi/ventriform.json and the table of settings in docs/operations.md
+#   documents  openapi/ventriform.json, the tables of settings in docs/operations.md and of figures in docs/figures.md
 #   web        web/src/generated, web/dist, crates/ventriform/assets/report.*
 #   python     python/ventriform/reports.py and _functions.pyi
 #   bill       ventriform.cdx.json
@@ -44,7 +44,7 @@ wanted() { [[ " ${parts[*]} " == *" $1 "* ]]; }
 # The document and the pages of docs/ of the code as it is.
 write_documents() {
   GENERATED_FOLDER=$out cargo test "${cargo_flags[@]}" --test api -- \
-    the_committed_document_matches_the_code the_page_for_operators_lists_every_setting >"$out/log" || { cat "$out/log"; exit 1; }
+    the_committed_document_matches_the_code the_page_for_operators_lists_every_setting the_page_of_figures_lists_every_figure >"$out/log" || { cat "$out/log"; exit 1; }
   rm "$out/log"
 }
 

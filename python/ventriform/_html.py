@@ -8,11 +8,6 @@ from typing import Any
 Row = tuple[str, Any]
 
 
-def figure(value: float | None, unit: str) -> str:
-    """A figure with its unit; a dash where there is none."""
-    return "–" if value is None else f"{value:.3g} {unit}".rstrip()
-
-
 def table(title: str, rows: Iterable[Row], picture: bytes | None = None) -> str:
     """An HTML table of names and values, both escaped, with a PNG picture beside it."""
     lines = [

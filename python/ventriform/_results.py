@@ -377,9 +377,9 @@ class Model(Surface):
         return ModelReport.from_json(self._native.report(), frame=self.frame)
 
     def _rows(self) -> list[_html.Row]:
-        report = self.report
-        found = [("distance to the surface", f"{report.distance.mean_mm:.2f} mm")]
-        return [("name", self.name), *super()._rows(), *found, *(("warning", one) for one in report.warnings)]
+        figures = _native.headlines("ModelReport", self._native.report().encode())
+        warnings = [("warning", one) for one in self.report.warnings]
+        return [("name", self.name), *super()._rows(), *figures, *warnings]
 
     @property
     def surface(self) -> Surface:
@@ -696,8 +696,7 @@ class Fit(Result):
         report = self._report
         rows = [
             ("confidence", f"{self.confidence:.2f}"),
-            ("wall", _html.figure(report.volumes_ml.wall, "ml")),
-            ("cavity", _html.figure(report.volumes_ml.cavity, "ml")),
+            *_native.headlines("SegmentationReport", self.files["report.json"]),
             ("model", report.template),
             ("frame", self.frame),
             *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
@@ -770,11 +769,8 @@ class Beat(Result):
         return [Flag(flag.code, flag.reason) for flag in self._report.flags]
 
     def _repr_html_(self) -> str:
-        report = self._report
         rows = [
-            ("EDV", _html.figure(report.edv_ml, "ml")),
-            ("ESV", _html.figure(report.esv_ml, "ml")),
-            ("EF", _html.figure(report.ef_percent, "%")),
+            *_native.headlines("BeatReport", self.files["beat.json"]),
             ("gates", len(self._made["vertices"])),
             ("frame", self.frame),
             *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
@@ -830,11 +826,8 @@ class Comparison(Result):
         return [Flag(flag.code, flag.reason) for flag in self._report.flags]
 
     def _rows(self) -> list[_html.Row]:
-        report = self._report
         return [
-            ("TID", _html.figure(report.tid, "")),
-            ("reversible", _html.figure(report.reversible_percent, "% of the wall")),
-            ("fixed", _html.figure(report.fixed_percent, "% of the wall")),
+            *_native.headlines("ComparisonReport", self.files["comparison.json"]),
             ("frame", self.frame),
             *(("flag", f"{flag.code}: {flag.reason}") for flag in self.flags),
         ]

@@ -15,6 +15,7 @@ use ventriform::base::progress::{CancelToken, Monitor, Plan};
 use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::BeatChoice;
 use ventriform::results::export::Format;
+use ventriform::results::figures;
 use ventriform::runs::advice::Explain;
 use ventriform::runs::gated::{GatedHeart, GatedOrder, from_files};
 
@@ -118,10 +119,9 @@ pub fn run(args: &BeatArgs) -> Result<()> {
 }
 
 fn headline(made: &GatedHeart) -> String {
-    let beat = &made.beat;
-    let [diastole, systole] = [beat.end_diastole, beat.end_systole].map(|e| e.cavity_ml);
-    match beat.ef_percent {
-        Some(ef) => format!("EDV {diastole:.0} ml, ESV {systole:.0} ml, EF {ef:.0} %"),
-        None => format!("no beat: the cavity has {systole:.0} to {diastole:.0} ml"),
+    let line = figures::line(figures::beat::FIGURES, &made.report());
+    match made.beat.ef_percent {
+        Some(_) => line,
+        None => format!("no beat: {line}"),
     }
 }

@@ -15,7 +15,7 @@ use ventriform::base::progress::{CancelToken, Monitor, Plan};
 use ventriform::mesh::files::MeshStatement;
 use ventriform::parameters::ComparisonChoice;
 use ventriform::results::export::Format;
-use ventriform::results::report::ComparisonReport;
+use ventriform::results::figures;
 use ventriform::runs::advice::Explain;
 use ventriform::runs::rest_stress::{ComparedHearts, ComparisonOrder, from_files};
 
@@ -115,7 +115,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     write_all(&args.output, &files)?;
     let report = made.report();
-    note!("{}", headline(&made, &report));
+    note!("{}", figures::line(figures::comparison::FIGURES, &report));
     for scan in [&report.stress, &report.rest] {
         for warning in &scan.warnings {
             note!("warning: {warning}");
@@ -125,18 +125,4 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         note!("warning: {}", flag.reason);
     }
     Ok(())
-}
-
-fn headline(made: &ComparedHearts, report: &ComparisonReport) -> String {
-    let change = &made.change;
-    let mut line = format!(
-        "TID {:.2}, reversible {:.0} % of the wall, fixed {:.0} %",
-        made.tid(),
-        change.reversible_percent,
-        change.fixed_percent
-    );
-    if let (Some(sss), Some(srs), Some(sds)) = (report.sss, report.srs, report.sds) {
-        line += &format!("; SSS {sss}, SRS {srs}, SDS {sds}");
-    }
-    line
 }

@@ -75,6 +75,7 @@ const LIBRARY_ROOMS: &[&str] = &[
     "heart/comparison",
     "heart/reader",
     "parameters",
+    "results/figures",
     "results/report",
     "results/export",
     "runs/pipeline",

@@ -9,13 +9,14 @@
 //! 3. `run`: work runs on threads of its own without the interpreter's lock, and ends when a signal arrives.
 //! 4. `volumes`, `models`: volumes and models that Python holds.
 //! 5. `given`, `files`: what work is given beside its parameters, and the files of its results.
-//! 6. `fits`, `masks`, `cohorts`, `phantoms`: the commands.
+//! 6. `fits`, `masks`, `cohorts`, `phantoms`: the commands; `figures`: what notebooks show of their reports.
 //!
 //! Guaranteed: no panic crosses the border, and files have the bytes that the command would write.
 
 mod arrays;
 mod cohorts;
 mod errors;
+mod figures;
 mod files;
 mod fits;
 mod given;
@@ -32,6 +33,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use super::cohorts::{build_normals, calibrate, evaluate};
+    #[pymodule_export]
+    use super::figures::headlines;
     #[pymodule_export]
     use super::fits::{beat, compare, segment};
     #[pymodule_export]

@@ -1,6 +1,7 @@
 // What was measured of a beat beside its figures: curve, phases, and maps of the wall.
 
 import { useMemo } from "preact/hooks";
+import { PartTable, rowsOf } from "../figures";
 import type { BeatReport, Perfusion, PolarFigure } from "../generated/openapi";
 import { useWatched } from "../state";
 import { number } from "../words";
@@ -137,31 +138,13 @@ export function BeatMaps({ scene, shown, beat }: { scene: Scene; shown: Loaded; 
 
 export function SegmentTable({ report }: { report: BeatReport }) {
   return (
-    <table class="segments">
-      <caption class="hidden">Motion, thickening and phase of the segments</caption>
-      <thead>
-        <tr>
-          <th scope="col">Segment</th>
-          <th scope="col">mm</th>
-          <th scope="col">thickens</th>
-          <th scope="col">by counts</th>
-          <th scope="col">phase</th>
-        </tr>
-      </thead>
-      <tbody>
-        {report.segments.map(one => (
-          <tr key={one.segment}>
-            <th scope="row">
-              {one.segment} {one.name}
-            </th>
-            <td>{number(one.motion_mm, 1)}</td>
-            <td>{number(one.thickening_percent, 0, "%")}</td>
-            <td>{number(one.thickening_counts_percent, 0, "%")}</td>
-            <td>{number(one.phase_degrees, 0, "°")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <PartTable
+      caption="Motion, thickening and phase of the segments"
+      head="Segment"
+      parts={report.segments}
+      nameOf={one => `${one.segment} ${one.name}`}
+      rows={rowsOf("SegmentMotionReport")}
+    />
   );
 }
 

@@ -1,51 +1,34 @@
 // What a comparison says in figures and words.
 
 import type { ComponentChildren } from "preact";
+import { BesideTable, PartTable, flatName, rowsOf, valueOf, written } from "../figures";
 import type { ComparedScan, ComparisonReport, Perfusion } from "../generated/openapi";
 import { Simulated } from "../limits";
 import { number } from "../words";
 import { flagsOf, isSimulated } from "./compared";
-import { shown } from "./polar";
-
-/** A signed change. */
-function change(value: number | null | undefined, digits: number, unit: string): string {
-  return typeof value === "number" && Number(value.toFixed(digits)) > 0
-    ? `+${number(value, digits, unit)}`
-    : number(value, digits, unit);
-}
 
 /** The figures that are read first: name, figure, and what stands smaller beside it. */
 export function headlinesOf(report: ComparisonReport): [string, string, string][] {
+  const beside = besideHeadlines(report);
+  return rowsOf("ComparisonReport")
+    .filter(row => row.short && valueOf(row, report) !== undefined)
+    .map(row => [row.short!, written(row, valueOf(row, report)), beside[row.place] ?? ""]);
+}
+
+/** What stands beside a headline, by its place. */
+function besideHeadlines(report: ComparisonReport): Record<string, string> {
   const isUncertain = report.flags.some(flag => flag.code === "tid_uncertain");
-  const { tid, reversible_percent, fixed_percent, sss, srs, sds, summed_percent, beat, stress, rest } = report;
-  const scores = (
-    [
-      ["SSS", sss],
-      ["SRS", srs],
-      ["SDS", sds],
-    ] as const
-  ).flatMap(([name, score], n): [string, string, string][] =>
-    score == null ? [] : [[name, String(score), summed_percent ? number(summed_percent[n], 0, "%") : ""]],
-  );
-  return [
-    [
-      "TID",
-      number(tid, 2),
-      `${number(stress.cavity_ml, 0)}\u00a0/\u00a0${number(rest.cavity_ml, 0, "ml")}${isUncertain ? ", uncertain" : ""}`,
-    ],
-    ["Reversible", number(reversible_percent, 0, "%"), "of the wall"],
-    ["Fixed", number(fixed_percent, 0, "%"), "of the wall"],
-    ...scores,
-    ...(beat?.ef_change_points == null
-      ? []
-      : [
-          [
-            "EF, change",
-            change(beat.ef_change_points, 0, ""),
-            `points: ${number(beat.stress_ef_percent, 0)} / ${number(beat.rest_ef_percent, 0, "%")}`,
-          ] as [string, string, string],
-        ]),
-  ];
+  const { summed_percent, beat, stress, rest } = report;
+  const [sss, srs, sds] = (summed_percent ?? []).map(share => number(share, 0, "%"));
+  return {
+    tid: `${number(stress.cavity_ml, 0)}\u00a0/\u00a0${number(rest.cavity_ml, 0, "ml")}${isUncertain ? ", uncertain" : ""}`,
+    reversible_percent: "of the wall",
+    fixed_percent: "of the wall",
+    sss: sss ?? "",
+    srs: srs ?? "",
+    sds: sds ?? "",
+    "beat/ef_change_points": `${number(beat?.stress_ef_percent, 0)} / ${number(beat?.rest_ef_percent, 0, "%")}`,
+  };
 }
 
 export function Headlines({ report }: { report: ComparisonReport }) {
@@ -123,49 +106,11 @@ export function LimitsUsed({ perfusion }: { perfusion: Perfusion }) {
 
 /** Deficit, extent and summed score of scans beside normal limits. */
 export function PerfusionTable({ of }: { of: [string, Perfusion][] }) {
-  const rows: [string, (one: Perfusion) => string][] = [
-    ["Deficit score", one => number(one.deficit_percent, 1, "%")],
-    [`Wall more than ${of[0]?.[1].z_limit ?? 2.5} SD below normal`, one => number(one.extent_percent, 0, "%")],
-    ["Mean depth there", one => number(one.severity, 1, "SD")],
-    ["Summed score", one => `${one.summed_score} (${number(one.summed_percent, 0, "%")})`],
-  ];
-  return (
-    <table>
-      <caption class="hidden">Uptake beside normal limits</caption>
-      <thead class={of.length > 1 ? "" : "hidden"}>
-        <tr>
-          <td />
-          {of.map(([name]) => (
-            <th key={name} scope="col">
-              {name}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody>
-        {rows.map(([name, read]) => (
-          <tr key={name}>
-            <th scope="row">{name}</th>
-            {of.map(([scan, one]) => (
-              <td key={scan}>{read(one)}</td>
-            ))}
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
+  return <BesideTable caption="Uptake beside normal limits" of={of} rows={rowsOf("Perfusion")} />;
 }
 
-const UNITS: Record<string, string> = { ml: "ml", mm: "mm", g: "g", percent: "%", degrees: "°", points: "points" };
-const FIGURE_WORDS: Record<string, string> = { ef: "EF", edv: "EDV", esv: "ESV", tid: "TID", sd: "SD" };
-
-/** The name of a figure of the limits, which ends with its unit, in words and with the unit apart. */
-function figureName(name: string): [string, string] {
-  const words = name.split("_");
-  const unit = UNITS[words.at(-1) ?? ""] ?? "";
-  const left = (unit ? words.slice(0, -1) : words).map(word => FIGURE_WORDS[word] ?? word).join(" ");
-  return [left.charAt(0).toUpperCase() + left.slice(1), unit];
-}
+/** The rows of the figures that normal limits may have. */
+const LIMITED = [...rowsOf("BeatReport"), ...rowsOf("SegmentationReport")];
 
 /** Figures of the whole heart beside the range of 95 in 100 of the people. */
 export function FiguresBeside({ perfusion }: { perfusion: Perfusion }) {
@@ -186,12 +131,14 @@ export function FiguresBeside({ perfusion }: { perfusion: Perfusion }) {
         </thead>
         <tbody>
           {rows.map(one => {
-            const [name, unit] = figureName(one.figure);
-            const digits = one.high < 10 ? 2 : 0;
+            const row = LIMITED.find(row => flatName(row) === one.figure);
+            const digits = row?.digits ?? 1;
             return (
               <tr key={one.figure}>
-                <th scope="row">{name}</th>
-                <td>{number(one.value, digits, unit)}</td>
+                <th scope="row" title={row?.about}>
+                  {row?.label ?? one.figure}
+                </th>
+                <td>{number(one.value, digits, row?.unit)}</td>
                 <td>
                   {number(one.low, digits)} to {number(one.high, digits)}
                 </td>
@@ -207,176 +154,72 @@ export function FiguresBeside({ perfusion }: { perfusion: Perfusion }) {
 
 export function SegmentScores({ perfusion }: { perfusion: Perfusion }) {
   return (
-    <table class="segments">
-      <caption class="hidden">Segments and territories beside normal limits</caption>
-      <thead>
-        <tr>
-          <th scope="col">Segment</th>
-          <th scope="col">z</th>
-          <th scope="col">score</th>
-          <th scope="col">below</th>
-        </tr>
-      </thead>
-      <tbody>
-        {perfusion.segments.map(one => (
-          <tr key={one.segment}>
-            <th scope="row">
-              {one.segment} {one.name}
-            </th>
-            <td>{number(one.z, 1)}</td>
-            <td>{one.score ?? "–"}</td>
-            <td>{number(one.extent_percent, 0, "%")}</td>
-          </tr>
-        ))}
-        {perfusion.territories.map(one => (
-          <tr key={one.name}>
-            <th scope="row">{one.name}</th>
-            <td />
-            <td>{one.summed_score}</td>
-            <td>{number(one.extent_percent, 0, "%")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <>
+      <PartTable
+        caption="Segments beside normal limits"
+        head="Segment"
+        parts={perfusion.segments}
+        nameOf={one => `${one.segment} ${one.name}`}
+        rows={rowsOf("SegmentScore")}
+      />
+      <PartTable
+        caption="Territories beside normal limits"
+        head="Territory"
+        parts={perfusion.territories}
+        nameOf={one => one.name}
+        rows={rowsOf("TerritoryScore")}
+      />
+    </>
   );
 }
 
 export function TerritoryTable({ report }: { report: ComparisonReport }) {
   return (
-    <table class="segments">
-      <caption class="hidden">Territories at stress and at rest</caption>
-      <thead>
-        <tr>
-          <th scope="col">Territory</th>
-          <th scope="col">stress</th>
-          <th scope="col">rest</th>
-          <th scope="col">less</th>
-          <th scope="col">reversible</th>
-          <th scope="col">fixed</th>
-        </tr>
-      </thead>
-      <tbody>
-        {report.territories.map(one => (
-          <tr key={one.name}>
-            <th scope="row">{one.name}</th>
-            <td>{number(shown(one.stress_percent), 0)}</td>
-            <td>{number(shown(one.rest_percent), 0)}</td>
-            <td>{number(one.difference_points, 0)}</td>
-            <td>{number(one.reversible_percent, 0, "%")}</td>
-            <td>{number(one.fixed_percent, 0, "%")}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <PartTable
+      caption="Territories at stress and at rest"
+      head="Territory"
+      parts={report.territories}
+      nameOf={one => one.name}
+      rows={rowsOf("ComparedTerritory")}
+    />
   );
 }
 
 export function SegmentChanges({ report }: { report: ComparisonReport }) {
-  const scored = report.sss != null;
-  const moved = report.segments.some(one => one.motion_change_mm != null);
-  const head = [
-    "stress",
-    "rest",
-    "less",
-    "reversible",
-    ...(scored ? ["scores"] : []),
-    ...(moved ? ["motion, mm", "thickening"] : []),
-  ];
   return (
-    <table class="segments">
-      <caption class="hidden">Segments at stress and at rest</caption>
-      <thead>
-        <tr>
-          <th scope="col">Segment</th>
-          {head.map(name => (
-            <th key={name} scope="col">
-              {name}
-            </th>
-          ))}
-        </tr>
-      </thead>
-      <tbody>
-        {report.segments.map(one => (
-          <tr key={one.segment}>
-            <th scope="row">
-              {one.segment} {one.name}
-            </th>
-            <td>{number(shown(one.stress_percent), 0)}</td>
-            <td>{number(shown(one.rest_percent), 0)}</td>
-            <td>{number(one.difference_points, 0)}</td>
-            <td>{number(one.reversible_percent, 0, "%")}</td>
-            {scored && (
-              <td>
-                {one.stress_score ?? "–"} / {one.rest_score ?? "–"}
-              </td>
-            )}
-            {moved && (
-              <>
-                <td>{change(one.motion_change_mm, 1, "")}</td>
-                <td>{change(one.thickening_change_points, 0, "")}</td>
-              </>
-            )}
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <PartTable
+      caption="Segments at stress and at rest"
+      head="Segment"
+      parts={report.segments}
+      nameOf={one => `${one.segment} ${one.name}`}
+      rows={rowsOf("ComparedSegment")}
+    />
   );
 }
 
-export function BeatTable({ report }: { report: ComparisonReport }) {
-  const { beat } = report;
+/** EF and volumes at stress beside those at rest. */
+export function BeatTable({ report: { beat } }: { report: ComparisonReport }) {
   if (!beat) return null;
-  const rows: [string, number | null | undefined, number | null | undefined, string][] = [
-    ["Ejection fraction", beat.stress_ef_percent, beat.rest_ef_percent, "%"],
-    ["End-diastolic volume", beat.stress_edv_ml, beat.rest_edv_ml, "ml"],
-    ["End-systolic volume", beat.stress_esv_ml, beat.rest_esv_ml, "ml"],
-  ];
+  const rows = rowsOf("BeatReport");
+  const at = (scan: string) =>
+    Object.fromEntries(rows.map(row => [row.place, (beat as Record<string, unknown>)[`${scan}_${row.place}`]]));
   return (
-    <table>
-      <caption class="hidden">The beat at stress and at rest</caption>
-      <thead>
-        <tr>
-          <td />
-          <th scope="col">stress</th>
-          <th scope="col">rest</th>
-        </tr>
-      </thead>
-      <tbody>
-        {rows.map(([name, atStress, atRest, unit]) => (
-          <tr key={name}>
-            <th scope="row">{name}</th>
-            <td>{number(atStress, 0, unit)}</td>
-            <td>{number(atRest, 0, unit)}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <BesideTable
+      caption="The beat at stress and at rest"
+      of={[
+        ["stress", at("stress")],
+        ["rest", at("rest")],
+      ]}
+      rows={rows}
+    />
   );
 }
 
 /** How both scans were brought together. */
 export function MatchTable({ report }: { report: ComparisonReport }) {
-  const rows: [string, string][] = [
-    ["Wall with muscle in both scans", number(report.compared_percent, 0, "%")],
-    ["Wall by which stress was scaled", number(report.matched_percent, 0, "%")],
-    ["Counts of stress for one at rest", number(report.scale, 2)],
-    ["Loss that counts as reversible", number(report.reversible_points, 0, "points")],
-    ["Stress map turned by", number(report.turn_degrees, 0, "°")],
-    ["Correlation of both maps", number(report.correlation, 2)],
-  ];
-  return (
-    <table>
-      <caption class="hidden">How both scans were matched</caption>
-      <tbody>
-        {rows.map(([name, value]) => (
-          <tr key={name}>
-            <th scope="row">{name}</th>
-            <td>{value}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
+  const caption = "How both scans were matched";
+  const rows = rowsOf("ComparisonReport").filter(row => row.section === caption);
+  return <BesideTable caption={caption} of={[["", report]]} rows={rows} />;
 }
 
 /** Description, tracer, dose, correction of a scan, as far as its header says. */

@@ -2,134 +2,39 @@
 
 import { at } from "../base";
 import { useState } from "preact/hooks";
-import { type Kind, type Result, type Volume, key, save, words } from "../api";
+import { type Result, type Volume, key, save, words } from "../api";
 import { fileNameOf, objectsOf, saveResult } from "../bundle";
 import { bytes, kindOf, moment, number, resultName } from "../words";
-import type {
-  Agreement,
-  BeatReport,
-  Evidence,
-  ModelSummary,
-  SegmentationReport,
-  VolumeIntervals,
-} from "../generated/openapi";
+import { type Figure, flatName, intervalOf, rowsOf, valueOf, written } from "../figures";
+import type { Evidence } from "../generated/openapi";
 import type { Loaded } from "./loaded";
 
-/** Name, figure, digits, unit; for some, the interval that holds the truth in nine of ten hearts. */
-type Row = [
-  string,
-  (loaded: Loaded) => number | null | undefined,
-  number,
-  string,
-  ((loaded: Loaded) => number[] | null | undefined)?,
-];
+/** The rows of a result's figures, and the document that has them. Those of comparisons have a view of their own. */
+function figuresOf(shown: Loaded): { rows: Figure[]; report: unknown } {
+  switch (kindOf(shown.result.id)) {
+    case "segmentation":
+      return { rows: rowsOf("SegmentationReport"), report: shown.report };
+    case "beat":
+      return { rows: rowsOf("BeatReport"), report: shown.beat?.report };
+    case "model":
+      return { rows: rowsOf("ModelReport").map(inSummary), report: shown.result.summary };
+    case "comparison":
+      return { rows: [], report: null };
+  }
+}
 
-const of = (read: (report: SegmentationReport) => number | null | undefined) => (loaded: Loaded) =>
-  loaded.report && read(loaded.report);
-const summary = (name: keyof ModelSummary) => (loaded: Loaded) => loaded.result.summary[name];
-const measure = (name: keyof Agreement) => of(report => report.measures?.[name]);
+const inSummary = (row: Figure): Figure => ({ ...row, place: flatName(row) });
 
-const interval = (read: (of: VolumeIntervals) => number[]) => (loaded: Loaded) => {
-  const found = loaded.report?.volumes_ml.anatomical_interval;
-  return found && read(found);
-};
-
-const beat =
-  <T,>(read: (report: BeatReport) => T) =>
-  (loaded: Loaded) =>
-    loaded.beat && read(loaded.beat.report);
-const reliable = (read: (phase: BeatReport["phase"]) => number) =>
-  beat(({ phase }) => (phase.reliable ? read(phase) : undefined));
-
-const FIT: [string, Row[]][] = [
-  [
-    "",
-    [
-      ["Cavity", of(r => r.volumes_ml.anatomical?.cavity ?? r.volumes_ml.cavity), 0, "ml", interval(of => of.cavity)],
-      ["Wall", of(r => r.volumes_ml.anatomical?.wall ?? r.volumes_ml.wall), 0, "ml", interval(of => of.wall)],
-      ["Mass", of(r => r.mass_g), 0, "g"],
-      ["Thickness", of(r => r.thickness_mm?.anatomical.mean), 1, "mm"],
-      ["Below the threshold", of(r => r.polar?.extent_percent), 1, "%"],
-    ],
-  ],
-  [
-    "As the blurred image shows it",
-    [
-      ["Cavity", of(r => r.volumes_ml.apparent?.cavity), 0, "ml"],
-      ["Wall", of(r => r.volumes_ml.apparent?.wall), 0, "ml"],
-      ["Thickness", of(r => r.thickness_mm?.apparent.mean), 1, "mm"],
-    ],
-  ],
-  [
-    "Against the expert",
-    [
-      ["Jaccard", measure("jaccard"), 3, ""],
-      ["Dice", measure("dice"), 3, ""],
-      ["Contour distance", measure("contour_distance_mm"), 1, "mm"],
-      ["Volume difference", measure("volume_difference_ml"), 0, "ml"],
-    ],
-  ],
-];
-
-const MODEL: [string, Row[]][] = [
-  [
-    "",
-    [
-      ["Points", summary("vertices"), 0, ""],
-      ["Distance to the surface, mean", summary("distance_mean_mm"), 2, "mm"],
-      ["Hausdorff distance", summary("hausdorff_mm"), 1, "mm"],
-      ["Volume error", summary("volume_error_percent"), 2, "%"],
-      ["Triangle shape 2r/R, mean", summary("radius_ratio_mean"), 3, ""],
-      ["Triangle shape 2r/R, least", summary("radius_ratio_min"), 3, ""],
-      ["Self-intersections", summary("self_intersections"), 0, ""],
-    ],
-  ],
-];
-
-const BEAT: [string, Row[]][] = [
-  [
-    "",
-    [
-      ["Ejection fraction", beat(r => r.ef_percent), 0, "%", beat(r => r.ef_interval_percent)],
-      ["End-diastolic volume", beat(r => r.edv_ml), 0, "ml", beat(r => r.edv_interval_ml)],
-      ["End-systolic volume", beat(r => r.esv_ml), 0, "ml", beat(r => r.esv_interval_ml)],
-      ["Stroke volume", beat(r => r.sv_ml), 0, "ml"],
-      ["Mass", beat(r => r.mass_g), 0, "g"],
-      ["Peak ejection rate", beat(r => r.rates?.peak_ejection_edv_per_s), 1, "EDV/s"],
-      ["Peak filling rate", beat(r => r.rates?.peak_filling_edv_per_s), 1, "EDV/s"],
-      ["Time to peak filling", beat(r => r.rates?.time_to_peak_filling_ms), 0, "ms"],
-      ["R-R interval", beat(r => r.rr_ms), 0, "ms"],
-    ],
-  ],
-  [
-    "Phases of the wall",
-    [
-      ["Mean", reliable(phase => phase.mean_degrees), 0, "°"],
-      ["Standard deviation", reliable(phase => phase.sd_degrees), 0, "°"],
-      ["By noise alone", beat(r => r.phase.noise_degrees), 0, "°"],
-      ["Bandwidth, 95 %", reliable(phase => phase.bandwidth_degrees), 0, "°"],
-      ["Entropy", reliable(phase => phase.entropy_percent), 0, "%"],
-    ],
-  ],
-];
-
-/** Figures of comparisons have a view of their own. */
-const ROWS: Record<Kind, [string, Row[]][]> = { segmentation: FIT, model: MODEL, beat: BEAT, comparison: [["", []]] };
+/** Most figures at the top of a printed page. */
+const HEADLINES = 5;
 
 /** The figures that are read first. */
 export function headlines(shown: Loaded): [string, string, string][] {
-  const rows = ROWS[kindOf(shown.result.id)][0]![1];
+  const { rows, report } = figuresOf(shown);
   return rows
-    .slice(0, 5)
-    .flatMap(([name, read, digits, unit, interval]): [string, string, string][] =>
-      typeof read(shown) === "number"
-        ? [[name, number(read(shown), digits, unit), between(interval?.(shown), digits)]]
-        : [],
-    );
-}
-
-function between(interval: number[] | null | undefined, digits: number): string {
-  return interval ? `${number(interval[0], digits)} to ${number(interval[1], digits)}` : "";
+    .filter(row => row.headline && valueOf(row, report) !== undefined)
+    .slice(0, HEADLINES)
+    .map(row => [row.label, written(row, valueOf(row, report)), intervalOf(row, report)]);
 }
 
 /** What a chance of a good fit says to a reader, from the greatest down. */
@@ -210,7 +115,9 @@ export function Verdict({ shown, open = false }: { shown: Loaded; open?: boolean
 }
 
 export function Figures({ shown, other, verdict = true }: { shown: Loaded; other: Loaded | null; verdict?: boolean }) {
-  const sections = ROWS[kindOf(shown.result.id)];
+  const { rows, report: figures } = figuresOf(shown);
+  const compared = other && figuresOf(other).report;
+  const sections = [...new Set(rows.map(row => row.section ?? ""))];
   const { report } = shown;
   const warnings = report?.warnings ?? shown.beat?.report.warnings ?? [];
   const reason = shown.beat?.report.no_rates;
@@ -232,8 +139,8 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
             {other && <th scope="col">compared</th>}
           </tr>
         </thead>
-        {sections.map(([title, rows]) => {
-          const filled = rows.filter(([, read]) => typeof read(shown) === "number");
+        {sections.map(title => {
+          const filled = rows.filter(row => (row.section ?? "") === title && valueOf(row, figures) !== undefined);
           if (filled.length === 0) return null;
           return (
             <tbody key={title}>
@@ -244,14 +151,14 @@ export function Figures({ shown, other, verdict = true }: { shown: Loaded; other
                   </th>
                 </tr>
               )}
-              {filled.map(([name, read, digits, unit, interval]) => (
-                <tr key={name}>
-                  <th scope="row">
-                    {name}
-                    {interval?.(shown) && <span class="interval">90 %: {between(interval(shown), digits)}</span>}
+              {filled.map(row => (
+                <tr key={row.place}>
+                  <th scope="row" title={row.about}>
+                    {row.label}
+                    {intervalOf(row, figures) && <span class="interval">90 %: {intervalOf(row, figures)}</span>}
                   </th>
-                  <td>{number(read(shown), digits, unit)}</td>
-                  {other && <td>{number(read(other), digits, unit)}</td>}
+                  <td>{written(row, valueOf(row, figures))}</td>
+                  {other && <td>{written(row, valueOf(row, compared))}</td>}
                 </tr>
               ))}
             </tbody>

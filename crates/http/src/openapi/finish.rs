@@ -11,7 +11,8 @@
 //! 5. Every operation gets examples: those of `examples.json`, recorded from a running service by
 //!    `scripts/check/contract.py`, and a command line for curl. A document has one example, under `components`.
 //! 6. Every operation takes `X-Request-Id`.
-//! 7. What several operations have alike stands under `components` ([`super::share`]).
+//! 7. The schemas of reports get the rows of their figures: `x-figures` ([`figures`](ventriform::results::figures)).
+//! 8. What several operations have alike stands under `components` ([`super::share`]).
 
 use super::bodies::{SourceJobRequest, VolumeJobRequest, job_discriminator, job_requests};
 use super::result_files::{self, binary, report_of};
@@ -20,6 +21,7 @@ use super::walk::{answers, contents, operations};
 use crate::wire::problem::MEDIA_TYPE;
 use serde_json::{Map, Value, json};
 use utoipa::ToSchema;
+use ventriform::results::figures;
 
 /// Requests and answers as a running service gave them.
 const RECORDED_EXAMPLES: &str = include_str!("examples.json");
@@ -46,6 +48,9 @@ pub fn finish(document: &mut Value) {
         add_request_id(operation);
         let sample = command_line(path, method, operation, &recorded);
         operation["x-codeSamples"] = json!([{"lang": "Shell", "label": "curl", "source": sample}]);
+    }
+    for (schema, rows) in figures::tables() {
+        document["components"]["schemas"][schema]["x-figures"] = rows;
     }
     document["components"]["examples"] = shared_examples(&recorded);
     share(document);
@@ -346,4 +351,64 @@ fn sample_body(contents: &Value, recorded: &Value) -> Option<String> {
         _ => "--data-binary @request.json".into(),
     };
     Some(format!("-H 'content-type: application/json' {data}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    /// The schema that `schema` stands for: what it refers to, or its part that is no `null`.
+    fn resolved<'a>(document: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
+        if let Some(path) = schema["$ref"].as_str() {
+            let found = document.pointer(path.trim_start_matches('#')).unwrap();
+            return resolved(document, found);
+        }
+        let parts = ["oneOf", "anyOf", "allOf"].map(|name| schema[name].as_array());
+        let parts: Vec<&Value> = parts.into_iter().flatten().flatten().collect();
+        if parts.is_empty() {
+            return vec![schema];
+        }
+        parts
+            .into_iter()
+            .flat_map(|part| resolved(document, part))
+            .collect()
+    }
+
+    fn at<'a>(document: &'a Value, schema: &'a Value, place: &str) -> Option<&'a Value> {
+        place.split('/').try_fold(schema, |schema, name| {
+            let parts = resolved(document, schema);
+            parts.iter().find_map(|part| {
+                let free = part["additionalProperties"].as_object().is_some()
+                    || part["additionalProperties"] == Value::Bool(true);
+                let free = free.then(|| &part["additionalProperties"]);
+                part["properties"].get(name).or(free)
+            })
+        })
+    }
+
+    #[test]
+    fn every_figure_has_its_place_in_the_schema_of_its_report() {
+        let document = crate::router::document();
+        let schemas = document["components"]["schemas"].as_object().unwrap();
+        let mut rows = 0;
+        for (name, schema) in schemas {
+            for row in schema["x-figures"].as_array().into_iter().flatten() {
+                rows += 1;
+                for place in ["place", "interval", "needs", "unless"] {
+                    let Some(place) = row[place].as_str() else {
+                        continue;
+                    };
+                    assert!(at(&document, schema, place).is_some(), "{name}: {place}");
+                }
+                let about = row["about"].as_str().unwrap();
+                assert!(about.ends_with('.') && row["label"].is_string(), "{row}");
+                if let (Some(field), "ModelReport") = (row["flat_name"].as_str(), name.as_str()) {
+                    let summary = &schemas["ModelSummary"]["properties"];
+                    assert!(summary.get(field).is_some(), "{name}: {field}");
+                }
+            }
+        }
+        let tables = ventriform::results::figures::TABLES.iter();
+        assert_eq!(rows, tables.map(|(_, rows)| rows.len()).sum::<usize>());
+    }
 }

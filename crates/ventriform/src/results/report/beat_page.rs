@@ -1,20 +1,21 @@
 //! The page of a beat: flags, figures with their intervals, curves, polar maps, segments, gates, the wall at both ends.
 
-use maud::{Markup, html};
-
-use super::beat_report::{BeatReport, SegmentMotionReport};
+use super::beat_report::BeatReport;
 use super::page_parts::{
-    figure, flags_headline, limits_hint, normal_limits, polar_maps, short, volume_line,
-    with_interval,
+    flags_headline, limits_hint, normal_limits, polar_maps, short, volume_line,
 };
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
-use crate::image::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
+use crate::image::draw::document::{self, HtmlDocument, Sign};
 use crate::image::draw::text::{data_uri, number};
 use crate::image::draw::views;
 use crate::image::volume::Provenance;
 use crate::mesh::TriMesh;
+use crate::results::figures::beat::{FIGURES, SEGMENT_FIGURES};
+use crate::results::figures::{cells, headlines};
+use maud::{Markup, html};
+use serde_json::Value;
 
 /// How to read the polar maps.
 const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the same map's \
@@ -125,7 +126,8 @@ fn checks(report: &BeatReport) -> Vec<(bool, String)> {
         let few = "Few beats were rejected".to_owned();
         checks.push((!raised("beats_rejected"), few));
     }
-    if report.has_stated_mass() {
+    let stated_mass_g = report.parameters.get("mass_g").and_then(Value::as_f64);
+    if stated_mass_g.is_some() {
         let met = "The wall has the mass that was given".to_owned();
         checks.push((!raised("mass_not_met"), met));
     }
@@ -151,63 +153,8 @@ fn verdict(report: &BeatReport) -> Markup {
 }
 
 fn figures(report: &BeatReport) -> Markup {
-    let rates = report.rates.as_ref();
-    let phase = report.phase.reliable.then_some(&report.phase);
-    let all = [
-        figure(
-            report.ef_percent,
-            0,
-            "%",
-            with_interval("ejection fraction", report.ef_interval_percent, 0),
-        ),
-        figure(
-            report.edv_ml,
-            0,
-            "ml",
-            with_interval("end-diastolic volume", report.edv_interval_ml, 0),
-        ),
-        figure(
-            report.esv_ml,
-            0,
-            "ml",
-            with_interval("end-systolic volume", report.esv_interval_ml, 0),
-        ),
-        figure(report.sv_ml, 0, "ml", "stroke volume"),
-        figure(report.muscle_g(), 0, "g", "mass of the wall (1.05 g/ml)"),
-        figure(
-            rates.map(|rates| rates.peak_ejection_edv_per_s),
-            2,
-            "EDV/s",
-            "peak ejection rate",
-        ),
-        figure(
-            rates.map(|rates| rates.peak_filling_edv_per_s),
-            2,
-            "EDV/s",
-            "peak filling rate",
-        ),
-        figure(
-            rates.map(|rates| rates.time_to_peak_filling_ms),
-            0,
-            "ms",
-            "end systole to peak filling",
-        ),
-        figure(
-            phase.map(|phase| phase.sd_degrees),
-            0,
-            "°",
-            "standard deviation of the phases",
-        ),
-        figure(
-            phase.map(|phase| phase.bandwidth_degrees),
-            0,
-            "°",
-            "bandwidth of the phases: 95 % of the wall",
-        ),
-    ];
-    let all: Vec<HeadlineFigure> = all.into_iter().flatten().collect();
     html! {
-        (document::figures(&all))
+        (document::figures(&headlines(FIGURES, report)))
         @if let Some(reason) = &report.no_rates { p.hint { "No rates: " (reason) "." } }
     }
 }
@@ -250,21 +197,6 @@ fn curves(page: &BeatPage) -> Markup {
 }
 
 fn segments(report: &BeatReport) -> Markup {
-    let known = |value: Option<f64>, decimals| number(value.unwrap_or(f64::NAN), decimals);
-    let cells = |segment: &SegmentMotionReport| {
-        [
-            number(segment.motion_mm, 1),
-            number(segment.thickening_percent, 0),
-            known(segment.thickening_counts_percent, 0),
-            known(segment.phase_degrees, 0),
-        ]
-    };
-    let columns = [
-        "motion inward, mm",
-        "thickening, %",
-        "by counts, %",
-        "phase, °",
-    ];
     html! {
         div {
             div.scroll tabindex="0" role="group" aria-label="Table of segments, scrollable" {
@@ -273,7 +205,7 @@ fn segments(report: &BeatReport) -> Markup {
                         tr {
                             th.n scope="col" { "No." }
                             th scope="col" { "Segment" }
-                            @for column in columns { th.n scope="col" { (column) } }
+                            @for row in SEGMENT_FIGURES { th.n scope="col" { (row.column()) } }
                         }
                     }
                     tbody {
@@ -281,7 +213,7 @@ fn segments(report: &BeatReport) -> Markup {
                             tr {
                                 td.n { (segment.segment) }
                                 th scope="row" { (segment.name) }
-                                @for cell in cells(segment) { td.n { (cell) } }
+                                @for cell in cells(SEGMENT_FIGURES, segment) { td.n { (cell) } }
                             }
                         }
                     }

@@ -220,17 +220,6 @@ pub struct BeatParts {
 }
 
 impl BeatReport {
-    /// Mass of the wall's muscle, g.
-    pub fn muscle_g(&self) -> f64 {
-        self.mass_g
-    }
-
-    /// Whether the caller stated the mass of the wall's muscle.
-    pub fn has_stated_mass(&self) -> bool {
-        let stated = self.parameters.get("mass_g");
-        stated.is_some_and(|mass| !mass.is_null())
-    }
-
     /// Joins the figures of `beat` to the other parts.
     pub fn new(beat: &Beat, parts: BeatParts) -> Self {
         let walls: Vec<f64> = beat.curve.iter().map(|v| v.wall_ml).collect();

@@ -1,18 +1,18 @@
 //! The page of a comparison: flags, figures, slices, polar maps side by side, territories and segments, both scans.
 
-use maud::{Markup, html};
-
-use super::comparison_report::{
-    ComparedScan, ComparedSegmentReport, ComparisonReport, UptakeChange,
-};
-use super::page_parts::{figure, flags_headline, polar_maps, short};
+use super::comparison_report::{ComparedScan, ComparisonReport};
+use super::page_parts::{flags_headline, polar_maps, short};
 use super::sections::Program;
 use super::summaries::object;
 use super::whose;
-use crate::image::draw::document::{self, HeadlineFigure, HtmlDocument};
+use crate::image::draw::document::{self, HtmlDocument};
 use crate::image::draw::table::{Table, TableColumn};
-use crate::image::draw::text::{data_uri, number, signed};
+use crate::image::draw::text::{data_uri, number};
 use crate::image::volume::Provenance;
+use crate::results::figures::comparison::{FIGURES, SEGMENT_FIGURES, TERRITORY_FIGURES};
+use crate::results::figures::{Figure, cells, headlines, readable};
+use maud::{Markup, html};
+use serde_json::Value;
 
 /// How to read the polar maps.
 pub(super) const MAPS_HINT: &str = "Apex in the centre, base outside. Uptake in per cent of the hottest quarter of the \
@@ -155,45 +155,6 @@ fn checks(report: &ComparisonReport) -> Vec<(bool, String)> {
     checks
 }
 
-/// The main figures.
-pub(super) fn headline_figures(report: &ComparisonReport) -> Vec<HeadlineFigure> {
-    let percent = |at: usize| {
-        let share = report.summed_percent.map(|percents| percents[at]);
-        share.map_or(String::new(), |share| format!(" ({} %)", number(share, 0)))
-    };
-    let score = |value: Option<u32>, at: usize, label: &str| {
-        let label = format!("{label}{}", percent(at));
-        figure(value.map(f64::from), 0, "of 68", label)
-    };
-    let beat = report.beat.as_ref();
-    let all = [
-        figure(
-            report.tid,
-            2,
-            "",
-            "TID: cavity at stress over that at rest, all gates",
-        ),
-        figure(report.reversible_percent, 0, "%", "of the wall reversible"),
-        figure(report.fixed_percent, 0, "%", "of the wall fixed"),
-        score(report.sss, 0, "SSS, summed stress score"),
-        score(report.srs, 1, "SRS, summed rest score"),
-        score(report.sds, 2, "SDS, summed difference score"),
-        figure(
-            beat.and_then(|beat| beat.stress_ef_percent),
-            0,
-            "%",
-            "ejection fraction at stress",
-        ),
-        figure(
-            beat.and_then(|beat| beat.rest_ef_percent),
-            0,
-            "%",
-            "ejection fraction at rest",
-        ),
-    ];
-    all.into_iter().flatten().collect()
-}
-
 /// The figures that are missing, and why.
 pub(super) fn missing_figures(report: &ComparisonReport) -> Vec<String> {
     let scores = "No scores and no z: the scans were compared with no normal limits.";
@@ -204,7 +165,7 @@ pub(super) fn missing_figures(report: &ComparisonReport) -> Vec<String> {
 
 fn figures(report: &ComparisonReport) -> Markup {
     html! {
-        (document::figures(&headline_figures(report)))
+        (document::figures(&headlines(FIGURES, report)))
         @for hint in missing_figures(report) { p.hint { (hint) } }
     }
 }
@@ -235,36 +196,20 @@ fn slices(page: &ComparisonPage) -> Markup {
     }
 }
 
-fn uptake(uptake: &UptakeChange) -> [String; 5] {
-    let known = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 0);
-    [
-        known(uptake.stress_percent),
-        known(uptake.rest_percent),
-        signed(uptake.difference_points.unwrap_or(f64::NAN), 0),
-        number(uptake.reversible_percent, 0),
-        number(uptake.fixed_percent, 0),
-    ]
-}
-
-const UPTAKE_COLUMNS: [&str; 5] = [
-    "stress, %",
-    "rest, %",
-    "rest less stress, points",
-    "reversible, %",
-    "fixed, %",
-];
-
 /// The walls of the arteries; `None` if there are none.
 pub(super) fn territory_table(report: &ComparisonReport) -> Option<Table> {
-    let rows = report.territories.iter();
-    let rows = rows.map(|territory| {
+    let rows = report.territories.iter().map(|territory| {
         let name = [territory.name.clone()];
-        name.into_iter().chain(uptake(&territory.uptake)).collect()
+        let figures = cells(TERRITORY_FIGURES, territory);
+        name.into_iter().chain(figures).collect()
     });
+    let heads = TERRITORY_FIGURES
+        .iter()
+        .map(|row| TableColumn::number(row.column()));
     (!report.territories.is_empty()).then(|| Table {
         columns: [TableColumn::name("Territory")]
             .into_iter()
-            .chain(UPTAKE_COLUMNS.map(TableColumn::number))
+            .chain(heads)
             .collect(),
         rows: rows.collect(),
     })
@@ -277,38 +222,22 @@ fn territories(report: &ComparisonReport) -> Markup {
     }
 }
 
-/// The segments.
+/// The segments, with those figures that one of them has.
 pub(super) fn segment_table(report: &ComparisonReport) -> Table {
-    let scored = report.sss.is_some();
-    let beating = report.beat.is_some();
-    let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
-    let known = |value: Option<f64>, decimals| signed(value.unwrap_or(f64::NAN), decimals);
-    let mut titles = vec![TableColumn::number("No."), TableColumn::name("Segment")];
-    titles.extend(UPTAKE_COLUMNS.map(TableColumn::number));
-    if scored {
-        titles.extend(["score at stress", "score at rest"].map(TableColumn::number));
-    }
-    if beating {
-        let changes = ["motion, change, mm", "thickening, change, points"];
-        titles.extend(changes.map(TableColumn::number));
-    }
-    let row = |segment: &ComparedSegmentReport| {
-        let mut cells = vec![segment.segment.to_string(), segment.name.clone()];
-        cells.extend(uptake(&segment.uptake));
-        if scored {
-            cells.extend([score(segment.stress_score), score(segment.rest_score)]);
-        }
-        if beating {
-            cells.extend([
-                known(segment.motion_change_mm, 1),
-                known(segment.thickening_change_points, 0),
-            ]);
-        }
-        cells
-    };
+    let segments: Vec<Value> = report.segments.iter().map(readable).collect();
+    let has = |row: &Figure| segments.iter().any(|segment| row.value(segment).is_some());
+    let figures: Vec<Figure> = SEGMENT_FIGURES.iter().copied().filter(has).collect();
+    let heads = figures.iter().map(|row| TableColumn::number(row.column()));
+    let rows = report.segments.iter().map(|segment| {
+        let names = [segment.segment.to_string(), segment.name.clone()];
+        names.into_iter().chain(cells(&figures, segment)).collect()
+    });
     Table {
-        columns: titles,
-        rows: report.segments.iter().map(row).collect(),
+        columns: [TableColumn::number("No."), TableColumn::name("Segment")]
+            .into_iter()
+            .chain(heads)
+            .collect(),
+        rows: rows.collect(),
     }
 }
 

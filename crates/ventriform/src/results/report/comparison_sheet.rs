@@ -2,8 +2,8 @@
 //! side, territories and segments.
 
 use super::comparison_page::{
-    self, MAPS_HINT, SLICES_HINT, TITLE, headline_figures, missing_figures, scan_table,
-    segment_table, territory_table,
+    self, MAPS_HINT, SLICES_HINT, TITLE, missing_figures, scan_table, segment_table,
+    territory_table,
 };
 use super::comparison_report::ComparisonReport;
 use super::page_parts::flags_headline;
@@ -12,6 +12,8 @@ use super::sheet_parts::{self, DrawnPage};
 use crate::image::draw::Image;
 use crate::image::draw::sheet::{Block, COLUMN_GAP_PX, CONTENT_WIDTH_PX, Tone};
 use crate::image::volume::Provenance;
+use crate::results::figures::comparison::FIGURES;
+use crate::results::figures::headlines;
 
 /// Polar maps beside each other.
 const MAPS_PER_ROW: usize = 3;
@@ -65,7 +67,7 @@ fn origin(sheet: &ComparisonSheet<'_>) -> String {
 /// Slices on the left; figures and the facts of both scans on the right.
 fn pictures_and_figures(sheet: &ComparisonSheet<'_>) -> Block {
     let report = sheet.report;
-    let mut facts = vec![Block::Figures(headline_figures(report))];
+    let mut facts = vec![Block::Figures(headlines(FIGURES, report))];
     let missing = missing_figures(report).into_iter();
     facts.extend(missing.map(|hint| Block::Sentence(Tone::Soft, hint)));
     let mut table = scan_table(report, sheet.scans.is_some());

@@ -1,8 +1,5 @@
 //! The page of a model: what was promised and whether it holds, figures, pictures, distributions.
 
-use maud::{Markup, html};
-use serde_json::{Map, Value};
-
 use super::closeness::Closeness;
 use super::distance::Direction;
 use super::distance_pictures;
@@ -14,11 +11,15 @@ use super::summaries::object;
 use super::summary::{Histogram, Summary};
 use super::whose;
 use crate::image::draw::chart::{self, Bins};
-use crate::image::draw::document::{self, HeadlineFigure, HtmlDocument, Sign};
+use crate::image::draw::document::{self, HtmlDocument, Sign};
 use crate::image::draw::text::{number, signed};
 use crate::image::draw::views;
 use crate::image::volume::Provenance;
 use crate::mesh::TriMesh;
+use crate::results::figures::headlines;
+use crate::results::figures::model::FIGURES;
+use maud::{Markup, html};
+use serde_json::{Map, Value};
 
 /// The page for `report` on `mesh`; with `closeness`, the distances to the surface that the
 /// model was made from, also the model coloured by them. Distances of another mesh are left out.
@@ -40,7 +41,7 @@ pub fn model_page(
         body: html! {
             (whose::section(scan))
             (verdict(report))
-            (figures(report))
+            (document::figures(&headlines(FIGURES, report)))
             (document::notes("Please note", report.warnings.iter().map(String::as_str)))
             (views::section("The model", mesh, &[], true))
             @if let Some(closeness) = closeness { (distances(report, mesh, closeness)) }
@@ -153,67 +154,6 @@ fn verdict(report: &ModelReport) -> Markup {
         ),
     };
     document::verdict(sign, &headline, &checks)
-}
-
-/// The headline figures.
-fn figures(report: &ModelReport) -> Markup {
-    let distance = &report.distance;
-    let total = report.timings_ms.get("total").and_then(Value::as_f64);
-    let figure = |value, unit, label| HeadlineFigure { value, unit, label };
-    let mut figures = vec![
-        figure(
-            report.mesh.vertices.to_string(),
-            "points",
-            format!("joined to {} triangles", report.mesh.triangles),
-        ),
-        figure(
-            number(report.shape.radius_ratio.mean, 3),
-            "of 1",
-            format!(
-                "mean shape of triangles (2r/R); worst {}",
-                number(report.shape.radius_ratio.min, 3)
-            ),
-        ),
-        figure(
-            number(distance.mean_mm, 2),
-            "mm",
-            format!(
-                "mean distance to the image's surface, {} voxel",
-                number(distance.mean_voxels, 2)
-            ),
-        ),
-        figure(
-            number(distance.hausdorff_mm, 2),
-            "mm",
-            format!(
-                "largest distance (Hausdorff); 95\u{a0}% within {}\u{a0}mm",
-                number(distance.hd95_mm, 2)
-            ),
-        ),
-        figure(
-            number(distance.volume_ml, 1),
-            "ml",
-            format!(
-                "wall volume, {}\u{a0}% against the surface",
-                signed(distance.volume_error_percent, 2)
-            ),
-        ),
-        figure(
-            number(report.smoothness.dihedral_deg.mean, 1),
-            "degrees",
-            "mean dihedral angle between neighbouring triangles".to_owned(),
-        ),
-        figure(
-            signed(report.fitness.gain_percent, 1),
-            "%",
-            "fitness gained by optimisation".to_owned(),
-        ),
-    ];
-    if let Some(total) = total.filter(|t| *t > 0.0) {
-        let label = "from voxels to the measured model".to_owned();
-        figures.push(figure(number(total, 0), "ms", label));
-    }
-    document::figures(&figures)
 }
 
 /// The model coloured by its distance to the surface, and the distances as a table.

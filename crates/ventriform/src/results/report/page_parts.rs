@@ -2,9 +2,11 @@
 
 use super::input::FileFacts;
 use super::perfusion_report::PerfusionReport;
-use crate::image::draw::document::{self, HeadlineFigure, Sign};
+use crate::image::draw::document::{self, Sign};
 use crate::image::draw::table::{Table, TableColumn};
-use crate::image::draw::text::{data_uri, number, signed};
+use crate::image::draw::text::{data_uri, number};
+use crate::results::figures::perfusion::{FIGURES, SEGMENT_FIGURES};
+use crate::results::figures::{Figure, cells, headlines};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
@@ -27,32 +29,6 @@ pub(super) fn flags_headline(flags: usize, result: &str) -> (Sign, String) {
         ),
         1 => (Sign::Flag, "There is one reason to look closer.".to_owned()),
         n => (Sign::Flag, format!("There are {n} reasons to look closer.")),
-    }
-}
-
-/// A headline figure, if there is a `value`.
-pub(super) fn figure(
-    value: impl Into<Option<f64>>,
-    decimals: usize,
-    unit: &'static str,
-    label: impl Into<String>,
-) -> Option<HeadlineFigure> {
-    Some(HeadlineFigure {
-        value: number(value.into()?, decimals),
-        unit,
-        label: label.into(),
-    })
-}
-
-/// A figure's `label`, with the interval that holds the true figure of nine of ten hearts.
-pub(super) fn with_interval(label: &str, interval: Option<[f64; 2]>, decimals: usize) -> String {
-    match interval {
-        Some([low, high]) => format!(
-            "{label}; 90 %: {} to {}",
-            number(low, decimals),
-            number(high, decimals)
-        ),
-        None => label.to_owned(),
     }
 }
 
@@ -113,52 +89,24 @@ pub(super) fn limits_line(perfusion: &PerfusionReport) -> String {
     )
 }
 
-/// The main figures beside normal limits.
-pub(super) fn limits_figures(perfusion: &PerfusionReport) -> Vec<HeadlineFigure> {
-    let figures = [
-        figure(perfusion.deficit_percent, 1, "%", "deficit score"),
-        figure(
-            perfusion.extent_percent,
-            1,
-            "%",
-            format!(
-                "of the wall below the limit, z = -{}",
-                number(perfusion.z_limit, 1)
-            ),
-        ),
-        figure(perfusion.severity, 1, "SD", "mean depth there"),
-        figure(
-            f64::from(perfusion.summed_score),
-            0,
-            "of 68",
-            format!("summed score ({} %)", number(perfusion.summed_percent, 0)),
-        ),
-    ];
-    figures.into_iter().flatten().collect()
-}
-
 /// The segments beside normal limits.
 pub(super) fn score_table(perfusion: &PerfusionReport) -> Table {
-    let z = |z: Option<f64>| z.map_or("–".to_owned(), |z| signed(z, 1));
-    let score = |score: Option<u8>| score.map_or("–".to_owned(), |score| score.to_string());
-    let rows = perfusion.segments.iter().map(|segment| {
-        vec![
-            segment.segment.to_string(),
-            segment.name.clone(),
-            z(segment.z),
-            score(segment.score),
-            number(segment.extent_percent, 1),
-        ]
+    let rows: Vec<Figure> = SEGMENT_FIGURES
+        .iter()
+        .copied()
+        .filter(|row| row.headline)
+        .collect();
+    let heads = rows.iter().map(|row| TableColumn::number(row.column()));
+    let segments = perfusion.segments.iter().map(|segment| {
+        let names = [segment.segment.to_string(), segment.name.clone()];
+        names.into_iter().chain(cells(&rows, segment)).collect()
     });
     Table {
-        columns: vec![
-            TableColumn::number("No."),
-            TableColumn::name("Segment"),
-            TableColumn::number("mean z"),
-            TableColumn::number("score, 0 to 4"),
-            TableColumn::number("below the limit, % of area"),
-        ],
-        rows: rows.collect(),
+        columns: [TableColumn::number("No."), TableColumn::name("Segment")]
+            .into_iter()
+            .chain(heads)
+            .collect(),
+        rows: segments.collect(),
     }
 }
 
@@ -171,7 +119,7 @@ pub(super) fn normal_limits(perfusion: Option<&PerfusionReport>) -> Markup {
         section {
             h2 { "Beside normal limits" }
             p.hint { (limits_line(perfusion)) }
-            (document::figures(&limits_figures(perfusion)))
+            (document::figures(&headlines(FIGURES, perfusion)))
             ul.warnings { @for flag in &perfusion.flags { li { (flag.reason) } } }
             (document::table(&score_table(perfusion), "Table of scores"))
         }

@@ -1,22 +1,21 @@
 //! The page of a segmentation: flags, figures, slices, polar map, agreement, the fitted model.
 
-use maud::{Markup, html};
-use serde_json::{Value, json};
-
 use super::embedded::Embedded;
-use super::page_parts::{
-    figure, flags_headline, limits_hint, normal_limits, short, volume_line, with_interval,
-};
+use super::page_parts::{flags_headline, limits_hint, normal_limits, short, volume_line};
 use super::sections::Program;
 use super::segmentation_report::{AppliedReaderReport, SegmentationReport};
 use super::summaries::object;
 use super::whose;
-use crate::image::draw::document::{self, HeadlineFigure, HtmlDocument};
+use crate::image::draw::document::{self, HtmlDocument};
 use crate::image::draw::table::{CellKind, Table, TableColumn};
-use crate::image::draw::text::{data_uri, number, signed};
+use crate::image::draw::text::{data_uri, number};
 use crate::image::draw::views;
 use crate::image::volume::Provenance;
 use crate::mesh::TriMesh;
+use crate::results::figures::segmentation::{AGAINST_THE_EXPERT, FIGURES, SEGMENT_FIGURES};
+use crate::results::figures::{cells, headlines, section};
+use maud::{Markup, html};
+use serde_json::{Value, json};
 
 /// A segmentation's report with its pictures.
 #[derive(Debug, Clone, Copy)]
@@ -236,113 +235,8 @@ fn verdict(report: &SegmentationReport) -> Markup {
     document::verdict(sign, &headline, &checks(report))
 }
 
-/// The main figures.
-pub(super) fn headline_figures(report: &SegmentationReport) -> Vec<HeadlineFigure> {
-    let measures = report.measures.as_ref();
-    let extent = report.polar.as_ref().map(|polar| polar.extent_percent);
-    let mut rows = size_rows(report);
-    rows.extend([
-        figure(extent, 1, "%", "of the wall below the threshold of uptake"),
-        figure(
-            measures.map(|m| m.jaccard),
-            3,
-            "of 1",
-            "Jaccard index against the expert (E_J)",
-        ),
-        figure(
-            measures.map(|m| m.dice),
-            3,
-            "of 1",
-            "Dice index against the expert",
-        ),
-        figure(
-            measures.and_then(|m| m.contour_distance_voxels),
-            3,
-            "voxels",
-            "mean distance of the contours (E_CD)",
-        ),
-        figure(
-            measures.and_then(|m| m.hausdorff95_mm),
-            1,
-            "mm",
-            "95th percentile of the distance between the contours",
-        ),
-    ]);
-    rows.into_iter().flatten().collect()
-}
-
 fn figures(report: &SegmentationReport) -> Markup {
-    document::figures(&headline_figures(report))
-}
-
-/// Volumes, thickness and mass: of both walls of a ventricle where the report has them.
-fn size_rows(report: &SegmentationReport) -> Vec<Option<HeadlineFigure>> {
-    let volumes = report.volumes_ml;
-    let (Some(apparent), Some(anatomical)) = (volumes.apparent, volumes.anatomical) else {
-        let wall = match report.is_ventricle() {
-            true => "volume of the wall",
-            false => "volume of the organ",
-        };
-        return vec![
-            figure(volumes.wall, 1, "ml", wall),
-            figure(volumes.cavity, 1, "ml", "volume of the cavity"),
-            figure(
-                report.wall_thickness_mm,
-                1,
-                "mm",
-                "mean thickness of the wall",
-            ),
-        ];
-    };
-    let thickness = report.thickness_mm.as_ref();
-    let interval = volumes.anatomical_interval;
-    vec![
-        figure(
-            anatomical.wall,
-            1,
-            "ml",
-            with_interval(
-                "anatomical wall: without the blur",
-                interval.map(|of| of.wall),
-                0,
-            ),
-        ),
-        figure(
-            anatomical.cavity,
-            1,
-            "ml",
-            with_interval(
-                "cavity within the anatomical wall",
-                interval.map(|of| of.cavity),
-                0,
-            ),
-        ),
-        figure(
-            thickness.map(|both| both.anatomical.mean),
-            1,
-            "mm",
-            "mean thickness of the anatomical wall",
-        ),
-        figure(
-            report.muscle_g(),
-            0,
-            "g",
-            "mass of the anatomical wall (1.05 g/ml)",
-        ),
-        figure(
-            apparent.wall,
-            1,
-            "ml",
-            "apparent wall: as it looks in the image",
-        ),
-        figure(apparent.cavity, 1, "ml", "cavity within the apparent wall"),
-        figure(
-            thickness.map(|both| both.apparent.mean),
-            1,
-            "mm",
-            "mean thickness of the apparent wall",
-        ),
-    ]
+    document::figures(&headlines(FIGURES, report))
 }
 
 /// What the slices show, and the name of each.
@@ -418,34 +312,31 @@ pub(super) fn polar_hint(report: &SegmentationReport) -> String {
 /// Uptake of the segments and of the arteries' territories; `None` without a polar map.
 pub(super) fn uptake_table(report: &SegmentationReport) -> Option<Table> {
     let figures = report.polar.as_ref()?;
-    let percent = |value: Option<f64>| number(value.unwrap_or(f64::NAN), 1);
-    let below = number(figures.threshold_percent, 0);
     let segments = figures.segments.iter().map(|segment| {
-        vec![
-            segment.number.to_string(),
-            segment.name.clone(),
-            segment.territory.clone().unwrap_or("–".to_owned()),
-            percent(segment.mean_percent),
-            number(segment.extent_percent, 1),
-        ]
+        let artery = segment.territory.clone().unwrap_or("–".to_owned());
+        let names = [segment.number.to_string(), segment.name.clone(), artery];
+        names
+            .into_iter()
+            .chain(cells(SEGMENT_FIGURES, segment))
+            .collect()
     });
     let territories = figures.territories.iter().map(|territory| {
-        vec![
-            String::new(),
-            "all of the territory".to_owned(),
-            territory.name.clone(),
-            percent(territory.mean_percent),
-            number(territory.extent_percent, 1),
-        ]
+        let names = ["", "all of the territory", &territory.name].map(str::to_owned);
+        names
+            .into_iter()
+            .chain(cells(SEGMENT_FIGURES, territory))
+            .collect()
     });
+    let heads = SEGMENT_FIGURES
+        .iter()
+        .map(|row| TableColumn::number(row.column()));
+    let names = [
+        TableColumn::number("No."),
+        TableColumn::name("Segment"),
+        TableColumn::text("Artery"),
+    ];
     Some(Table {
-        columns: vec![
-            TableColumn::number("No."),
-            TableColumn::name("Segment"),
-            TableColumn::text("Artery"),
-            TableColumn::number("mean, %"),
-            TableColumn::number(format!("below {below} %, % of area")),
-        ],
+        columns: names.into_iter().chain(heads).collect(),
         rows: segments.chain(territories).collect(),
     })
 }
@@ -498,40 +389,7 @@ fn polar(report: &SegmentationReport, svg: &[u8]) -> Markup {
 
 /// Measures against the expert's mask, where there was one: name, value, unit.
 pub(super) fn agreement_rows(report: &SegmentationReport) -> Vec<[String; 3]> {
-    let Some(measures) = report.measures else {
-        return Vec::new();
-    };
-    let difference = measures.volume_difference_percent;
-    [
-        ("Jaccard (E_J)", Some(measures.jaccard), 3, ""),
-        ("Dice", Some(measures.dice), 3, ""),
-        (
-            "Mean contour distance (E_CD)",
-            measures.contour_distance_voxels,
-            3,
-            "voxels",
-        ),
-        (
-            "Mean contour distance",
-            measures.contour_distance_mm,
-            2,
-            "mm",
-        ),
-        ("Hausdorff distance", measures.hausdorff_mm, 2, "mm"),
-        ("Hausdorff distance, 95 %", measures.hausdorff95_mm, 2, "mm"),
-        ("Volume of the mask", Some(measures.volume_ml), 1, "ml"),
-        (
-            "Volume of the expert's mask",
-            Some(measures.expert_volume_ml),
-            1,
-            "ml",
-        ),
-    ]
-    .into_iter()
-    .filter_map(|(name, value, decimals, unit)| Some((name, number(value?, decimals), unit)))
-    .chain(difference.map(|share| ("Difference of the volumes", signed(share, 1), "%")))
-    .map(|(name, value, unit)| [name.to_owned(), value, unit.to_owned()])
-    .collect()
+    section(FIGURES, AGAINST_THE_EXPERT, report)
 }
 
 fn agreement(report: &SegmentationReport) -> Markup {

@@ -195,11 +195,6 @@ impl SegmentationReport {
     /// Density of the myocardium, g/ml.
     pub const MYOCARDIAL_DENSITY_G_PER_ML: f64 = 1.05;
 
-    /// Mass of the anatomical wall's muscle, g; ventricles only.
-    pub fn muscle_g(&self) -> Option<f64> {
-        self.mass_g
-    }
-
     /// Joins the figures of `fit` to the other parts.
     pub fn new(fit: &Fit, parts: SegmentationParts) -> Self {
         let (fit, judgement) = (&fit.model, &fit.judgement);

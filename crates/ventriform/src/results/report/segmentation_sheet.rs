@@ -1,10 +1,10 @@
 //! The page of a segmentation as one picture: whose scan it is, flags, slices with contours, the polar map beside the
 //! figures, the segments, and what stands beside normal limits.
 
-use super::page_parts::{flags_headline, limits_figures, limits_line, score_table};
+use super::page_parts::{flags_headline, limits_line, score_table};
 use super::sections::Program;
 use super::segmentation_page::{
-    agreement_rows, headline_figures, origin, polar_hint, slice_names, title, uptake_table,
+    agreement_rows, origin, polar_hint, slice_names, title, uptake_table,
 };
 use super::segmentation_report::SegmentationReport;
 use super::sheet_parts::{self, DrawnPage};
@@ -12,6 +12,7 @@ use crate::image::draw::Image;
 use crate::image::draw::sheet::{Block, COLUMN_GAP_PX, CONTENT_WIDTH_PX, Tone};
 use crate::image::draw::table::{Table, TableColumn};
 use crate::image::volume::Provenance;
+use crate::results::figures::{headlines, perfusion, segmentation};
 
 /// The slices are small: a pixel of theirs is shown as a square of so many.
 const SLICES_ENLARGED: usize = 2;
@@ -95,7 +96,7 @@ fn slices(sheet: &SegmentationSheet<'_>) -> Vec<Block> {
 /// The polar map with its segments on the left, and the figures on the right; figures alone where there is no map.
 fn figures(sheet: &SegmentationSheet<'_>) -> Vec<Block> {
     let report = sheet.report;
-    let figures = Block::Figures(headline_figures(report));
+    let figures = Block::Figures(headlines(segmentation::FIGURES, report));
     let (Some(map), Some(table)) = (sheet.polar, uptake_table(report)) else {
         return vec![Block::Heading("Figures".into()), figures];
     };
@@ -119,7 +120,7 @@ fn limits(report: &SegmentationReport) -> Vec<Block> {
     };
     let half = (CONTENT_WIDTH_PX - COLUMN_GAP_PX) / 2;
     let mut left = vec![
-        Block::Figures(limits_figures(perfusion)),
+        Block::Figures(headlines(perfusion::FIGURES, perfusion)),
         Block::Sentence(Tone::Soft, limits_line(perfusion)),
     ];
     let reasons: Vec<String> = perfusion

@@ -7,21 +7,23 @@
 //! The report has groups of TID 1501 ([`structured_report`](super::structured_report)): one of the volume at each end,
 //! whose cardiac cycle phase says which (CID 12233), one of what is measured over the whole beat, one of each of the 17
 //! segments, unless the gates are no beat, and those beside normal limits ([`normals`]). A figure that the report lacks
-//! is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
+//! is left out, and so are phases that are not reliable; their scatter by noise stays. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
-use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::normals;
 use super::structured_report::{
-    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, WALL_SEGMENTS, concept, figure,
-    finding_site, group, measured, text, tracking, within,
+    self as sr, RANGES_COMMENT, WALL_SEGMENTS, concept, finding_site, group, measured, text,
+    tracking,
 };
 use super::uid::Uids;
 use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
-use crate::results::report::{BeatReport, SegmentMotionReport};
+use crate::results::figures::beat::{FIGURES, SEGMENT_FIGURES};
+use crate::results::figures::code::{Code, dcm, sct};
+use crate::results::figures::{Group, readable};
+use crate::results::report::BeatReport;
 
 /// An end of the beat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -170,9 +172,10 @@ impl<'a> DicomBeat<'a> {
     fn groups(&self, uids: &Uids) -> Vec<DataSet> {
         let label = self.structure.label;
         let mut groups = Vec::new();
-        for (end, figures) in [
-            (BeatEnd::Diastole, DIASTOLIC_FIGURES),
-            (BeatEnd::Systole, SYSTOLIC_FIGURES),
+        let report = readable(self.report);
+        for (end, measured_at) in [
+            (BeatEnd::Diastole, Group::EndDiastole),
+            (BeatEnd::Systole, Group::EndSystole),
         ] {
             let name = format!("{label}, {}", end.name());
             let mut content = self.beginning(&name, uids);
@@ -182,15 +185,12 @@ impl<'a> DicomBeat<'a> {
                 end.code(),
             ));
             content.push(finding_site(self.structure.site));
-            content.extend(measured(self.report, figures));
+            content.extend(measured(&report, FIGURES, measured_at));
             groups.push(group("1501", content));
         }
         let mut content = self.beginning(label, uids);
         content.push(finding_site(self.structure.site));
-        content.extend(measured(self.report, BEAT_FIGURES));
-        if self.report.phase.reliable {
-            content.extend(measured(self.report, PHASE_FIGURES));
-        }
+        content.extend(measured(&report, FIGURES, Group::Whole));
         content.push(text("CONTAINS", dcm("121106", "Comment"), RANGES_COMMENT));
         let flags = self.report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
@@ -202,10 +202,9 @@ impl<'a> DicomBeat<'a> {
             let Some(site) = site else { continue };
             let mut content = self.beginning(&format!("Segment {number}"), uids);
             content.push(finding_site(*site));
-            content.extend(measured(segment, SEGMENT_FIGURES));
-            if self.report.phase.reliable {
-                content.extend(measured(segment, SEGMENT_PHASE));
-            }
+            let mut segment = segment.clone();
+            segment.phase_degrees = segment.phase_degrees.filter(|_| self.report.phase.reliable);
+            content.extend(measured(&readable(&segment), SEGMENT_FIGURES, Group::Whole));
             groups.push(group("1501", content));
         }
         let perfusion = self.report.perfusion.iter();
@@ -223,116 +222,3 @@ impl<'a> DicomBeat<'a> {
         content
     }
 }
-
-const VOLUMES_PER_SECOND: Code = ucum("{EDV}/s", "end-diastolic volumes per second");
-const MILLISECOND: Code = ucum("ms", "millisecond");
-const DEGREE: Code = ucum("deg", "degree");
-
-const DIASTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
-    figure(
-        |r| Some(r.edv_ml),
-        loinc("8821-1", "Left Ventricular ED Volume"),
-        MILLILITRE,
-    ),
-    |r| r.edv_interval_ml,
-)];
-
-const SYSTOLIC_FIGURES: &[Figure<BeatReport>] = &[within(
-    figure(
-        |r| Some(r.esv_ml),
-        loinc("8823-7", "Left Ventricular ES Volume"),
-        MILLILITRE,
-    ),
-    |r| r.esv_interval_ml,
-)];
-
-/// Measurements over the whole beat. Without a beat there is neither stroke nor ejection.
-const BEAT_FIGURES: &[Figure<BeatReport>] = &[
-    figure(|r| r.sv_ml, sct("90096001", "Stroke Volume"), MILLILITRE),
-    within(
-        figure(
-            |r| r.ef_percent,
-            sct("70822001", "Cardiac ejection fraction"),
-            PERCENT,
-        ),
-        |r| r.ef_interval_percent,
-    ),
-    figure(|r| Some(r.muscle_g()), dcm("122447", "Wall Mass"), GRAM),
-    figure(
-        |r| Some(r.rates.as_ref()?.peak_ejection_edv_per_s),
-        dcm("122616", "Peak Ejection Rate"),
-        VOLUMES_PER_SECOND,
-    ),
-    figure(
-        |r| Some(r.rates.as_ref()?.peak_filling_edv_per_s),
-        dcm("122618", "Peak Filling Rate"),
-        VOLUMES_PER_SECOND,
-    ),
-    figure(
-        |r| Some(r.rates.as_ref()?.time_to_peak_filling_ms),
-        own(
-            "PEAK-FILLING-MS",
-            "Time from end systole to the peak filling rate",
-        ),
-        MILLISECOND,
-    ),
-];
-
-const PHASE_FIGURES: &[Figure<BeatReport>] = &[
-    figure(
-        |r| Some(r.phase.mean_degrees),
-        own("PHASE-MEAN", "Mean phase of the wall's thickening"),
-        DEGREE,
-    ),
-    figure(
-        |r| Some(r.phase.sd_degrees),
-        own("PHASE-SD", "Standard deviation of the phases"),
-        DEGREE,
-    ),
-    figure(
-        |r| Some(r.phase.bandwidth_degrees),
-        own(
-            "PHASE-BANDWIDTH",
-            "Smallest arc with 95 per cent of the phases",
-        ),
-        DEGREE,
-    ),
-    figure(
-        |r| Some(r.phase.entropy_percent),
-        own("PHASE-ENTROPY", "Entropy of the phases"),
-        PERCENT,
-    ),
-    figure(
-        |r| Some(r.phase.noise_degrees),
-        own("PHASE-NOISE", "Scatter of the phases by noise alone"),
-        DEGREE,
-    ),
-];
-
-/// Measurements of a segment.
-const SEGMENT_FIGURES: &[Figure<SegmentMotionReport>] = &[
-    figure(
-        |s| Some(s.motion_mm),
-        sct(
-            "60797005",
-            "Cardiac wall motion, function (observable entity)",
-        ),
-        MILLIMETRE,
-    ),
-    figure(
-        |s| Some(s.thickening_percent),
-        loinc("59092-7", "% Thickening"),
-        PERCENT,
-    ),
-    figure(
-        |s| s.thickening_counts_percent,
-        own("THICKENING-COUNT", "Thickening by counts"),
-        PERCENT,
-    ),
-];
-
-const SEGMENT_PHASE: &[Figure<SegmentMotionReport>] = &[figure(
-    |s| s.phase_degrees,
-    own("PHASE", "Phase of the greatest thickness"),
-    DEGREE,
-)];

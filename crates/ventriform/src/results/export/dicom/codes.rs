@@ -1,58 +1,7 @@
 //! The coded concepts of the objects, from DICOM PS3.16.
 
 use crate::image::volume::nifti::LabelEntry;
-
-/// A coded concept: value, coding scheme and meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Code {
-    /// Code Value (0008,0100).
-    pub value: &'static str,
-    /// Coding Scheme Designator (0008,0102).
-    pub scheme: &'static str,
-    /// Code Meaning (0008,0104).
-    pub meaning: &'static str,
-}
-
-/// Designator of the codes that no public scheme has.
-pub(super) const OWN_SCHEME: &str = "99VENTRIFORM";
-
-/// A code of DICOM's own scheme.
-pub(super) const fn dcm(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "DCM", meaning)
-}
-
-/// A code of SNOMED CT.
-pub(super) const fn sct(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "SCT", meaning)
-}
-
-/// A unit of UCUM.
-pub(super) const fn ucum(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "UCUM", meaning)
-}
-
-/// A code of LOINC.
-pub(super) const fn loinc(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "LN", meaning)
-}
-
-/// A code of this software.
-pub(super) const fn own(value: &'static str, meaning: &'static str) -> Code {
-    assert!(value.len() <= 16, "a Code Value has at most 16 characters");
-    code(value, OWN_SCHEME, meaning)
-}
-
-const fn code(value: &'static str, scheme: &'static str, meaning: &'static str) -> Code {
-    assert!(
-        meaning.len() <= 64,
-        "a Code Meaning has at most 64 characters"
-    );
-    Code {
-        value,
-        scheme,
-        meaning,
-    }
-}
+use crate::results::figures::code::{Code, dcm, own, sct};
 
 pub(super) const ANATOMICAL_STRUCTURE: Code = sct("91723000", "Anatomical Structure");
 /// PS3.16 has the ventricle and its wall, but not its cavity.
@@ -61,7 +10,6 @@ pub(super) const DEFORMABLE_MODELS: Code = dcm("123111", "Deformable Models");
 pub(super) const SEGMENTATION_STEP: Code = dcm("113076", "Segmentation");
 pub(super) const SOURCE_FOR_PROCESSING: Code =
     dcm("121322", "Source image for image processing operation");
-pub(super) const MILLIMETRE: Code = ucum("mm", "mm");
 
 /// The colour of the structure, sRGB: the CIELab colour of its segment.
 const STRUCTURE_RGB: [u8; 3] = [255, 150, 0];

@@ -10,24 +10,21 @@
 //! segments in each state, and one of each segment's change. The group of a scan names the limits that its scores stand
 //! beside ([`limits_used`]). A figure that the report lacks is left out: without normal limits there are no scores.
 
-use super::codes::{Code, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
-use super::normals::{
-    DEFECT_EXTENT, DEFICIT_SCORE, REST_SCORE, SCORE_UNIT, SEGMENT_SCORE, STRESS_SCORE, limits_used,
-    patient_state,
-};
+use super::normals::{limits_used, patient_state};
 use super::structured_report::{
-    self as sr, Figure, MILLILITRE, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group,
-    measured, text, tracking,
+    self as sr, WALL_SEGMENTS, concept, finding_site, group, measured, text, tracking,
 };
 use super::uid::Uids;
 use super::{DicomError, DicomObject, ObjectFacts, SourceScan, Structure, capture, put_facts};
 use crate::heart::comparison::WhichScan;
 use crate::image::draw::Image;
-use crate::results::report::{
-    ComparedScan, ComparedSegmentReport, ComparedTerritoryReport, ComparisonReport,
-    ComparisonSheet, DrawnPage, comparison_sheet,
+use crate::results::figures::code::{Code, dcm};
+use crate::results::figures::comparison::{
+    FIGURES, SCAN_FIGURES, SEGMENT_FIGURES, TERRITORY_FIGURES,
 };
+use crate::results::figures::{Group, readable};
+use crate::results::report::{ComparisonReport, ComparisonSheet, DrawnPage, comparison_sheet};
 use dicom_dictionary_std::uids;
 
 /// An object of a comparison.
@@ -251,39 +248,41 @@ impl<'a> DicomComparison<'a> {
 
     fn groups(&self) -> Vec<DataSet> {
         let (report, label) = (self.report, self.structure.label);
-        let site = self.structure.site;
+        let (site, whole) = (self.structure.site, readable(report));
         let mut content = self.beginning(&format!("{label}, rest and stress"), None, site);
-        content.extend(measured(report, COMPARISON_FIGURES));
+        content.extend(measured(&whole, FIGURES, Group::Whole));
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", dcm("121106", "Comment"), &flag.reason)));
         let mut groups = vec![group("1501", content)];
-        for (scan, own, summed) in [
-            (WhichScan::Stress, &report.stress, STRESS_FIGURES),
-            (WhichScan::Rest, &report.rest, REST_FIGURES),
+        for (scan, own, state) in [
+            (WhichScan::Stress, &report.stress, Group::Stress),
+            (WhichScan::Rest, &report.rest, Group::Rest),
         ] {
             let name = format!("{label} at {scan}");
             let mut content = self.beginning(&name, Some(scan), site);
-            content.extend(measured(own, SCAN_FIGURES));
-            content.extend(measured(report, summed));
+            content.extend(measured(&readable(own), SCAN_FIGURES, Group::Whole));
+            content.extend(measured(&whole, FIGURES, state));
             content.extend(own.perfusion.iter().flat_map(limits_used));
             groups.push(group("1501", content));
         }
         for territory in &report.territories {
             let name = format!("Territory of {}", territory.name);
             let mut content = self.beginning(&name, None, site);
-            content.extend(measured(territory, TERRITORY_FIGURES));
+            let territory = readable(territory);
+            content.extend(measured(&territory, TERRITORY_FIGURES, Group::Whole));
             groups.push(group("1501", content));
         }
         for segment in &report.segments {
             let number = segment.segment;
             let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
             let Some(site) = site else { continue };
-            for (state, figures) in [
-                (Some(WhichScan::Stress), SEGMENT_AT_STRESS),
-                (Some(WhichScan::Rest), SEGMENT_AT_REST),
-                (None, SEGMENT_CHANGE),
+            let segment = readable(segment);
+            for (state, measured_at) in [
+                (Some(WhichScan::Stress), Group::Stress),
+                (Some(WhichScan::Rest), Group::Rest),
+                (None, Group::Whole),
             ] {
-                let figures = measured(segment, figures);
+                let figures = measured(&segment, SEGMENT_FIGURES, measured_at);
                 if figures.is_empty() {
                     continue;
                 }
@@ -307,112 +306,3 @@ impl<'a> DicomComparison<'a> {
         content
     }
 }
-
-const NO_UNITS: Code = ucum("1", "no units");
-const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
-const VOLUME: Code = sct("118565006", "Volume");
-const REVERSIBLE_SHARE: Code = own("REVERSIBLE", "Share that loses uptake at stress");
-const FIXED_SHARE: Code = own("FIXED", "Share below the threshold in both scans");
-
-/// Measurements of both scans together.
-const COMPARISON_FIGURES: &[Figure<ComparisonReport>] = &[
-    figure(
-        |r| Some(r.tid),
-        sct(
-            "428832008",
-            "Transient ischemic dilatation ratio of left ventricular cavity",
-        ),
-        NO_UNITS,
-    ),
-    figure(|r| Some(r.reversible_percent), REVERSIBLE_SHARE, PERCENT),
-    figure(|r| Some(r.fixed_percent), FIXED_SHARE, PERCENT),
-    figure(
-        |r| r.sds.map(f64::from),
-        loinc("82644-6", "Summed difference score"),
-        SCORE_UNIT,
-    ),
-    figure(
-        |r| r.beat.as_ref()?.ef_change_points,
-        own("EF-CHANGE", "Ejection fraction at stress less that at rest"),
-        PERCENT,
-    ),
-];
-
-const STRESS_FIGURES: &[Figure<ComparisonReport>] = &[
-    figure(|r| r.sss.map(f64::from), STRESS_SCORE, SCORE_UNIT),
-    figure(
-        |r| r.beat.as_ref()?.stress_ef_percent,
-        EJECTION_FRACTION,
-        PERCENT,
-    ),
-];
-
-const REST_FIGURES: &[Figure<ComparisonReport>] = &[
-    figure(|r| r.srs.map(f64::from), REST_SCORE, SCORE_UNIT),
-    figure(
-        |r| r.beat.as_ref()?.rest_ef_percent,
-        EJECTION_FRACTION,
-        PERCENT,
-    ),
-];
-
-const EJECTION_FRACTION: Code = sct("70822001", "Cardiac ejection fraction");
-
-/// Measurements of one scan.
-const SCAN_FIGURES: &[Figure<ComparedScan>] = &[
-    figure(
-        |s| Some(s.cavity_ml),
-        own("CAVITY", "Volume of the cavity, all gates"),
-        MILLILITRE,
-    ),
-    figure(|s| Some(s.muscle_ml), VOLUME, MILLILITRE),
-    figure(
-        |s| match &s.perfusion {
-            Some(perfusion) => Some(perfusion.extent_percent),
-            None => Some(s.polar.as_ref()?.extent_percent),
-        },
-        DEFECT_EXTENT,
-        PERCENT,
-    ),
-    figure(
-        |s| Some(s.perfusion.as_ref()?.deficit_percent),
-        DEFICIT_SCORE,
-        PERCENT,
-    ),
-];
-
-const TERRITORY_FIGURES: &[Figure<ComparedTerritoryReport>] = &[
-    figure(
-        |t| Some(t.uptake.reversible_percent),
-        REVERSIBLE_SHARE,
-        PERCENT,
-    ),
-    figure(|t| Some(t.uptake.fixed_percent), FIXED_SHARE, PERCENT),
-];
-
-const SEGMENT_AT_STRESS: &[Figure<ComparedSegmentReport>] = &[
-    sr::mean(|s| s.uptake.stress_percent, MYOCARDIAL_PERFUSION, PERCENT),
-    figure(|s| s.stress_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
-];
-
-const SEGMENT_AT_REST: &[Figure<ComparedSegmentReport>] = &[
-    sr::mean(|s| s.uptake.rest_percent, MYOCARDIAL_PERFUSION, PERCENT),
-    figure(|s| s.rest_score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
-];
-
-const SEGMENT_CHANGE: &[Figure<ComparedSegmentReport>] = &[
-    figure(
-        |s| s.uptake.difference_points,
-        own("DIFFERENCE", "Uptake at rest less that at stress"),
-        PERCENT,
-    ),
-    figure(
-        |s| {
-            s.uptake
-                .difference_points
-                .map(|_| s.uptake.reversible_percent)
-        },
-        REVERSIBLE_SHARE,
-        PERCENT,
-    ),
-];

@@ -1,7 +1,7 @@
 //! A data set under construction, over `dicom-object`.
 
 use super::DicomError;
-use super::codes::Code;
+use crate::results::figures::code::Code;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR};

@@ -1,146 +1,75 @@
 //! The figures of a segmentation's report as measurement groups of a structured report
 //! ([`structured_report`](super::structured_report)).
 //!
-//! One measurement group holds what was measured of the whole structure ([`STRUCTURE_FIGURES`]). It is a
-//! group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
+//! The figures are those of [`crate::results::figures::segmentation`]. One measurement group holds what was measured of
+//! the whole structure. It is a group of TID 1411 that refers to the segment of `mask.dcm`, or of TID 1501 where the source is no
 //! DICOM image that the template could name. For a ventricle the cavity, and the apparent and the anatomical
-//! wall and cavity have a group of TID 1501 each ([`WALL_FIGURES`]), and so has each of the 17 segments of the heart
+//! wall and cavity have a group of TID 1501 each, and so has each of the 17 segments of the heart
 //! association ([`WALL_SEGMENTS`]): readers of the template look at the group for where and how a figure was
 //! measured, not at the figure. The volumes of the anatomical
 //! wall and cavity have the ends of the interval that holds the true one. A scan beside normal limits has the groups of
 //! [`normals`] too. A figure that the report lacks is left out.
 
-use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
+use super::codes::LV_CAVITY;
 use super::data_set::{DataSet, reference};
-use super::normals::{self, DEFECT_EXTENT};
+use super::normals;
 use super::structured_report::{
-    self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, SeriesReference,
-    WALL_SEGMENTS, concept, figure, finding_site, group, image, mean, measured, text, tracking,
-    within,
+    self as report, RANGES_COMMENT, SeriesReference, WALL_SEGMENTS, concept, finding_site, group,
+    image, measured, text, tracking,
 };
 use super::{DicomObject, DicomResults};
-use crate::heart::polar::PolarSegment;
-use crate::results::report::SegmentationReport;
+use crate::results::figures::code::{Code, dcm, own, sct};
+use crate::results::figures::segmentation::{FIGURES, SEGMENT_FIGURES};
+use crate::results::figures::{Group, readable};
 use dicom_dictionary_std::{tags, uids};
+use serde_json::Value;
 
-const VOLUME: Code = sct("118565006", "Volume");
-const WALL_MASS: Code = sct("118538004", "Mass");
-const WALL_THICKNESS: Code = dcm("122445", "Wall Thickness");
-const MYOCARDIAL_PERFUSION: Code = sct("251053005", "Myocardial perfusion (observable entity)");
-
-const NO_UNITS: Code = ucum("1", "no units");
-
-/// Measurements of the whole structure. A new figure of the report is a new line here.
-const STRUCTURE_FIGURES: &[Figure<SegmentationReport>] = &[
-    figure(|r| Some(r.volumes_ml.wall), VOLUME, MILLILITRE),
-    figure(SegmentationReport::muscle_g, WALL_MASS, GRAM),
-    mean(|r| r.wall_thickness_mm, WALL_THICKNESS, MILLIMETRE),
-    figure(
-        |r| Some(r.polar.as_ref()?.extent_percent),
-        DEFECT_EXTENT,
-        PERCENT,
-    ),
-    figure(
-        |r| Some(r.measures?.jaccard),
-        own("JACCARD", "Jaccard index with the expert's mask"),
-        NO_UNITS,
-    ),
-    figure(
-        |r| Some(r.measures?.dice),
-        own("DICE", "Dice index with the expert's mask"),
-        NO_UNITS,
-    ),
-    figure(
-        |r| r.measures?.contour_distance_mm,
-        own("CONTOUR-MM", "Mean contour distance to the expert's mask"),
-        MILLIMETRE,
-    ),
-    figure(
-        |r| r.measures?.hausdorff_mm,
-        own("HAUSDORFF-MM", "Hausdorff distance to the expert's mask"),
-        MILLIMETRE,
-    ),
-];
-
-/// A part of a ventricle that has volumes of its own, and what is measured of it.
+/// A part of a ventricle that has figures of its own.
 struct Part {
+    /// What its figures say of themselves.
+    group: Group,
     /// Its name, after the name of the structure.
     name: &'static str,
     /// Method of measurement, if there are several.
     method: Option<Code>,
     /// Where it was measured, if not in the whole structure.
     site: Option<Code>,
-    figures: &'static [Figure<SegmentationReport>],
 }
 
 const WITH_BLUR: Code = own("APPARENT", "With the blur of the image");
 const WITHOUT_BLUR: Code = own("ANATOMICAL", "Without the blur of the image");
 
-const WALL_FIGURES: [Part; 5] = [
+const PARTS: [Part; 5] = [
     Part {
+        group: Group::Cavity,
         name: "cavity",
         method: None,
         site: Some(LV_CAVITY),
-        figures: &[figure(|r| r.volumes_ml.cavity, VOLUME, MILLILITRE)],
     },
     Part {
+        group: Group::ApparentWall,
         name: "apparent wall",
         method: Some(WITH_BLUR),
         site: None,
-        figures: &[
-            figure(|r| Some(r.volumes_ml.apparent?.wall), VOLUME, MILLILITRE),
-            mean(
-                |r| Some(r.thickness_mm?.apparent.mean),
-                WALL_THICKNESS,
-                MILLIMETRE,
-            ),
-        ],
     },
     Part {
+        group: Group::ApparentCavity,
         name: "apparent cavity",
         method: Some(WITH_BLUR),
         site: Some(LV_CAVITY),
-        figures: &[figure(
-            |r| Some(r.volumes_ml.apparent?.cavity),
-            VOLUME,
-            MILLILITRE,
-        )],
     },
     Part {
+        group: Group::AnatomicalWall,
         name: "anatomical wall",
         method: Some(WITHOUT_BLUR),
         site: None,
-        figures: &[
-            within(
-                figure(|r| Some(r.volumes_ml.anatomical?.wall), VOLUME, MILLILITRE),
-                |r| Some(r.volumes_ml.anatomical_interval?.wall),
-            ),
-            mean(
-                |r| Some(r.thickness_mm?.anatomical.mean),
-                WALL_THICKNESS,
-                MILLIMETRE,
-            ),
-        ],
     },
     Part {
+        group: Group::AnatomicalCavity,
         name: "anatomical cavity",
         method: Some(WITHOUT_BLUR),
         site: Some(LV_CAVITY),
-        figures: &[within(
-            figure(
-                |r| Some(r.volumes_ml.anatomical?.cavity),
-                VOLUME,
-                MILLILITRE,
-            ),
-            |r| Some(r.volumes_ml.anatomical_interval?.cavity),
-        )],
     },
-];
-
-/// Measurements of each of them.
-const SEGMENT_FIGURES: &[Figure<PolarSegment>] = &[
-    mean(|s| s.mean_percent, MYOCARDIAL_PERFUSION, PERCENT),
-    figure(|s| Some(s.extent_percent), DEFECT_EXTENT, PERCENT),
 ];
 
 /// Puts everything that is particular to this object.
@@ -161,16 +90,14 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) {
 
 fn groups(results: &DicomResults<'_>) -> Vec<DataSet> {
     let mut groups = vec![whole(results)];
-    groups.extend(
-        WALL_FIGURES
-            .iter()
-            .filter_map(|part| of_part(results, part)),
-    );
+    let report = results.figures.map(readable);
+    let parts = PARTS.iter();
+    groups.extend(parts.filter_map(|part| part_group(results, report.as_ref()?, part)));
     let polar = results.figures.and_then(|report| report.polar.as_ref());
     for segment in polar.iter().flat_map(|polar| &polar.segments) {
         let number = segment.number;
         let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
-        let figures = measured(segment, SEGMENT_FIGURES);
+        let figures = measured(&readable(segment), SEGMENT_FIGURES, Group::Whole);
         let (Some(site), false) = (site, figures.is_empty()) else {
             continue;
         };
@@ -220,7 +147,7 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
         }
     }
     if let Some(report) = results.figures {
-        content.extend(measured(report, STRUCTURE_FIGURES));
+        content.extend(measured(&readable(report), FIGURES, Group::Whole));
         let comment = dcm("121106", "Comment");
         let flags = report.flags.iter();
         content.extend(flags.map(|flag| text("CONTAINS", comment, &flag.reason)));
@@ -233,9 +160,9 @@ fn whole(results: &DicomResults<'_>) -> DataSet {
     group(if images.is_some() { "1411" } else { "1501" }, content)
 }
 
-/// The group of one part; `None` where the report tells nothing of it.
-fn of_part(results: &DicomResults<'_>, part: &Part) -> Option<DataSet> {
-    let figures = measured(results.figures?, part.figures);
+/// The group of one part; `None` where the report has nothing of it.
+fn part_group(results: &DicomResults<'_>, report: &Value, part: &Part) -> Option<DataSet> {
+    let figures = measured(report, FIGURES, part.group);
     if figures.is_empty() {
         return None;
     }

@@ -51,12 +51,13 @@ pub use comparison::{ComparisonObject, DicomComparison};
 pub use data_set::{IMPLEMENTATION_CLASS_UID, IMPLEMENTATION_NAME, file_start};
 pub use source::{Deidentification, Moment, SourceScan, StatedIdentity, identity, legible};
 
-use self::codes::{ANATOMICAL_STRUCTURE, Code, DEFORMABLE_MODELS};
+use self::codes::{ANATOMICAL_STRUCTURE, DEFORMABLE_MODELS};
 use self::data_set::DataSet;
 use self::uid::Uids;
 use super::ExportError;
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
+use crate::results::figures::code::Code;
 use crate::results::report::{
     DrawnPage, SegmentationReport, SegmentationSheet, segmentation_sheet,
 };

@@ -8,66 +8,21 @@
 //! rest. Parts without limits or muscle have no group.
 
 use super::Structure;
-use super::codes::{Code, dcm, loinc, own, sct, ucum};
 use super::data_set::DataSet;
 use super::structured_report::{
-    Figure, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group, measured, text, tracking,
+    WALL_SEGMENTS, concept, finding_site, group, measured, text, tracking,
 };
 use super::uid::Uids;
 use crate::heart::comparison::WhichScan;
 use crate::heart::normals::{KIND_NOT_STATED, names_protocol, yes_or_no};
-use crate::results::report::{PerfusionReport, SegmentScore, TerritoryScore};
+use crate::results::figures::code::{Code, dcm, own, sct};
+use crate::results::figures::perfusion::{
+    FIGURES, REST_SCORE, SEGMENT_FIGURES, STRESS_SCORE, SUMMED_SCORE, TERRITORY_FIGURES,
+};
+use crate::results::figures::{Figure, Group, readable};
+use crate::results::report::PerfusionReport;
 
-pub(super) const DEFECT_EXTENT: Code = sct(
-    "427751006",
-    "Extent of cardiac perfusion defect (observable entity)",
-);
-pub(super) const DEFICIT_SCORE: Code = own("DEFICIT", "Deficit score against normal limits");
-pub(super) const SEGMENT_SCORE: Code = own("SCORE", "Perfusion score, 0 normal to 4 absent");
-pub(super) const STRESS_SCORE: Code = loinc("82648-7", "Summed stress score");
-pub(super) const REST_SCORE: Code = own("SRS", "Summed rest score");
-pub(super) const SCORE_UNIT: Code = ucum("{score}", "score");
-
-/// The sum of scores of a part of the wall, or of a scan whose state is not known.
-const SUMMED_SCORE: Code = own("SUMMED-SCORE", "Summed score");
-const MEAN_Z: Code = own("Z", "Mean z, negative below the normal mean");
-const DEFECT_SEVERITY: Code = own("SEVERITY", "Mean |z| of the wall below the normal limit");
-const DEVIATIONS_UNIT: Code = ucum("{SD}", "standard deviations");
 const BESIDE_LIMITS: Code = own("NORMAL-LIMITS", "Comparison with normal limits");
-
-const WALL_FIGURES: &[Figure<PerfusionReport>] = &[
-    figure(|p| Some(p.extent_percent), DEFECT_EXTENT, PERCENT),
-    figure(|p| Some(p.deficit_percent), DEFICIT_SCORE, PERCENT),
-    figure(|p| p.severity, DEFECT_SEVERITY, DEVIATIONS_UNIT),
-];
-
-/// The summed score of a scan at stress, of one at rest, and of one whose state is not known.
-const STRESS_FIGURES: &[Figure<PerfusionReport>] =
-    &[figure(summed_score, STRESS_SCORE, SCORE_UNIT)];
-const REST_FIGURES: &[Figure<PerfusionReport>] = &[figure(summed_score, REST_SCORE, SCORE_UNIT)];
-const SUMMED_FIGURES: &[Figure<PerfusionReport>] =
-    &[figure(summed_score, SUMMED_SCORE, SCORE_UNIT)];
-
-fn summed_score(perfusion: &PerfusionReport) -> Option<f64> {
-    Some(f64::from(perfusion.summed_score))
-}
-
-const TERRITORY_FIGURES: &[Figure<TerritoryScore>] = &[
-    figure(|t| Some(t.extent_percent), DEFECT_EXTENT, PERCENT),
-    figure(|t| Some(t.deficit_percent), DEFICIT_SCORE, PERCENT),
-    figure(
-        |t| Some(f64::from(t.summed_score)),
-        SUMMED_SCORE,
-        SCORE_UNIT,
-    ),
-];
-
-const SEGMENT_FIGURES: &[Figure<SegmentScore>] = &[
-    figure(|s| s.z, MEAN_Z, DEVIATIONS_UNIT),
-    figure(|s| s.score.map(f64::from), SEGMENT_SCORE, SCORE_UNIT),
-    figure(|s| s.z.map(|_| s.extent_percent), DEFECT_EXTENT, PERCENT),
-    figure(|s| s.z.map(|_| s.deficit_percent), DEFICIT_SCORE, PERCENT),
-];
 
 /// The groups of a scan beside limits.
 pub(super) fn groups(
@@ -91,13 +46,9 @@ pub(super) fn groups(
         content
     };
     let mut content = beginning(structure.label.to_owned(), structure.site);
-    content.extend(measured(perfusion, WALL_FIGURES));
-    let summed = match state {
-        Some(WhichScan::Stress) => STRESS_FIGURES,
-        Some(WhichScan::Rest) => REST_FIGURES,
-        None => SUMMED_FIGURES,
-    };
-    content.extend(measured(perfusion, summed));
+    let rows = FIGURES.iter().map(|row| named_by_state(*row, state));
+    let rows: Vec<Figure> = rows.collect();
+    content.extend(measured(&readable(perfusion), &rows, Group::Whole));
     content.extend(limits_used(perfusion));
     let flags = perfusion.flags.iter();
     content.extend(flags.map(|flag| comment(&flag.reason)));
@@ -105,13 +56,14 @@ pub(super) fn groups(
     for territory in &perfusion.territories {
         let name = format!("Territory of {}", territory.name);
         let mut content = beginning(name, structure.site);
-        content.extend(measured(territory, TERRITORY_FIGURES));
+        let territory = readable(territory);
+        content.extend(measured(&territory, TERRITORY_FIGURES, Group::Whole));
         groups.push(group("1501", content));
     }
     for segment in &perfusion.segments {
         let number = segment.segment;
         let site = number.checked_sub(1).and_then(|at| WALL_SEGMENTS.get(at));
-        let figures = measured(segment, SEGMENT_FIGURES);
+        let figures = measured(&readable(segment), SEGMENT_FIGURES, Group::Whole);
         let (Some(site), false) = (site, figures.is_empty()) else {
             continue;
         };
@@ -120,6 +72,22 @@ pub(super) fn groups(
         groups.push(group("1501", content));
     }
     groups
+}
+
+/// A row of the wall: the summed score of a scan at stress or at rest has a code of its own.
+fn named_by_state(mut row: Figure, state: Option<WhichScan>) -> Figure {
+    if let Some(coded) = row
+        .coded
+        .as_mut()
+        .filter(|coded| coded.concept == SUMMED_SCORE)
+    {
+        coded.concept = match state {
+            Some(WhichScan::Stress) => STRESS_SCORE,
+            Some(WhichScan::Rest) => REST_SCORE,
+            None => SUMMED_SCORE,
+        };
+    }
+    row
 }
 
 /// The limits that figures stand beside, as texts of a measurement group: the people they are of, the version of the

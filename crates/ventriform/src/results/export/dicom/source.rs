@@ -7,6 +7,7 @@ use super::uid::derived;
 use crate::base::geometry::frame::VoxelToPatient;
 use crate::base::text::is_printable;
 use crate::image::volume::{Provenance, is_date, is_uid};
+use crate::results::figures::code::dcm;
 use dicom_dictionary_std::tags;
 use serde::{Deserialize, Serialize};
 
@@ -425,7 +426,7 @@ impl SourceScan {
         if self.deidentified {
             set.text(tags::PATIENT_IDENTITY_REMOVED, "YES");
             set.text(tags::LONGITUDINAL_TEMPORAL_INFORMATION_MODIFIED, "REMOVED");
-            let profile = super::codes::dcm("113100", "Basic Application Confidentiality Profile");
+            let profile = dcm("113100", "Basic Application Confidentiality Profile");
             set.code(tags::DEIDENTIFICATION_METHOD_CODE_SEQUENCE, profile);
         }
     }

@@ -1,9 +1,9 @@
 //! The mesh as Encapsulated STL Storage (PS3.3 A.85.1).
 
-use super::codes::MILLIMETRE;
 use super::data_set::DataSet;
 use super::{DicomError, DicomResults};
 use crate::results::export::{Format, Metadata, encode};
+use crate::results::figures::Unit;
 use dicom_core::PrimitiveValue;
 use dicom_core::VR;
 use dicom_dictionary_std::tags;
@@ -33,7 +33,7 @@ pub(super) fn put(results: &DicomResults<'_>, set: &mut DataSet) -> Result<(), D
         PrimitiveValue::from(bytes.len() as u32),
     );
     set.bytes(tags::ENCAPSULATED_DOCUMENT, bytes);
-    set.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, MILLIMETRE);
+    set.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, Unit::MILLIMETRE.code);
     set.text(tags::MODEL_MODIFICATION, "NO");
     set.text(tags::MODEL_MIRRORING, "NO");
     set.text(tags::CONTENT_DESCRIPTION, results.structure.label);

@@ -2,77 +2,26 @@
 //! 1500 of PS3.16.
 //!
 //! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
-//! source images, and the evidence. [`Figure`] is one figure of a report and how it is coded.
+//! source images, and the evidence. What is measured stands in the rows of [`crate::results::figures`].
 
-use super::codes::{Code, OWN_SCHEME, dcm, sct, ucum};
 use super::data_set::{DataSet, reference};
 use super::{SourceScan, Structure};
 use crate::base::numeric::decimals::round;
+use crate::results::figures::code::{Code, OWN_SCHEME, dcm, sct};
+use crate::results::figures::{Coded, Figure, Group};
 use dicom_core::Tag;
 use dicom_dictionary_std::tags;
+use serde_json::Value;
 
-/// A figure of a report, or of an entry `T` of one, and how it is coded.
-pub(super) struct Figure<T> {
-    /// The figure; `None` or not finite where there is none.
-    pub value: fn(&T) -> Option<f64>,
-    pub concept: Code,
-    pub unit: Code,
-    /// Derivation from the single values.
-    pub derivation: Option<Code>,
-    /// An interval about the figure that holds the true value with a stated chance.
-    pub interval: Option<Interval<T>>,
-}
-
-/// The ends of an interval about a figure.
-type Interval<T> = fn(&T) -> Option<[f64; 2]>;
-
-/// The distance that the true value may lie below a figure, and above it (CID 225).
 /// The comment of a group with intervals: no code says how sure a range is.
 pub(super) const RANGES_COMMENT: &str =
     "Ranges of measurement uncertainty hold the true value of nine of ten hearts.";
 
+/// The distance that the true value may lie below a figure, and above it (CID 225).
 const RANGE_BELOW: Code = sct("371885007", "-, range of lower measurement uncertainty");
 const RANGE_ABOVE: Code = sct("371886008", "+, range of upper measurement uncertainty");
 
-pub(super) const MEAN_VALUE: Code = sct("373098007", "Mean");
-pub(super) const MILLILITRE: Code = ucum("ml", "milliliter");
-pub(super) const GRAM: Code = ucum("g", "gram");
-pub(super) const PERCENT: Code = ucum("%", "Percent");
-
-pub(super) const fn figure<T>(
-    value: fn(&T) -> Option<f64>,
-    concept: Code,
-    unit: Code,
-) -> Figure<T> {
-    Figure {
-        value,
-        concept,
-        unit,
-        derivation: None,
-        interval: None,
-    }
-}
-
-/// `figure` with an interval about it, whose ends are properties of the measurement (TID 310).
-pub(super) const fn within<T>(figure: Figure<T>, interval: Interval<T>) -> Figure<T> {
-    Figure {
-        value: figure.value,
-        concept: figure.concept,
-        unit: figure.unit,
-        derivation: figure.derivation,
-        interval: Some(interval),
-    }
-}
-
-pub(super) const fn mean<T>(value: fn(&T) -> Option<f64>, concept: Code, unit: Code) -> Figure<T> {
-    Figure {
-        value,
-        concept,
-        unit,
-        derivation: Some(MEAN_VALUE),
-        interval: None,
-    }
-}
+const MEAN_VALUE: Code = sct("373098007", "Mean");
 
 /// The 17 segments of the left ventricle in their order (CID 3717).
 pub(super) const WALL_SEGMENTS: [Code; 17] = [
@@ -239,25 +188,31 @@ fn series_of<'a>(scans: &[&'a SourceScan]) -> Vec<SourceSeries<'a>> {
     all
 }
 
-/// Those of `figures` that `source` has, as NUM items.
-pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
-    let item = |figure: &Figure<T>| {
-        let value = (figure.value)(source).filter(|value| value.is_finite())?;
-        let mut item = number("CONTAINS", figure.concept, value, figure.unit);
-        let derived = dcm("121401", "Derivation");
-        let derivation = (figure.derivation).map(|code| concept("HAS CONCEPT MOD", derived, code));
-        let interval = figure.interval.and_then(|interval| interval(source));
-        let ends = interval.into_iter().flat_map(|[low, high]| {
-            let ends = [(RANGE_BELOW, value - low), (RANGE_ABOVE, high - value)];
-            ends.map(|(name, range)| number("HAS PROPERTIES", name, round(range), figure.unit))
-        });
-        let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();
-        if !properties.is_empty() {
-            item.items(tags::CONTENT_SEQUENCE, properties);
-        }
-        Some(item)
-    };
-    figures.iter().filter_map(item).collect()
+/// Of the `rows` that stand in such a measurement group those that `report` has, as NUM items.
+pub(super) fn measured(report: &Value, rows: &[Figure], group: Group) -> Vec<DataSet> {
+    rows.iter()
+        .filter_map(|row| {
+            let coded = row.coded.filter(|coded| coded.group == group)?;
+            measurement(report, row, coded)
+        })
+        .collect()
+}
+
+fn measurement(report: &Value, row: &Figure, coded: Coded) -> Option<DataSet> {
+    let value = row.value(report).filter(|value| value.is_finite())?;
+    let unit = row.unit.code;
+    let mut item = number("CONTAINS", coded.concept, value, unit);
+    let derived = dcm("121401", "Derivation");
+    let derivation = (coded.is_mean).then(|| concept("HAS CONCEPT MOD", derived, MEAN_VALUE));
+    let ends = row.interval(report).into_iter().flat_map(|[low, high]| {
+        let ends = [(RANGE_BELOW, value - low), (RANGE_ABOVE, high - value)];
+        ends.map(|(name, range)| number("HAS PROPERTIES", name, round(range), unit))
+    });
+    let properties: Vec<DataSet> = derivation.into_iter().chain(ends).collect();
+    if !properties.is_empty() {
+        item.items(tags::CONTENT_SEQUENCE, properties);
+    }
+    Some(item)
 }
 
 /// A NUM item.

@@ -1,0 +1,133 @@
+// Figures of reports by the rows that describe them: name, unit, digits, what they mean.
+
+import { FIGURES } from "./generated/figures";
+import { number } from "./words";
+
+/** A figure of a report, as the service describes it. */
+export interface Figure {
+  /** The fields that lead to it, with `/` between them. */
+  place: string;
+  label: string;
+  about: string;
+  unit: string;
+  digits: number;
+  short?: string;
+  section?: string;
+  interval?: string;
+  needs?: string;
+  unless?: string;
+  flat_name?: string;
+  signed?: boolean;
+  headline?: boolean;
+}
+
+/** The rows of a report, or of a part of one, by the name of its schema. */
+export const rowsOf = (schema: keyof typeof FIGURES): Figure[] => FIGURES[schema];
+
+function at(report: unknown, place: string): unknown {
+  return place.split("/").reduce<unknown>((part, name) => (part as Record<string, unknown> | null)?.[name], report);
+}
+
+const holds = (found: unknown) => found !== undefined && found !== null && found !== false;
+
+/** The figure of `report`; nothing where it has none, or another one says more. */
+export function valueOf(row: Figure, report: unknown): number | undefined {
+  const value = at(report, row.place);
+  const counts = (!row.needs || holds(at(report, row.needs))) && !(row.unless && holds(at(report, row.unless)));
+  return counts && typeof value === "number" ? value : undefined;
+}
+
+/** The name of the figure in lists without nesting. */
+export const flatName = (row: Figure): string => row.flat_name ?? row.place.replaceAll("/", "_");
+
+/** `value` as the row has it written. */
+export function written({ digits, signed, unit }: Figure, value: number | undefined, withUnit = true): string {
+  const text = number(value, digits, withUnit ? unit : "");
+  return signed && value !== undefined && Number(value.toFixed(digits)) > 0 ? `+${text}` : text;
+}
+
+/** The interval that holds the true figure of nine of ten hearts. */
+export function intervalOf(row: Figure, report: unknown): string {
+  const ends = row.interval ? at(report, row.interval) : null;
+  return Array.isArray(ends) ? `${number(ends[0], row.digits)} to ${number(ends[1], row.digits)}` : "";
+}
+
+const headOf = ({ label, short, unit }: Figure) => `${short ?? label}${unit && `, ${unit}`}`;
+
+interface PartProps<Part> {
+  caption: string;
+  /** Head of the first column. */
+  head: string;
+  parts: Part[];
+  nameOf: (part: Part) => string;
+  rows: Figure[];
+}
+
+/** Parts of the wall with those of their figures that one of them has. */
+export function PartTable<Part>({ caption, head, parts, nameOf, rows }: PartProps<Part>) {
+  const columns = rows.filter(row => row.headline && parts.some(part => valueOf(row, part) !== undefined));
+  return (
+    <table class="segments">
+      <caption class="hidden">{caption}</caption>
+      <thead>
+        <tr>
+          <th scope="col">{head}</th>
+          {columns.map(row => (
+            <th key={row.place} scope="col" title={row.about}>
+              {headOf(row)}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {parts.map(part => (
+          <tr key={nameOf(part)}>
+            <th scope="row">{nameOf(part)}</th>
+            {columns.map(row => (
+              <td key={row.place}>{written(row, valueOf(row, part), false)}</td>
+            ))}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+interface BesideProps {
+  caption: string;
+  /** What is shown beside each other, each with the head of its column; no heads for one alone. */
+  of: [string, unknown][];
+  rows: Figure[];
+}
+
+/** Figures of several things of one kind beside each other. */
+export function BesideTable({ caption, of, rows }: BesideProps) {
+  const filled = rows.filter(row => of.some(([, one]) => valueOf(row, one) !== undefined));
+  return (
+    <table>
+      <caption class="hidden">{caption}</caption>
+      <thead class={of.length > 1 ? "" : "hidden"}>
+        <tr>
+          <td />
+          {of.map(([name]) => (
+            <th key={name} scope="col">
+              {name}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>
+        {filled.map(row => (
+          <tr key={row.place}>
+            <th scope="row" title={row.about}>
+              {row.label}
+            </th>
+            {of.map(([name, one]) => (
+              <td key={name}>{written(row, valueOf(row, one))}</td>
+            ))}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
