@@ -10,18 +10,20 @@
 //! is left out, and so are phases that are not reliable. EDV, ESV and EF have the ends of the interval that holds the
 //! true value of nine of ten hearts, as distances below and above (TID 310, CID 225).
 
-use super::codes::{Code, MILLIMETRE, dcm, loinc, own, sct, ucum};
-use super::data_set::DataSet;
+use super::codes::{MILLIMETRE, own};
 use super::normals;
 use super::structured_report::{
-    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, WALL_SEGMENTS, concept, figure,
-    finding_site, group, measured, text, tracking, within,
+    self as sr, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, WALL_SEGMENTS, figure, measured,
+    within,
 };
-use super::uid::Uids;
 use super::{DicomError, DicomObject, DicomResults, SourceScan, Structure, put_facts};
 use crate::image::grid::voxelise::Mask;
 use crate::mesh::TriMesh;
 use crate::results::report::{BeatReport, SegmentMotionReport};
+use ventriform_dicom::write::code::{Code, dcm, loinc, sct, ucum};
+use ventriform_dicom::write::content::{concept, finding_site, group, text, tracking};
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
 
 /// An end of the beat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -164,7 +166,7 @@ impl<'a> DicomBeat<'a> {
             format!("{}: measurements of the beat", self.structure.label),
             &mut set,
         );
-        set.file()
+        Ok(set.file()?)
     }
 
     fn groups(&self, uids: &Uids) -> Vec<DataSet> {

@@ -1,57 +1,14 @@
 //! The coded concepts of the objects, from DICOM PS3.16.
 
 use crate::image::volume::nifti::LabelEntry;
-
-/// A coded concept: value, coding scheme and meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Code {
-    /// Code Value (0008,0100).
-    pub value: &'static str,
-    /// Coding Scheme Designator (0008,0102).
-    pub scheme: &'static str,
-    /// Code Meaning (0008,0104).
-    pub meaning: &'static str,
-}
+use ventriform_dicom::write::code::{Code, dcm, sct, ucum};
 
 /// Designator of the codes that no public scheme has.
 pub(super) const OWN_SCHEME: &str = "99VENTRIFORM";
 
-/// A code of DICOM's own scheme.
-pub(super) const fn dcm(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "DCM", meaning)
-}
-
-/// A code of SNOMED CT.
-pub(super) const fn sct(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "SCT", meaning)
-}
-
-/// A unit of UCUM.
-pub(super) const fn ucum(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "UCUM", meaning)
-}
-
-/// A code of LOINC.
-pub(super) const fn loinc(value: &'static str, meaning: &'static str) -> Code {
-    code(value, "LN", meaning)
-}
-
 /// A code of this software.
 pub(super) const fn own(value: &'static str, meaning: &'static str) -> Code {
-    assert!(value.len() <= 16, "a Code Value has at most 16 characters");
-    code(value, OWN_SCHEME, meaning)
-}
-
-const fn code(value: &'static str, scheme: &'static str, meaning: &'static str) -> Code {
-    assert!(
-        meaning.len() <= 64,
-        "a Code Meaning has at most 64 characters"
-    );
-    Code {
-        value,
-        scheme,
-        meaning,
-    }
+    Code::new(value, OWN_SCHEME, meaning)
 }
 
 pub(super) const ANATOMICAL_STRUCTURE: Code = sct("91723000", "Anatomical Structure");

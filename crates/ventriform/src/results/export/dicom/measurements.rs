@@ -10,18 +10,19 @@
 //! wall and cavity have the ends of the interval that holds the true one. A scan beside normal limits has the groups of
 //! [`normals`] too. A figure that the report lacks is left out.
 
-use super::codes::{Code, LV_CAVITY, MILLIMETRE, dcm, own, sct, ucum};
-use super::data_set::{DataSet, reference};
+use super::codes::{LV_CAVITY, MILLIMETRE, own};
 use super::normals::{self, DEFECT_EXTENT};
 use super::structured_report::{
     self as report, Figure, GRAM, MILLILITRE, PERCENT, RANGES_COMMENT, SeriesReference,
-    WALL_SEGMENTS, concept, figure, finding_site, group, image, mean, measured, text, tracking,
-    within,
+    WALL_SEGMENTS, figure, mean, measured, within,
 };
 use super::{DicomObject, DicomResults};
 use crate::heart::polar::PolarSegment;
 use crate::results::report::SegmentationReport;
-use dicom_dictionary_std::{tags, uids};
+use ventriform_dicom::write::code::{Code, dcm, sct, ucum};
+use ventriform_dicom::write::content::{concept, finding_site, group, image, text, tracking};
+use ventriform_dicom::write::data_set::{DataSet, reference};
+use ventriform_dicom::{tags, uids};
 
 const VOLUME: Code = sct("118565006", "Volume");
 const WALL_MASS: Code = sct("118538004", "Mass");

@@ -8,15 +8,15 @@
 //! rest. Parts without limits or muscle have no group.
 
 use super::Structure;
-use super::codes::{Code, dcm, loinc, own, sct, ucum};
-use super::data_set::DataSet;
-use super::structured_report::{
-    Figure, PERCENT, WALL_SEGMENTS, concept, figure, finding_site, group, measured, text, tracking,
-};
-use super::uid::Uids;
+use super::codes::own;
+use super::structured_report::{Figure, PERCENT, WALL_SEGMENTS, figure, measured};
 use crate::heart::comparison::WhichScan;
 use crate::heart::normals::{KIND_NOT_STATED, names_protocol, yes_or_no};
 use crate::results::report::{PerfusionReport, SegmentScore, TerritoryScore};
+use ventriform_dicom::write::code::{Code, dcm, loinc, sct, ucum};
+use ventriform_dicom::write::content::{concept, finding_site, group, text, tracking};
+use ventriform_dicom::write::data_set::DataSet;
+use ventriform_dicom::write::uid::Uids;
 
 pub(super) const DEFECT_EXTENT: Code = sct(
     "427751006",

@@ -4,12 +4,13 @@
 //! In: whose scan it is, and the measurement groups. Out: the content tree with language, observer, procedure and the
 //! source images, and the evidence. [`Figure`] is one figure of a report and how it is coded.
 
-use super::codes::{Code, OWN_SCHEME, dcm, sct, ucum};
-use super::data_set::{DataSet, reference};
+use super::codes::OWN_SCHEME;
 use super::{SourceScan, Structure};
 use crate::base::numeric::decimals::round;
-use dicom_core::Tag;
-use dicom_dictionary_std::tags;
+use ventriform_dicom::tags;
+use ventriform_dicom::write::code::{Code, dcm, sct, ucum};
+use ventriform_dicom::write::content::{concept, container, image, number, template, text, unique};
+use ventriform_dicom::write::data_set::{DataSet, reference};
 
 /// A figure of a report, or of an entry `T` of one, and how it is coded.
 pub(super) struct Figure<T> {
@@ -173,7 +174,8 @@ fn context(structure: Structure) -> Vec<DataSet> {
         _ => imaging,
     };
     // The device is the software: one UID for each version.
-    let device = super::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
+    let device =
+        ventriform_dicom::write::uid::derived(&[b"device", env!("CARGO_PKG_VERSION").as_bytes()]);
     vec![
         concept("HAS CONCEPT MOD", language, english),
         concept(
@@ -258,95 +260,6 @@ pub(super) fn measured<T>(source: &T, figures: &[Figure<T>]) -> Vec<DataSet> {
         Some(item)
     };
     figures.iter().filter_map(item).collect()
-}
-
-/// A NUM item.
-fn number(relationship: &str, name: Code, value: f64, unit: Code) -> DataSet {
-    let mut measured = DataSet::new();
-    measured.decimals(tags::NUMERIC_VALUE, &[value]);
-    measured.code(tags::MEASUREMENT_UNITS_CODE_SEQUENCE, unit);
-    let mut item = item(relationship, "NUM", Some(name));
-    item.item(tags::MEASURED_VALUE_SEQUENCE, measured);
-    item
-}
-
-pub(super) fn tracking(name: &str, uid: &str) -> Vec<DataSet> {
-    const OBSERVATION_RELATION: &str = "HAS OBS CONTEXT";
-    vec![
-        text(
-            OBSERVATION_RELATION,
-            dcm("112039", "Tracking Identifier"),
-            name,
-        ),
-        unique(
-            OBSERVATION_RELATION,
-            dcm("112040", "Tracking Unique Identifier"),
-            uid,
-        ),
-    ]
-}
-
-pub(super) fn finding_site(site: Code) -> DataSet {
-    concept("HAS CONCEPT MOD", sct("363698007", "Finding Site"), site)
-}
-
-pub(super) fn group(id: &str, content: Vec<DataSet>) -> DataSet {
-    let mut group = container(dcm("125007", "Measurement Group"), content);
-    group.item(tags::CONTENT_TEMPLATE_SEQUENCE, template(id));
-    group
-}
-
-fn template(id: &str) -> DataSet {
-    let mut item = DataSet::new();
-    item.text(tags::MAPPING_RESOURCE, "DCMR");
-    item.text(tags::TEMPLATE_IDENTIFIER, id);
-    item
-}
-
-fn item(relationship: &str, kind: &str, name: Option<Code>) -> DataSet {
-    let mut item = DataSet::new();
-    item.text(tags::RELATIONSHIP_TYPE, relationship);
-    item.text(tags::VALUE_TYPE, kind);
-    if let Some(name) = name {
-        item.code(tags::CONCEPT_NAME_CODE_SEQUENCE, name);
-    }
-    item
-}
-
-fn with_text(mut item: DataSet, tag: Tag, text: &str) -> DataSet {
-    item.text(tag, text);
-    item
-}
-
-fn container(name: Code, content: Vec<DataSet>) -> DataSet {
-    let mut item = item("CONTAINS", "CONTAINER", Some(name));
-    item.text(tags::CONTINUITY_OF_CONTENT, "SEPARATE");
-    item.items(tags::CONTENT_SEQUENCE, content);
-    item
-}
-
-pub(super) fn concept(relationship: &str, name: Code, code: Code) -> DataSet {
-    let mut item = item(relationship, "CODE", Some(name));
-    item.code(tags::CONCEPT_CODE_SEQUENCE, code);
-    item
-}
-
-pub(super) fn text(relationship: &str, name: Code, text: &str) -> DataSet {
-    with_text(
-        item(relationship, "TEXT", Some(name)),
-        tags::TEXT_VALUE,
-        text,
-    )
-}
-
-fn unique(relationship: &str, name: Code, uid: &str) -> DataSet {
-    with_text(item(relationship, "UIDREF", Some(name)), tags::UID, uid)
-}
-
-pub(super) fn image(relationship: &str, name: Option<Code>, referenced: DataSet) -> DataSet {
-    let mut item = item(relationship, "IMAGE", name);
-    item.item(tags::REFERENCED_SOP_SEQUENCE, referenced);
-    item
 }
 
 /// Every study with the instances in it that the content refers to; none if it refers to none.
